@@ -1,10 +1,10 @@
-//! The library: a scene built in Rust, solved, and read as arrays. The command line goes the same way ([`run`]).
+//! The library: a scene is built in Rust and solved, and its solution is read as arrays. The command line goes the same way ([`run`]).
 //!
-//! Lengths and stresses are in any units that fit each other; forces are in stress times length squared, in the plane for a
-//! thickness of one length. Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.
+//! Lengths and stresses are in any consistent units; forces are in stress times length squared, in the plane for a thickness of one length.
+//! Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.
 //!
-//! Two squares of side 1 with E = 100 and nu = 0, pressed together by p = 1 through a layer p = 50 c: each becomes 1/100 shorter, and
-//! the layer 1/50 thinner.
+//! In the example two squares of side 1 with Young's modulus 100 and Poisson's ratio 0 are pressed together by a pressure of 1, through a
+//! layer whose pressure is 50 times its compression. Each square becomes 1/100 shorter, and the layer 1/50 thinner.
 //!
 //! ```
 //! use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshArrays, Scene, Session, solve};
@@ -57,7 +57,7 @@ use crate::interrupt::Interrupt;
 use crate::run::{self, All, Begin, Clock, Done, report, results};
 use std::rc::Rc;
 
-/// What a run found.
+/// The solution of a scene.
 pub struct Solution {
     done: Done,
     recovered: Rc<All>,
@@ -65,16 +65,17 @@ pub struct Solution {
     report: Report,
 }
 
-/// Solves a scene, built here or [loaded](crate::scene::load) from a file. Not converging is no error: see [`Solution::status`]. With
-/// several ranks all of them call it, with the same scene.
+/// Solve a scene, built in Rust or [loaded](crate::scene::load) from a file. Collective: all ranks call it with the same scene.
+///
+/// A run that does not converge is no error: see [`Solution::status`].
 ///
 /// # Errors
-/// Refusals of scene, mesh, laws and PETSc options, and failures of PETSc; with several ranks one of them has the words.
+/// Refusals of scene, mesh, laws and PETSc options, and failures of PETSc. Of several ranks only one has the message.
 pub fn solve(session: &Session, scene: Scene) -> Result<Solution> {
     solve_with(session, scene, &mut Silent)
 }
 
-/// [`solve`], with rows of the history shown to an observer while it runs.
+/// Solve a scene as [`solve`] does, and show the rows of the history to an observer while the run iterates.
 ///
 /// # Errors
 /// Those of [`solve`].
@@ -93,33 +94,33 @@ pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Keep) -> Resul
 }
 
 impl Solution {
-    /// How the run ended.
+    /// Return how the run ended.
     pub fn status(&self) -> &Status {
         &self.done.outcome.status
     }
 
-    /// Whether what was asked for is reached, or all that double numbers allow.
+    /// Return whether the tolerance is reached, or the accuracy that double precision allows.
     pub fn is_converged(&self) -> bool {
         report::exit_code(&self.done) == 0
     }
 
-    /// Counters, forces, approaches, largest stresses, times, warnings and settings: what `report.json` has.
+    /// Return the contents of `report.json`: counters, forces, approaches, largest stresses, times, warnings and settings.
     pub fn report(&self) -> &Report {
         &self.report
     }
 
-    /// One row an iterate.
+    /// Return the rows of the history, one for each iteration.
     pub fn history(&self) -> &[Row] {
         &self.done.outcome.rows
     }
 
-    /// Number of pairs of contact surfaces: those of the scene in its order, then those that were found.
+    /// Return the number of pairs of contact surfaces. Pairs of the scene come first, in its order, then those that were found.
     pub fn pairs(&self) -> usize {
         self.done.model().pairs.len()
     }
 
-    /// Places, gaps, compressions, pressures and normal displacements at the contact points of a pair below [`Solution::pairs`], on
-    /// every rank.
+    /// Return positions, gaps, compressions, pressures and normal displacements at the contact points of a pair, on every rank. `pair` is less
+    /// than [`Solution::pairs`].
     ///
     /// # Panics
     /// When there is no such pair.
@@ -127,8 +128,9 @@ impl Solution {
         report::contact_table(&self.done, self.estimate.as_ref(), pair)
     }
 
-    /// Displacements and stresses at the nodes of a body, in the order of the scene; none on ranks that have no part of it. Of a body that is
-    /// dealt out over ranks each has those of its part: every cell is in one of them, nodes between parts are in several.
+    /// Return displacements and stresses at the nodes of a body; none on ranks that have no part of it. Bodies are in the order of the scene.
+    ///
+    /// If a body is distributed over ranks, each rank has the nodes of its part. Every cell is in one part; nodes between parts are in several.
     ///
     /// # Errors
     /// The failure of a solver that should have found the interior of the body.
@@ -143,8 +145,8 @@ impl Solution {
         }
     }
 
-    /// The number of each node of [`Solution::body`] among the points of the mesh: of [`MeshArrays::points`], or of the points in a file that a
-    /// group uses.
+    /// Return for each node of [`Solution::body`] its index among the points of the mesh. These are [`MeshArrays::points`], or the points of a
+    /// file that a group uses.
     ///
     /// # Panics
     /// When there is no such body.

@@ -1,4 +1,4 @@
-//! The command line: words -> request -> command -> exit code.
+//! The command line: arguments -> request -> command -> exit code.
 
 mod ranks;
 
@@ -129,30 +129,29 @@ enum Solving {
     Sweep(sweep::Request),
 }
 
-/// The option of the program, without its dashes, that a word with one dash may mean: it looks like one of PETSc.
-fn two_dashes(petsc: &[String]) -> Option<String> {
+/// Return the first word among PETSc options that is an option of the program, typed with one dash instead of two. It has no dashes.
+fn option_with_one_dash(petsc: &[String]) -> Option<String> {
     let command = Cli::command();
     let known = command.get_subcommands().flat_map(clap::Command::get_arguments).filter_map(clap::Arg::get_long);
     let known: Vec<&str> = known.filter(|name| name.len() > 1 && *name != "help").collect();
-    let bare = petsc.iter().filter_map(|word| word.strip_prefix('-'));
-    bare.filter(|word| known.contains(word)).map(str::to_owned).next()
+    petsc.iter().filter_map(|word| word.strip_prefix('-')).find(|word| known.contains(word)).map(str::to_owned)
 }
 
-/// Why the words of a command line lead to no command.
+/// The reason why a command line leads to no command.
 enum Refusal {
-    /// In our words.
+    /// A refusal of this program.
     Ours(Error),
-    /// In those of the parser, which are help or the version if the user asked for them.
+    /// A refusal of the parser, or help or the version if the user asked for them.
     Parser(clap::Error),
 }
 
 impl Refusal {
-    /// Print it; return the exit code.
+    /// Print the refusal, and return the exit code.
     fn print(&self) -> i32 {
         match self {
             Self::Ours(error) => complain(error),
             Self::Parser(refusal) => match refusal.print() {
-                // a closed pipe is no reason to say more
+                // a closed pipe is no failure
                 Err(cause) if cause.kind() != ErrorKind::BrokenPipe => {
                     complain(&Error::file(Path::new("standard output"), "write", &cause))
                 }
@@ -169,16 +168,16 @@ impl Refusal {
     }
 }
 
-/// Runs the program with the words of its command line, the name first; returns the exit code.
+/// Run the program with the words of its command line, the program's name first, and return the exit code.
 pub fn run(words: Vec<OsString>) -> i32 {
-    // a rank that ended before it starts MPI, with help perhaps, would keep the others waiting
+    // MPI starts first: the other ranks would wait for a rank that ended before, say after printing help
     let session = match Session::is_one_of_several().then(Session::start_mpi).transpose() {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
     let is_first = session.as_ref().is_none_or(|session| session.rank() == 0);
-    let alike = session.as_ref().map_or(Ok(()), |session| ranks::refuse_other_words(session, &words));
-    let (cli, petsc) = match alike.map_err(Refusal::Ours).and_then(|()| parse(words)) {
+    let are_alike = session.as_ref().map_or(Ok(()), |session| ranks::refuse_other_words(session, &words));
+    let (cli, petsc) = match are_alike.map_err(Refusal::Ours).and_then(|()| parse(words)) {
         Ok(parsed) => parsed,
         Err(refusal) => return if is_first { refusal.print() } else { refusal.exit_code() },
     };
@@ -190,14 +189,17 @@ pub fn run(words: Vec<OsString>) -> i32 {
     match (cli.command, session) {
         (Command::Solving(command), session) => with_session(session, &petsc, &interrupt, command),
         (command, None) => without_session(&interrupt, command, petsc),
-        // the first rank does what several cannot share
+        // only the first rank runs a command that is not parallel
         (command, Some(session)) => {
             tell(&Ranks::new(&session), || Ok(without_session(&interrupt, command, petsc))).unwrap_or(1)
         }
     }
 }
 
-/// Reads the words of a command line; gives the command and the options of PETSc.
+/// Parse the words of a command line into a command and the options of PETSc.
+///
+/// # Errors
+/// Refusals of the command line, among them the text of help and the version.
 fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusal> {
     let refuse = |message: String, help: String| Err(Refusal::Ours(Error::new(Kind::Usage, message).help(help)));
     let mut words = words.into_iter();
@@ -210,7 +212,7 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusa
         }
     };
     let (program, petsc) = options::split(words);
-    if let Some(flag) = two_dashes(&petsc) {
+    if let Some(flag) = option_with_one_dash(&petsc) {
         return refuse(format!("PETSc knows no option -{flag}"), format!("did you mean --{flag}?"));
     }
     if let Some(flag) = program.iter().chain(&petsc).find(|word| matches!(word.as_str(), "-n" | "-np")) {
@@ -224,7 +226,7 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusa
         Err(refusal) => refusal,
     };
     let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
-    // options of PETSc have underscores, ours have none
+    // options of PETSc have underscores, those of this program have none
     if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
         return refuse(format!("`{word}`: PETSc options take one dash"), format!("did you mean -{bare}?"));
     }
@@ -232,12 +234,12 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusa
     if command.ends_with(".toml") {
         return refuse(format!("`{command}` is no command"), format!("did you mean `winkler solve {command}`?"));
     }
-    // nothing that the program takes would help behind `--`
+    // the parser suggests `--` before the word, but the program takes no such words
     refusal.remove(ContextKind::Suggested);
     Err(Refusal::Parser(refusal))
 }
 
-/// Runs a command that starts other programs or none, and needs neither MPI nor PETSc.
+/// Run a command that needs neither MPI nor PETSc; it may start other programs.
 fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) -> i32 {
     let ended = match command {
         Command::Solving(_) => unreachable!("these commands have a session"),
@@ -253,36 +255,34 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
             bench::bench(interrupt, &request)
         }
         Command::Mesh(request) => mesh::mesh(interrupt, &request),
-        Command::Report { folder, output } => report::save(&folder, output.as_deref()).and_then(|path| {
-            say(path.display())?;
-            Ok(0)
-        }),
-        Command::Plot { folder, what, output } => report::draw(&folder, &what, output.as_deref()).and_then(|paths| {
-            paths.iter().try_for_each(|path| say(path.display()))?;
-            Ok(0)
-        }),
+        Command::Report { folder, output } => {
+            report::save(&folder, output.as_deref()).and_then(|path| say(path.display())).map(|()| 0)
+        }
+        Command::Plot { folder, what, output } => report::draw(&folder, &what, output.as_deref())
+            .and_then(|paths| paths.iter().try_for_each(|path| say(path.display())))
+            .map(|()| 0),
     };
     ended.unwrap_or_else(|error| complain(&error))
 }
 
-/// Writes a man page of the program and one of each command.
+/// Write a man page of the program and one of each command.
 fn manual(folder: &Path) -> Result<i32> {
     make_folder(folder)?;
-    // made aside and moved: what has the name of a page is replaced, never written through
-    let aside = folder.join(format!(".winkler-{}-man", std::process::id()));
-    let wrong = |cause: std::io::Error| Error::file(folder, "write man pages to", &cause);
-    let made =
-        std::fs::create_dir(&aside).and_then(|()| clap_mangen::generate_to(Cli::command(), &aside)).and_then(|()| {
-            std::fs::read_dir(&aside)?
-                .flatten()
-                .try_for_each(|page| std::fs::rename(page.path(), folder.join(page.file_name())))
-        });
-    // what is left of a failure is litter
-    let _ = std::fs::remove_dir_all(&aside);
-    made.map_err(wrong).map(|()| 0)
+    // pages are made in a folder of their own and moved: a link with the name of a page is replaced, never written through
+    let made_in = folder.join(format!(".winkler-{}-man", std::process::id()));
+    let move_pages = || {
+        let mut pages = std::fs::read_dir(&made_in)?.flatten();
+        pages.try_for_each(|page| std::fs::rename(page.path(), folder.join(page.file_name())))
+    };
+    let made = std::fs::create_dir(&made_in)
+        .and_then(|()| clap_mangen::generate_to(Cli::command(), &made_in))
+        .and_then(|()| move_pages());
+    // pages that are left after a failure are of no use
+    let _ = std::fs::remove_dir_all(&made_in);
+    made.map_err(|cause| Error::file(folder, "write man pages to", &cause)).map(|()| 0)
 }
 
-/// Runs a command that solves, in a session that has started MPI if there are several ranks.
+/// Run a command that solves. With several ranks the session has started MPI already.
 fn with_session(session: Option<Session>, petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
     let session = match session.map_or_else(Session::start_mpi, Ok) {
         Ok(session) => session,
@@ -301,7 +301,7 @@ fn with_session(session: Option<Session>, petsc: &[String], interrupt: &Interrup
         Err(error) if error.is_common() && session.rank() > 0 => error.kind().exit_code(),
         Err(error) => {
             let code = complain(&error);
-            // the other ranks may be waiting for this one unless all agreed to end
+            // other ranks may wait for this one, unless the error is collective
             if session.size() > 1 && !error.is_agreed() {
                 session.abort(code);
             }
@@ -310,6 +310,7 @@ fn with_session(session: Option<Session>, petsc: &[String], interrupt: &Interrup
     }
 }
 
+/// Run a command that solves, in a session with PETSc.
 fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Result<i32> {
     match command {
         Solving::Solve(request) => solve::solve(session, interrupt, &request),
@@ -318,8 +319,9 @@ fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Resul
     }
 }
 
+/// Print an error, and return its exit code.
 fn complain(error: &Error) -> i32 {
-    // NO_COLOR, CLICOLOR_FORCE and `--color` decide, and else whether this is a terminal
+    // colors follow NO_COLOR, CLICOLOR_FORCE and `--color`; without these a terminal has them
     let color = AutoStream::choice(&std::io::stderr()) != ColorChoice::Never;
     eprintln!("{}", error.render(color));
     if error.kind() == Kind::Usage {

@@ -1,7 +1,7 @@
-//! Functions given by files: heights of measured surfaces and profiles, for the expressions of a scene.
+//! Functions that are given by files, heights of measured surfaces and profiles, for the expressions of a scene.
 //!
-//! Data flow: a file -> `read` numbers in rows -> arranged as a [`Grid`], as knots of a profile or as a triangulation -> values
-//! and gradients at any place.
+//! Data flow: file -> numbers in rows (`read`) -> [`Grid`], knots of a profile, or triangulation (`arrange`) -> value and gradient at any
+//! place ([`Data::sample`]).
 
 mod arrange;
 mod function;

@@ -1,4 +1,4 @@
-//! Numbers that the user may write as expressions in the coordinates: gaps, loads, zones, laws of layers.
+//! Expressions in the coordinates, with which the user gives gaps, loads, zones and laws of layers.
 
 mod dual;
 mod grammar;
@@ -23,31 +23,35 @@ use text::Text;
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
 ///
-/// It knows + - * / ^, comparisons, && || !, `pi`, and the functions of docs/scene-file.md. -x^2 is -(x^2), and
-/// a^b^c is a^(b^c). Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays one.
+/// It may have + - * / ^, comparisons, && || !, `pi`, and the functions of docs/scene-file.md. -x^2 is -(x^2), and a^b^c is a^(b^c).
+/// Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays NaN.
 #[derive(Clone)]
 pub struct Expression {
     program: Arc<Program>,
+    /// Names of the variables of its scope.
     variables: Arc<[&'static str]>,
+    /// The text as the user wrote it.
     text: Arc<str>,
+    /// The place of the text in the scene.
     place: Place,
 }
 
-/// What a [`Field`] can depend on, in the order of its values.
+/// The variables of a [`Field`], in the order of their values: coordinates and the iteration.
 const COORDINATES: [&str; 4] = ["x", "y", "z", "k"];
 
 impl Expression {
-    /// Parses `text`, which stands at `place` (with or without the quotes of a TOML string). Refuses what the scope has not, pointing at
-    /// the word that is wrong; files of data are read when the first expression asks for them.
+    /// Parse a text, which stands at `place` with or without the quotes of a TOML string.
+    ///
+    /// A name that is not in the scope is refused, with a caret at the name. Files of data are read when the first expression uses them.
     ///
     /// # Errors
     /// Texts that are no expression, and data that cannot be read.
     pub fn parse(text: &str, place: &Place, scope: Scope) -> Result<Self> {
-        Self::made(text, place, scope, |slot| slot)
+        Self::parse_with(text, place, scope, |slot| slot)
     }
 
-    /// The same; `slot` says which value each variable of the scope takes.
-    fn made(text: &str, place: &Place, scope: Scope, slot: impl Fn(usize) -> usize) -> Result<Self> {
+    /// Parse a text; `slot` returns the index of the value for each variable of the scope.
+    fn parse_with(text: &str, place: &Place, scope: Scope, slot: impl Fn(usize) -> usize) -> Result<Self> {
         debug_assert!(scope.variables.len() <= MOST_VARIABLES);
         let mut code = grammar::parse(Text { text, place }, scope)?;
         for step in &mut code {
@@ -59,13 +63,13 @@ impl Expression {
         Ok(Self { program, variables: scope.variables.into(), text: text.into(), place: place.clone() })
     }
 
-    /// Value for the values of the variables, in the order given to [`Expression::parse`]; NaN where it is not
-    /// defined. Values beyond the variables are not used.
+    /// Return the value for given values of the variables, in the order of the scope; NaN where it is not defined. Values beyond the variables
+    /// are not used.
     pub fn eval(&self, values: &[f64]) -> f64 {
         self.program.eval(&full(values))
     }
 
-    /// The same with the derivative by the variable of this number.
+    /// Return the value and the derivative by the variable with the index `variable`.
     pub fn eval_by(&self, variable: usize, values: &[f64]) -> (f64, f64) {
         let values = full(values);
         let dual = |slot| Dual { value: values[slot], slope: if slot == variable { 1.0 } else { 0.0 } };
@@ -73,33 +77,34 @@ impl Expression {
         (value, slope)
     }
 
-    /// Whether the expression uses no variable.
+    /// Return whether the expression uses no variable.
     pub fn is_constant(&self) -> bool {
         self.program.variables().next().is_none()
     }
 
-    /// Whether it depends on no variable but the first.
+    /// Return whether it depends on no variable except the first.
     pub fn uses_only_first(&self) -> bool {
         self.program.variables().all(|slot| slot == 0)
     }
 
-    /// The data that it asks.
+    /// Return the data that it uses.
     pub fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
         self.program.data()
     }
 
-    /// The refusal of values outside of data, if that is why there is none; `what` names the quantity.
+    /// Return the refusal of values for which data are needed at a place where they have no value; none if there is no such place. `what` is the
+    /// quantity in the message.
     pub fn outside(&self, what: &str, values: &[f64]) -> Option<Error> {
         let (data, place) = self.program.outside(&full(values))?;
         Some(data.outside(&self.place, what, &place))
     }
 
-    /// The text as the user wrote it.
+    /// Return the text as the user wrote it.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Where it stands.
+    /// Return its place in the scene.
     pub fn place(&self) -> &Place {
         &self.place
     }
@@ -114,11 +119,11 @@ impl fmt::Debug for Expression {
 /// A number, an expression in x, y, z (and for zones the iteration k), or a function of a Rust program.
 #[derive(Clone)]
 pub enum Field {
-    /// The same everywhere; always finite when it comes from a scene.
+    /// A number, always finite if it comes from a scene.
     Constant(f64),
-    /// Depends on the place, or on k.
+    /// An expression that depends on the place or on k.
     Expression(Expression),
-    /// Depends on the place (x, y, z); no scene file has it.
+    /// A function of the place (x, y, z). Scene files have none.
     Function(Rc<dyn Fn([f64; 3]) -> f64>),
 }
 
@@ -141,8 +146,11 @@ impl fmt::Debug for Field {
 }
 
 impl Field {
-    /// Parses an expression in x, y, in space also z, and with `iteration` also k; see [`Expression::parse`]. One
-    /// without variables becomes a constant, and is refused if that is not finite.
+    /// Parse an expression in x, y, in space also z, and with `iteration` also k: see [`Expression::parse`]. An expression without variables
+    /// becomes a constant.
+    ///
+    /// # Errors
+    /// Those of [`Expression::parse`], and a constant that is not finite.
     pub fn parse(text: &str, place: &Place, dimension: usize, iteration: bool, data: &Library) -> Result<Self> {
         let names: Vec<_> = COORDINATES
             .into_iter()
@@ -153,7 +161,7 @@ impl Field {
             })
             .collect();
         let slot = |variable: usize| coordinate(names[variable]).unwrap_or(variable);
-        let expression = Expression::made(text, place, Scope { variables: &names, data }, slot)?;
+        let expression = Expression::parse_with(text, place, Scope { variables: &names, data }, slot)?;
         if !expression.is_constant() {
             return Ok(Field::Expression(expression));
         }
@@ -165,8 +173,7 @@ impl Field {
         }
     }
 
-    /// Value at a point (z = 0 in plane problems); NaN or infinite where the expression is not defined, or if it
-    /// uses k.
+    /// Return the value at a point (z = 0 in plane problems), with NaN for k. It is NaN or infinite where the expression is not defined.
     pub fn eval(&self, x: [f64; 3]) -> f64 {
         match self {
             Field::Constant(value) => *value,
@@ -175,7 +182,7 @@ impl Field {
         }
     }
 
-    /// Value at a point in iteration `k`.
+    /// Return the value at a point in iteration `k`.
     pub fn eval_at(&self, x: [f64; 3], k: usize) -> f64 {
         match self {
             Field::Constant(value) => *value,
@@ -184,40 +191,47 @@ impl Field {
         }
     }
 
-    /// Whether it is the same everywhere.
+    /// Return whether it is a number, the same everywhere.
     pub fn is_constant(&self) -> bool {
         matches!(self, Field::Constant(_))
     }
 
-    /// Value at a point, refused if it is not finite; `what` names the quantity in the message ("gap").
+    /// Return the value at a point. `what` is the quantity in a message ("gap").
+    ///
+    /// # Errors
+    /// A value that is not finite.
     pub fn eval_finite(&self, what: &str, x: [f64; 3]) -> Result<f64> {
         let value = self.eval(x);
         if value.is_finite() { Ok(value) } else { Err(self.refuse(what, &x, value)) }
     }
 
-    /// Whether it holds at a point in iteration `k`: true, or a number > 0. Refused where it is not defined; `what` names it in
-    /// the message ("psi").
+    /// Return whether it is true, which is a number > 0, at a point in iteration `k`. `what` is its name in a message ("psi").
+    ///
+    /// # Errors
+    /// A point where it is not defined.
     pub fn is_true_at(&self, what: &str, x: [f64; 3], k: usize) -> Result<bool> {
         let value = self.eval_at(x, k);
         if value.is_nan() { Err(self.refuse(what, &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
     }
 
-    /// The data that it asks.
+    /// Return the data that it uses.
     pub fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
-        match self {
-            Field::Expression(expression) => Some(expression.data()),
-            _ => None,
-        }
-        .into_iter()
-        .flatten()
+        self.expression().into_iter().flat_map(Expression::data)
     }
 
-    /// Whether it is the constant zero.
+    fn expression(&self) -> Option<&Expression> {
+        match self {
+            Field::Expression(expression) => Some(expression),
+            _ => None,
+        }
+    }
+
+    /// Return whether it is the constant zero.
     pub fn is_zero(&self) -> bool {
         matches!(self, Field::Constant(0.0))
     }
 
-    /// The number, the expression as written, or the word `function`.
+    /// Return the number, the expression as the user wrote it, or the word `function`.
     pub fn text(&self) -> String {
         match self {
             Field::Constant(value) => value.to_string(),
@@ -226,14 +240,12 @@ impl Field {
         }
     }
 
-    /// Where the expression stands, if it is one.
+    /// Return the place of the expression in the scene, if it is one.
     pub fn place(&self) -> Option<&Place> {
-        match self {
-            Field::Expression(expression) => Some(expression.place()),
-            _ => None,
-        }
+        self.expression().map(Expression::place)
     }
 
+    /// Return the refusal of a value at a point. `values` are those of the coordinates, and of the iteration if it counts.
     fn refuse(&self, what: &str, values: &[f64], value: f64) -> Error {
         let Field::Expression(expression) = self else {
             let at: Vec<String> = values.iter().map(f64::to_string).collect();
@@ -250,15 +262,17 @@ impl Field {
     }
 }
 
+/// Return the index of a variable of a field.
 fn coordinate(name: &str) -> Option<usize> {
     COORDINATES.iter().position(|known| *known == name)
 }
 
+/// Return as many values as a program takes, NaN for those that are missing.
 fn full(values: &[f64]) -> Values<f64> {
     std::array::from_fn(|slot| values.get(slot).copied().unwrap_or(f64::NAN))
 }
 
-/// Names that have a meaning in every expression.
+/// Return the names that have a meaning in some expression, which data must not have.
 pub fn names() -> impl Iterator<Item = &'static str> {
     // c is the compression in a layer's law
     operators::functions().chain(COORDINATES).chain(["c", "pi"])

@@ -2,7 +2,7 @@
 
 use winkler::petsc::{Heap, keep_apart, leave};
 
-/// Running out of memory ends a run with a message and its code.
+/// The allocator, which ends a run that is out of memory with a message and an exit code.
 #[global_allocator]
 static HEAP: Heap = Heap;
 

@@ -1,4 +1,4 @@
-//! Ranks that were started with different words, which would wait for each other for ever.
+//! The refusal of ranks that were started with different command lines. They would wait for each other without end.
 
 use crate::error::{Error, Kind, Result, few};
 use crate::exchange::{share, tell};
@@ -7,14 +7,14 @@ use crate::petsc::Session;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 
-/// Variables with options of PETSc, which takes those of the first rank for all.
+/// Variables with options of PETSc, which uses those of the first rank on all ranks.
 const VARIABLES: [&str; 2] = ["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"];
 
-/// Refuse, on all ranks, different versions of the program, words of the command line, but for the name of the program, and options of PETSc
+/// Refuse ranks that differ in the version of the program, in the words of the command line after the program's name, or in the options of PETSc
 /// in the environment. Collective.
 ///
 /// # Errors
-/// What the ranks were started with.
+/// A collective error with what the ranks were started with.
 pub(super) fn refuse_other_words(session: &Session, words: &[OsString]) -> Result<()> {
     let words = words.iter().skip(1).map(shown).collect::<Vec<_>>().join(" ");
     let mut facts =
@@ -22,7 +22,7 @@ pub(super) fn refuse_other_words(session: &Session, words: &[OsString]) -> Resul
     let variables = VARIABLES.map(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()));
     let first = tell(&Ranks::new(session), || Ok(variables.clone()))?;
     for ((name, own), first) in VARIABLES.iter().zip(variables).zip(first) {
-        // a launcher need not pass variables on to other machines: who has none has those of the first rank
+        // a launcher need not pass variables on to other machines: a rank without a variable has that of the first rank
         facts.extend(own.or(first).map(|value| ((*name).to_owned(), value)));
     }
     let different: BTreeSet<String> = differences(session, &facts).into_iter().map(|found| found.what).collect();
@@ -45,7 +45,7 @@ fn plural(what: &str) -> String {
     if VARIABLES.contains(&what) { format!("values of {what}") } else { format!("{what}s") }
 }
 
-/// Return the values with the ranks that have them, in the order of the first ranks.
+/// Return a line for each different value with the ranks that have it, in the order of the first such rank.
 fn groups(values: &[String]) -> Vec<String> {
     let mut groups: Vec<(&String, Vec<usize>)> = Vec::new();
     for (rank, value) in values.iter().enumerate() {
@@ -61,7 +61,7 @@ fn groups(values: &[String]) -> Vec<String> {
     groups.into_iter().map(line).collect()
 }
 
-/// Return a word as one could type it.
+/// Return a word as it could be typed.
 fn shown(word: &OsString) -> String {
     match word.to_str() {
         Some(text) if !text.is_empty() && !text.contains(|c: char| c.is_whitespace() || "\"'\\".contains(c)) => {

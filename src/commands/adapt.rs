@@ -1,9 +1,8 @@
-//! Meshes one after another: adapted to an error, or one coarse mesh that gives the start.
+//! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own.
 
 use super::adapted;
-use super::carry;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
-use super::told::Told;
+use super::transfer::{self, EstimatedSolution};
 use crate::ddm::{Start, Status};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
@@ -24,71 +23,78 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 /// Cells of a body's first mesh.
-const FIRST: usize = 150;
+const FIRST_CELLS: usize = 150;
 
-/// Part of the error asked for that the next mesh aims at, so that an estimate a little too good costs no further mesh.
+/// Ratio of the error that the next mesh aims at to the error asked for. An estimate a little too good then costs no further mesh.
 const AIM: f64 = 0.7;
 
-/// Part of an error that the next mesh may leave at least: what a coarse mesh tells of a kink does not hold for a very fine one.
+/// Least ratio of the error of the next mesh to the present error. What a coarse mesh shows of a kink does not hold for a very fine one.
 const LEAST: f64 = 0.1;
 
-/// A mesh has so many times the cells of the one before at least: all before the last one then cost no more than that one together. What the errors promise of fewer
-/// cells does not come where they fall more slowly than h^p, at edges of supports, loads and contact.
-const MORE: f64 = 2.0;
+/// Least ratio of the cells of a mesh to those of the mesh before. All meshes before the last one then cost no more than that one together.
+///
+/// Meshes with fewer cells do not have the predicted errors where these fall more slowly than h^p, at edges of supports, loads and contact.
+const GROWTH: f64 = 2.0;
 
-/// So many meshes in a row that are worse than the best one end the run. One may be worse by chance of the mesher; the second has twice its cells.
-const WORSE: usize = 2;
+/// Number of meshes in a row that are worse than the best one, after which the run ends. One may be worse by chance of the mesher; the
+/// second has twice its cells.
+const MOST_WORSE: usize = 2;
 
-/// What remains to be done of a run of several meshes.
+/// The state of a run on several meshes. A round is one mesh, with the solution on it.
 pub struct Plan {
     /// The scene of this round.
     pub scene: Rc<Scene>,
-    /// Meshes so far.
+    /// Reports of the rounds so far.
     pub rounds: Vec<RoundReport>,
-    /// Why the meshes end before the error is reached, in words.
+    /// Why the run ends before the error is reached, as a text.
     pub limit: Option<String>,
+    /// The error to which meshes are adapted; none without adaptation.
     goal: Option<AdaptSpec>,
     /// The scene that follows a coarse one.
     finer: Option<Rc<Scene>>,
-    /// Where the first round goes on.
+    /// The checkpoint from which the first round goes on.
     resumed: Option<Checkpoint>,
-    /// The scene as it was asked for.
-    asked: Rc<Scene>,
+    /// The scene as it was requested.
+    requested: Rc<Scene>,
+    /// The key under which sizes are kept for later runs: see [`adapted::purpose`].
     purpose: String,
-    /// The solution that the next mesh starts from.
-    carried: Vec<ContactTable>,
+    /// The solution that the next round starts from; empty without one.
+    start_from: Vec<ContactTable>,
+    /// Seconds from the begin of the run to the end of the round before.
     seconds: f64,
-    /// The errors told of the mesh before.
-    told: Option<Told>,
+    /// The solution of the round before with its estimated errors.
+    previous: Option<EstimatedSolution>,
     /// The best mesh so far.
     best: Option<Best>,
     /// Whether this round is the best mesh once more, with which the run ends.
-    ends: bool,
-    /// Cells that the sizes of this round foretold.
-    foretold: Option<f64>,
+    repeats_best: bool,
+    /// Number of cells that was predicted for this round from its sizes.
+    predicted_cells: Option<f64>,
     /// The load steps that follow on the last mesh, while meshes are adapted under the largest of them.
-    steps: Option<History>,
+    later_steps: Option<History>,
 }
 
 /// The last mesh that was better than the best one before it: with a smaller error, or with a smaller energy error.
 struct Best {
+    /// Its error: the largest of those of pressures and displacements, relative.
     error: f64,
     /// Its relative error in the energy norm.
     energy: f64,
     /// Its number, from 1 on.
     round: usize,
-    /// Its sizes.
+    /// The view of the sizes that it follows.
     view: Option<Arc<str>>,
-    /// Sizes that its errors ask for.
+    /// The sizes that its errors lead to.
     next: Sizes,
     /// The solution on it.
     tables: Vec<ContactTable>,
-    /// Meshes since then, all worse.
+    /// Number of meshes since then, all worse.
     worse: usize,
 }
 
 impl Plan {
-    /// The first round of a scene: its own mesh, a coarse one, the one that an earlier run ended with, or that of a checkpoint.
+    /// Return the plan whose first round is on the scene's own mesh, a coarse one, the one that an earlier run ended with, or that of a
+    /// checkpoint.
     ///
     /// # Errors
     /// A scene whose mesh cannot follow sizes; what [`run::build`] refuses.
@@ -102,19 +108,19 @@ impl Plan {
         let mut plan = Self {
             purpose: adapted::purpose(&scene),
             goal: scene.adapt.clone(),
-            asked: scene.clone(),
+            requested: scene.clone(),
             scene,
             rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
             resumed,
             limit: None,
             finer: None,
-            carried: Vec::new(),
+            start_from: Vec::new(),
             seconds: 0.0,
-            told: None,
+            previous: None,
             best: None,
-            ends: false,
-            foretold: None,
-            steps: None,
+            repeats_best: false,
+            predicted_cells: None,
+            later_steps: None,
         };
         let is_nested = matches!(plan.scene.method.start, method::Start::Nested);
         if plan.adapts() || is_nested {
@@ -126,7 +132,7 @@ impl Plan {
         if plan.resumed.is_some() {
             plan.resume();
         } else if plan.adapts() {
-            plan.keep_steps_for_the_end();
+            plan.defer_steps();
             plan.begin_coarse(session, interrupt, clock)?;
         } else if is_nested {
             plan.begin_nested(session, interrupt, clock)?;
@@ -134,7 +140,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Go on where the checkpoint ended: with its mesh, and behind its load steps.
+    /// Go on where the checkpoint ended: on its mesh, and after its load steps.
     fn resume(&mut self) {
         let Some(Checkpoint { head, .. }) = &self.resumed else { return };
         let scene = Rc::make_mut(&mut self.scene);
@@ -143,23 +149,23 @@ impl Plan {
             scene.method.steps.begun = head.steps.len();
             self.limit.clone_from(&head.limit);
         } else {
-            self.keep_steps_for_the_end();
+            self.defer_steps();
         }
     }
 
-    /// Begin an adaptation with the mesh that the last one ended with, or with a coarse one.
+    /// Begin an adaptation with the mesh that an earlier adaptation ended with, or with a coarse one.
     fn begin_coarse(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
-        // the cache of another rank may know of other sizes
+        // the cache of another rank may have other sizes
         let mut view = tell(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
         if view.is_none() {
-            let coarse: Sizing = |meshes, bodies| sizes::coarse(meshes, bodies, FIRST * bodies);
+            let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
             view = sized(session, &self.scene, coarse, interrupt, clock)?;
         }
         follow(Rc::make_mut(&mut self.scene), view);
         Ok(())
     }
 
-    /// Begin with a mesh of twice the sizes, whose solution is the start of the scene's own.
+    /// Begin with a mesh of twice the sizes, whose solution is the start on the scene's own mesh.
     fn begin_nested(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
         let mut coarse = Scene::clone(&self.scene);
         coarse.estimate = true;
@@ -170,36 +176,38 @@ impl Plan {
         Ok(())
     }
 
-    /// Whether meshes are adapted to an error.
+    /// Return whether meshes are adapted to an error.
     pub fn adapts(&self) -> bool {
         self.goal.is_some()
     }
 
-    /// Adapt meshes under the largest load step alone: its mesh serves smaller loads, too, and steps would cost as often as there are meshes.
-    fn keep_steps_for_the_end(&mut self) {
+    /// Adapt meshes under the largest load step alone, and leave all steps to the last mesh.
+    ///
+    /// A mesh for the largest load serves smaller loads, too, and all steps on every mesh would cost as many times as much.
+    fn defer_steps(&mut self) {
         let history = &self.scene.method.steps;
         if self.adapts() && !history.is_empty() {
             let largest = history.heaviest();
-            self.steps = Some(std::mem::replace(&mut Rc::make_mut(&mut self.scene).method.steps, largest));
+            self.later_steps = Some(std::mem::replace(&mut Rc::make_mut(&mut self.scene).method.steps, largest));
         }
     }
 
-    /// Whether this round makes all load steps on the last mesh of an adaptation.
+    /// Return whether this round makes all load steps on the last mesh of an adaptation.
     pub fn is_stepping(&self) -> bool {
-        self.adapts() && self.steps.is_none() && !self.scene.method.steps.is_empty()
+        self.adapts() && self.later_steps.is_none() && !self.scene.method.steps.is_empty()
     }
 
     /// End the adaptation on the mesh of this round. Return whether another round makes all load steps on it.
     fn end_meshes(&mut self, session: &Session) -> Result<bool> {
-        let Some(steps) = self.steps.take() else { return Ok(false) };
-        // the first step is another load than the largest one: it finds its own start
-        self.carried.clear();
+        let Some(steps) = self.later_steps.take() else { return Ok(false) };
+        // the first step has another load than the largest one, so that it finds its own start
+        self.start_from.clear();
         Rc::make_mut(&mut self.scene).method.steps = steps;
         options::withdraw(session)?;
         Ok(true)
     }
 
-    /// A mesh that is a file cannot follow sizes.
+    /// Refuse a mesh that is a file, since it cannot follow sizes.
     fn refuse_finished_mesh(&self) -> Result<()> {
         let MeshSource::Msh { file } = &self.scene.mesh else { return Ok(()) };
         let place = self.goal.as_ref().map_or(&file.place, |goal| &goal.place);
@@ -207,11 +215,13 @@ impl Plan {
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
 
-    /// Build the scene of this round. If Gmsh makes no mesh of the sizes that the best mesh leads to, or one that is refused, coarser sizes are tried, down to those that promise no more
-    /// cells than the best mesh has; the run then ends with that one. Collective.
+    /// Build the scene of this round. Collective.
+    ///
+    /// Gmsh may make no mesh of the sizes that the best mesh leads to, or one that is refused. Coarser sizes are then tried, down to those
+    /// that would give no more cells than the best mesh has. If there is still no mesh, the run ends with the best one.
     ///
     /// # Errors
-    /// What [`run::build`] refuses, but a later mesh.
+    /// What [`run::build`] refuses, but not the mesh of a later round.
     pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
         loop {
             match run::build(session, self.scene.clone(), interrupt, clock) {
@@ -221,10 +231,10 @@ impl Plan {
         }
     }
 
-    /// After sizes of which no mesh came: follow coarser ones, or the best mesh once more.
+    /// Follow coarser sizes, or the best mesh once more, after sizes that gave no mesh.
     fn coarsen(&mut self, session: &Session, error: &Error) -> Result<()> {
         let Some(best) = &mut self.best else { return Ok(()) };
-        best.next.refine(1.0 / MORE);
+        best.next.refine(1.0 / GROWTH);
         if best.next.cells > self.rounds[best.round - 1].cells as f64 {
             return self.go_from_best(session).map(drop);
         }
@@ -232,7 +242,7 @@ impl Plan {
         self.end_with_best(session, f64::INFINITY).map(drop)
     }
 
-    /// Where this round begins: where a checkpoint or an earlier round ended.
+    /// Return where this round begins: where a checkpoint or an earlier round ended.
     ///
     /// # Errors
     /// The checkpoint is of another mesh.
@@ -243,10 +253,10 @@ impl Plan {
         }
     }
 
-    /// What a checkpoint of this round says of it; none of a coarse mesh that only gives the start.
+    /// Return the head of a checkpoint of this round; none for a coarse mesh that only gives the start.
     pub fn head(&self) -> Option<Head> {
         self.finer.is_none().then(|| Head {
-            settings: settings_digest(&self.asked),
+            settings: settings_digest(&self.requested),
             rounds: self.rounds.clone(),
             sizes: self.sizes().map(|view| view.to_string()),
             on_last_mesh: self.is_stepping(),
@@ -255,21 +265,21 @@ impl Plan {
         })
     }
 
-    /// The start of this round, if an earlier one gives it.
+    /// Return the start of this round, if an earlier round gives it.
     fn start(&self, built: &Built) -> Option<Start> {
         let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
-        (!self.carried.is_empty()).then(|| match newton {
-            true => Start::Pressure(carry::pressure(&self.carried, discrete)),
-            false => Start::Trace(carry::trace(&self.carried, discrete)),
+        (!self.start_from.is_empty()).then(|| match newton {
+            true => Start::Pressure(transfer::pressure(&self.start_from, discrete)),
+            false => Start::Trace(transfer::trace(&self.start_from, discrete)),
         })
     }
 
-    /// Whether another round follows this one. Collective.
+    /// Make the plan of the next round. Return whether there is one. Collective.
     ///
     /// # Errors
     /// Failures of PETSc.
-    pub fn goes_on(
+    pub fn advance(
         &mut self,
         session: &Session,
         done: &Done,
@@ -279,12 +289,11 @@ impl Plan {
         if matches!(done.outcome.status, Status::Paused { .. }) || self.is_stepping() {
             return Ok(false);
         }
-        let good = done.outcome.status.is_solved();
+        let is_solved = done.outcome.status.is_solved();
         let (discrete, model) = (&done.built.discrete, done.model());
-        let tables = || (0..model.pairs.len()).map(|i| report::contact_table(done, None, i)).collect();
         if let Some(finer) = self.finer.take() {
-            if good {
-                self.carried = tables();
+            if is_solved {
+                self.start_from = contact_tables(done);
             }
             self.scene = finer;
             options::withdraw(session)?;
@@ -294,7 +303,7 @@ impl Plan {
             return Ok(false);
         };
         self.record(done, estimate, clock);
-        if !good || self.ends {
+        if !is_solved || self.repeats_best {
             return Ok(false);
         }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
@@ -305,50 +314,52 @@ impl Plan {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
             return self.end_with_best(session, error);
         }
-        // coarse meshes may miss a singularity of the pressure; on the first mesh that resolves it the estimated error of pressures grows while that in energy falls
+        // coarse meshes may miss a singularity of the pressure: on the first mesh that resolves it the estimated error of pressures grows,
+        // while that in energy falls
         if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
             return self.follow_best(session);
         }
+        // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
-        let now = self.rounds[self.rounds.len() - 1].cells as f64;
-        // a mesher does not make as many cells as its sizes foretell: the mesh before tells how many of them
-        let most = goal.cells as f64 * self.foretold.map_or(1.0, |foretold| foretold / now);
-        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: MORE, most });
-        if next.cells >= 0.9 * most && now >= 0.7 * goal.cells as f64 {
-            self.limit = Some(format!("a mesh has {now} cells: allow more (adapt.cells)"));
+        let cells = self.rounds[self.rounds.len() - 1].cells as f64;
+        // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
+        let most = goal.cells as f64 * self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
+        let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: GROWTH, most });
+        if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {
+            self.limit = Some(format!("a mesh has {cells} cells: allow more (adapt.cells)"));
             return self.end_with_best(session, error);
         }
-        let (round, sizes, tables) = (self.rounds.len(), self.sizes(), tables());
-        self.best = Some(Best { error, energy: estimate.energy, round, view: sizes, next, tables, worse: 0 });
+        let (round, view, tables) = (self.rounds.len(), self.sizes(), contact_tables(done));
+        self.best = Some(Best { error, energy: estimate.energy, round, view, next, tables, worse: 0 });
         self.go_from_best(session)
     }
 
-    /// After a mesh that is worse than the best one: let another follow the best one, with more cells, or end the run.
+    /// After a mesh that is worse than the best one, let another mesh with more cells follow the best one, or end the run.
     fn follow_best(&mut self, session: &Session) -> Result<bool> {
         let Some(best) = &mut self.best else { return Ok(false) };
         best.worse += 1;
-        if best.worse == WORSE {
+        if best.worse == MOST_WORSE {
             let Best { round, error, .. } = best;
             self.limit =
-                Some(format!("mesh {round} has an error of {error:.1e}, and {WORSE} more meshes are no better"));
+                Some(format!("mesh {round} has an error of {error:.1e}, and {MOST_WORSE} more meshes are no better"));
             return self.end_with_best(session, f64::INFINITY);
         }
-        best.next.refine(MORE);
+        best.next.refine(GROWTH);
         self.go_from_best(session)
     }
 
-    /// Let the next mesh follow the sizes that the errors of the best one ask for, and start from the solution there.
+    /// Let the next mesh follow the sizes that the errors of the best one lead to, and start from the solution on the best one.
     fn go_from_best(&mut self, session: &Session) -> Result<bool> {
         let Some(best) = &self.best else { return Ok(false) };
-        self.carried = best.tables.clone();
-        self.foretold = Some(best.next.cells);
+        self.start_from = best.tables.clone();
+        self.predicted_cells = Some(best.next.cells);
         follow(Rc::make_mut(&mut self.scene), Some(view(&best.next)));
         options::withdraw(session)?;
         Ok(true)
     }
 
-    /// Note the mesh of this round.
+    /// Add the report of this round.
     fn record(&mut self, done: &Done, estimate: &Estimate, clock: &mut Clock) {
         let (discrete, total) = (&done.built.discrete, clock.total());
         self.rounds.push(RoundReport {
@@ -363,29 +374,29 @@ impl Plan {
         self.seconds = total;
     }
 
-    /// End the run with the best mesh: with one more round on it, unless the last one, with this `error`, is no worse.
+    /// End the run with the best mesh. Return whether there is one more round on it: not if this round, with this `error`, is no worse.
     fn end_with_best(&mut self, session: &Session, error: f64) -> Result<bool> {
         let Some(best) = self.best.take().filter(|best| best.error < error) else { return self.end_meshes(session) };
-        self.ends = true;
-        self.carried = best.tables;
+        self.repeats_best = true;
+        self.start_from = best.tables;
         follow(Rc::make_mut(&mut self.scene), best.view.as_deref().map(str::to_owned));
-        if self.steps.is_some() {
+        if self.later_steps.is_some() {
             return self.end_meshes(session);
         }
         options::withdraw(session)?;
         Ok(true)
     }
 
-    /// Keep the sizes of the mesh with which the run has ended, on the rank that writes.
+    /// Save the sizes of the mesh with which the run has ended, on the rank that writes.
     ///
     /// # Errors
     /// The cache of meshes cannot be written.
-    pub fn keep_mesh(&self, done: &Done) -> Result<()> {
+    pub fn save_mesh(&self, done: &Done) -> Result<()> {
         let sizes = self.sizes().filter(|_| self.adapts() && done.outcome.status.is_solved());
-        sizes.map_or(Ok(()), |sizes| adapted::keep(&self.purpose, self.limit.is_none(), &sizes))
+        sizes.map_or(Ok(()), |sizes| adapted::save(&self.purpose, self.limit.is_none(), &sizes))
     }
 
-    /// The field of sizes that the mesh of this round follows.
+    /// Return the view of the sizes that the mesh of this round follows.
     fn sizes(&self) -> Option<Arc<str>> {
         match &self.scene.mesh {
             MeshSource::Geo { sizes, .. } => sizes.clone(),
@@ -393,25 +404,27 @@ impl Plan {
         }
     }
 
-    /// Hold the estimate of a mesh against what the solution differs from that on the mesh before.
-    pub fn hold(&mut self, done: &Done, estimate: &mut Estimate) {
-        if self.goal.is_none() || self.is_stepping() || !done.outcome.status.is_solved() {
+    /// Increase the estimate of a mesh if the difference to the solution on the mesh before shows that it is too small.
+    pub fn correct(&mut self, done: &Done, estimate: &mut Estimate) {
+        if !self.adapts() || self.is_stepping() || !done.outcome.status.is_solved() {
             return;
         }
-        let tables: Vec<_> = (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect();
-        self.told.iter().for_each(|told| told.hold(&tables, estimate));
-        self.told = Some(Told::new(estimate, tables));
+        let tables = contact_tables(done);
+        self.previous.iter().for_each(|previous| previous.correct(&tables, estimate));
+        self.previous = Some(EstimatedSolution::new(estimate, tables));
     }
 }
 
-/// Sizes of the next mesh from the meshes of a number of bodies.
-type Sizing = fn(&dyn Meshes, usize) -> Sizes;
+/// Return the solution on the contact surfaces, one table for each pair.
+fn contact_tables(done: &Done) -> Vec<ContactTable> {
+    (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
+}
 
-/// The view of sizes that follow from the own mesh of a scene.
+/// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
 fn sized(
     session: &Session,
     scene: &Scene,
-    sizing: Sizing,
+    sizing: fn(&dyn Meshes, usize) -> Sizes,
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Option<String>> {
@@ -421,11 +434,12 @@ fn sized(
     options::withdraw(session).map(|()| sizes)
 }
 
+/// Return sizes as a view of Gmsh.
 fn view(sizes: &Sizes) -> String {
     mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
 }
 
-/// Lets the mesh of a scene follow sizes.
+/// Let the mesh of a scene follow a view of sizes.
 fn follow(scene: &mut Scene, view: Option<String>) {
     if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
         *sizes = view.map(Into::into);

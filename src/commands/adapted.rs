@@ -1,11 +1,13 @@
-//! Meshes that adaptations ended with, remembered by what they are for: the next run begins with one, and `winkler mesh --adapted` writes it.
+//! The sizes of meshes that adaptations ended with. The next run begins with them, and `winkler mesh --adapted` makes the mesh of them.
 
 use crate::error::Result;
 use crate::mesh;
 use crate::scene::Scene;
 use serde_json::Value;
 
-/// Return all that an adaptation is for, as text. Load steps are a part of it, since they choose the load under which meshes are adapted.
+/// Return the settings that an adapted mesh depends on, as a text: the key under which its sizes are saved.
+///
+/// Load steps are among them, since they choose the load under which meshes are adapted.
 pub fn purpose(scene: &Scene) -> String {
     let mut settings = scene.settings();
     let steps = settings["method"]["steps"].take();
@@ -14,20 +16,20 @@ pub fn purpose(scene: &Scene) -> String {
     settings.to_string()
 }
 
-/// Keep the sizes of the mesh that an adaptation ended with, and whether its error is the one that was asked for: only then does the next run
-/// begin with them.
+/// Save the sizes of the mesh that an adaptation ended with. The next run begins with them only if `is_reached`: the mesh has the error that
+/// was asked for.
 ///
 /// # Errors
 /// The cache cannot be written.
-pub fn keep(purpose: &str, is_reached: bool, sizes: &str) -> Result<()> {
-    mesh::keep_final(&named(purpose, is_reached), sizes)
+pub fn save(purpose: &str, is_reached: bool, sizes: &str) -> Result<()> {
+    mesh::keep_final(&key(purpose, is_reached), sizes)
 }
 
-/// The sizes of a mesh with the error that was asked for, or else of the best one of a run that did not reach it.
+/// Return the saved sizes of a mesh with the error that was asked for, or (not `is_reached`) of the best mesh of a run that did not reach it.
 pub fn recall(purpose: &str, is_reached: bool) -> Option<String> {
-    mesh::recall_final(&named(purpose, is_reached))
+    mesh::recall_final(&key(purpose, is_reached))
 }
 
-fn named(purpose: &str, is_reached: bool) -> String {
+fn key(purpose: &str, is_reached: bool) -> String {
     if is_reached { purpose.to_owned() } else { format!("best of {purpose}") }
 }

@@ -1,7 +1,6 @@
-//! `winkler check`: builds everything, solves nothing, says what is there.
+//! `winkler check`: build the problem of a scene and print what it has, without solving it.
 
-use super::typed::SceneArgs;
-use super::{load, said, surfaces};
+use super::{SceneArgs, clock_with_phases, load, surfaces};
 use crate::contact::{ContactPair, Left};
 use crate::discretize::BodyInfo;
 use crate::error::Result;
@@ -11,11 +10,11 @@ use crate::petsc::Session;
 use crate::run::preflight::Coupling;
 use crate::run::words::in_words;
 use crate::run::{self, Built, preflight, report};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// What the user typed.
+/// The command line of `winkler check`.
 #[derive(clap::Args)]
 pub struct Request {
     #[command(flatten)]
@@ -25,20 +24,22 @@ pub struct Request {
     output: Option<PathBuf>,
 }
 
-/// Builds a scene's problem and prints bodies, dofs, surfaces, gaps and the rigid motions left to each body; returns the
-/// exit code. With a folder it draws the measured surfaces and the layers of asperities in it.
+/// Build a scene's problem, print it and return the exit code.
+///
+/// Bodies, dofs, surfaces, gaps and the unconstrained rigid motions of each body are printed. With a folder, measured surfaces and layers of
+/// asperities are drawn into it.
 ///
 /// # Errors
 /// Refusals of scene and mesh; pictures that cannot be written.
 pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let mut clock = said::watched(session.rank() == 0 && !request.scene.json);
+    let mut clock = clock_with_phases(session.rank() == 0 && !request.scene.json);
     let mut scene = load(session, &request.scene.scene, &request.scene.overrides())?;
     let settings = scene.settings();
     if scene.method.steps.is_table() {
         Rc::make_mut(&mut scene).method.steps = scene.method.steps.heaviest();
     }
     let built = run::build(session, scene, interrupt, &mut clock)?;
-    // nothing is solved: no line for what would follow
+    // nothing is solved, so that no line may name a next phase
     clock.watch = None;
     clock.total();
     let shared = report::Shared::gather(&built.discrete);
@@ -49,64 +50,67 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         surfaces::draw(&built, &Folder::claim(folder)?)?;
     }
     if request.scene.json {
-        let mut value = json!(report::headline(session, &built, &shared.solvers, &clock));
-        value["settings"] = settings;
-        value["status"] = json!("checked");
-        value["message"] = json!(built.choice);
-        for (info, body) in built.discrete.bodies.iter().zip(0..) {
-            value["bodies"][body]["supported"] = json!(info.supported);
-            value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
-            value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
-        }
-        value["pairs"] = pairs(&built);
-        let (data, of_pairs) = surfaces::json(&built);
-        value["data"] = data;
-        for (pair, of_pair) in of_pairs.into_iter().enumerate() {
-            value["pairs"][pair]["surface"] = of_pair;
-        }
-        say(format_args!("{value:#}"))?;
+        let headline = json!(report::headline(session, &built, &shared.solvers, &clock));
+        say(format_args!("{:#}", to_json(&built, settings, headline)))?;
     } else {
         print(&built, &report::solvers_in_words(&shared.solvers))?;
     }
     Ok(0)
 }
 
-fn pairs(built: &Built) -> serde_json::Value {
-    let describe = |i: usize| {
-        let pair = &built.discrete.model.pairs[i];
-        let (low, high) = gap_range(&pair.gap);
-        let coupling = preflight::coupling(built, i);
-        json!({
-            "surfaces": pair.surfaces,
-            "contact": built.discrete.contacts[i].spec.table,
-            "carrier": pair.surfaces[0],
-            "points": pair.len(),
-            "length": pair.weight.iter().sum::<f64>(),
-            "gap": [low, high],
-            "facets_uncovered": pair.uncovered(),
-            "facets_steep": pair.left(Left::Steep),
-            "facets_far": pair.left(Left::Far),
-            "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
-            "facets_averaged": pair.averaged(),
-            "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
-            "theta": coupling.theta,
-            "expected_sweeps": coupling.sweeps.iter().filter(|_| coupling.pressure > 0.0).map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
-        })
-    };
-    (0..built.discrete.model.pairs.len()).map(describe).collect()
+/// Return all of `--json`: the headline of a report, with what is known before a solution.
+fn to_json(built: &Built, settings: Value, headline: Value) -> Value {
+    let mut value = headline;
+    value["settings"] = settings;
+    value["status"] = json!("checked");
+    value["message"] = json!(built.choice);
+    for (info, body) in built.discrete.bodies.iter().zip(0..) {
+        value["bodies"][body]["supported"] = json!(info.supported);
+        value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
+        value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
+    }
+    value["pairs"] = (0..built.discrete.model.pairs.len()).map(|i| pair_to_json(built, i)).collect();
+    value["data"] = surfaces::data_to_json(built);
+    value
 }
 
+fn pair_to_json(built: &Built, i: usize) -> Value {
+    let pair = &built.discrete.model.pairs[i];
+    let (low, high) = gap_range(&pair.gap);
+    let coupling = preflight::coupling(built, i);
+    let sweeps = coupling.sweeps.iter().filter(|_| coupling.pressure > 0.0);
+    json!({
+        "surfaces": pair.surfaces,
+        "contact": built.discrete.contacts[i].spec.table,
+        "carrier": pair.surfaces[0],
+        "points": pair.len(),
+        "length": pair.weight.iter().sum::<f64>(),
+        "gap": [low, high],
+        "facets_uncovered": pair.uncovered(),
+        "facets_steep": pair.left(Left::Steep),
+        "facets_far": pair.left(Left::Far),
+        "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
+        "facets_averaged": pair.averaged(),
+        "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
+        "theta": coupling.theta,
+        "expected_sweeps": sweeps.map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
+        "surface": surfaces::pair_to_json(built, i),
+    })
+}
+
+/// Return the least and the largest gap.
 fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
+/// Print the problem: every body and every pair, or sums where there are too many of them.
 fn print(built: &Built, solvers: &str) -> Result<()> {
     say(&built.scene.title)?;
     let lines = match built.discrete.bodies.len() {
         ..=LISTED => each_body(built),
         _ => all_bodies(built),
     };
-    let lines = lines.into_iter().chain(surfaces::lines(built)).chain(match built.discrete.model.pairs.len() {
+    let lines = lines.into_iter().chain(surfaces::data_lines(built)).chain(match built.discrete.model.pairs.len() {
         ..=LISTED => each_pair(built),
         _ => all_pairs(built),
     });
@@ -114,7 +118,7 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
     lines.chain([solver]).chain(warning_lines(&built.warnings, "--json")).try_for_each(say)
 }
 
-/// Two lines or three a body.
+/// Return two or three lines for each body.
 fn each_body(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
     for info in &built.discrete.bodies {
@@ -132,12 +136,12 @@ fn each_body(built: &Built) -> Vec<String> {
     lines
 }
 
-/// Sums over the bodies, and which of them supports or nothing hold.
+/// Return sums over the bodies, and the names of the bodies that have unconstrained rigid motions.
 fn all_bodies(built: &Built) -> Vec<String> {
     let bodies = &built.discrete.bodies;
-    let sum = |of: fn(&BodyInfo) -> usize| bodies.iter().map(of).sum::<usize>();
-    let range = |of: fn(&BodyInfo) -> usize| {
-        let (least, most) = bodies.iter().map(of).fold((usize::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
+    let sum = |count: fn(&BodyInfo) -> usize| bodies.iter().map(count).sum::<usize>();
+    let range = |count: fn(&BodyInfo) -> usize| {
+        let (least, most) = bodies.iter().map(count).fold((usize::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
         if least == most { least.to_string() } else { format!("{least} to {most}") }
     };
     let mut lines = vec![format!(
@@ -150,8 +154,9 @@ fn all_bodies(built: &Built) -> Vec<String> {
         range(|info| info.cells),
         range(|info| info.dofs)
     )];
-    let named = |what: &str, of: fn(&BodyInfo) -> &Vec<String>| {
-        let names: Vec<&String> = bodies.iter().filter(|info| !of(info).is_empty()).map(|info| &info.name).collect();
+    let named = |what: &str, motions: fn(&BodyInfo) -> &Vec<String>| {
+        let names: Vec<&String> =
+            bodies.iter().filter(|info| !motions(info).is_empty()).map(|info| &info.name).collect();
         let line =
             || format!("    rigid motions {what}: of {} bodies, {}", names.len(), in_words(names.iter().copied()));
         (!names.is_empty()).then(line)
@@ -161,7 +166,7 @@ fn all_bodies(built: &Built) -> Vec<String> {
     lines
 }
 
-/// Two lines a pair.
+/// Return two lines for each pair, and those of its measured surfaces and its layer of asperities.
 fn each_pair(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
@@ -186,12 +191,14 @@ fn each_pair(built: &Built) -> Vec<String> {
                 expected(&coupling)
             ),
         });
-        lines.extend(surfaces::of_pair(built, i));
+        lines.extend(surfaces::pair_lines(built, i));
     }
     lines
 }
 
-/// theta and sweeps of a pair in words.
+/// Return theta and the expected number of sweeps of a pair as a text.
+///
+/// Each side has theta = kappa/(k + kappa), with the stiffness k of its body and the tangent kappa of the layer.
 fn expected(coupling: &Coupling) -> String {
     let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
         true => format!("{method} {count:.0}"),
@@ -202,7 +209,7 @@ fn expected(coupling: &Coupling) -> String {
     format!("theta {a:.3} and {b:.3}; sweeps to expect for a residual of 1e-8: {sweeps}")
 }
 
-/// Sums over the pairs, and what to expect of the one with the largest theta.
+/// Return sums over the pairs, and the number of sweeps to expect from the pair with the largest theta.
 fn all_pairs(built: &Built) -> Vec<String> {
     let pairs = &built.discrete.model.pairs;
     let gaps = pairs.iter().map(|pair| gap_range(&pair.gap));
@@ -217,16 +224,17 @@ fn all_pairs(built: &Built) -> Vec<String> {
         sci(high, 3)
     )];
     let all = (0..pairs.len()).map(|i| (&pairs[i], preflight::coupling(built, i)));
-    let pushed: Vec<(&ContactPair, Coupling)> = all.filter(|(_, coupling)| coupling.pressure > 0.0).collect();
-    if pushed.len() < pairs.len() {
-        let rest = pairs.len() - pushed.len();
+    let pressed: Vec<(&ContactPair, Coupling)> = all.filter(|(_, coupling)| coupling.pressure > 0.0).collect();
+    if pressed.len() < pairs.len() {
+        let rest = pairs.len() - pressed.len();
         lines.push(format!(
             "    {rest} of them have no load of a body as a whole across: their pressure cannot be estimated"
         ));
     }
-    let both = |coupling: &Coupling| coupling.theta[0] * coupling.theta[1];
-    if let Some((pair, coupling)) = pushed.iter().max_by(|(_, a), (_, b)| both(a).total_cmp(&both(b))) {
-        let [least, most] = [f64::min, f64::max].map(|pick| pushed.iter().map(|(_, of)| of.pressure).reduce(pick));
+    let product = |coupling: &Coupling| coupling.theta[0] * coupling.theta[1];
+    if let Some((pair, coupling)) = pressed.iter().max_by(|(_, a), (_, b)| product(a).total_cmp(&product(b))) {
+        let pressures = || pressed.iter().map(|(_, coupling)| coupling.pressure);
+        let [least, most] = [f64::min, f64::max].map(|pick| pressures().reduce(pick));
         let [least, most] = [least, most].map(|pressure| sci(pressure.unwrap_or(f64::NAN), 3));
         let [a, b] = &pair.surfaces;
         lines.push(format!(

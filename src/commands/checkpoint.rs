@@ -1,7 +1,7 @@
-//! The state of a run in a file: what another process, on any number of ranks, needs to go on.
+//! Checkpoints: files with what another process, on any number of ranks, needs to go on with a run.
 //!
-//! The file `checkpoint` has a line that names its format, a line of JSON, numbers as `postcard` writes them, and the SHA-256 of all that.
-//! It is replaced as a whole, so that there is always a good one.
+//! The file `checkpoint` has a line that names its format, a line of JSON (the head), numbers as `postcard` writes them, and the SHA-256 of
+//! all that. It is replaced as a whole, so that there is always a good one.
 
 use crate::ddm::{Row, Start, State};
 use crate::error::{Error, Kind, Result};
@@ -16,51 +16,54 @@ use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the folder of results.
+/// The name of the file in the folder of results.
 pub const FILE: &str = "checkpoint";
 
-/// Name under which the next run that does not go on from it leaves it.
+/// The name that a checkpoint gets when a run begins in its folder without going on from it.
 pub const ASIDE: &str = "checkpoint.old";
 
+/// The first line.
 const FORMAT: &str = "winkler checkpoint 5";
 
-/// How the first line of all versions begins.
-const KIND: &[u8] = b"winkler checkpoint ";
+/// The beginning of the first line in all versions.
+const ANY_FORMAT: &[u8] = b"winkler checkpoint ";
 
-/// Bytes of the digest at the end.
-const DIGEST: usize = 32;
+/// Number of bytes of the digest at the end.
+const DIGEST_BYTES: usize = 32;
 
-/// What is known besides the numbers.
+/// The part of a checkpoint that is written as JSON.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Head {
     /// Digest of the scene's settings.
     pub settings: String,
-    /// Digest of the file of its mesh, and of what bodies and contact points were made of it.
+    /// Digest of the file of the mesh, and of the bodies and contact points that were made from it.
     pub mesh: String,
-    /// Meshes of an adaptation before this one.
+    /// Reports of the meshes of an adaptation before this one.
     pub rounds: Vec<RoundReport>,
     /// Sizes that the mesh follows, if it does.
     pub sizes: Option<String>,
-    /// Load steps before this one.
+    /// Reports of the load steps before this one.
     pub steps: Vec<StepReport>,
-    /// Whether these are all load steps on the last mesh of an adaptation, not the largest one alone.
+    /// Whether the run makes all load steps on the last mesh of an adaptation, not the largest step alone.
     pub on_last_mesh: bool,
-    /// Why the error was not reached on that mesh, if it was not.
+    /// Why the error was not reached on the last mesh, if it was not.
     pub limit: Option<String>,
 }
 
-/// A state that was read.
+/// A checkpoint that was read.
 pub struct Checkpoint {
     /// The file.
     path: PathBuf,
-    /// What is known besides.
+    /// The part that is JSON.
     pub head: Head,
+    /// Rows of the history of earlier load steps.
     earlier: Vec<Row>,
+    /// The state of the iteration.
     state: State,
 }
 
 impl Checkpoint {
-    /// Writes the state of a run that has paused into a folder; collective, one rank writes.
+    /// Write the state of a paused run into a folder. Collective; the rank with `writes` writes the file.
     ///
     /// # Errors
     /// The file cannot be written, on the rank that writes it.
@@ -74,8 +77,8 @@ impl Checkpoint {
         let failed = |cause: String| Error::new(Kind::File, "the checkpoint cannot be written").because(cause);
         let json = serde_json::to_string(&head).map_err(|cause| failed(cause.to_string()))?;
         let next = outcome.next_states();
-        let layer = (&next.compression, &next.smoothing);
-        let numbers = (earlier, &outcome.rows, layer, &outcome.iterate.trace, states);
+        let (rows, trace) = (&outcome.rows, &outcome.iterate.trace);
+        let numbers = (earlier, rows, &next.compression, &next.smoothing, trace, states);
         let mut bytes = postcard::to_extend(&numbers, format!("{FORMAT}\n{json}\n").into_bytes())
             .map_err(|cause| failed(cause.to_string()))?;
         let sum = Sha256::digest(&bytes);
@@ -83,10 +86,10 @@ impl Checkpoint {
         write_whole(&folder.join(FILE), |out| out.write_all(&bytes))
     }
 
-    /// Read the checkpoint in a folder, on the first rank, for all. Collective.
+    /// Read the checkpoint in a folder on the first rank, and broadcast it. Collective.
     ///
     /// # Errors
-    /// There is none, it is damaged, of another version, or of another scene.
+    /// There is none, or it is damaged, of another version, or of another scene.
     pub fn read(exchange: &dyn Exchange, folder: &Path, scene: &Scene) -> Result<Self> {
         let path = folder.join(FILE);
         let bytes = tell(exchange, || {
@@ -96,7 +99,7 @@ impl Checkpoint {
         })?;
         let checkpoint = parse(&path, &bytes).ok_or_else(|| {
             let path = path.display();
-            let wrong = match bytes.starts_with(KIND) && !bytes.starts_with(format!("{FORMAT}\n").as_bytes()) {
+            let wrong = match bytes.starts_with(ANY_FORMAT) && !bytes.starts_with(format!("{FORMAT}\n").as_bytes()) {
                 true => format!("{path} was written by another version of winkler"),
                 false => format!("{path} is damaged, or no checkpoint"),
             };
@@ -104,37 +107,37 @@ impl Checkpoint {
         })?;
         match checkpoint.head.settings == settings_digest(scene) {
             true => Ok(checkpoint),
-            false => Err(checkpoint.other("scene")),
+            false => Err(checkpoint.refuse_other("scene")),
         }
     }
 
-    /// Where a problem goes on; it has the rank's own bodies.
+    /// Return the state from which a problem goes on, restricted to the bodies of this rank.
     ///
     /// # Errors
-    /// It has another mesh.
+    /// The problem has another mesh.
     pub fn resume(self, built: &Built) -> Result<Begin> {
-        // the first rank has read the mesh
+        // only the first rank has read the mesh
         if built.mesh.is_some() && self.head.mesh != mesh_digest(built) {
-            return Err(self.other("mesh"));
+            return Err(self.refuse_other("mesh"));
         }
         let discrete = &built.discrete;
         let Self { head, earlier, mut state, .. } = self;
         for (state, slot) in state.field.states.iter_mut().zip(&discrete.model.bodies) {
-            match &slot.local {
-                None => state.clear(),
-                Some(body) => {
-                    // of a body that another solver worked with the traces count
-                    let fits = |whole: &&Distribution| state.len() == whole.dofs + body.rigid();
-                    if let Some(distribution) = body.distribution().filter(fits) {
-                        *state = distribution.scatter(state);
-                    }
-                }
+            let Some(body) = &slot.local else {
+                state.clear();
+                continue;
+            };
+            // a state of another length is that of another solver, for which the traces are used
+            let fits = |whole: &&Distribution| state.len() == whole.dofs + body.rigid();
+            if let Some(distribution) = body.distribution().filter(fits) {
+                *state = distribution.scatter(state);
             }
         }
         Ok(Begin { start: Some(Start::Continue(Box::new(state))), steps: head.steps, earlier })
     }
 
-    fn other(&self, what: &str) -> Error {
+    /// Return the refusal of a checkpoint that is of another scene or mesh.
+    fn refuse_other(&self, what: &str) -> Error {
         Error::new(Kind::Scene, format!("{} is of another {what}", self.path.display())).help(
             "a run goes on with the scene and the overrides that it began with; only `title`, `units`, `[output]` and \
                    `method.stop` may change. Or begin anew, without `--restart`",
@@ -142,18 +145,11 @@ impl Checkpoint {
     }
 }
 
-/// States of all bodies; one message, and one for each body that is dealt out.
+/// Return the states of all bodies on all ranks. One message, and one more for each body that is distributed over ranks.
 fn gather(model: &Model, field: &Field) -> Vec<Vec<f64>> {
-    let whole = |(slot, state): (&BodySlot, &Vec<f64>)| {
-        let Some((body, distribution)) = slot.local.as_ref().and_then(|body| Some((body, body.distribution()?))) else {
-            return state.clone();
-        };
-        let (own, rigid) = state.split_at(state.len() - body.rigid());
-        let all = distribution.gather(own, rigid);
-        if body.leads() { all } else { Vec::new() }
-    };
-    let states: Vec<Vec<f64>> = model.bodies.iter().zip(&field.states).map(whole).collect();
-    // empty where the body lives elsewhere
+    let states: Vec<Vec<f64>> =
+        model.bodies.iter().zip(&field.states).map(|(slot, state)| whole_state(slot, state)).collect();
+    // a rank has an empty state of each body that it does not own
     let fill = |mut all: Vec<Vec<f64>>, other: Vec<Vec<f64>>| {
         all.iter_mut().zip(other).filter(|(own, _)| own.is_empty()).for_each(|(own, other)| *own = other);
         all
@@ -161,18 +157,29 @@ fn gather(model: &Model, field: &Field) -> Vec<Vec<f64>> {
     share(&*model.exchange, states).into_iter().reduce(fill).unwrap_or_default()
 }
 
+/// Return the state of a body with all of its dofs on the rank that owns the body; on other ranks it is empty.
+fn whole_state(slot: &BodySlot, state: &[f64]) -> Vec<f64> {
+    let Some((body, distribution)) = slot.local.as_ref().and_then(|body| Some((body, body.distribution()?))) else {
+        return state.to_vec();
+    };
+    let (own, rigid) = state.split_at(state.len() - body.rigid());
+    let all = distribution.gather(own, rigid);
+    if body.leads() { all } else { Vec::new() }
+}
+
+/// Return the checkpoint in the bytes of a file; none if they are damaged or of another version.
 fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
-    let (text, digest) = bytes.split_at_checked(bytes.len().checked_sub(DIGEST)?)?;
+    let (text, digest) = bytes.split_at_checked(bytes.len().checked_sub(DIGEST_BYTES)?)?;
     let mut lines = text.splitn(3, |&byte| byte == b'\n');
     let is_ours = lines.next()? == FORMAT.as_bytes() && Sha256::digest(text)[..] == *digest;
     let head: Head = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
-    let (earlier, rows, (compression, smoothing), trace, states) = postcard::from_bytes(lines.next()?).ok()?;
+    let (earlier, rows, compression, smoothing, trace, states) = postcard::from_bytes(lines.next()?).ok()?;
     let state = State { field: Field { states, trace }, compression, smoothing, rows, memory: None };
     Some(Checkpoint { path: path.to_owned(), head, earlier, state })
 }
 
-/// Digest of what a scene asks for, without what changes neither problem nor method: where its files are, what Gmsh may take, what is written,
-/// when it ends.
+/// Return a digest of the settings of a scene that change the problem or the method. Paths of files, limits of Gmsh, output and stopping rules
+/// are not among them.
 pub fn settings_digest(scene: &Scene) -> String {
     let mut problem = scene.problem();
     problem["method"]["stop"] = Value::Null;
@@ -182,8 +189,9 @@ pub fn settings_digest(scene: &Scene) -> String {
     digest(&problem.to_string())
 }
 
-/// Digest of the file of the mesh, whose nodes, cells and groups may be others where the counts are the same, of the bodies' sizes and of
-/// all contact points; on the rank that has read the mesh.
+/// Return a digest of the file of the mesh, of the sizes of the bodies and of all contact points, on the rank that has read the mesh.
+///
+/// The file counts because nodes, cells and groups may differ where their numbers are the same.
 fn mesh_digest(Built { mesh, discrete, .. }: &Built) -> String {
     let bodies = discrete.bodies.iter().map(|body| (&body.name, body.nodes, body.cells, body.dofs));
     let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.weight, &pair.gap));

@@ -1,13 +1,13 @@
-//! `winkler mesh`: makes the mesh of a scene, or finds it, and says what is in it.
+//! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use super::adapted;
-use super::typed::flags;
+use super::{adapted, flags};
+use crate::discretize::{Verified, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::linalg::bounds;
-use crate::mesh::{Loaded, Origin};
+use crate::mesh::{Group, Loaded, Mesh, Origin};
 use crate::output::progress::Line;
 use crate::output::report::readable;
 use crate::output::{CellKind, Encoding, Grid, say, write_whole};
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What the user typed.
+/// The command line of `winkler mesh`.
 #[derive(clap::Args)]
 pub struct Request {
     /// Scene file (TOML)
@@ -44,8 +44,9 @@ pub struct Request {
     json: bool,
 }
 
-/// Makes the mesh of a scene or finds it in the cache, prints its bodies and groups with the shape of their cells, and
-/// writes it where asked; returns the exit code.
+/// Make the mesh of a scene or find it in the cache, and return the exit code.
+///
+/// Bodies with the quality of their cells and groups are printed. With `-o` the mesh is written to a file.
 ///
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
@@ -63,7 +64,7 @@ pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     }
 }
 
-/// Let the mesh of a scene follow the sizes with which the last run that adapted it has ended. Return whether that run reached its error.
+/// Let the mesh of a scene follow the sizes with which the last run that adapted it ended. Return whether that run reached its error.
 ///
 /// # Errors
 /// A scene that is not adapted, or has not been.
@@ -75,18 +76,19 @@ fn follow_adapted(scene: &mut Scene) -> Result<bool> {
             error.help("the scene needs a script for its mesh and `adapt = { error = E }`, or type --tolerance E")
         );
     };
-    let kept = |is_reached| Some((is_reached, adapted::recall(&purpose, is_reached)?));
-    let missing = || {
-        let message = format!("no mesh of {} was adapted to an error of {}", file.value.display(), adapt.error);
-        Error::scene(&adapt.place, message).help(
-            "first run `winkler solve` with the same scene, --set and --tolerance; meshes are kept in the cache ($WINKLER_CACHE)",
-        )
-    };
-    let (is_reached, view) = [true, false].into_iter().find_map(kept).ok_or_else(missing)?;
-    *sizes = Some(view.into());
-    Ok(is_reached)
+    for is_reached in [true, false] {
+        if let Some(view) = adapted::recall(&purpose, is_reached) {
+            *sizes = Some(view.into());
+            return Ok(is_reached);
+        }
+    }
+    let message = format!("no mesh of {} was adapted to an error of {}", file.value.display(), adapt.error);
+    Err(Error::scene(&adapt.place, message).help(
+        "first run `winkler solve` with the same scene, --set and --tolerance; meshes are kept in the cache ($WINKLER_CACHE)",
+    ))
 }
 
+/// Load the mesh, write it if a file was asked for, and print it.
 fn show<const D: usize>(
     scene: &Scene,
     is_reached: Option<bool>,
@@ -112,10 +114,38 @@ fn show<const D: usize>(
     Ok(0)
 }
 
-/// All that is said about a mesh.
+/// Return all that is printed about a mesh, as JSON.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
     let Loaded { mesh, origin, file, unkept, .. } = loaded;
-    let verified = crate::discretize::verify(scene, &Serial, || Ok(mesh))?;
+    let verified = verify(scene, &Serial, || Ok(mesh))?;
+    let mesh = &verified.mesh;
+    let bodies = bodies(&verified)?;
+    let groups: Vec<Value> = mesh.groups.iter().map(|group| group_facts(mesh, group)).collect();
+    Ok(json!({
+        "title": scene.title,
+        "file": file,
+        "origin": match origin {
+            Origin::File => "the scene's own file",
+            Origin::Cache => "from the cache",
+            Origin::Gmsh => "made by Gmsh",
+        },
+        "unkept": unkept,
+        "seconds": seconds,
+        "dimension": D,
+        "order": mesh.order.degree(),
+        "nodes": mesh.points.len(),
+        "split": mesh.split,
+        "straightened": mesh.straightened,
+        "bodies": bodies,
+        "groups": groups,
+    }))
+}
+
+/// Return what is printed about each body.
+///
+/// # Errors
+/// A body without cells.
+fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<Value>> {
     let mesh = &verified.mesh;
     let mut checked = verified.checked.iter();
     let mut bodies = Vec::new();
@@ -135,33 +165,14 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
             "quality": { "least": quality.least, "mean": quality.mean },
         }));
     }
-    let groups: Vec<Value> = mesh
-        .groups
-        .iter()
-        .map(|group| {
-            let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
-            let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
-            json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len(), "low": low, "high": high })
-        })
-        .collect();
-    Ok(json!({
-        "title": scene.title,
-        "file": file,
-        "origin": match origin {
-            Origin::File => "the scene's own file",
-            Origin::Cache => "from the cache",
-            Origin::Gmsh => "made by Gmsh",
-        },
-        "unkept": unkept,
-        "seconds": seconds,
-        "dimension": D,
-        "order": mesh.order.degree(),
-        "nodes": mesh.points.len(),
-        "split": mesh.split,
-        "straightened": mesh.straightened,
-        "bodies": bodies,
-        "groups": groups,
-    }))
+    Ok(bodies)
+}
+
+/// Return what is printed about a group.
+fn group_facts<const D: usize>(mesh: &Mesh<D>, group: &Group) -> Value {
+    let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
+    let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
+    json!({ "name": group.name, "dimension": group.dimension, "simplices": group.len(), "low": low, "high": high })
 }
 
 fn print(facts: &Value) -> Result<()> {
@@ -216,7 +227,7 @@ fn print(facts: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Writes the mesh: `.msh` as the file that was read, `.vtu` as cells with the number of their body.
+/// Write the mesh: as `.msh` a copy of the file that was read, as `.vtu` cells with the index of their group.
 fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
     match path.extension().and_then(|end| end.to_str()) {
         Some("msh") => {
@@ -232,6 +243,7 @@ fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
     }
 }
 
+/// Return the cells of the mesh, each with the index of its group.
 fn grid<const D: usize>(loaded: &Loaded<D>) -> Grid {
     let mesh = &loaded.mesh;
     let mut grid = Grid {
@@ -242,11 +254,11 @@ fn grid<const D: usize>(loaded: &Loaded<D>) -> Grid {
         at_points: Vec::new(),
         at_cells: Vec::new(),
     };
-    let mut number = Vec::new();
+    let mut groups = Vec::new();
     for (index, group) in mesh.groups.iter().filter(|group| group.dimension == D).enumerate() {
         grid.connectivity.extend(&group.connectivity);
-        number.extend(vec![index as f64; group.len()]);
+        groups.extend(vec![index as f64; group.len()]);
     }
-    grid.at_cells.push(("group".to_owned(), 1, number));
+    grid.at_cells.push(("group".to_owned(), 1, groups));
     grid
 }

@@ -1,33 +1,153 @@
-//! The commands, each a table of contents of its run: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`]. What those
-//! that solve share with the library is in [`run`](crate::run).
+//! The commands, one file each: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`], [`new`](mod@new). This file has what
+//! several of them take from the command line and print. What they share with the library is in [`run`](crate::run).
 
 pub mod adapt;
 mod adapted;
 pub mod bench;
-pub mod carry;
 pub mod check;
 pub mod checkpoint;
-mod curves;
 pub mod mesh;
 pub mod new;
-mod reuse;
-mod said;
 mod series;
 pub mod solve;
 pub mod surfaces;
 pub mod sweep;
-mod told;
-mod typed;
+pub mod transfer;
 pub mod write;
 
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
+use crate::output::progress::Line;
+use crate::output::{LISTED, Verbosity};
 use crate::petsc::Session;
+use crate::problem::{MethodName, name_of};
+use crate::run::report::{Shared, solvers_in_words};
+use crate::run::{self, Clock, Ready};
 use crate::scene::Scene;
+use clap::Args;
+use std::cell::RefCell;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// Folder of results: `-o`, else what the scene says, else `results/<case>`.
+/// The options that say how much a command prints.
+#[derive(Args)]
+pub struct VerbosityArgs {
+    /// Print errors, warnings and the folder of the results only
+    #[arg(short, long, conflicts_with_all = ["verbose", "json"])]
+    quiet: bool,
+    /// Print what is decided and why, with the PETSc options of each body, on standard error
+    #[arg(short, long)]
+    verbose: bool,
+}
+
+impl VerbosityArgs {
+    /// Return the verbosity that these options ask for.
+    pub fn verbosity(&self) -> Verbosity {
+        match (self.quiet, self.verbose) {
+            (true, _) => Verbosity::Quiet,
+            (_, true) => Verbosity::Verbose,
+            _ => Verbosity::Usual,
+        }
+    }
+}
+
+/// A scene file with the options that replace some of its keys.
+#[derive(Args)]
+pub struct SceneArgs {
+    /// Scene file (TOML)
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Method: auto, robin, ncg, anderson, newton-robin or newton (short for --set method.name=NAME)
+    #[arg(long, value_name = "NAME")]
+    method: Option<String>,
+    /// Estimate the error of the discretisation (short for --set estimate=true)
+    #[arg(long)]
+    estimate: bool,
+    /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
+    #[arg(long, value_name = "E", allow_hyphen_values = true)]
+    tolerance: Option<String>,
+    /// Run the mesh's .geo script even if it can start programs or write files
+    #[arg(long)]
+    trust_geo: bool,
+    /// Print the report as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl SceneArgs {
+    /// Return all overrides of the scene, those with an option of their own last.
+    pub fn overrides(&self) -> Vec<String> {
+        let method = self.method.iter().map(|name| format!("--method {name}"));
+        let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
+        let flags = flags([(self.estimate, "--estimate"), (self.trust_geo, "--trust-geo")]);
+        self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
+    }
+}
+
+/// Return those of the flags that the user typed.
+fn flags<const N: usize>(all: [(bool, &str); N]) -> impl Iterator<Item = String> {
+    all.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned())
+}
+
+/// One `--over`: a key of the scene and the values that it takes.
+struct Variation {
+    /// Key of the scene.
+    key: String,
+    /// Its values as they were typed.
+    values: Vec<String>,
+}
+
+impl Variation {
+    /// Read `KEY=V1,V2,...`. Commas inside brackets, braces, parentheses or quotes do not separate values.
+    ///
+    /// # Errors
+    /// A text that is not of this form.
+    fn parse(text: &str) -> Result<Self> {
+        let refuse = || {
+            Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
+                .help("for example --over method.gamma=0.3,0.6,0.9")
+        };
+        let (key, list) = text.split_once('=').ok_or_else(refuse)?;
+        let mut values = vec![String::new()];
+        let (mut depth, mut quote) = (0, None);
+        for c in list.chars() {
+            match (quote, c) {
+                (None, '"' | '\'') => quote = Some(c),
+                (Some(open), c) if c == open => quote = None,
+                (None, '[' | '{' | '(') => depth += 1,
+                (None, ']' | '}' | ')') => depth -= 1,
+                (None, ',') if depth == 0 => {
+                    values.push(String::new());
+                    continue;
+                }
+                _ => {}
+            }
+            if let Some(value) = values.last_mut() {
+                value.push(c);
+            }
+        }
+        if key.trim().is_empty() || values.iter().any(|value| value.trim().is_empty()) {
+            return Err(refuse());
+        }
+        let values = values.into_iter().map(|value| value.trim().to_owned()).collect();
+        Ok(Self { key: key.trim().to_owned(), values })
+    }
+}
+
+/// Return all combinations of values, one value of each variation; those of the last variation change first.
+fn combinations(variations: &[Variation]) -> Vec<Vec<String>> {
+    variations.iter().fold(vec![Vec::new()], |combinations, Variation { values, .. }| {
+        combinations
+            .iter()
+            .flat_map(|before| values.iter().map(move |value| [before.clone(), vec![value.clone()]].concat()))
+            .collect()
+    })
+}
+
+/// Return the folder of results: that of `-o`, else that of the scene, else `results/<case>`.
 pub fn folder_of(scene: &Scene, typed: Option<&PathBuf>) -> PathBuf {
     typed
         .cloned()
@@ -35,7 +155,7 @@ pub fn folder_of(scene: &Scene, typed: Option<&PathBuf>) -> PathBuf {
         .unwrap_or_else(|| PathBuf::from("results").join(case_of(&scene.path)))
 }
 
-/// Name of a scene's case: the folder of a file called `scene.toml`, else the file's name.
+/// Return the name of a scene's case: the folder of a file called `scene.toml`, else the file's name.
 fn case_of(path: &Path) -> &OsStr {
     let stem = path.file_stem().unwrap_or_default();
     match path.parent().and_then(|parent| parent.file_name()) {
@@ -44,12 +164,82 @@ fn case_of(path: &Path) -> &OsStr {
     }
 }
 
-/// Reads a scene on every rank; a refusal is printed once.
+/// Read a scene on every rank. A refusal is printed once.
 ///
 /// # Errors
 /// Refusals of the scene, or of scenes that are not the same on all ranks.
 pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Rc<Scene>> {
     let scene = crate::parallel::agree(session, crate::scene::load(path, overrides).map(Rc::new))?;
-    crate::run::refuse_other_scenes(session, &[&*scene])?;
+    run::refuse_other_scenes(session, &[&*scene])?;
     Ok(scene)
+}
+
+/// Return a clock. If `is_shown`, a line on the terminal names the phase under way, up to the first iteration.
+fn clock_with_phases(is_shown: bool) -> Clock {
+    let line = RefCell::new(None);
+    let next = move |ended: &str, estimate: Option<f64>| {
+        // the old line is removed before the next one begins
+        drop(line.borrow_mut().take());
+        *line.borrow_mut() = match ended {
+            "" => Some(Line::new("mesh", None)),
+            "mesh" => Some(Line::new("bodies and contact points", None)),
+            "discretize" => Some(Line::new("factorisations and start", estimate)),
+            _ => None,
+        };
+    };
+    let mut clock = Clock::default();
+    clock.watch = is_shown.then(|| Rc::new(next) as _);
+    clock
+}
+
+/// Return the lines of `--verbose`: what was decided and why, and the PETSc options of each body. Collective.
+///
+/// # Errors
+/// When PETSc is out of memory.
+fn decisions(session: &Session, ready: &Ready) -> Result<Vec<String>> {
+    let built = &ready.built;
+    let (scene, discrete) = (&built.scene, &built.discrete);
+    let solvers = Shared::gather(discrete).solvers;
+    let mut lines = vec![format!("{}: decided", scene.title)];
+    let name = name_of(&MethodName::ALL, &scene.method.name);
+    let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
+    let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
+    lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));
+    lines.push(format!("  inner solver: {} ({})", solvers_in_words(&solvers), built.choice));
+    lines.push(format!("  {} ranks, {}", session.size(), session.blas_name()));
+    for (body, solver) in discrete.bodies.iter().zip(&solvers).take(LISTED) {
+        lines.push(format!("  body {}: {} dofs on rank {}: {solver}", body.name, body.dofs, body.rank));
+    }
+    for pair in discrete.model.pairs.iter().take(LISTED) {
+        let [carrier, other] = &pair.surfaces;
+        lines
+            .push(format!("  {carrier} - {other}: {} points on `{carrier}`, whose mesh is finer or alike", pair.len()));
+    }
+    for chosen in built.options.iter().take(LISTED) {
+        // PETSc's table has the options of a solver only while they are lent to it
+        let all = chosen.lend(session, || session.options().all())?;
+        let prefix = format!("-{}_", chosen.prefix());
+        let own = all.into_iter().filter(|(name, _)| name.starts_with(&prefix));
+        let own: Vec<String> =
+            own.map(|(name, value)| value.map_or(name.clone(), |value| format!("{name} {value}"))).collect();
+        lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
+    }
+    Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
+        let a = Variation::parse("method.gamma=0.3, 0.6").expect("two numbers");
+        assert_eq!((a.key.as_str(), &a.values[..]), ("method.gamma", &["0.3".to_owned(), "0.6".to_owned()][..]));
+        let b = Variation::parse("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
+        assert_eq!(b.values, ["\"max(x, 1)\"", "0"]);
+        assert!(Variation::parse("method.gamma").is_err() && Variation::parse("method.gamma=1,,2").is_err());
+        let runs = combinations(&[a, b]);
+        assert_eq!(runs.len(), 4);
+        assert_eq!(runs[1], ["0.3", "0"]);
+    }
 }

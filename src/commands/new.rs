@@ -1,4 +1,4 @@
-//! `winkler new`: a small scene that works, with its script, to begin from.
+//! `winkler new`: write a small scene that works, with its script, to begin from.
 
 use crate::error::{Error, Kind, Result};
 use crate::output::{make_folder, say};
@@ -9,11 +9,10 @@ use std::path::Path;
 const PLANE: [&str; 2] = [include_str!("new/plane.toml"), include_str!("new/plane.geo")];
 const SPACE: [&str; 2] = [include_str!("new/space.toml"), include_str!("new/space.geo")];
 
-/// Writes a scene and its script into the folder `folder`, whose last word names the scene; returns the exit code. Files that are there
-/// stay as they are.
+/// Write a scene and its script into `folder`, whose last word names the scene, and return the exit code. Existing files are not replaced.
 ///
 /// # Errors
-/// A folder without a name or with one that is no file name, files that are there or cannot be written.
+/// A folder without a name or with one that is no file name, files that exist or cannot be written.
 pub fn new(folder: &Path, in_space: bool) -> Result<i32> {
     let name = folder.file_name().and_then(|name| name.to_str()).filter(|name| !name.contains(['"', '\\']));
     let Some(name) = name else {
@@ -35,8 +34,8 @@ pub fn new(folder: &Path, in_space: bool) -> Result<i32> {
         };
         write().map_err(|cause| Error::file(&path, "write", &cause))?;
     }
-    let scene = folder.join("scene.toml");
-    let scene = scene.display();
+    let path = folder.join("scene.toml");
+    let scene = path.display();
     say(format_args!("{scene} and {name}.geo are there. Next:\n  winkler check {scene}\n  winkler solve {scene}"))?;
     Ok(0)
 }

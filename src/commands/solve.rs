@@ -1,24 +1,25 @@
-//! `winkler solve`: one scene, one run, all its results.
+//! `winkler solve`: solve one scene and write all its results.
 
 use super::adapt::Plan;
 use super::checkpoint::{self, Checkpoint};
-use super::typed::{Manner, SceneArgs, flags};
-use super::write::{Writing, to_json};
-use super::{folder_of, load, said, series};
+use super::write::{ResultFiles, to_json};
+use super::{SceneArgs, VerbosityArgs, clock_with_phases, decisions, flags, folder_of, load, series};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::exchange::share;
 use crate::interrupt::Interrupt;
 use crate::output::progress::Line;
-use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, StepTable, Verbosity, say};
+use crate::output::{
+    Checksums, Folder, HistoryWriter, IterationTable, Report, StepTable, Verbosity, say, warning_lines,
+};
 use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
 use crate::run::asking::{is_snapshot, signal};
-use crate::run::{self, All, Asking, Built, Clock, Done, Keep, Ready, measure, report};
+use crate::run::{self, All, Asking, Clock, Done, Keep, Ready, measure, report};
 use std::path::{Path, PathBuf};
 
-/// What the user typed.
+/// The command line of `winkler solve`.
 #[derive(clap::Args)]
 pub struct Request {
     #[command(flatten)]
@@ -42,10 +43,11 @@ pub struct Request {
     #[arg(long, value_name = "DIR")]
     restart: Option<PathBuf>,
     #[command(flatten)]
-    manner: Manner,
+    verbosity: VerbosityArgs,
 }
 
 impl Request {
+    /// Return all overrides of the scene.
     fn overrides(&self) -> Vec<String> {
         let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
         let checkpoint = self.checkpoint.iter().map(|minutes| format!("--checkpoint {minutes}"));
@@ -53,42 +55,53 @@ impl Request {
     }
 }
 
-/// Solves a scene, writes its results and returns the exit code.
+/// Solve a scene, write its results and return the exit code.
 ///
 /// # Errors
-/// Everything that keeps the run from starting, and failures of the file system. Not converging is an exit code, and all
-/// that was computed is written.
+/// Everything that keeps the run from starting, and failures of the file system. A run that does not converge is no error: it has an exit code
+/// of its own, and all that was computed is written.
 pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let first = session.rank() == 0;
-    let (json, verbosity) = (request.scene.json, request.manner.verbosity());
+    let (json, verbosity) = (request.scene.json, request.verbosity.verbosity());
     let is_loud = first && !json && verbosity != Verbosity::Quiet;
-    let mut clock = said::watched(is_loud);
+    let mut clock = clock_with_phases(is_loud);
     let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
-    let kept = agree(session, request.restart.as_ref().map(read).transpose())?;
+    let checkpoint = agree(session, request.restart.as_ref().map(read).transpose())?;
     let folder = agree(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
-    let mut plan = Plan::new(session, scene, kept, interrupt, &mut clock)?;
-    // one rank has the clock
+    let mut plan = Plan::new(session, scene, checkpoint, interrupt, &mut clock)?;
+    // only one rank measures the time between checkpoints
     let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
-    let saved =
+    let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
-    let solving = Solving { session, interrupt, asking: &asking, folder: &folder, first, json, verbosity, is_loud };
-    let mut solving = Rounds { of: solving, clock, saved, has_begun: false, unwritten: Vec::new() };
+    let mut solver = Solver {
+        session,
+        interrupt,
+        asking: &asking,
+        folder: &folder,
+        first,
+        json,
+        verbosity,
+        is_loud,
+        clock,
+        has_checkpoint,
+        has_tables: false,
+        unwritten: Vec::new(),
+    };
     let last = loop {
-        let round = solving.solve(&mut plan)?;
-        if !plan.goes_on(session, &round.done, round.estimate.as_ref(), &mut solving.clock)? {
+        let round = solver.solve(&mut plan)?;
+        if !plan.advance(session, &round.done, round.estimate.as_ref(), &mut solver.clock)? {
             break round;
         }
         if plan.adapts() {
-            solving.keep(&plan, round);
+            solver.write_round(&plan, round);
         }
     };
-    solving.finish(&plan, last)
+    solver.finish(&plan, last)
 }
 
-/// What does not change from mesh to mesh.
-#[derive(Clone, Copy)]
-struct Solving<'s> {
+/// The state of the command over its rounds, one for each mesh.
+struct Solver<'s> {
     session: &'s Session,
     interrupt: &'s Interrupt,
     asking: &'s Asking,
@@ -97,22 +110,18 @@ struct Solving<'s> {
     first: bool,
     json: bool,
     verbosity: Verbosity,
+    /// Whether this rank prints progress on the terminal.
     is_loud: bool,
-}
-
-/// The rounds of a run, one a mesh.
-struct Rounds<'s> {
-    of: Solving<'s>,
     clock: Clock,
     /// Whether the folder has a checkpoint of this run.
-    saved: bool,
+    has_checkpoint: bool,
     /// Whether the folder has the tables of this run.
-    has_begun: bool,
-    /// What could not be written of earlier meshes, in words.
+    has_tables: bool,
+    /// Messages about files of earlier meshes that could not be written.
     unwritten: Vec<String>,
 }
 
-/// A round that has ended.
+/// A round that has ended: the solution on one mesh.
 struct Round {
     done: Done,
     estimate: Option<Estimate>,
@@ -120,126 +129,124 @@ struct Round {
     tables: Result<()>,
 }
 
-impl Rounds<'_> {
-    /// Solves on the next mesh of the plan, and estimates the error.
+impl Solver<'_> {
+    /// Solve on the next mesh of the plan, and estimate the error.
     fn solve(&mut self, plan: &mut Plan) -> Result<Round> {
-        let Solving { session, interrupt, asking, folder, first, verbosity, is_loud, .. } = self.of;
+        let Self { session, interrupt, folder, .. } = *self;
         let built = plan.build(session, interrupt, &mut self.clock)?;
         let begin = agree(session, plan.begin(&built))?;
         let ready = run::set_up(session, built, begin, &mut self.clock)?;
         let all = session.options().all()?;
-        let monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
-        if verbosity == Verbosity::Verbose {
-            let decided = said::decisions(session, &ready)?;
-            decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}"));
+        let is_monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
+        if self.verbosity == Verbosity::Verbose {
+            let decisions = decisions(session, &ready)?;
+            decisions.iter().filter(|_| self.first).for_each(|line| eprintln!("{line}"));
         }
-        let (history, steps) = self.open_tables(&ready)?;
+        let tables = self.open_tables(&ready)?;
         let stop = &plan.scene.method.stop;
-        let mut watchers = Watchers {
-            table: IterationTable::new(is_loud && !monitored, &run::targets(&plan.scene), stop.residual),
-            history,
-            steps,
+        let mut watcher = Watcher {
+            table: IterationTable::new(self.is_loud && !is_monitored, &run::targets(&plan.scene), stop.residual),
+            tables,
             folder,
-            asking,
+            asking: self.asking,
             session,
-            path: folder.path(),
             plan,
             clock: self.clock.clone(),
-            saved: self.saved,
-            failed: Vec::new(),
+            has_checkpoint: self.has_checkpoint,
+            unwritten: Vec::new(),
         };
         let stage = session.stage("iterate");
-        let mut done = run::iterate(ready, interrupt, &mut watchers, &mut self.clock)?;
+        let mut done = run::iterate(ready, interrupt, &mut watcher, &mut self.clock)?;
         drop(stage);
-        done.warnings.append(&mut watchers.failed);
+        done.warnings.append(&mut watcher.unwritten);
         done.warnings.extend(self.unwritten.drain(..).map(|what| format!("of an earlier mesh: {what}")));
-        self.saved = watchers.saved;
+        self.has_checkpoint = watcher.has_checkpoint;
         let stage = session.stage("estimate");
         let mut estimate = run::estimate(&mut done, &mut self.clock)?;
         drop(stage);
-        watchers.table.finish();
-        let tables = watchers.history.map_or(Ok(()), |history| history.finish());
-        let tables = tables.and(watchers.steps.map_or(Ok(()), |steps| steps.finish()));
-        estimate.iter_mut().for_each(|estimate| plan.hold(&done, estimate));
+        watcher.table.finish();
+        let tables = watcher.tables.finish();
+        estimate.iter_mut().for_each(|estimate| plan.correct(&done, estimate));
         Ok(Round { done, estimate, tables })
     }
 
-    /// The tables of a round. Those of a later mesh are worth less than its results, so that the run goes on without them.
-    fn open_tables(&mut self, ready: &Ready) -> Result<(Option<HistoryWriter>, Option<StepTable>)> {
-        let Solving { folder, first, .. } = self.of;
-        // all refusals are behind: from here on the folder has this run alone
-        if first && !self.has_begun {
-            begin_in(folder, self.saved)?;
+    /// Open the tables of a round. If those of a later mesh cannot be written, the run goes on without them, since its results are worth more.
+    fn open_tables(&mut self, ready: &Ready) -> Result<Tables> {
+        if !self.first {
+            return Ok(Tables::default());
         }
-        let has_begun = std::mem::replace(&mut self.has_begun, true);
-        match tables(folder, ready, first) {
-            Err(error) if has_begun => {
+        // nothing can be refused any more: from here on the folder has this run alone
+        if !self.has_tables {
+            prepare_folder(self.folder, self.has_checkpoint)?;
+        }
+        let is_later = std::mem::replace(&mut self.has_tables, true);
+        match Tables::open(self.folder, ready) {
+            Err(error) if is_later => {
                 self.unwritten.push(error.message().to_owned());
-                Ok((None, None))
+                Ok(Tables::default())
             }
             opened => opened,
         }
     }
 
-    /// Writes the results of a mesh that is not the last: whatever comes of the next one, they are there.
-    fn keep(&mut self, plan: &Plan, Round { done, estimate, tables }: Round) {
-        let (session, path) = (self.of.session, self.of.folder.path());
+    /// Write the results of a mesh that is not the last, so that they exist whatever happens on the next mesh.
+    fn write_round(&mut self, plan: &Plan, Round { done, estimate, tables }: Round) {
+        let (session, path) = (self.session, self.folder.path());
         let estimate = estimate.as_ref();
-        let writing = Writing { session, path, plan, done: &done, estimate, fields: false, is_last: false };
+        let files = ResultFiles { session, path, plan, done: &done, estimate, fields: false, is_last: false };
         let ended = match plan.is_stepping() {
             true => "ended while load steps were at work on the last mesh",
             false => "ended while the next mesh was at work: the error asked for is not reached",
         };
-        let (_, written) = writing.all(&mut self.clock, |report| {
+        let (_, written) = files.write(&mut self.clock, |report| {
             (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
         });
-        // what cannot be written now may find room at the end, and what was computed goes on
+        // the run goes on with what it computed: a disk that is full now may have room at the end
         if let Err(error) = tables.and(written) {
             self.unwritten.push(error.message().to_owned());
         }
     }
 
-    /// Writes all results of the last mesh, and returns the exit code.
+    /// Write all results of the last mesh, and return the exit code.
     fn finish(mut self, plan: &Plan, Round { done, estimate, tables }: Round) -> Result<i32> {
-        let Solving { session, folder, first, is_loud, .. } = self.of;
+        let Self { session, folder, first, is_loud, .. } = self;
         let path = folder.path();
         let line = is_loud.then(|| Line::new("stresses and files", None));
         let estimate = estimate.as_ref();
-        let writing = Writing { session, path, plan, done: &done, estimate, fields: true, is_last: true };
-        let (report, written) = writing.all(&mut self.clock, |report| {
+        let files = ResultFiles { session, path, plan, done: &done, estimate, fields: true, is_last: true };
+        let (report, written) = files.write(&mut self.clock, |report| {
             if let Some(limit) = &plan.limit {
                 report.status = "mesh-limit".to_owned();
                 report.message = format!("the error asked for is not reached: {limit}");
             }
         });
         let written = match plan.scene.output.report {
-            true => written.and(page(&done, path, first)),
+            true => written.and(write_page(&done, path, first)),
             false => written,
         };
         drop(line);
         let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
         if first {
-            if self.saved && code == 0 {
-                // nothing is left to go on from; one that is gone already is as well
+            if self.has_checkpoint && code == 0 {
+                // nothing is left to go on with; it is no failure if the file is gone already
                 let _ = std::fs::remove_file(path.join(checkpoint::FILE));
             }
-            self.say(&report, &done, code)?;
+            self.print(&report, &done, code)?;
         }
         tables.and(written)?;
-        agree(session, if first { plan.keep_mesh(&done) } else { Ok(()) })?;
+        agree(session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
         Ok(code)
     }
 
-    /// Says how the run ended.
-    fn say(&self, report: &Report, done: &Done, code: i32) -> Result<()> {
-        let Solving { json, verbosity, folder, .. } = self.of;
-        if json {
+    /// Print how the run ended.
+    fn print(&self, report: &Report, done: &Done, code: i32) -> Result<()> {
+        if self.json {
             return say(to_json(report)?.trim_end());
         }
-        let again = if self.saved && code > 1 { "; --restart with this folder goes on" } else { "" };
-        let results = format!("  results in {}{again}", folder.path().display());
-        if verbosity == Verbosity::Quiet {
-            return say(said::briefly(report, code, &results));
+        let again = if self.has_checkpoint && code > 1 { "; --restart with this folder goes on" } else { "" };
+        let results = format!("  results in {}{again}", self.folder.path().display());
+        if self.verbosity == Verbosity::Quiet {
+            return say(brief_summary(report, code, &results));
         }
         let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
         let (solvers, choice) = (report::solvers_in_words(&solvers), &done.built.choice);
@@ -247,14 +254,23 @@ impl Rounds<'_> {
     }
 }
 
-/// Takes the folder of results for this run, on the first rank, which writes its tables.
+/// Return the text of a run with `-q`: how it ended if it is not solved, its warnings, and where the results are.
+fn brief_summary(report: &Report, code: i32, results: &str) -> String {
+    let ended = (code != 0).then(|| format!("{}: {}", report.title, report.message));
+    let warnings = warning_lines(&report.warnings, "report.json");
+    ended.into_iter().chain(warnings).chain([results.to_owned()]).collect::<Vec<_>>().join("\n")
+}
+
+/// Take the folder of results for this run. The first rank, which writes its tables, locks it.
 pub(super) fn claim(session: &Session, path: PathBuf) -> Result<Folder> {
     if session.rank() == 0 { Folder::claim(path) } else { Folder::create(path) }
 }
 
-/// Lets a folder have no results but those of the run that begins. A run that `goes_on` from the checkpoint there is the one whose files it
-/// has; another checkpoint is set aside, since hours of work may be in it.
-fn begin_in(folder: &Folder, goes_on: bool) -> Result<()> {
+/// Remove the results of other runs from the folder.
+///
+/// If this run `goes_on` from the checkpoint in the folder, the results are its own and stay. Another checkpoint is renamed, since hours of work
+/// may be in it.
+fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
     Checksums::withdraw(folder.path());
     if goes_on {
         return Ok(());
@@ -268,59 +284,66 @@ fn begin_in(folder: &Folder, goes_on: bool) -> Result<()> {
     }
 }
 
-/// Writes the page of the results when all ranks have written their fields. Collective.
-fn page(done: &Done, path: &Path, first: bool) -> Result<()> {
+/// Write the page of the results when all ranks have written their fields. Collective.
+fn write_page(done: &Done, path: &Path, first: bool) -> Result<()> {
     share(&*done.model().exchange, ());
     if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 
-/// The tables that grow, on the rank that writes them.
-fn tables(folder: &Folder, ready: &Ready, writes: bool) -> Result<(Option<HistoryWriter>, Option<StepTable>)> {
-    if !writes {
-        return Ok((None, None));
-    }
-    Ok((Some(history(folder, &ready.built)?), steps(folder, ready)?))
-}
-
-fn history(folder: &Folder, built: &Built) -> Result<HistoryWriter> {
-    let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-    HistoryWriter::create(folder, &names, !built.scene.method.steps.is_empty())
-}
-
-/// The table of load steps, if there are any, with those of another process.
-fn steps(folder: &Folder, ready: &Ready) -> Result<Option<StepTable>> {
-    let (built, history) = (&ready.built, &ready.built.scene.method.steps);
-    if history.is_empty() {
-        return Ok(None);
-    }
-    let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
-    let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
-    let mut table = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
-    ready.steps.iter().for_each(|step| table.row(&history.names, step));
-    Ok(Some(table))
-}
-
-/// Table and file of the iterations of a round, what is asked meanwhile, and its checkpoints and snapshots.
-struct Watchers<'a> {
-    table: IterationTable,
+/// The tables that grow while a round iterates. They are open only on the rank that writes.
+#[derive(Default)]
+struct Tables {
+    /// Rows of the iterations.
     history: Option<HistoryWriter>,
+    /// Rows of the load steps, if there are any.
     steps: Option<StepTable>,
+}
+
+impl Tables {
+    /// Open the tables of a round. The table of load steps begins with those of another process.
+    fn open(folder: &Folder, ready: &Ready) -> Result<Self> {
+        let (built, history) = (&ready.built, &ready.built.scene.method.steps);
+        let bodies: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
+        let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
+        let mut tables = Self { history: Some(rows), steps: None };
+        if !history.is_empty() {
+            let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
+            let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
+            let mut steps = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
+            ready.steps.iter().for_each(|step| steps.row(&history.names, step));
+            tables.steps = Some(steps);
+        }
+        Ok(tables)
+    }
+
+    fn finish(self) -> Result<()> {
+        let history = self.history.map_or(Ok(()), |history| history.finish());
+        history.and(self.steps.map_or(Ok(()), |steps| steps.finish()))
+    }
+}
+
+/// The observer of a round: it writes iterations and load steps to the terminal and to tables, passes requests of the user on, and writes
+/// checkpoints and snapshots.
+struct Watcher<'a> {
+    /// The table on the terminal.
+    table: IterationTable,
+    /// The tables in files.
+    tables: Tables,
     folder: &'a Folder,
     asking: &'a Asking,
     session: &'a Session,
-    path: &'a Path,
     plan: &'a Plan,
     clock: Clock,
     /// Whether the folder has a checkpoint of this run.
-    saved: bool,
-    /// What could not be written, in words.
-    failed: Vec<String>,
+    has_checkpoint: bool,
+    /// Messages about files that could not be written.
+    unwritten: Vec<String>,
 }
 
-impl Observer for Watchers<'_> {
+impl Observer for Watcher<'_> {
     fn row(&mut self, row: &Row) {
         self.table.row(row);
-        if let Some(history) = &mut self.history {
+        if let Some(history) = &mut self.tables.history {
             history.row(row);
             history.complaint().iter().for_each(|text| self.table.warn(text));
         }
@@ -331,32 +354,32 @@ impl Observer for Watchers<'_> {
     }
 }
 
-impl Watchers<'_> {
-    /// Notes a failure once: a disk that is full now may have room later.
+impl Watcher<'_> {
+    /// Note a failure to write, each message once. The run goes on: a disk that is full now may have room later.
     fn note_failure(&mut self, what: &str, written: Result<()>) {
         if let Err(error) = written {
             let text = format!("{what} was not written: {}", error.message());
-            if !self.failed.contains(&text) {
-                self.failed.push(text);
+            if !self.unwritten.contains(&text) {
+                self.unwritten.push(text);
             }
         }
     }
 }
 
-impl Keep for Watchers<'_> {
+impl Keep for Watcher<'_> {
     fn state(&mut self, done: &Done) {
         let Status::Paused { asked } = done.outcome.status else { return };
         let is_due = signal(asked).is_some() || !is_snapshot(asked);
         let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
-        let written = Checkpoint::write(self.path, head, done, self.session.rank() == 0);
-        self.saved |= written.is_ok();
+        let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
+        self.has_checkpoint |= written.is_ok();
         self.note_failure("a checkpoint", written);
     }
 
     fn step(&mut self, done: &Done, recovered: &All) {
         let scene = &done.built.scene;
         let history = &scene.method.steps;
-        if let (Some(table), Some(step)) = (&mut self.steps, done.steps.last()) {
+        if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
             table.row(&history.names, step);
             table.complaint().iter().for_each(|text| self.table.warn(text));
         }
@@ -368,9 +391,10 @@ impl Keep for Watchers<'_> {
     }
 
     fn results(&mut self, done: &mut Done) {
-        let Self { session, path, plan, .. } = *self;
-        let writing = Writing { session, path, plan, done, estimate: None, fields: true, is_last: false };
-        let (_, written) = writing.all(&mut self.clock.clone(), |_| {});
+        let Self { session, plan, .. } = *self;
+        let path = self.folder.path();
+        let files = ResultFiles { session, path, plan, done, estimate: None, fields: true, is_last: false };
+        let (_, written) = files.write(&mut self.clock.clone(), |_| {});
         self.note_failure("a snapshot", written);
     }
 }

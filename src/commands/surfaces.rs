@@ -1,4 +1,4 @@
-//! What `check` says of measured surfaces and of the layers made of them.
+//! What `check` prints and draws of measured surfaces and of the layers made from them.
 
 use crate::data::{Data, Roughness};
 use crate::discretize::resolution::{Resolution, resolution};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Data in the gap of a contact, or in its layer.
+/// Return the data in the gap of a contact and in its layer.
 fn of_contact(built: &Built, spec: &ContactSpec) -> Vec<Arc<Data>> {
     let mut data: Vec<Arc<Data>> = spec.gap.data().cloned().collect();
     match &spec.layer {
@@ -25,19 +25,19 @@ fn of_contact(built: &Built, spec: &ContactSpec) -> Vec<Arc<Data>> {
     data
 }
 
-/// Data of all contacts, each once, by name.
+/// Return the data of all contacts, each once, by name.
 fn in_contacts(built: &Built) -> BTreeMap<String, Arc<Data>> {
     let contacts = built.discrete.contacts.iter();
     let data = contacts.flat_map(|info| of_contact(built, &info.spec));
     data.map(|data| (data.spec.name.clone(), data)).collect()
 }
 
-/// Lines on the data of contacts.
-pub fn lines(built: &Built) -> Vec<String> {
-    in_contacts(built).values().flat_map(|data| of_data(data)).collect()
+/// Return the lines that describe the data of contacts.
+pub fn data_lines(built: &Built) -> Vec<String> {
+    in_contacts(built).values().flat_map(|data| lines_of_data(data)).collect()
 }
 
-fn of_data(data: &Data) -> Vec<String> {
+fn lines_of_data(data: &Data) -> Vec<String> {
     let (name, file) = (&data.spec.name, data.spec.file.display());
     let Some(grid) = data.grid() else { return vec![format!("  data {name}: {file}, points on no regular grid")] };
     let counts: Vec<String> =
@@ -72,8 +72,8 @@ fn of_data(data: &Data) -> Vec<String> {
     lines
 }
 
-/// How the mesh follows the gap of a pair; none where no data are in it.
-fn followed(built: &Built, pair: usize) -> Option<Resolution> {
+/// Return how well the mesh follows the gap of a pair; none for a gap without data.
+fn gap_resolution(built: &Built, pair: usize) -> Option<Resolution> {
     let info = &built.discrete.contacts[pair];
     let spacing = |data: &Arc<Data>| {
         let axes = data.grid().map_or(&[][..], |grid| &grid.axes);
@@ -83,10 +83,10 @@ fn followed(built: &Built, pair: usize) -> Option<Resolution> {
     Some(resolution(&info.surface, &info.spec.gap, detail))
 }
 
-/// Lines on a pair: what its mesh leaves out of a measured gap, and its layer if that is made of asperities.
-pub fn of_pair(built: &Built, pair: usize) -> Vec<String> {
+/// Return the lines that describe what the mesh of a pair leaves out of a measured gap, and the pair's layer if that is made of asperities.
+pub fn pair_lines(built: &Built, pair: usize) -> Vec<String> {
     let mut lines = Vec::new();
-    lines.extend(followed(built, pair).map(|Resolution { height, variance, area, side }| {
+    lines.extend(gap_resolution(built, pair).map(|Resolution { height, variance, area, side }| {
         format!(
             "    the gap has an rms height of {}; facets with sides of {} leave out {:.1} % of its variance, and more than a tenth of \
              the rms height on {:.1} % of the surface",
@@ -108,11 +108,12 @@ pub fn of_pair(built: &Built, pair: usize) -> Vec<String> {
     lines
 }
 
-/// Rows of a law that are printed: for a look, beside the other lines of a pair.
+/// Rows of a law that are printed, few beside the other lines of a pair.
 const SHOWN: usize = 8;
-/// Points of a law that are drawn: straight pieces of four pixels look like a curve.
+/// Points of a law that are drawn. Straight lines of four pixels look like a curve.
 const DRAWN: usize = 200;
 
+/// Return the text that describes a layer of asperities.
 fn described(spec: &AsperitySpec) -> String {
     let heights = match &spec.depths {
         Depths::Normal { deviation, highest } => {
@@ -128,7 +129,8 @@ fn described(spec: &AsperitySpec) -> String {
     )
 }
 
-/// Compressions, pressures and tangents of a pair's law up to that where the mean plane of the summits is met.
+/// Return `count` compressions of a pair's law, each with its pressure and tangent. The last compression is that at which the mean plane of
+/// the summits is in contact.
 fn law(built: &Built, pair: usize, spec: &AsperitySpec, count: usize) -> Vec<[f64; 3]> {
     let law = &built.discrete.model.pairs[pair].law;
     let end = match &spec.depths {
@@ -144,28 +146,29 @@ fn law(built: &Built, pair: usize, spec: &AsperitySpec, count: usize) -> Vec<[f6
     (1..=count).map(at).collect()
 }
 
-/// All of it for `--json`: of the data, and of each pair.
-pub fn json(built: &Built) -> (Value, Vec<Value>) {
-    let data = in_contacts(built);
-    let data = data.values().filter_map(|data| {
+/// Return the roughness of the data of contacts by name, for `--json`. Only data on regular grids have it.
+pub fn data_to_json(built: &Built) -> Value {
+    let data = in_contacts(built).into_iter();
+    data.filter_map(|(name, data)| {
         let Roughness { range, height, slope, curvature } = data.grid()?.roughness();
-        let value = json!({ "range": range, "rms_height": height, "rms_slope": slope, "rms_curvature": curvature });
-        Some((data.spec.name.clone(), value))
-    });
-    let pair = |pair: usize| {
-        let followed = followed(built, pair).map(|Resolution { height, variance, area, side }| {
-            json!({ "rms_height": height, "variance_left_out": variance, "area_left_out": area, "side": side })
-        });
-        let table = match &built.discrete.contacts[pair].spec.layer {
-            LayerSpec::Asperities(spec) => Some(law(built, pair, spec, SHOWN)),
-            _ => None,
-        };
-        json!({ "gap_followed": followed, "law": table })
-    };
-    (Value::Object(data.collect()), (0..built.discrete.contacts.len()).map(pair).collect())
+        Some((name, json!({ "range": range, "rms_height": height, "rms_slope": slope, "rms_curvature": curvature })))
+    })
+    .collect()
 }
 
-/// Draws the data of contacts and their laws into a folder.
+/// Return the resolution of a pair's gap and the table of its law, for `--json`.
+pub fn pair_to_json(built: &Built, pair: usize) -> Value {
+    let resolution = gap_resolution(built, pair).map(|Resolution { height, variance, area, side }| {
+        json!({ "rms_height": height, "variance_left_out": variance, "area_left_out": area, "side": side })
+    });
+    let table = match &built.discrete.contacts[pair].spec.layer {
+        LayerSpec::Asperities(spec) => Some(law(built, pair, spec, SHOWN)),
+        _ => None,
+    };
+    json!({ "gap_followed": resolution, "law": table })
+}
+
+/// Draw the data of contacts and their laws into a folder.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -196,7 +199,7 @@ pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
     Ok(())
 }
 
-/// Heights along the lines through the middle of a grid.
+/// Return the plot of the heights along the lines through the middle of a grid; none for data on no grid.
 fn profiles(data: &Data, built: &Built) -> Option<Plot> {
     let grid = data.grid()?;
     let [columns, rows] = grid.axes.map(|axis| axis.count);

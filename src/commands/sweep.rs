@@ -1,9 +1,11 @@
-//! `winkler sweep`: a scene over values of its keys, one row a run.
+//! `winkler sweep`: solve a scene for every combination of values of its keys, one row of a table for each run.
+//!
+//! A run takes over what it can from the run before it. The stiffness matrix of a body does not depend on method, layers, gaps and the values
+//! of loads and supports: then a condensed body is reused. Where only the method changes, the whole problem is reused.
 
 use super::solve::claim;
-use super::typed::{Manner, SceneArgs};
-use super::write::to_json;
-use super::{curves, folder_of, reuse, said};
+use super::write::{convergence_curve, pressure_curve, pressure_plot, reference_curve, to_json};
+use super::{SceneArgs, Variation, VerbosityArgs, combinations, decisions, folder_of};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
@@ -11,15 +13,20 @@ use crate::output::steps::{contact_column, vector_columns, vector_fields};
 use crate::output::{
     ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
 };
-use crate::parallel::agree;
+use crate::parallel::{Ranks, agree};
 use crate::petsc::Session;
+use crate::problem::method::{MethodName, MethodSpec};
 use crate::run::words::numbered;
-use crate::run::{self, Asking, Begin, Built, Clock, Keep, measure, report, results};
+use crate::run::{self, Asking, Begin, Built, Clock, Done, Keep, Ready, measure, report, results};
+use crate::scene::Scene;
+use crate::solver::options;
+use indicatif::ProgressBar;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// What the user typed.
+/// The command line of `winkler sweep`.
 #[derive(clap::Args)]
 pub struct Request {
     #[command(flatten)]
@@ -31,112 +38,89 @@ pub struct Request {
     #[arg(long, value_name = "KEY=V1,V2,...", required = true)]
     over: Vec<String>,
     #[command(flatten)]
-    manner: Manner,
+    verbosity: VerbosityArgs,
 }
 
-/// Runs a scene for every combination of values and writes `sweep.csv`, `convergence.svg` and `pressure.svg`; returns the
-/// exit code: that of a run that did not converge, if there is one. The run that a signal ends is the last.
+/// Solve a scene for every combination of values, and write `sweep.csv`, `convergence.svg` and `pressure.svg`.
+///
+/// Return the exit code: that of a run that did not converge, if there is one. A signal ends the sweep with the run under way.
 ///
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
 pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let axes = agree(session, request.over.iter().map(|text| axis(text)).collect::<Result<Vec<_>>>())?;
-    let runs = combinations(&axes);
-    let load = |values: &[String]| {
-        let mut overrides = request.scene.overrides();
-        overrides.extend(values.iter().zip(&axes).map(|(value, (key, _))| format!("--over {key}={value}")));
-        crate::scene::load(&request.scene.scene, &overrides).map(Rc::new)
-    };
-    let scenes = agree(session, runs.iter().map(|values| load(values)).collect::<Result<Vec<_>>>())?;
+    let variations =
+        agree(session, request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>())?;
+    let cases = agree(session, cases(request, &variations))?;
+    let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
-    let folder = agree(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
-    let first = session.rank() == 0;
-    let (mut table, mut columns) = (None::<RowFile>, None);
-    let mut exit = 0;
-    let (mut reports, mut histories, mut pressures, mut reference) = (Vec::new(), Vec::new(), Pressures::new(), None);
-    // the same pairs of all runs
-    let mut shown = None;
-    let mut before = None;
-    let mut watched = Watched(Asking::new(interrupt, None));
-    let (json, verbosity) = (request.scene.json, request.manner.verbosity());
-    let is_loud = first && !json && verbosity != Verbosity::Quiet;
-    let bar = progress::runs(runs.len(), is_loud);
-    for (scene, values) in scenes.iter().zip(&runs) {
+    let folder = agree(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
+    let (json, verbosity) = (request.scene.json, request.verbosity.verbosity());
+    let is_loud = session.rank() == 0 && !json && verbosity != Verbosity::Quiet;
+    let bar = progress::runs(cases.len(), is_loud);
+    let mut sweep = Sweep { session, interrupt, verbosity, is_loud, json, folder, bar, columns: None, table: None };
+    let mut watcher = Watcher(Asking::new(interrupt, None));
+    let (mut results, mut exit, mut before) = (Results::default(), 0, None);
+    for case in &cases {
         let mut clock = Clock::default();
-        bar.set_message(label(&axes, values));
-        let built = reuse::build(session, scene.clone(), before.take(), interrupt, &mut clock)?;
-        let header = header(&axes, &built);
-        agree(session, same(columns.get_or_insert_with(|| header.clone()), &header, &label(&axes, values)))?;
-        let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
-        if first && table.is_none() {
-            // before anything is computed that could be lost
-            folder.clear()?;
-            table = Some(RowFile::create(&folder, "sweep.csv", &header, &[])?);
-        }
-        if verbosity == Verbosity::Verbose {
-            let decided = said::decisions(session, &ready)?;
-            bar.suspend(|| decided.iter().filter(|_| first).for_each(|line| eprintln!("{line}")));
-        }
-        let done = run::iterate(ready, interrupt, &mut watched, &mut clock)?;
+        sweep.bar.set_message(case.label.clone());
+        let ready = sweep.prepare(&variations, case, before.take(), &mut clock)?;
+        let done = run::iterate(ready, interrupt, &mut watcher, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
         exit = exit.max(report::exit_code(&done));
-        let interrupted = matches!(done.outcome.status, Status::Paused { .. });
-        if !first {
-            if interrupted {
-                break;
-            }
-            before = Some(done);
-            continue;
+        if session.rank() == 0 {
+            sweep.print_row(case, &done, &report)?;
+            results.add(case, &done, report);
         }
-        let label = label(&axes, values);
-        if let Some(table) = &mut table {
-            table.push(&line(values, &report, scene.dimension.value));
-            table.complaint().iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
-        }
-        bar.inc(1);
-        // with `-q` runs that are solved say nothing
-        if is_loud || (!json && report::exit_code(&done) != 0) {
-            let (status, iterations) = (&report.status, report.iterations);
-            let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
-            bar.suspend(|| say(format_args!("{label}: {status}, {iterations} iterations, residual {residual}")))?;
-        }
-        histories.push(curves::convergence(&label, &done.outcome));
-        let pairs = &done.model().pairs;
-        let shown = shown.get_or_insert_with(|| busiest(&report.pairs, scenes[0].output.pairs.unwrap_or(LISTED)));
-        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
-            let empty = || curves::pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
-            pressures.entry(i).or_insert_with(empty).series.push(curves::pressure(&label, &done, i));
-            if let Some(curve) = curves::reference(&done.built.discrete, i) {
-                reference.get_or_insert((i, curve));
-            }
-        }
-        reports.push(report);
-        if interrupted {
+        if matches!(done.outcome.status, Status::Paused { .. }) {
             break;
         }
         before = Some(done);
     }
-    bar.finish_and_clear();
-    if first {
-        let mut written = table.map_or(Ok(()), RowFile::finish);
-        if scenes[0].output.plots {
-            written = written.and(plots(&folder, &scenes[0].title, &histories, pressures, reference));
-        }
-        if json {
-            say(to_json(&reports)?.trim_end())?;
-        } else {
-            say(format_args!("results in {}", folder.path().display()))?;
-        }
-        written?;
+    sweep.bar.finish_and_clear();
+    if session.rank() == 0 {
+        sweep.finish(&cases[0].scene, results)?;
     }
     Ok(exit)
 }
 
-/// Nobody looks at the rows of a sweep, but signals are heard.
-struct Watched(Asking);
+/// One run of the sweep.
+struct Case {
+    /// Values of the keys, in the order of the variations.
+    values: Vec<String>,
+    /// The values with their keys, as they are printed.
+    label: String,
+    scene: Rc<Scene>,
+}
 
-impl Observer for Watched {
+/// Load the scenes of all runs.
+fn cases(request: &Request, variations: &[Variation]) -> Result<Vec<Case>> {
+    let case = |values: Vec<String>| {
+        let mut overrides = request.scene.overrides();
+        overrides.extend(
+            variations.iter().zip(&values).map(|(Variation { key, .. }, value)| format!("--over {key}={value}")),
+        );
+        let scene = Rc::new(crate::scene::load(&request.scene.scene, &overrides)?);
+        Ok(Case { label: label(variations, &values), values, scene })
+    };
+    combinations(variations).into_iter().map(case).collect()
+}
+
+/// Return the values with the last words of their keys, or with whole keys where two have the same last word.
+fn label(variations: &[Variation], values: &[String]) -> String {
+    let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+    let parts = variations.iter().zip(values).map(|(Variation { key, .. }, value)| {
+        let is_ambiguous = variations.iter().filter(|other| last(&other.key) == last(key)).count() > 1;
+        let short = if is_ambiguous { key.clone() } else { last(key) };
+        format!("{short} = {value}")
+    });
+    parts.collect::<Vec<_>>().join(", ")
+}
+
+/// An observer that passes signals on, and writes no rows.
+struct Watcher(Asking);
+
+impl Observer for Watcher {
     fn row(&mut self, _row: &Row) {}
 
     fn asked(&self) -> u8 {
@@ -144,61 +128,90 @@ impl Observer for Watched {
     }
 }
 
-impl Keep for Watched {}
+impl Keep for Watcher {}
 
-/// One `--over`: key and values. Commas inside brackets, braces, parentheses or quotes do not separate.
-pub(super) fn axis(text: &str) -> Result<(String, Vec<String>)> {
-    let refuse = || {
-        Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
-            .help("for example --over method.gamma=0.3,0.6,0.9")
-    };
-    let (key, list) = text.split_once('=').ok_or_else(refuse)?;
-    let mut values = vec![String::new()];
-    let (mut depth, mut quote) = (0, None);
-    for c in list.chars() {
-        match (quote, c) {
-            (None, '"' | '\'') => quote = Some(c),
-            (Some(open), c) if c == open => quote = None,
-            (None, '[' | '{' | '(') => depth += 1,
-            (None, ']' | '}' | ')') => depth -= 1,
-            (None, ',') if depth == 0 => {
-                values.push(String::new());
-                continue;
-            }
-            _ => {}
+/// The sweep under way: what it prints and the table that it writes.
+struct Sweep<'a> {
+    session: &'a Session,
+    interrupt: &'a Interrupt,
+    verbosity: Verbosity,
+    /// Whether this rank prints progress on the terminal.
+    is_loud: bool,
+    json: bool,
+    folder: Folder,
+    bar: ProgressBar,
+    /// Columns of the table, from the first run on.
+    columns: Option<Vec<String>>,
+    /// `sweep.csv`, on the first rank and from the first run on.
+    table: Option<RowFile>,
+}
+
+impl Sweep<'_> {
+    /// Build the problem of a run, with what the run before has left, and set up its method. Collective.
+    ///
+    /// # Errors
+    /// Refusals of the problem; a run whose row would have other columns than those before; failures of the file system.
+    fn prepare(
+        &mut self,
+        variations: &[Variation],
+        case: &Case,
+        before: Option<Done>,
+        clock: &mut Clock,
+    ) -> Result<Ready> {
+        let session = self.session;
+        let built = build(session, case.scene.clone(), before, self.interrupt, clock)?;
+        let header = header(variations, &built);
+        let columns = self.columns.get_or_insert_with(|| header.clone());
+        agree(session, refuse_other_columns(columns, &header, &case.label))?;
+        let ready = run::set_up(session, built, Begin::default(), clock)?;
+        if session.rank() == 0 && self.table.is_none() {
+            // before anything is computed that could be lost
+            self.folder.clear()?;
+            self.table = Some(RowFile::create(&self.folder, "sweep.csv", &header, &[])?);
         }
-        if let Some(value) = values.last_mut() {
-            value.push(c);
+        if self.verbosity == Verbosity::Verbose {
+            let lines = decisions(session, &ready)?;
+            self.bar.suspend(|| lines.iter().filter(|_| session.rank() == 0).for_each(|line| eprintln!("{line}")));
         }
+        Ok(ready)
     }
-    if key.trim().is_empty() || values.iter().any(|value| value.trim().is_empty()) {
-        return Err(refuse());
+
+    /// Write the row of a run to the table, and print how the run ended.
+    fn print_row(&mut self, case: &Case, done: &Done, report: &Report) -> Result<()> {
+        if let Some(table) = &mut self.table {
+            table.push(&line(&case.values, report, case.scene.dimension.value));
+            table.complaint().iter().for_each(|text| self.bar.suspend(|| eprintln!("warning: {text}")));
+        }
+        self.bar.inc(1);
+        // with `-q` only runs that are not solved are printed
+        if self.is_loud || (!self.json && report::exit_code(done) != 0) {
+            let (label, status, iterations) = (&case.label, &report.status, report.iterations);
+            let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
+            self.bar
+                .suspend(|| say(format_args!("{label}: {status}, {iterations} iterations, residual {residual}")))?;
+        }
+        Ok(())
     }
-    Ok((key.trim().to_owned(), values.into_iter().map(|value| value.trim().to_owned()).collect()))
+
+    /// End the table, draw the plots, and print the reports or the folder.
+    fn finish(self, scene: &Scene, results: Results) -> Result<()> {
+        let mut written = self.table.map_or(Ok(()), RowFile::finish);
+        if scene.output.plots {
+            written = written.and(results.write_plots(&self.folder, &scene.title));
+        }
+        if self.json {
+            say(to_json(&results.reports)?.trim_end())?;
+        } else {
+            say(format_args!("results in {}", self.folder.path().display()))?;
+        }
+        written
+    }
 }
 
-pub(super) fn combinations(axes: &[(String, Vec<String>)]) -> Vec<Vec<String>> {
-    axes.iter().fold(vec![Vec::new()], |runs, (_, values)| {
-        runs.iter()
-            .flat_map(|run| values.iter().map(move |value| [run.clone(), vec![value.clone()]].concat()))
-            .collect()
-    })
-}
-
-fn label(axes: &[(String, Vec<String>)], values: &[String]) -> String {
-    let parts = axes.iter().zip(values).map(|((key, _), value)| {
-        let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
-        let ambiguous = axes.iter().filter(|(other, _)| last(other) == last(key)).count() > 1;
-        let short = if ambiguous { key.clone() } else { last(key) };
-        format!("{short} = {value}")
-    });
-    parts.collect::<Vec<_>>().join(", ")
-}
-
-fn header(axes: &[(String, Vec<String>)], built: &Built) -> Vec<String> {
+fn header(variations: &[Variation], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
-    let mut header: Vec<String> = axes.iter().map(|(key, _)| key.clone()).collect();
+    let mut header: Vec<String> = variations.iter().map(|variation| variation.key.clone()).collect();
     let columns = "status iterations sweeps factorizations dense_factorizations inner_iterations residual increment F1 dofs seconds";
     header.extend(columns.split_whitespace().map(str::to_owned));
     for pair in &pairs {
@@ -230,51 +243,145 @@ fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     line
 }
 
-/// Refuses a run, called by its values, whose row would have other columns than those before.
-fn same(columns: &[String], header: &[String], run: &str) -> Result<()> {
+/// Refuse a run, named by its label, whose row would have other columns than those before.
+fn refuse_other_columns(columns: &[String], header: &[String], label: &str) -> Result<()> {
     if columns == header {
         return Ok(());
     }
-    Err(Error::new(Kind::Usage, format!("with {run} the scene has other contacts or supports than in the runs before"))
-        .because("all rows of sweep.csv have the same columns")
-        .help("sweep over values that leave them as they are; the rows so far are kept"))
+    Err(Error::new(
+        Kind::Usage,
+        format!("with {label} the scene has other contacts or supports than in the runs before"),
+    )
+    .because("all rows of sweep.csv have the same columns")
+    .help("sweep over values that leave them as they are; the rows so far are kept"))
 }
 
-/// The pressures of all runs along each pair.
-type Pressures = BTreeMap<usize, Plot>;
-
-fn plots(
-    folder: &Folder,
-    title: &str,
-    histories: &[ConvergenceSeries],
-    pressures: Pressures,
+/// What all runs together are printed and drawn from.
+#[derive(Default)]
+struct Results {
+    reports: Vec<Report>,
+    /// Residual and increment of each run.
+    histories: Vec<ConvergenceSeries>,
+    /// Pairs whose pressures are drawn, the same for all runs.
+    shown: Option<Vec<usize>>,
+    /// The pressures of all runs along each pair.
+    pressures: BTreeMap<usize, Plot>,
+    /// The first reference pressure that the scenes have, with its pair.
     reference: Option<(usize, Series)>,
-) -> Result<()> {
-    let convergence = Plot::convergence(title, histories);
-    folder.write("convergence.svg", |out| convergence.write(out))?;
-    let names = numbered(pressures.iter().map(|_| "pressure".to_owned()));
-    for ((pair, of_pair), name) in pressures.into_iter().zip(names) {
-        let mut curves = of_pair.series;
-        curves.extend(reference.iter().filter(|(index, _)| *index == pair).map(|(_, curve)| curve.clone()));
-        let plot = Plot::pressure(title, &of_pair.x.label, &of_pair.y.label, curves);
-        folder.write(&format!("{name}.svg"), |out| plot.write(out))?;
-    }
-    Ok(())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
-        let a = axis("method.gamma=0.3, 0.6").expect("two numbers");
-        assert_eq!(a, ("method.gamma".to_owned(), vec!["0.3".to_owned(), "0.6".to_owned()]));
-        let b = axis("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
-        assert_eq!(b.1, ["\"max(x, 1)\"", "0"]);
-        assert!(axis("method.gamma").is_err() && axis("method.gamma=1,,2").is_err());
-        let runs = combinations(&[a, b]);
-        assert_eq!(runs.len(), 4);
-        assert_eq!(runs[1], ["0.3", "0"]);
+impl Results {
+    /// Add a run.
+    fn add(&mut self, case: &Case, done: &Done, report: Report) {
+        let (scene, label) = (&case.scene, &case.label);
+        self.histories.push(convergence_curve(label, &done.outcome));
+        let pairs = &done.model().pairs;
+        let most = scene.output.pairs.unwrap_or(LISTED);
+        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
+        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
+            let empty = || pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
+            self.pressures.entry(i).or_insert_with(empty).series.push(pressure_curve(label, done, i));
+            if let Some(curve) = reference_curve(&done.built.discrete, i) {
+                self.reference.get_or_insert((i, curve));
+            }
+        }
+        self.reports.push(report);
     }
+
+    fn write_plots(&self, folder: &Folder, title: &str) -> Result<()> {
+        let convergence = Plot::convergence(title, &self.histories);
+        folder.write("convergence.svg", |out| convergence.write(out))?;
+        let names = numbered(self.pressures.iter().map(|_| "pressure".to_owned()));
+        for ((pair, of_pair), name) in self.pressures.iter().zip(names) {
+            let mut curves = of_pair.series.clone();
+            curves.extend(self.reference.iter().filter(|(index, _)| index == pair).map(|(_, curve)| curve.clone()));
+            let plot = Plot::pressure(title, &of_pair.x.label, &of_pair.y.label, curves);
+            folder.write(&format!("{name}.svg"), |out| plot.write(out))?;
+        }
+        Ok(())
+    }
+}
+
+/// Build `scene` with what the run before has left.
+///
+/// # Errors
+/// Those of [`run::build`].
+fn build(
+    session: &Session,
+    scene: Rc<Scene>,
+    before: Option<Done>,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Built> {
+    let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
+    if serves(&last, &scene) {
+        let discrete = &mut last.discrete;
+        discrete.model.exchange = Rc::new(Ranks::new(session));
+        let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+        discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
+        discrete.assemblies = 0;
+        return Ok(Built { scene, ..last });
+    }
+    let is_same = settings(&last.scene, without_values) == settings(&scene, without_values);
+    let condensed = if is_same { last.into_condensed() } else { Vec::new() };
+    options::withdraw(session)?;
+    run::build_with(session, scene, condensed, interrupt, clock)
+}
+
+/// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.
+fn serves(last: &Built, scene: &Scene) -> bool {
+    let both = [&*last.scene, scene];
+    // an estimate of the error needs the meshes, which are kept only for it
+    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate || scene.method.stop.balanced);
+    // how linear steps are solved was chosen for the method
+    let [old_joint, new_joint] = both.map(|scene| {
+        let MethodSpec { name, linear, .. } = &scene.method;
+        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
+    });
+    last.condensed.len() == last.discrete.bodies.len()
+        && old_meshes == new_meshes
+        // tables of factors change the loads of bodies
+        && both.iter().all(|scene| !scene.method.steps.is_table())
+        && old_joint == new_joint
+        && settings(&last.scene, |_| ()) == settings(scene, |_| ())
+}
+
+/// Return the settings of a scene on which bodies can depend, changed by `edit`.
+fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
+    let mut settings = scene.settings();
+    if let Value::Object(map) = &mut settings {
+        ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
+    }
+    edit(&mut settings);
+    settings
+}
+
+/// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
+fn without_values(settings: &mut Value) {
+    each(settings.get_mut("contact"), |contact| without(contact, &["gap", "layer", "reference"]));
+    each(settings.get_mut("body"), |body| {
+        without(body, &["force", "path"]);
+        if let Some(Value::Array(loads)) = body.get_mut("load") {
+            // only rigid surfaces change the dofs: they join them
+            loads.retain(|load| load["rigid"] == true);
+        }
+        for key in ["load", "fix"] {
+            each(body.get_mut(key), |item| {
+                without(item, &["path"]);
+                for key in ["force", "x", "y", "z", "normal"] {
+                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
+                }
+            });
+        }
+    });
+}
+
+fn without(table: &mut Map<String, Value>, keys: &[&str]) {
+    keys.iter().for_each(|key| drop(table.remove(*key)));
+}
+
+/// Edit each table of a list in the settings.
+fn each(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
+    let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
+    tables.filter_map(Value::as_object_mut).for_each(edit);
 }

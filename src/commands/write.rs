@@ -1,62 +1,66 @@
-//! All files of a run: what is small comes first, so that a full disk takes fields and not results.
+//! The files of the results of a run. Small files come first, so that on a full disk fields are missing and not results.
 
 use super::adapt::Plan;
-use super::{curves, series};
+use super::series;
+use crate::contact::ContactPair;
+use crate::ddm::Outcome;
+use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::exchange::share;
-use crate::output::{Checksums, Folder, LISTED, PairReport, PairRow, Plot, Report, StepReport, busiest, contacts};
+use crate::linalg::bounds;
+use crate::output::{
+    Checksums, Color, ConvergenceSeries, Folder, LISTED, PairReport, PairRow, Plot, Report, Series, StepReport, Style,
+    busiest, contacts,
+};
 use crate::petsc::Session;
+use crate::problem::units::label;
 use crate::problem::{Plane, force_labels};
 use crate::run::words::numbered;
-use crate::run::{Clock, Done, measure, report, results};
+use crate::run::{All, Clock, Done, measure, report, results};
+use crate::scene::Scene;
 use serde::Serialize;
 use std::path::Path;
 
-/// What is to be written, and where.
-pub struct Writing<'a> {
-    /// Ranks.
+/// The results of a run, and where they are to be written.
+pub struct ResultFiles<'a> {
+    /// Session of this rank.
     pub session: &'a Session,
     /// Folder of results.
     pub path: &'a Path,
-    /// Meshes before.
+    /// Plan with the meshes before.
     pub plan: &'a Plan,
-    /// What was found.
+    /// Solution.
     pub done: &'a Done,
-    /// And how good it is.
+    /// Estimate of its error.
     pub estimate: Option<&'a Estimate>,
-    /// Whether fields may be written, if the scene wants them.
+    /// Whether fields may be written, if the scene asks for them.
     pub fields: bool,
-    /// Whether these are the results that stay: tables of iterations and steps have ended.
+    /// Whether these results are final, which means that the tables of iterations and steps have ended.
     pub is_last: bool,
 }
 
-impl Writing<'_> {
-    /// Writes tables, report, plots and fields in this order, and the report again with all of their names; what cannot be written
-    /// keeps nothing else from it. The report, and the first failure. Collective.
-    pub fn all(&self, clock: &mut Clock, change: impl Fn(&mut Report)) -> (Report, Result<()>) {
+impl ResultFiles<'_> {
+    /// Write tables, report, plots and fields in this order, and then the report again with the names of all files.
+    ///
+    /// A file that cannot be written does not keep the others from being written. Return the report, changed by `change`, and the first
+    /// failure. Collective.
+    pub fn write(&self, clock: &mut Clock, change: impl Fn(&mut Report)) -> (Report, Result<()>) {
         let _stage = self.session.stage("output");
-        let Self { session, path, plan, done, estimate, .. } = *self;
+        let Self { session, path, done, .. } = *self;
         let recovered = results::recover(done);
-        let make = |clock: &Clock| {
-            let mut report = report::report(session, done, &recovered, clock);
-            report.discretization_error = estimate.map(report::discretization_error);
-            report.rounds.clone_from(&plan.rounds);
-            change(&mut report);
-            report
-        };
         let fields = self.fields && (done.built.scene.output.vtu || done.built.scene.output.msh);
         let first = session.rank() == 0;
-        // names of a snapshot are no reason for others
+        // a list of files of its own, without those of a snapshot
         let folder = match Folder::create(path) {
             Ok(folder) => folder,
             Err(error) => {
-                // the others wait for this rank before they end
+                // the other ranks wait for this one below
                 share(&*done.model().exchange, ());
-                return (make(clock), Err(error));
+                return (self.new_report(&recovered, clock, &change), Err(error));
             }
         };
-        let mut report = make(clock);
+        let mut report = self.new_report(&recovered, clock, &change);
         let mut written = Ok(());
         if first {
             Checksums::withdraw(path);
@@ -64,9 +68,9 @@ impl Writing<'_> {
             let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
             report.left_out = left_out(&report.pairs, &shown);
             let plots = Plots::of(done, &shown);
-            written = self.small(&folder, &report, &shown, &plots);
+            written = self.tables(&folder, &report, &shown, &plots);
             if output.plots || fields {
-                // before what is large
+                // once before the large files
                 written = written.and(self.report(&folder, &mut report, fields));
             }
             written = written.and(plots.write(done, &folder));
@@ -78,7 +82,7 @@ impl Writing<'_> {
         clock.total();
         report.times.clone_from(&clock.times);
         report.memory.clone_from(&clock.memory);
-        // the sums are of the files of all ranks
+        // the checksums need the files of all ranks
         share(&*done.model().exchange, ());
         if first {
             written = written.and(self.report(&folder, &mut report, fields));
@@ -89,8 +93,17 @@ impl Writing<'_> {
         (report, failed.map_or(written, Err))
     }
 
-    /// Tables: one of all pairs, and those of the pairs shown.
-    fn small(&self, folder: &Folder, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
+    /// Return the report of the solution, changed by `change`. Collective.
+    fn new_report(&self, recovered: &All, clock: &Clock, change: &impl Fn(&mut Report)) -> Report {
+        let mut report = report::report(self.session, self.done, recovered, clock);
+        report.discretization_error = self.estimate.map(report::discretization_error);
+        report.rounds.clone_from(&self.plan.rounds);
+        change(&mut report);
+        report
+    }
+
+    /// Write the table of all pairs, and a table for each of the pairs that are shown.
+    fn tables(&self, folder: &Folder, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
         let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
         let stems = series::stems(self.done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
@@ -102,18 +115,19 @@ impl Writing<'_> {
         shown.iter().map(save).fold(contacts::save(folder, &report.pairs, &rows), Result::and)
     }
 
+    /// Write the report, with the names of the files so far and of the fields.
     fn report(&self, folder: &Folder, report: &mut Report, fields: bool) -> Result<()> {
         report.files = self.names(folder, fields);
         let json = to_json(report)?;
         folder.write("report.json", |out| out.write_all(json.as_bytes()))
     }
 
-    /// Whether a file is not written any more by this run, nor by `winkler report`.
+    /// Return whether a file is not written any more by this run, nor by `winkler report`.
     fn is_final(&self, name: &str) -> bool {
         name != crate::report::FILE && (self.is_last || !["history.csv", "steps.csv"].contains(&name))
     }
 
-    /// Names of the files of a run, those of other ranks included.
+    /// Return the names of the files of a run, those of other ranks included.
     fn names(&self, folder: &Folder, fields: bool) -> Vec<String> {
         let own = folder.files();
         let mut names: Vec<String> = own
@@ -135,7 +149,7 @@ impl Writing<'_> {
     }
 }
 
-/// A report, or several, as JSON text, ended by a newline.
+/// Return a report, or several, as JSON text that ends with a newline.
 ///
 /// # Errors
 /// None in practice: a report holds nothing that JSON cannot hold.
@@ -145,7 +159,7 @@ pub fn to_json(report: &impl Serialize) -> Result<String> {
         .map_err(|cause| Error::new(Kind::File, "the report cannot be written as JSON").because(cause.to_string()))
 }
 
-/// What the pairs lack that are not `shown` and how to get it, in words; none if all are.
+/// Return the message that pairs other than those `shown` have no table and plot; none if all are shown.
 fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
     let (all, left) = (pairs.len(), pairs.len() - shown.len());
     (left > 0).then(|| {
@@ -156,7 +170,7 @@ fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
     })
 }
 
-/// Approach and force of pair `i` in each step.
+/// Return the approach and the force of pair `i` in each step.
 fn approach(steps: &[StepReport], i: usize) -> Vec<(f64, f64)> {
     let of_step = |step: &StepReport| {
         let pair = &step.pairs[i];
@@ -167,14 +181,14 @@ fn approach(steps: &[StepReport], i: usize) -> Vec<(f64, f64)> {
 
 /// The plots of a run.
 struct Plots {
-    /// Pairs that are shown.
+    /// Indices of the pairs that are shown.
     shown: Vec<usize>,
-    /// Those that have a plot of their pressure, with its file.
+    /// Indices of those that have a plot of their pressure, each with the name of its file.
     plotted: Vec<(usize, String)>,
 }
 
 impl Plots {
-    /// Only along curves: points of a surface over one coordinate would be a cloud.
+    /// Return the plots of the pairs `shown`. Pressures are plotted only along curves: points of a surface over one coordinate would be a cloud.
     fn of(done: &Done, shown: &[usize]) -> Self {
         let has_plot = |i: &usize| done.built.scene.output.plots && done.model().pairs[*i].along_curve;
         let plotted: Vec<usize> = shown.iter().copied().filter(has_plot).collect();
@@ -188,7 +202,7 @@ impl Plots {
         if !scene.output.plots {
             return Ok(());
         }
-        let convergence = Plot::convergence(&scene.title, &[curves::convergence("", &done.outcome)]);
+        let convergence = Plot::convergence(&scene.title, &[convergence_curve("", &done.outcome)]);
         folder.write("convergence.svg", |out| convergence.write(out))?;
         if done.steps.len() > 1 {
             let names = measure::pair_names(&done.built);
@@ -199,16 +213,55 @@ impl Plots {
             folder.write("force-approach.svg", |out| plot.write(out))?;
         }
         for &(i, ref file) in &self.plotted {
-            let mut curves = vec![curves::pressure("pressure", done, i)];
-            curves.extend(curves::reference(&done.built.discrete, i));
-            // with more plots than pairs that a person knows by heart, each says whose it is
+            let mut curves = vec![pressure_curve("pressure", done, i)];
+            curves.extend(reference_curve(&done.built.discrete, i));
+            // among many plots each has the names of its surfaces
             let title = match model.pairs.len() {
                 ..=LISTED => scene.title.clone(),
                 _ => format!("{}: {} - {}", scene.title, model.pairs[i].surfaces[0], model.pairs[i].surfaces[1]),
             };
-            let plot = curves::pressure_plot(&title, scene, &model.pairs[i], curves);
+            let plot = pressure_plot(&title, scene, &model.pairs[i], curves);
             folder.write(file, |out| plot.write(out))?;
         }
         Ok(())
     }
+}
+
+/// Return residual and increment of a run against the iteration.
+pub fn convergence_curve(label: &str, outcome: &Outcome) -> ConvergenceSeries {
+    let rows = outcome.rows.iter().map(|row| (row.iteration, row.residual, row.increment)).collect();
+    ConvergenceSeries { label: label.to_owned(), rows }
+}
+
+/// Return the pressure of pair `i` along its surface, against the coordinate that varies most.
+pub fn pressure_curve(label: &str, done: &Done, i: usize) -> Series {
+    let model = done.model();
+    let (axis, _) = main_axis(&model.pairs[i]);
+    let pressure = &done.outcome.layer.pressure[model.range(i)];
+    let points = model.pairs[i].position.iter().zip(pressure).map(|(x, &p)| (x[axis], p)).collect();
+    Series::new(label, points, Style::Line)
+}
+
+/// Return the scene's reference pressure of pair `i`, if it has one.
+pub fn reference_curve(discrete: &Discrete, i: usize) -> Option<Series> {
+    let field = discrete.contacts[i].spec.reference.as_ref()?;
+    let pair = &discrete.model.pairs[i];
+    let (axis, _) = main_axis(pair);
+    let points = pair.position.iter().map(|&x| (x[axis], field.eval(x))).collect();
+    Some(Series::new("reference", points, Style::Dashed).color(Color::Grey))
+}
+
+/// Return the plot of pressures along a pair, in the units of the scene.
+pub fn pressure_plot(title: &str, scene: &Scene, pair: &ContactPair, curves: Vec<Series>) -> Plot {
+    let units = scene.units.as_ref();
+    let x = label(main_axis(pair).1, units.map(|units| units.length));
+    Plot::pressure(title, &x, &label("contact pressure", units.map(|units| units.stress)), curves)
+}
+
+/// Return the coordinate along which a pair's points spread most, and its name.
+fn main_axis(pair: &ContactPair) -> (usize, &'static str) {
+    let [low, high] = bounds(pair.position.iter().copied());
+    let spread = |k: usize| high[k] - low[k];
+    let axis = (0..3).max_by(|&i, &j| spread(i).total_cmp(&spread(j)).then(j.cmp(&i))).unwrap_or(0);
+    (axis, ["x", "y", "z"][axis])
 }

@@ -1,4 +1,4 @@
-//! From numbers in rows to a function of one place or two.
+//! The step from numbers in rows to a function of one coordinate or two.
 
 use super::grid::{Axis, Grid};
 use super::knots::Knots;
@@ -7,22 +7,26 @@ use super::rule::{DataSpec, Interpolation, Outside};
 use super::scattered::Scattered;
 use crate::error::Result;
 
-/// A function of a place.
+/// A function of one coordinate or two, by the places of its points.
 #[derive(Debug, Clone)]
 pub enum Shape {
-    /// Of points at equal distances.
+    /// Points at equal distances.
     Grid(Grid),
-    /// Of one coordinate, at any distances.
+    /// Points of one coordinate at any distances.
     Knots(Knots),
-    /// Of two coordinates, anywhere.
+    /// Points of two coordinates at any places, with the range of each coordinate.
     Scattered(Scattered, [[f64; 2]; 2]),
 }
 
-/// Points farther from those of a regular grid than this share of the spacing are not on it. Written coordinates are rounded; a place that is
-/// wrong by so much changes a height by as small a share of its difference to the next one, a hundredth.
+/// Largest distance of a point from its place on a regular grid, as a multiple of the spacing.
+///
+/// Coordinates in files are rounded. A place that is wrong by so much changes a height by a hundredth of the difference to the next height.
 const ROUNDED: f64 = 1e-2;
 
-/// Arranges the numbers of a file.
+/// Return the function that the numbers of a file give.
+///
+/// # Errors
+/// Numbers that give no function, or not one that the scene asks for.
 pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     match (spec.points, rows.columns) {
         _ if rows.values.is_empty() => Err(spec.refuse("has no numbers", "write heights in rows")),
@@ -36,7 +40,7 @@ pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     }
 }
 
-/// Heights in rows and columns; a single row or column is a profile.
+/// Return the function of heights in rows and columns. A single row or column is a profile.
 fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     let mut counts = [rows.columns, rows.count()];
     if counts[0] == 1 {
@@ -50,6 +54,7 @@ fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     grid(spec, axes, values)
 }
 
+/// Return a regular grid, with the interpolation that the scene asks for.
 fn grid(spec: &DataSpec, axes: [Axis; 2], values: Vec<f64>) -> Result<Shape> {
     let thin = |axis: &Axis| axis.count != 1 && axis.count < 3;
     if spec.interpolation == Interpolation::Cubic && axes.iter().any(thin) {
@@ -58,7 +63,7 @@ fn grid(spec: &DataSpec, axes: [Axis; 2], values: Vec<f64>) -> Result<Shape> {
     Ok(Shape::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
 }
 
-/// Points (x, height) in any order.
+/// Return the function of points (x, height) in any order.
 fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
     let points = rows.values.chunks_exact(2).map(|point| placed(spec, [point[0], 0.0], point[1]));
     let points: Vec<[f64; 3]> = points.collect();
@@ -77,7 +82,7 @@ fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
     Ok(Shape::Knots(Knots(knots)))
 }
 
-/// Points (x, y, height) in any order.
+/// Return the function of points (x, y, height) in any order.
 fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
     let points = rows.values.chunks_exact(3).map(|point| placed(spec, [point[0], point[1]], point[2]));
     let points: Vec<[f64; 3]> = points.collect();
@@ -106,13 +111,13 @@ fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
     }
 }
 
-/// A point of the file in the lengths and heights of the scene.
+/// Return a point of the file in the units of the scene.
 fn placed(spec: &DataSpec, place: [f64; 2], height: f64) -> [f64; 3] {
     let [x, y] = [0, 1].map(|d| spec.origin[d] + spec.spacing[d] * place[d]);
     [x, y, spec.unit * height]
 }
 
-/// What only a regular grid has.
+/// Refuse settings that need a regular grid.
 fn only_linear(spec: &DataSpec) -> Result<()> {
     const HELP: &str = "scattered points have interpolate = \"linear\" and outside = \"clamp\" or \"error\"; or resample them on a grid";
     match (spec.interpolation, spec.outside) {
@@ -124,17 +129,19 @@ fn only_linear(spec: &DataSpec) -> Result<()> {
     }
 }
 
-/// Steps of rounding, of the largest coordinate of all, by which two places that are meant to be one can differ: half a step each for the number
-/// read, its product with the spacing and the sum with the origin, at both. Slopes between such points are those of rounding.
+/// Largest distance of two points that are meant to be at one place, as a multiple of the roundoff of the largest coordinate.
+///
+/// Each of both places has an error of half a unit for the number read, for its product with the spacing, and for the sum with the origin.
+/// Slopes between such points are those of roundoff.
 const TWINS: f64 = 3.0;
 
-/// Two points at one place have no height there.
+/// Refuse two points at one place: the function would have two heights there.
 fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &Rows) -> Result<()> {
     let largest = |d: usize| points.iter().fold(spec.origin[d].abs(), |most, point| most.max(point[d].abs()));
     let near = [0, 1].map(|d| TWINS * f64::EPSILON * largest(d));
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
-    // points of about the same x side by side, in the order of y
+    // each chunk has points of about the same x, which are then sorted by y
     for column in order.chunk_by_mut(|&a, &b| points[b][0] - points[a][0] <= near[0]) {
         column.sort_by(|&a, &b| points[a][1].total_cmp(&points[b][1]));
         let is_near = |d: usize, a: usize, b: usize| (points[a][d] - points[b][d]).abs() <= near[d];
@@ -152,12 +159,12 @@ fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &Rows) -> Result<()>
     Ok(())
 }
 
-/// The regular axis that coordinates lie on, many of them perhaps on one point; none if they do not.
+/// Return the regular axis on which coordinates lie; none if there is no such axis. Several coordinates may lie on one point.
 fn regular(coordinates: impl Iterator<Item = f64>) -> Option<Axis> {
     let mut sorted: Vec<f64> = coordinates.collect();
     sorted.sort_by(f64::total_cmp);
     let (first, last) = (*sorted.first()?, *sorted.last()?);
-    // between points of the axis there is about a spacing, within one only rounding
+    // sorted coordinates differ by about a spacing between points of the axis, and by roundoff within one point
     let widest = sorted.windows(2).map(|two| two[1] - two[0]).fold(0.0, f64::max);
     let steps = sorted.windows(2).filter(|two| two[1] - two[0] > 0.5 * widest).count();
     let axis = Axis { origin: first, spacing: (last - first) / steps as f64, count: steps + 1 };
@@ -165,7 +172,7 @@ fn regular(coordinates: impl Iterator<Item = f64>) -> Option<Axis> {
     (axis.spacing > 0.0 && axis.spacing.is_finite() && sorted.iter().all(is_on)).then_some(axis)
 }
 
-/// The point of an axis that is nearest to a coordinate.
+/// Return the index of the point of an axis that is nearest to a coordinate.
 fn nearest(axis: &Axis, x: f64) -> usize {
     ((x - axis.origin) / axis.spacing).round().clamp(0.0, (axis.count - 1) as f64) as usize
 }

@@ -1,4 +1,4 @@
-//! Data of a scene as a function of places.
+//! The data of a scene as functions.
 
 use super::arrange::{self, Shape};
 use super::grid::Grid;
@@ -11,21 +11,22 @@ use std::sync::{Arc, OnceLock};
 /// The data of a scene by name.
 pub type Library = BTreeMap<String, Arc<Data>>;
 
-/// A function given by a file, which is read when it is first asked for.
+/// A function given by a file, which is read when the function is first needed.
 #[derive(Debug)]
 pub struct Data {
-    /// What the scene says of it.
+    /// The settings of the scene.
     pub spec: DataSpec,
+    /// The function, once the file is read.
     shape: OnceLock<Shape>,
 }
 
 impl Data {
-    /// A function whose file is still to be read.
+    /// Return a function whose file is not read yet.
     pub fn new(spec: DataSpec) -> Self {
         Self { spec, shape: OnceLock::new() }
     }
 
-    /// Reads the file, unless that was done.
+    /// Read the file, unless that was done.
     ///
     /// # Errors
     /// The file cannot be read, or is no surface and no profile; the refusal names its line.
@@ -38,7 +39,7 @@ impl Data {
         Ok(())
     }
 
-    /// Number of coordinates that it takes: 1 for a profile, 2 for a surface.
+    /// Return the number of arguments: 1 for a profile, 2 for a surface.
     pub fn arguments(&self) -> usize {
         match self.shape.get() {
             Some(Shape::Grid(grid)) if grid.axes[1].count > 1 => 2,
@@ -47,7 +48,7 @@ impl Data {
         }
     }
 
-    /// Value and gradient at a place of as many coordinates.
+    /// Return value and gradient at a place, which has as many coordinates as there are arguments.
     pub fn sample(&self, place: &[f64]) -> Sample {
         let at = [place.first(), place.get(1)].map(|x| x.copied().unwrap_or(0.0));
         let holds = self.spec.outside == Outside::Clamp;
@@ -59,7 +60,7 @@ impl Data {
         }
     }
 
-    /// All its numbers in a fixed order; none if nothing has asked for them.
+    /// Return all its numbers in a fixed order; none if the file is not read yet.
     pub fn numbers(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match self.shape.get() {
             Some(Shape::Grid(Grid { axes, values, .. })) => {
@@ -72,7 +73,7 @@ impl Data {
         }
     }
 
-    /// The regular grid, if its file was read and has one.
+    /// Return the regular grid, if the file is read and has one.
     pub fn grid(&self) -> Option<&Grid> {
         match self.shape.get() {
             Some(Shape::Grid(grid)) => Some(grid),
@@ -80,7 +81,7 @@ impl Data {
         }
     }
 
-    /// The refusal of a place where it has no value; `what` names what the value was for, in an expression at `here`.
+    /// Return the refusal of a place without a value. `what` is the quantity whose expression, at `here`, needs the value.
     pub fn outside(&self, here: &Place, what: &str, place: &[f64]) -> Error {
         let join = |coordinates: &[f64]| coordinates.iter().map(|&x| shown(x)).collect::<Vec<_>>().join(", ");
         let range = match self.shape.get() {

@@ -1,4 +1,4 @@
-//! Values at the points of a regular grid, in one direction or two; a lookup takes the same few operations whatever the size.
+//! Values at the points of a regular grid in one direction or two. A lookup takes the same few operations whatever the size.
 
 use super::rule::{Interpolation, Outside, Sample};
 
@@ -14,8 +14,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// First and last place that have values: half a spacing beyond the points, since a measured height is the mean over a cell around its
-    /// point.
+    /// Return the first and the last place with a value. They are half a spacing beyond the points, since a measured height is the mean over a
+    /// cell around its point.
     pub fn range(&self) -> [f64; 2] {
         [-0.5, self.count as f64 - 0.5].map(|steps| self.origin + self.spacing * steps)
     }
@@ -24,26 +24,29 @@ impl Axis {
 /// A function on a regular grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    /// Along a row, and from row to row.
+    /// The axis along a row, and the axis from row to row.
     pub axes: [Axis; 2],
-    /// Row by row.
+    /// Values at the points, row by row.
     pub values: Vec<f64>,
-    /// What is between the points.
+    /// Interpolation between the points.
     pub interpolation: Interpolation,
-    /// What is beyond them.
+    /// Values beyond the points.
     pub outside: Outside,
 }
 
-/// The points along an axis that a value comes from, with their weights and the derivatives of these; weights of zero fill up.
+/// The points along an axis from which a value is interpolated. Points that are not needed have the weight zero.
 #[derive(Clone, Copy, Default)]
 struct Stencil {
+    /// Indices of the points.
     at: [usize; 4],
+    /// Their weights.
     weight: [f64; 4],
+    /// Derivatives of the weights by the coordinate.
     slope: [f64; 4],
 }
 
 impl Grid {
-    /// Value and gradient at a place; of a profile the second coordinate counts nothing.
+    /// Return value and gradient at a place. A profile does not depend on the second coordinate.
     pub fn sample(&self, place: [f64; 2]) -> Sample {
         let [Some(across), Some(down)] = [0, 1].map(|axis| self.stencil(axis, place[axis])) else {
             return Sample::NONE;
@@ -66,7 +69,7 @@ impl Grid {
         sample
     }
 
-    /// Where a coordinate lies on an axis; none where there are no values.
+    /// Return the stencil of a coordinate on an axis; none where there are no values.
     fn stencil(&self, axis: usize, x: f64) -> Option<Stencil> {
         let Axis { origin, spacing, count } = self.axes[axis];
         if count == 1 {
@@ -80,7 +83,7 @@ impl Grid {
             Outside::Error if !(-0.5..=last + 0.5).contains(&steps) => return None,
             _ => (steps.clamp(0.0, last), !(0.0..=last).contains(&steps)),
         };
-        // the last cell of a periodic grid ends at the first point; of another the last point ends the last cell
+        // a periodic grid has one more cell, between its last and its first point
         let cells = if self.outside == Outside::Periodic { count } else { count - 1 };
         let cell = (steps as usize).min(cells - 1);
         let mut stencil = match self.interpolation {
@@ -105,7 +108,9 @@ impl Grid {
 }
 
 impl Stencil {
-    /// Takes a point beyond the end from the three next to it, f = 3 f1 - 3 f2 + f3: Keys' condition, which keeps the third order.
+    /// Replace the point beyond the end of the grid by extrapolation, f = 3 f1 - 3 f2 + f3, from the three points next to it.
+    ///
+    /// This is Keys' condition, which keeps the third order.
     fn fold(&mut self, beyond: usize, next: [usize; 3]) {
         for weights in [&mut self.weight, &mut self.slope] {
             let weight = std::mem::take(&mut weights[beyond]);
@@ -114,12 +119,12 @@ impl Stencil {
     }
 }
 
-/// Weights at t from 0 to 1 between the second and the third point.
+/// Return the weights of linear interpolation at t, which is from 0 to 1 between the second and the third point.
 fn linear(t: f64) -> Stencil {
     Stencil { weight: [0.0, 1.0 - t, t, 0.0], slope: [0.0, -1.0, 1.0, 0.0], ..Stencil::default() }
 }
 
-/// The same for cubic convolution.
+/// Return the weights of cubic convolution at t.
 fn cubic(t: f64) -> Stencil {
     let weight = [
         t * (-0.5 + t * (1.0 - 0.5 * t)),

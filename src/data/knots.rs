@@ -1,18 +1,18 @@
-//! A profile whose points have any distances: straight lines between them.
+//! A profile whose points are at any distances, with straight lines between them.
 
 use super::rule::Sample;
 
-/// Points (x, value), x increasing; at least two.
+/// The points (x, value) of a profile, at least two, with increasing x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knots(pub Vec<[f64; 2]>);
 
 impl Knots {
-    /// First and last place.
+    /// Return the first and the last place.
     pub fn range(&self) -> [f64; 2] {
         [self.0[0][0], self.0[self.0.len() - 1][0]]
     }
 
-    /// The value at a place; beyond the ends that of the end, or nothing.
+    /// Return the value at a place. Beyond an end it is the value there if `holds`, else there is none.
     pub fn sample(&self, x: f64, holds: bool) -> Sample {
         let [first, last] = self.range();
         let is_within = (first..=last).contains(&x);

@@ -1,4 +1,4 @@
-//! Arrays of NumPy: `.npy`.
+//! Files of NumPy with an array: `.npy`.
 
 use super::rows::Rows;
 use super::rule::DataSpec;
@@ -8,12 +8,15 @@ use std::cmp::Ordering;
 
 const HELP: &str = "save the heights as they come from NumPy: np.save(\"surface.npy\", heights)";
 
-/// Whether a file is one of NumPy.
+/// Return whether bytes are those of a file of NumPy.
 pub fn is_ours(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x93NUMPY")
 }
 
-/// An array of one direction, which becomes a column, or two.
+/// Read an array of one direction, which becomes a column, or of two.
+///
+/// # Errors
+/// A damaged file, or an array of another kind.
 pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let damaged = |cause: std::io::Error| spec.refuse(format_args!("is no file of NumPy: {cause}"), HELP);
     refuse_short_header(spec, bytes)?;
@@ -28,7 +31,7 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let DType::Plain(kind) = file.dtype() else {
         return Err(spec.refuse("has records, not numbers", HELP));
     };
-    // also a header that is wrong must not ask for memory
+    // compared before reading, so that no memory is taken for a header that is wrong
     let size = kind.num_bytes().unwrap_or(1).max(1);
     let length = count.checked_mul(columns).and_then(|all| all.checked_mul(size));
     match length.map(|length| length.cmp(&rest.len())) {
@@ -62,8 +65,10 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     Ok(Rows { columns, values, lines: Vec::new() })
 }
 
-/// Refuses a header that is longer than the file, before anybody takes memory for it: NumPy writes its length, of two bytes in version 1 and
-/// of four in later ones, behind the six bytes of the name and the two of the version.
+/// Refuse a header that is longer than the file, before memory is taken for it.
+///
+/// The file begins with six bytes of the name and two of the version. The length of the header follows, in two bytes in version 1 and in four
+/// in later ones.
 fn refuse_short_header(spec: &DataSpec, bytes: &[u8]) -> Result<()> {
     let (version, length) = (bytes.get(6), bytes.get(8..).unwrap_or_default());
     let (at, length) = match version {
@@ -80,6 +85,7 @@ fn refuse_short_header(spec: &DataSpec, bytes: &[u8]) -> Result<()> {
     }
 }
 
+/// Read the numbers of an array.
 fn numbers<T: Deserialize + Into<f64>>(file: NpyFile<&[u8]>) -> std::io::Result<Vec<f64>> {
     file.data::<T>().map_err(std::io::Error::other)?.map(|number| number.map(Into::into)).collect()
 }

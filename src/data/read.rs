@@ -1,14 +1,14 @@
-//! Numbers in rows, from a file of any kind that is known.
+//! Reading of numbers in rows from a file of any supported kind.
 
 use super::rows::Rows;
 use super::rule::DataSpec;
 use super::{npy, text};
 use crate::error::Result;
 
-/// Reads a file of NumPy, or a text.
+/// Read a file of NumPy, or a text.
 ///
 /// # Errors
-/// The file cannot be read, or what is wrong with its contents.
+/// A file that cannot be read, that is damaged, or that has numbers that are not finite.
 pub fn rows(spec: &DataSpec) -> Result<Rows> {
     let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.place))?;
     let rows = match npy::is_ours(&bytes) {

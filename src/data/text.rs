@@ -1,15 +1,17 @@
 //! Texts of numbers, as profilometers and spreadsheets write them.
 //!
-//! Fields are parted by `;`, tabs, commas or blanks, whichever of these, in this order, the last line has (of a number
-//! alone: the first line). With the first two a decimal comma is read, too. Lines that begin with `#`, and lines before the first number,
-//! are skipped.
+//! The separator of fields is the first of `;`, tab, comma and blank that the last line has. If the last line is a single number, the first
+//! line decides. With `;` and tabs a decimal comma is read, too. Lines that begin with `#`, and lines before the first number, are skipped.
 
 use super::rows::Rows;
 use super::rule::DataSpec;
 use crate::error::Result;
 use crate::file::other_encoding;
 
-/// Reads a text.
+/// Read a text.
+///
+/// # Errors
+/// Bytes that are no text, a field that is no number, rows of different lengths.
 pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if let Some(other) = other_encoding(bytes) {
@@ -19,13 +21,13 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let is_row = |line: &&[u8]| !line.is_empty() && !line.starts_with(b"#");
     let is_end = |byte: &u8| *byte == b'\n';
     let last = bytes.rsplit(is_end).map(<[u8]>::trim_ascii).find(is_row).unwrap_or_default();
-    // a number alone does not say what parts others
+    // a line with one number has no separator
     let first = || bytes.split(is_end).map(<[u8]>::trim_ascii).find(is_row).unwrap_or_default();
     let separator = separator(last).or_else(|| separator(first())).unwrap_or(b' ');
     let mut rows = Rows::default();
     let lines = bytes.split(is_end).map(<[u8]>::trim_ascii).zip(1..);
     for (text, line) in lines.filter(|(text, _)| is_row(text)) {
-        // a separator at the end of a line ends it, and many blanks are one
+        // a separator at the end of a line is ignored, and several blanks are one separator
         let text = text.strip_suffix(&[separator]).unwrap_or(text);
         let fields = || {
             let fields = text.split(|&byte| byte == separator).map(<[u8]>::trim_ascii);
@@ -58,7 +60,7 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     Ok(rows)
 }
 
-/// What a message shows of a field.
+/// Return the start of a field, for a message.
 fn start_of(field: &[u8]) -> String {
     const SHOWN: usize = 40;
     let text = String::from_utf8_lossy(field);
@@ -66,14 +68,14 @@ fn start_of(field: &[u8]) -> String {
     if start.len() < text.len() { start + "..." } else { start }
 }
 
-/// What parts the fields of a line, if there are several.
+/// Return the separator of the fields of a line; none if there is one field.
 fn separator(line: &[u8]) -> Option<u8> {
     b";\t, ".iter().copied().find(|separator| line.contains(separator))
 }
 
-/// The number that a field is.
+/// Return the number in a field; none if it is no number.
 fn number(field: &[u8], separator: u8) -> Option<f64> {
-    // as spreadsheets may quote every field
+    // spreadsheets may quote every field
     let bare = field.strip_prefix(b"\"").and_then(|rest| rest.strip_suffix(b"\"")).unwrap_or(field);
     let text = std::str::from_utf8(bare.trim_ascii()).ok()?;
     match matches!(separator, b';' | b'\t') && text.contains(',') {

@@ -1,17 +1,17 @@
-//! Exact derivatives of expressions: the same program, run on pairs of a value and its slope.
+//! Exact derivatives of expressions, by running the same program on pairs of a value and its derivative.
 
 use super::operators::{Binary, Two, Unary};
 use super::program::Number;
 use crate::data::Data;
 
-/// A value and its derivative.
+/// A value and its derivative by one variable.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Dual {
     pub value: f64,
     pub slope: f64,
 }
 
-/// Derivative times slope; what does not change has no slope, however steep the function.
+/// Return the derivative of a function times the slope of its argument. It is zero for a constant argument, even if the derivative is infinite.
 fn times(derivative: f64, slope: f64) -> f64 {
     if slope == 0.0 { 0.0 } else { derivative * slope }
 }

@@ -1,6 +1,6 @@
-//! Grammar of expressions: operator precedence, function calls, and where a slip stands.
+//! The parser of expressions: operator precedence, function calls, and refusals with their place.
 //!
-//! The steps come out in postfix order as the words are read, so that a long text costs no more than its length.
+//! Steps are written in postfix order while the tokens are read, so that the cost is proportional to the length of the text.
 
 use super::operators::{self, BINARY, Binary, COMPARISON, INFIX, POWER, SIGN, SIGNS, UNARY, Unary};
 use super::program::{Number, Step};
@@ -9,12 +9,15 @@ use super::text::Text;
 use super::token::{self, Token};
 use crate::data::Data;
 use crate::error::{Error, Result, nearest};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
-/// Deepest nesting: it bounds the recursion here.
+/// Largest depth of nesting, which bounds the recursion of the parser.
 const DEEPEST: usize = 60;
 
-/// Parses a whole text.
+/// Parse a whole text into steps.
+///
+/// # Errors
+/// Texts that are no expression, and data that cannot be read.
 pub(super) fn parse(text: Text, scope: Scope) -> Result<Vec<Step>> {
     let (token, span) = token::next(&text, 0)?;
     if token == Token::End {
@@ -32,36 +35,41 @@ pub(super) fn parse(text: Text, scope: Scope) -> Result<Vec<Step>> {
     }
 }
 
+/// The state of the parser.
 struct Parser<'a> {
     text: Text<'a>,
     scope: Scope<'a>,
+    /// The next token.
     token: Token<'a>,
+    /// The bytes of the next token in the text.
     span: Range<usize>,
+    /// Depth of nesting.
     depth: usize,
+    /// The steps so far.
     code: Vec<Step>,
 }
 
 impl<'a> Parser<'a> {
-    /// Moves on, and gives back the word left behind and its place.
+    /// Read the next token. Return the token before it, with its bytes.
     fn step(&mut self) -> Result<(Token<'a>, Range<usize>)> {
         let (token, span) = token::next(&self.text, self.span.end)?;
         Ok((std::mem::replace(&mut self.token, token), std::mem::replace(&mut self.span, span)))
     }
 
-    /// Operands joined by operators that bind at least as tightly as `least`.
+    /// Parse operands that are joined by operators with at least the binding power `least`.
     fn expression(&mut self, least: u8) -> Result<()> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(self.text.refuse(self.span.clone(), "the expression is nested too deeply"));
         }
         self.operand()?;
-        let mut compared = false;
+        let mut has_comparison = false;
         while let Token::Symbol(symbol) = self.token
             && let Some((power, operator)) = INFIX.iter().find(|(_, known)| known.name == symbol)
             && *power >= least
         {
             let (_, span) = self.step()?;
-            if *power == COMPARISON && std::mem::replace(&mut compared, true) {
+            if *power == COMPARISON && std::mem::replace(&mut has_comparison, true) {
                 return Err(self.text.refuse(span, "comparisons do not chain").help("write 0 < x && x < 1"));
             }
             self.expression(if *power == POWER { SIGN } else { power + 1 })?;
@@ -71,7 +79,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// A number, a variable, a call, a parenthesis, or one of these with a sign.
+    /// Parse a number, a variable, a call, a parenthesis, or one of these with a sign.
     fn operand(&mut self) -> Result<()> {
         let (token, span) = self.step()?;
         match token {
@@ -94,7 +102,7 @@ impl<'a> Parser<'a> {
                 Ok(())
             }
             Token::End => {
-                // blanks may have several bytes
+                // the last character may be a blank of several bytes
                 let last = self.text.text.char_indices().next_back().map_or(0, |(at, _)| at);
                 Err(self
                     .text
@@ -104,7 +112,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// A function of the values in parentheses; the name was read, `(` comes next.
+    /// Parse the arguments of a function whose name was read. The next token is `(`.
     fn call(&mut self, name: &str, span: Range<usize>) -> Result<()> {
         let unary = UNARY.iter().find(|known| known.name == name);
         let binary = BINARY.iter().find(|known| known.name == name);
@@ -125,7 +133,7 @@ impl<'a> Parser<'a> {
             loop {
                 self.expression(0)?;
                 given += 1;
-                // of many values the first two are one value before the third is read
+                // `min` and `max` of many values are applied to two values at a time
                 if let Some(function) = binary.filter(|_| given > 1 && arguments.contains(&given)) {
                     self.apply_two(function);
                 }
@@ -137,7 +145,7 @@ impl<'a> Parser<'a> {
         }
         self.close(&open)?;
         if !arguments.contains(&given) {
-            return Err(self.miscounted(name, *arguments.start(), *arguments.end() > 2, given, data.as_deref(), span));
+            return Err(self.miscounted(name, &arguments, given, data.as_deref(), span));
         }
         match (unary, data) {
             (Some(function), _) => self.apply_one(function),
@@ -147,7 +155,7 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// Applies an operator of one value to what was read last; of a number it makes a number.
+    /// Apply an operator to the last value. A number is replaced by the result at once.
     fn apply_one(&mut self, function: &'static Unary) {
         match self.code.last_mut() {
             Some(Step::Number(value)) => *value = value.one(function),
@@ -155,7 +163,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Applies an operator to the last two values; of two numbers it makes one.
+    /// Apply an operator to the last two values. Two numbers are replaced by the result at once.
     fn apply_two(&mut self, function: &'static Binary) {
         match self.code[..] {
             [.., Step::Number(left), Step::Number(right)] => {
@@ -166,6 +174,7 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Parse a variable, or `pi`.
     fn variable(&mut self, name: &str, span: Range<usize>) -> Result<()> {
         if name == "pi" {
             self.code.push(Step::Number(std::f64::consts::PI));
@@ -190,6 +199,7 @@ impl<'a> Parser<'a> {
         })
     }
 
+    /// Return the refusal of a call whose name is no function.
     fn unknown_function(&self, name: &str, span: Range<usize>) -> Error {
         if self.scope.variables.contains(&name) || name == "pi" {
             return self.text.refuse(span, format!("`{name}` is not a function")).help("write `*` to multiply");
@@ -202,12 +212,13 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// All names that an expression may use here.
+    /// Return the list of all names that an expression may use, for a message.
     fn known(&self) -> String {
         let functions: Vec<_> = self.functions().collect();
         format!("known are {}, pi, and the functions {}", self.scope.variables.join(", "), functions.join(", "))
     }
 
+    /// Read the parenthesis that closes the one at `open`.
     fn close(&mut self, open: &Range<usize>) -> Result<()> {
         match self.token {
             Token::Symbol(")") => self.step().map(|_| ()),
@@ -217,15 +228,16 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Return the refusal of a value that follows another without an operator. After a number it may be meant as a unit.
     fn missing_operator(&self) -> Error {
         let found = &self.text.text[self.span.clone()];
-        let after_number =
+        let is_after_number =
             self.text.text[..self.span.start].trim_end().ends_with(|c: char| c.is_ascii_digit() || c == '.');
-        let unit = found.starts_with(char::is_alphabetic)
+        let is_unit = found.starts_with(char::is_alphabetic)
             && !self.scope.variables.contains(&found)
             && found != "pi"
             && !self.functions().any(|known| known == found);
-        if after_number && unit {
+        if is_after_number && is_unit {
             return self
                 .text
                 .refuse(self.span.clone(), format!("`{found}` is neither a variable nor an operator"))
@@ -238,28 +250,28 @@ impl<'a> Parser<'a> {
             .help("write `*` to multiply")
     }
 
-    /// Names of all functions.
+    /// Return the names of all functions.
     fn functions(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         let data = self.scope.data.keys().map(String::as_str);
         operators::functions().map(|name| -> &'a str { name }).chain(data)
     }
 
-    /// The refusal of a call with too few values, or too many.
+    /// Return the refusal of a call with too few values, or too many.
     fn miscounted(
         &self,
         name: &str,
-        wanted: usize,
-        more: bool,
+        arguments: &RangeInclusive<usize>,
         given: usize,
         data: Option<&Data>,
         span: Range<usize>,
     ) -> Error {
-        let plural = if wanted == 1 && !more { "" } else { "s" };
-        let more = if more { " or more" } else { "" };
-        let error = self.text.refuse(span, format!("`{name}` takes {wanted}{more} value{plural}, not {given}"));
+        let least = *arguments.start();
+        let more = if *arguments.end() > 2 { " or more" } else { "" };
+        let plural = if least == 1 { "" } else { "s" };
+        let error = self.text.refuse(span, format!("`{name}` takes {least}{more} value{plural}, not {given}"));
         match data {
             None => error,
-            Some(_) if wanted == 1 => {
+            Some(_) if least == 1 => {
                 error.help("its file is a profile, heights along one line: write the place along it")
             }
             Some(_) => error.help("its file is a surface: write the places along a row of the file and down its rows"),

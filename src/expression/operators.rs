@@ -1,38 +1,38 @@
 //! The operators and functions of expressions, each with its derivatives.
 //!
-//! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Nothing hides a NaN, so that a value
-//! outside the domain of a function can be refused where it is used.
+//! Truth is a number: comparisons give 1 or 0, and a number > 0 is true. Operators and functions keep a NaN, so that a value outside the
+//! domain of a function can be refused where it is used.
 
 use crate::linalg::portable;
 
 /// A sign or a function of one value.
 #[derive(Debug)]
 pub(super) struct Unary {
-    /// How it is written.
+    /// Its name in an expression.
     pub name: &'static str,
-    /// What it makes of a value.
+    /// The function.
     pub value: fn(f64) -> f64,
-    /// Its derivative, by the value put in and that which came out; none of what is constant between its jumps.
+    /// Its derivative, as a function of the argument and the value; none for a function that is constant between jumps.
     pub slope: Option<fn(f64, f64) -> f64>,
 }
 
 /// An operator or a function of two values.
 #[derive(Debug)]
 pub(super) struct Binary {
-    /// How it is written.
+    /// Its name in an expression.
     pub name: &'static str,
-    /// What it makes of them.
+    /// The function.
     pub kind: Two,
 }
 
-/// What is made of two values.
+/// A function of two values.
 #[derive(Debug)]
 pub(super) enum Two {
-    /// A number, with its derivatives by both, by the values put in and that which came out.
+    /// A differentiable function. The second function returns its derivatives by both arguments, from the arguments and the value.
     Smooth(fn(f64, f64) -> f64, fn(f64, f64, f64) -> [f64; 2]),
     /// A truth.
     Truth(fn(f64, f64) -> f64),
-    /// The first, if this is so, or the second.
+    /// The choice of one argument: the first, if the condition holds, or the second.
     Pick(fn(f64, f64) -> bool),
 }
 
@@ -57,7 +57,7 @@ pub(super) static UNARY: [Unary; 17] = [
     steps("floor", f64::floor),
     smooth("log", portable::log, |a, _| 1.0 / a),
     smooth("log10", portable::log10, |a, _| 1.0 / (a * std::f64::consts::LN_10)),
-    // 0 for 0
+    // 0 at 0, unlike `signum`
     steps("sign", |a| if a == 0.0 { 0.0 } else { a.signum() }),
     smooth("sin", portable::sin, |a, _| portable::cos(a)),
     smooth("sinh", portable::sinh, |a, _| portable::cosh(a)),
@@ -69,18 +69,18 @@ pub(super) static UNARY: [Unary; 17] = [
 /// Signs.
 pub(super) static SIGNS: [Unary; 2] = [smooth("-", |a| -a, |_, _| -1.0), steps("!", |a| compare(a, a, a <= 0.0))];
 
-/// Functions of two values; `min` and `max` take more, one after the other, and unlike those of `f64` they keep a NaN.
+/// Functions of two values. `min` and `max` take more values, one after another, and unlike those of `f64` they keep a NaN.
 pub(super) static BINARY: [Binary; 3] = [
     two("atan2", Two::Smooth(portable::atan2, |a, b, _| [b, -a].map(|x| x / (a * a + b * b)))),
     two("max", Two::Pick(|a, b| a.is_nan() || a > b)),
     two("min", Two::Pick(|a, b| a.is_nan() || a < b)),
 ];
 
-/// Operators with their binding powers: higher binds tighter.
+/// Operators with their binding powers. An operator with a higher power binds more tightly.
 pub(super) static INFIX: [(u8, Binary); 13] = [
-    // true if one side is, whatever the other
+    // true if one side is true, even if the other is NaN
     (1, two("||", Two::Truth(|a, b| if a > 0.0 || b > 0.0 { 1.0 } else { compare(a, b, false) }))),
-    // false if one side is, whatever the other: `x > 0 && log(x) > 1` is defined for all x
+    // false if one side is false, even if the other is NaN: `x > 0 && log(x) > 1` is defined for all x
     (2, two("&&", Two::Truth(|a, b| if a <= 0.0 || b <= 0.0 { 0.0 } else { compare(a, b, true) }))),
     (COMPARISON, two("==", Two::Truth(|a, b| compare(a, b, a == b)))),
     (COMPARISON, two("!=", Two::Truth(|a, b| compare(a, b, a != b)))),
@@ -109,11 +109,12 @@ pub(super) const SIGN: u8 = 6;
 /// Binding power of `^`, which groups to the right.
 pub(super) const POWER: u8 = 7;
 
-/// Names of the functions.
+/// Return the names of the functions.
 pub(super) fn functions() -> impl Iterator<Item = &'static str> {
     UNARY.iter().map(|function| function.name).chain(BINARY.iter().map(|function| function.name))
 }
 
+/// Return a truth as a number, or NaN if an argument is NaN.
 fn compare(a: f64, b: f64, truth: bool) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { f64::from(u8::from(truth)) }
 }

@@ -1,10 +1,10 @@
-//! Expressions as programs for a stack of numbers: a loop over their steps, however long or deep the text is.
+//! Expressions as programs for a stack of numbers. The evaluation is a loop over steps, however long or deep the text is.
 
 use super::operators::{Binary, Two, Unary};
 use crate::data::Data;
 use std::sync::Arc;
 
-/// Most variables that an expression can use at once.
+/// Largest number of variables of an expression.
 pub(super) const MOST_VARIABLES: usize = 4;
 
 /// Values of the variables.
@@ -14,7 +14,7 @@ pub(super) type Values<T> = [T; MOST_VARIABLES];
 #[derive(Debug, Clone)]
 pub(super) enum Step {
     Number(f64),
-    /// By its place among the values.
+    /// A variable, by its index among the values.
     Variable(usize),
     Unary(&'static Unary),
     Binary(&'static Binary),
@@ -22,15 +22,15 @@ pub(super) enum Step {
     Data(Arc<Data>),
 }
 
-/// What expressions count with: plain numbers, or pairs of a value and a slope.
+/// The numbers for which expressions are evaluated: plain numbers, or pairs of a value and a derivative.
 pub(super) trait Number: Copy + Default {
-    /// A constant.
+    /// Return a constant.
     fn constant(value: f64) -> Self;
-    /// A function of this one.
+    /// Return a function of this number.
     fn one(self, function: &Unary) -> Self;
-    /// A function of this one and another.
+    /// Return a function of this number and another.
     fn two(self, other: Self, function: &Binary) -> Self;
-    /// Value of data at a place.
+    /// Return the value of data at a place.
     fn data(data: &Data, place: &[Self]) -> Self;
 }
 
@@ -56,18 +56,18 @@ impl Number for f64 {
     }
 }
 
-/// An expression, for any kind of number.
+/// An expression as a sequence of steps.
 pub(super) struct Program {
     steps: Vec<Step>,
-    /// Numbers that the stack holds at most.
+    /// Largest number of values on the stack.
     depth: usize,
 }
 
-/// Numbers of a stack that needs no memory of its own; expressions of a usual size need less than ten.
+/// Size of a stack without an allocation. Expressions of a usual size need less than ten numbers.
 const SHALLOW: usize = 16;
 
 impl Program {
-    /// Of steps each of which finds its values.
+    /// Return the program of some steps. Every step must find its arguments on the stack.
     pub(super) fn new(steps: Vec<Step>) -> Self {
         let (mut held, mut depth) = (0, 0);
         for step in &steps {
@@ -82,20 +82,20 @@ impl Program {
         Self { steps, depth }
     }
 
-    /// The value for the values of the variables.
+    /// Return the value for given values of the variables.
     pub(super) fn eval<T: Number>(&self, variables: &Values<T>) -> T {
-        self.watched(variables, |_, _| {})
+        self.eval_with(variables, |_, _| {})
     }
 
-    /// The same; `watch` sees each call of data with its place.
-    fn watched<T: Number>(&self, variables: &Values<T>, watch: impl FnMut(&Arc<Data>, &[T])) -> T {
+    /// Return the value, and call `watch` for each use of data with its place.
+    fn eval_with<T: Number>(&self, variables: &Values<T>, watch: impl FnMut(&Arc<Data>, &[T])) -> T {
         match self.depth {
             ..=SHALLOW => self.run(variables, &mut [T::default(); SHALLOW], watch),
             depth => self.run(variables, &mut vec![T::default(); depth], watch),
         }
     }
 
-    /// `watched` on a stack that is deep enough.
+    /// Return the value, with a stack that is deep enough.
     fn run<T: Number>(&self, variables: &Values<T>, stack: &mut [T], mut watch: impl FnMut(&Arc<Data>, &[T])) -> T {
         let mut top = 0;
         for step in &self.steps {
@@ -124,10 +124,10 @@ impl Program {
         stack[0]
     }
 
-    /// The first data that have no value at the place where they are asked for, and that place.
+    /// Return the first data that have no value at the place where they are needed, and that place.
     pub(super) fn outside(&self, variables: &Values<f64>) -> Option<(Arc<Data>, Vec<f64>)> {
         let mut found = None;
-        self.watched(variables, |data, place: &[f64]| {
+        self.eval_with(variables, |data, place: &[f64]| {
             if found.is_none() && place.iter().all(|x| x.is_finite()) && data.sample(place).value.is_nan() {
                 found = Some((data.clone(), place.to_vec()));
             }
@@ -135,7 +135,7 @@ impl Program {
         found
     }
 
-    /// All data that it asks.
+    /// Return all data that it uses.
     pub(super) fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
         self.steps.iter().filter_map(|step| match step {
             Step::Data(data) => Some(data),
@@ -143,7 +143,7 @@ impl Program {
         })
     }
 
-    /// The variables that it uses.
+    /// Return the indices of the variables that it uses.
     pub(super) fn variables(&self) -> impl Iterator<Item = usize> {
         self.steps.iter().filter_map(|step| match step {
             Step::Variable(variable) => Some(*variable),

@@ -1,8 +1,8 @@
-//! Names that an expression can use.
+//! The names that an expression can use.
 
 use crate::data::Library;
 
-/// What the words of an expression can mean besides the common functions.
+/// The names that an expression can use besides the common functions and `pi`.
 #[derive(Clone, Copy)]
 pub struct Scope<'a> {
     /// Names of the variables, at most four.
@@ -12,7 +12,7 @@ pub struct Scope<'a> {
 }
 
 impl<'a> Scope<'a> {
-    /// Variables alone.
+    /// Return a scope of variables alone.
     pub fn of(variables: &'a [&'static str]) -> Self {
         static NONE: Library = Library::new();
         Self { variables, data: &NONE }

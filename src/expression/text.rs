@@ -3,7 +3,7 @@
 use crate::error::{Error, Place};
 use std::ops::Range;
 
-/// A text and the place of the string that it stands in.
+/// A text, and the place of the string that contains it.
 #[derive(Clone, Copy)]
 pub(super) struct Text<'a> {
     pub text: &'a str,
@@ -11,7 +11,7 @@ pub(super) struct Text<'a> {
 }
 
 impl Text<'_> {
-    /// A refusal of some of its bytes, with the caret inside the string where the text is verbatim in the source (no escapes).
+    /// Return a refusal of some of its bytes. The caret is inside the string if the source has the text verbatim, without escapes.
     pub fn refuse(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         let Place { source, span: whole } = self.place;
         let written = source.text.get(whole.clone()).unwrap_or_default();

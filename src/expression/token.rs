@@ -1,11 +1,11 @@
-//! Words of an expression.
+//! The tokens of an expression.
 
 use super::operators::INFIX;
 use super::text::Text;
 use crate::error::Result;
 use std::ops::Range;
 
-/// One word of an expression.
+/// A token of an expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Token<'a> {
     Number(f64),
@@ -15,7 +15,10 @@ pub(super) enum Token<'a> {
     End,
 }
 
-/// The word at or after `start`, and where it stands.
+/// Return the token at or after the byte `start`, and its bytes in the text.
+///
+/// # Errors
+/// Bytes that are no token.
 pub(super) fn next<'a>(whole: &Text<'a>, start: usize) -> Result<(Token<'a>, Range<usize>)> {
     let text = whole.text;
     let start = text.len() - text[start..].trim_start().len();
@@ -53,7 +56,7 @@ pub(super) fn next<'a>(whole: &Text<'a>, start: usize) -> Result<(Token<'a>, Ran
     }
 }
 
-/// Length of the number that `rest` starts with: digits, a point, an exponent.
+/// Return the length in bytes of the number with which `rest` starts: digits, a point, an exponent.
 fn number_length(rest: &str) -> usize {
     let digits = |from: usize| rest[from..].bytes().take_while(|b| b.is_ascii_digit() || *b == b'.').count();
     let mantissa = digits(0);

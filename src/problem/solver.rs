@@ -1,5 +1,7 @@
 //! Inner solvers by name: what solves the linear systems of bodies.
 
+use serde::{Deserialize, Serialize};
+
 /// The inner solver that the scene requests. PETSc options override it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct SolverSpec {

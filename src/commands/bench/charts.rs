@@ -5,7 +5,7 @@ use super::table::{Row, Table};
 use crate::linalg::fit;
 use crate::output::{Axis, Color, Plot, Series, Style};
 
-/// All plots that the rows have numbers for, with their file names; those of several scenes have the scene in it.
+/// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the scene in it.
 pub(super) fn all(table: &Table, plan: &Plan) -> Vec<(String, Plot)> {
     let mut plots = Vec::new();
     for (name, scene) in plan.names.iter().zip(&plan.scenes) {
@@ -32,40 +32,47 @@ struct Chart<'a> {
     title: &'a str,
 }
 
-/// Rows of one curve, by a name made of the parts of their keys that differ.
-type Curve<'a> = (String, Vec<&'a Row>);
+/// The rows of one curve.
+struct Curve<'a> {
+    /// The values that its rows have in common.
+    key: Vec<String>,
+    /// The name of the curve: those of the values that differ between curves.
+    name: String,
+    rows: Vec<&'a Row>,
+}
 
 impl Chart<'_> {
-    /// Rows that differ in the columns that `along` picks only, as curves.
+    /// Return the curves whose rows differ only in the columns for which `along` holds.
     fn curves(&self, along: impl Fn(&str) -> bool) -> Vec<Curve<'_>> {
         let columns = self.plan.columns();
-        let kept: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).collect();
-        // a curve has one method: that which ran
+        let common: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).collect();
+        // the method of a curve is the one that ran
         let value = |row: &'_ Row, column: usize| -> String {
             if columns[column] == ASKED { row.method.clone() } else { row.key[column].clone() }
         };
         let differs = |column: usize| self.rows.iter().any(|row| value(row, column) != value(self.rows[0], column));
-        let named: Vec<usize> = kept.iter().copied().filter(|&column| differs(column)).collect();
-        let mut curves: Vec<(Vec<String>, Curve)> = Vec::new();
+        let named: Vec<usize> = common.iter().copied().filter(|&column| differs(column)).collect();
+        let mut curves: Vec<Curve> = Vec::new();
         for row in self.rows {
-            let key: Vec<String> = kept.iter().map(|&column| value(row, column)).collect();
-            if let Some((_, (_, rows))) = curves.iter_mut().find(|(known, _)| *known == key) {
-                rows.push(row);
+            let key: Vec<String> = common.iter().map(|&column| value(row, column)).collect();
+            if let Some(curve) = curves.iter_mut().find(|curve| curve.key == key) {
+                curve.rows.push(row);
                 continue;
             }
             let parts: Vec<String> = named.iter().map(|&column| part(&columns[column], &value(row, column))).collect();
             let name = if parts.is_empty() { row.key[columns.len() - 4].clone() } else { parts.join(", ") };
-            curves.push((key, (name, vec![row])));
+            curves.push(Curve { key, name, rows: vec![row] });
         }
-        curves.into_iter().map(|(_, curve)| curve).collect()
+        curves
     }
 
+    /// Return a plot with logarithmic axes; none without points.
     fn plot(&self, x: &str, y: &str, series: Vec<Series>) -> Option<Plot> {
         let has_points = series.iter().any(|series| !series.points.is_empty());
         has_points.then(|| Plot { title: self.title.to_owned(), x: Axis::log(x), y: Axis::log(y), series })
     }
 
-    /// Time against error: who reaches an accuracy first. The dashed line joins the runs that no other one beats in both.
+    /// Return the plot of time against error. The dashed line joins the runs that no other run beats in both.
     fn time_error(&self) -> Option<Plot> {
         let mut series =
             self.series(is_of_mesh, |row| Some((row.number("error")?, row.number("seconds")?)), |_| String::new());
@@ -76,7 +83,7 @@ impl Chart<'_> {
         self.plot(&format!("relative error ({of})"), "wall time, s", series)
     }
 
-    /// A number against the dofs, with the exponent of the power that fits it.
+    /// Return the plot of a number against the dofs, with the exponent of the fitted power law in the name of each curve.
     fn against_dofs(&self, name: &str, label: &str) -> Option<Plot> {
         let slope =
             |points: &[(f64, f64)]| exponent(points).map_or(String::new(), |slope| format!(" (dofs^{slope:.2})"));
@@ -84,7 +91,7 @@ impl Chart<'_> {
         self.plot("degrees of freedom", label, series)
     }
 
-    /// Sweeps against the coupling of the bodies, where it was varied.
+    /// Return the plot of sweeps against 1/(1 - theta), with the coupling theta of the bodies; none if theta was not varied.
     fn iterations_theta(&self) -> Option<Plot> {
         let is_over = |column: &str| !is_of_mesh(column) && self.plan.keys.iter().any(|key| key == column);
         let point = |row: &Row| Some((1.0 / (1.0 - row.number("theta")?), row.number("sweeps")?));
@@ -96,31 +103,34 @@ impl Chart<'_> {
         self.plot("1 / (1 - theta)", "sweeps", series)
     }
 
-    /// A curve of points for each group of rows, sorted by x; `more` is added to its name.
+    /// Return the points (x, y) of each curve, sorted by x. The text of `suffix` is added to the name.
     fn series(
         &self,
         along: impl Fn(&str) -> bool,
         point: impl Fn(&Row) -> Option<(f64, f64)>,
-        more: impl Fn(&[(f64, f64)]) -> String,
+        suffix: impl Fn(&[(f64, f64)]) -> String,
     ) -> Vec<Series> {
-        let curve = |(name, rows): Curve| {
+        let mut all = Vec::new();
+        for Curve { name, rows, .. } in self.curves(along) {
             let mut points: Vec<(f64, f64)> = rows.into_iter().filter_map(&point).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let label = name + &more(&points);
-            Series::new(label, points, Style::LineMarkers)
-        };
-        self.curves(along).into_iter().map(curve).filter(|series| !series.points.is_empty()).collect()
+            if !points.is_empty() {
+                all.push(Series::new(name + &suffix(&points), points, Style::LineMarkers));
+            }
+        }
+        all
     }
 }
 
+/// Return whether a column is a key of the mesh.
 fn is_of_mesh(column: &str) -> bool {
     column.starts_with("mesh.")
 }
 
-/// Errors that differ by less than this are those of one mesh, solved by others.
+/// Relative difference of errors below which two runs are those of different solvers on one mesh.
 const ALIKE: f64 = 0.01;
 
-/// The points (error, time) that no other one beats, sorted by the error: each is faster than all with a smaller error, and more
+/// Return the points (error, time) that no other point beats, sorted by the error. Each is faster than all points with a smaller error, and more
 /// accurate than all faster ones by more than [`ALIKE`].
 fn pareto(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     points.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.total_cmp(&b.0)));
@@ -134,15 +144,16 @@ fn pareto(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     front
 }
 
-/// Sizes from which on an exponent is more than the slope of a line between two measured times.
-const SIZES: usize = 3;
+/// Fewest sizes for an exponent. With two it would be no more than the slope of a line between two measured times.
+const FEWEST_SIZES: usize = 3;
 
-/// Exponent of the power law through points by least squares of the logarithms; `None` with fewer than [`SIZES`] places.
+/// Return the exponent of the power law through points (size, value), by least squares of the logarithms; none with fewer than
+/// [`FEWEST_SIZES`] sizes.
 fn exponent(points: &[(f64, f64)]) -> Option<f64> {
-    let mut places: Vec<f64> = points.iter().map(|point| point.0).collect();
-    places.sort_by(f64::total_cmp);
-    places.dedup();
-    if places.len() < SIZES {
+    let mut sizes: Vec<f64> = points.iter().map(|point| point.0).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.dedup();
+    if sizes.len() < FEWEST_SIZES {
         return None;
     }
     let [x, y] = [|point: &(f64, f64)| point.0.ln(), |point: &(f64, f64)| point.1.ln()]

@@ -1,4 +1,4 @@
-//! Error of a contact pressure: against a table, or against the closed form of the scene.
+//! The error of a contact pressure, against a table or against the closed form of the scene.
 
 use super::plan::Plan;
 use super::request::usage;
@@ -10,17 +10,20 @@ use rstar::primitives::GeomWithData;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Contact points of one pair with their weights and pressures, in the order of the file.
+/// The contact points of one pair, in the order of the file.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Points {
-    /// File without its folder.
+    /// Name of the file, without its folder.
     name: String,
+    /// Positions, n.
     at: Vec<[f64; 3]>,
+    /// Areas (lengths in the plane), n.
     weight: Vec<f64>,
+    /// Pressures, n.
     pressure: Vec<f64>,
 }
 
-/// What is read of a row of the file.
+/// The columns that are read of a row of the file.
 #[derive(Deserialize)]
 struct Point {
     x: f64,
@@ -30,12 +33,12 @@ struct Point {
     pressure: f64,
 }
 
-/// What `--against` names.
+/// The contact tables of `--against`; empty without it.
 #[derive(Default)]
 pub(super) struct References(Vec<Points>);
 
 impl References {
-    /// Reads a contact table, or all tables of a folder of results.
+    /// Read a contact table, or all tables of a folder of results.
     ///
     /// # Errors
     /// Files that cannot be read, several scenes, one table for several pairs.
@@ -63,13 +66,13 @@ impl References {
         digest(&self.0)
     }
 
-    /// Relative error of the pressures of a run; `None` without `--against`.
+    /// Return the relative error of the pressures of a run; `None` without `--against`.
     pub fn error(&self, scene: &Scene, run: &[Points]) -> Option<f64> {
         (!self.0.is_empty()).then(|| difference(scene.dimension.value, run, &self.0))?
     }
 }
 
-/// The contact tables in a folder of results, by their names.
+/// Read the contact tables in a folder of results, in the order of their names.
 ///
 /// # Errors
 /// A folder or table that cannot be read.
@@ -106,89 +109,103 @@ impl Points {
     }
 }
 
-/// Relative error in L2 of the pressures of a run against those of another one, over all pairs; `None` where they cannot be
+/// Return the relative error in L2 of the pressures of a run against those of another run, over all pairs; `None` where they cannot be
 /// compared.
 pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points]) -> Option<f64> {
     if run.len() != reference.len() {
         return None;
     }
-    let mut sums = (0.0, 0.0);
+    let mut squares = Squares::default();
     for own in run {
         // tables of the same pair, or the only two
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
         let known: Vec<f64> = match dimension {
-            2 => own.at.iter().map(|x| along(other, x)).collect(),
-            _ => over(other, &own.at),
+            2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
+            _ => on_surface(other, &own.at),
         };
-        add(&mut sums, own, &known);
+        squares.add(own, &known);
     }
-    relative(sums)
+    squares.relative()
 }
 
-/// Relative error in L2 of the pressures of a run against the `reference` of its contacts; `None` where one has none.
+/// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without one, or with several pairs.
 pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
-    let mut sums = (0.0, 0.0);
-    // a scene with several pairs would need to know which table is whose
+    // with several pairs it is not known which table belongs to which contact
     let ([contact], [own]) = (&scene.contacts[..], run) else { return None };
     let field = contact.reference.as_ref()?;
     let known: Vec<f64> = own.at.iter().map(|&x| field.eval(x)).collect();
-    add(&mut sums, own, &known);
-    relative(sums)
+    let mut squares = Squares::default();
+    squares.add(own, &known);
+    squares.relative()
 }
 
-fn add(sums: &mut (f64, f64), own: &Points, known: &[f64]) {
-    for q in 0..known.len() {
-        sums.0 += own.weight[q] * (own.pressure[q] - known[q]).powi(2);
-        sums.1 += own.weight[q] * known[q].powi(2);
-    }
+/// Squares of pressures, integrated over contact surfaces.
+#[derive(Default)]
+struct Squares {
+    error: f64,
+    reference: f64,
 }
 
-fn relative((error, whole): (f64, f64)) -> Option<f64> {
-    let relative = (error / whole).sqrt();
-    relative.is_finite().then_some(relative)
-}
-
-/// Pressure of a curve of points at the foot of `x` on it, linear between neighbours.
-fn along(curve: &Points, x: &[f64; 3]) -> f64 {
-    let mut best = (f64::INFINITY, curve.pressure.first().copied().unwrap_or(f64::NAN));
-    for q in 1..curve.at.len() {
-        let (a, b) = (curve.at[q - 1], curve.at[q]);
-        let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-        let to = |to: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|c| to[c] - a[c]) };
-        let edge = to(&b);
-        let s = (dot(to(x), edge) / dot(edge, edge)).clamp(0.0, 1.0);
-        let foot: [f64; 3] = std::array::from_fn(|c| a[c] + s * edge[c] - x[c]);
-        let distance = dot(foot, foot);
-        if distance < best.0 {
-            best = (distance, (1.0 - s) * curve.pressure[q - 1] + s * curve.pressure[q]);
+impl Squares {
+    /// Add the pressures of a run at points with known pressures (n).
+    fn add(&mut self, run: &Points, known: &[f64]) {
+        for q in 0..known.len() {
+            self.error += run.weight[q] * (run.pressure[q] - known[q]).powi(2);
+            self.reference += run.weight[q] * known[q].powi(2);
         }
     }
-    best.1
+
+    /// Return the relative error; `None` if it is not finite.
+    fn relative(&self) -> Option<f64> {
+        Some((self.error / self.reference).sqrt()).filter(|relative| relative.is_finite())
+    }
 }
 
-/// Points that a plane is fitted through.
+/// Return the pressure at the point of a curve that is nearest to `x`, linear between the points of the table.
+fn on_curve(curve: &Points, x: &[f64; 3]) -> f64 {
+    let (mut least, mut pressure) = (f64::INFINITY, curve.pressure.first().copied().unwrap_or(f64::NAN));
+    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    for q in 1..curve.at.len() {
+        let (a, b) = (curve.at[q - 1], curve.at[q]);
+        let from_a = |to: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|c| to[c] - a[c]) };
+        let edge = from_a(&b);
+        let s = (dot(from_a(x), edge) / dot(edge, edge)).clamp(0.0, 1.0);
+        let to_edge: [f64; 3] = std::array::from_fn(|c| a[c] + s * edge[c] - x[c]);
+        let squared = dot(to_edge, to_edge);
+        if squared < least {
+            (least, pressure) = (squared, (1.0 - s) * curve.pressure[q - 1] + s * curve.pressure[q]);
+        }
+    }
+    pressure
+}
+
+/// Number of points that a plane is fitted through.
 const NEIGHBOURS: usize = 8;
 
-/// Pressures of scattered points of a surface at places on it: the plane of least squares through the nearest points, near
-/// ones with more weight.
-fn over(surface: &Points, places: &[[f64; 3]]) -> Vec<f64> {
+/// Return the pressures at places on a surface of scattered points.
+///
+/// They are those of the plane of least squares through the nearest points, whose equations are weighted by the inverse distances.
+fn on_surface(surface: &Points, places: &[[f64; 3]]) -> Vec<f64> {
     let points = surface.at.iter().zip(&surface.pressure);
     let tree = RTree::bulk_load(points.map(|(&x, &p)| GeomWithData::new(x, p)).collect());
-    let at = |x: &[f64; 3]| {
-        let near: Vec<_> = tree.nearest_neighbor_iter_with_distance_2(*x).take(NEIGHBOURS).collect();
-        let Some(&(_, far)) = near.last() else { return f64::NAN };
-        let weight = |distance: f64| 1.0 / (distance + 1e-20 * far).max(f64::MIN_POSITIVE).sqrt();
-        let row = |k: usize| -> [f64; 4] {
-            let y = near[k].0.geom();
-            [1.0, y[0] - x[0], y[1] - x[1], y[2] - x[2]].map(|value| weight(near[k].1) * value)
-        };
-        let matrix = nalgebra::DMatrix::from_fn(near.len(), 4, |k, c| row(k)[c]);
-        let right = nalgebra::DVector::from_fn(near.len(), |k, _| weight(near[k].1) * near[k].0.data);
-        let svd = matrix.svd(true, true);
-        let small = 1e-9 * svd.singular_values.max();
-        svd.solve(&right, small).map_or(f64::NAN, |plane| plane[0])
+    places.iter().map(|x| plane_at(&tree, x)).collect()
+}
+
+/// Return the value at `x` of the plane through the nearest points, which have their pressures as data.
+fn plane_at(tree: &RTree<GeomWithData<[f64; 3], f64>>, x: &[f64; 3]) -> f64 {
+    let near: Vec<_> = tree.nearest_neighbor_iter_with_distance_2(*x).take(NEIGHBOURS).collect();
+    let Some(&(_, far)) = near.last() else { return f64::NAN };
+    // distances are squared; the small term keeps the weight of a point at `x` itself finite
+    let weight = |squared: f64| 1.0 / (squared + 1e-20 * far).max(f64::MIN_POSITIVE).sqrt();
+    let row = |k: usize| -> [f64; 4] {
+        let y = near[k].0.geom();
+        [1.0, y[0] - x[0], y[1] - x[1], y[2] - x[2]].map(|value| weight(near[k].1) * value)
     };
-    places.iter().map(at).collect()
+    let matrix = nalgebra::DMatrix::from_fn(near.len(), 4, |k, c| row(k)[c]);
+    let right = nalgebra::DVector::from_fn(near.len(), |k, _| weight(near[k].1) * near[k].0.data);
+    let svd = matrix.svd(true, true);
+    let small = 1e-9 * svd.singular_values.max();
+    svd.solve(&right, small).map_or(f64::NAN, |plane| plane[0])
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! `winkler bench`: a scene by every mesh, order, inner solver, method and number of ranks that was asked for, each in a
-//! process of its own; times, memory, counts and errors as a table and plots.
+//! `winkler bench`: run a scene with every mesh, order, inner solver, method and number of ranks that was asked for, each in a process of its
+//! own. Times, memory, counters and errors are written as a table and plots.
 
 mod charts;
 mod compare;
@@ -26,12 +26,13 @@ use std::path::PathBuf;
 use std::time::Instant;
 use table::{Row, Table};
 
-/// Runs all combinations, writes `bench.csv` row by row and the plots at the end; returns the exit code: 1 if a run did
-/// not converge, was refused or did not end in time.
+/// Run all combinations, and write `bench.csv` row by row and the plots at the end.
+///
+/// Return the exit code: 1 if a run did not converge, was refused or did not end in time.
 ///
 /// # Errors
-/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written, a signal. What goes wrong in a
-/// run is a row.
+/// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written, a signal. A failure of a run is no error,
+/// but a row.
 pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     interrupt.hold();
     let is_one_of_many = |name| std::env::var(name).is_ok_and(|size| size.parse::<usize>().is_ok_and(|size| size > 1));
@@ -50,9 +51,9 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         bar.set_message(case.label());
         let scene = crate::scene::load(&case.scene, &case.overrides);
         let inputs = scene.as_ref().ok().and_then(inputs);
-        let kept = table.kept(case, inputs.as_deref());
-        let is_new = kept.is_none();
-        let mut row = match kept {
+        let old = table.old_row(case, inputs.as_deref());
+        let is_new = old.is_none();
+        let mut row = match old {
             Some(row) => row,
             None if table.is_beyond(&plan, case) => Row::skipped(case, "an earlier mesh took too long"),
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
@@ -80,6 +81,7 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     Ok(i32::from(!table.rows.iter().all(Row::is_good)))
 }
 
+/// Return the folder of the results: that of `-o`, else `bench` in that of the only scene, else `results/bench`.
 fn folder(request: &Request, plan: &Plan) -> PathBuf {
     match (&request.folder, &plan.scenes[..]) {
         (Some(folder), _) => folder.clone(),
@@ -88,15 +90,14 @@ fn folder(request: &Request, plan: &Plan) -> PathBuf {
     }
 }
 
-/// Return a digest of all that a run of a scene computes with: the scene, its data, and what its mesh is made from. None if that is not
-/// known beforehand.
+/// Return a digest of all inputs of a run: the scene, its data, and what its mesh is made from; none if that is not known before the run.
 fn inputs(scene: &Scene) -> Option<String> {
     let order = scene.bodies.iter().map(|body| body.order).max()?;
     let mesh = crate::mesh::made_from(&scene.mesh, scene.dimension.value, order)?;
     Some(digest(&(scene.problem().to_string(), mesh)))
 }
 
-/// One row: as many runs as asked for, and what they say.
+/// Run a case as often as asked for, and return its row. `meshed` has the overrides of meshes that are in the cache.
 fn measure(
     case: &Case,
     scene: Result<Scene>,
@@ -108,7 +109,7 @@ fn measure(
         Ok(scene) => scene,
         Err(error) => return Ok(Row::refused(case, &error)),
     };
-    // Gmsh works before the clock starts
+    // the mesh is made before times are measured
     if meshed.insert(case.mesh_overrides.clone()) {
         runner.mesh(case)?;
     }
@@ -123,7 +124,8 @@ fn measure(
     Ok(row)
 }
 
-/// Error of a run against what is known beforehand: `--against`, or the closed form of the scene.
+/// Return the error of a run against a known solution, and what it is measured in and against. The solution is that of `--against`, or a closed
+/// form of the scene.
 fn known_error(
     scene: &Scene,
     row: &Row,

@@ -1,22 +1,21 @@
-//! Which runs a benchmark makes: all combinations of what was asked for.
+//! The plan of a benchmark: all combinations of scenes, keys, orders, methods, solvers and ranks.
 
 use super::request::{Request, usage};
-use crate::commands::case_of;
-use crate::commands::sweep::{axis, combinations};
+use crate::commands::{Variation, case_of, combinations};
 use crate::error::Result;
 use crate::problem::{MethodName, Order, Preset, name_of};
 use crate::scene::Scene;
 use std::path::PathBuf;
 
-/// All runs.
+/// The runs of a benchmark.
 pub(super) struct Plan {
-    /// The scenes with the overrides that hold for all runs.
+    /// The scenes with the overrides of all runs.
     pub scenes: Vec<Scene>,
     /// Their names in the table.
     pub names: Vec<String>,
     /// Keys of `--over`.
     pub keys: Vec<String>,
-    /// The combinations, solvers fastest but for ranks.
+    /// The combinations, ordered by scene, values of the keys, order, method, solver and ranks; the last changes first.
     pub cases: Vec<Case>,
 }
 
@@ -25,27 +24,27 @@ pub(super) struct Plan {
 pub(super) struct Case {
     /// Scene file.
     pub scene: PathBuf,
-    /// Columns that tell it from the others: see [`Plan::columns`].
+    /// Values of the columns that distinguish it from other cases: see [`Plan::columns`].
     pub key: Vec<String>,
-    /// Short names of the parts that differ within the plan.
+    /// Short texts of those values that differ within the plan.
     parts: Vec<String>,
     /// Overrides of the scene.
     pub overrides: Vec<String>,
-    /// Those of them that the mesh depends on.
+    /// Those overrides that the mesh depends on.
     pub mesh_overrides: Vec<String>,
     /// PETSc options.
-    pub words: Vec<String>,
-    /// MPI ranks.
+    pub petsc: Vec<String>,
+    /// Number of MPI ranks.
     pub ranks: usize,
 }
 
 /// The method's name for one linear factor-and-solve.
 pub(super) const LINEAR: &str = "linear";
 
-/// Columns of a key besides those of `--over`.
+/// Columns of a key after the scene and those of `--over`.
 const COLUMNS: [&str; 4] = ["solver", ASKED, "order", "ranks"];
 
-/// Column of the method that was asked for; what ran can be another.
+/// Column of the method that was asked for. The method that ran can be another.
 pub(super) const ASKED: &str = "asked";
 
 /// An inner solver: a name in the table with its overrides of the scene and its PETSc options.
@@ -53,19 +52,31 @@ pub(super) const ASKED: &str = "asked";
 struct Solver {
     name: String,
     overrides: Vec<String>,
-    words: Vec<String>,
-    /// Whether it factors or preconditions all of G, so that one solve by it is a yardstick.
-    whole: bool,
+    petsc: Vec<String>,
+    /// Whether it factors or preconditions whole stiffness matrices, so that one solve by it is a reference cost.
+    is_whole: bool,
+}
+
+/// The choices that make a case of a scene and a mesh.
+struct Choice<'a> {
+    /// Values of the keys.
+    values: &'a [String],
+    /// Element order of all bodies, if it is not the scene's.
+    order: Option<usize>,
+    /// Method, if it is not the scene's.
+    method: Option<&'a str>,
+    solver: &'a Solver,
+    ranks: usize,
 }
 
 impl Plan {
-    /// The plan of a request.
+    /// Return the plan of a request.
     ///
     /// # Errors
     /// Scenes that cannot be read, lists that make no sense.
     pub fn new(request: &Request) -> Result<Self> {
-        let axes = request.over.iter().map(|text| axis(text)).collect::<Result<Vec<_>>>()?;
-        if axes.iter().any(|(key, _)| key == "solver") {
+        let variations = request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>()?;
+        if variations.iter().any(|variation| variation.key == "solver") {
             return Err(usage("`--over solver=...` would hide the solvers of the table").help("--solver mumps,hypre"));
         }
         let solvers = solvers(&request.solvers)?;
@@ -78,10 +89,10 @@ impl Plan {
         let overrides = request.all_overrides();
         let scenes =
             request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
-        let keys = axes.iter().map(|(key, _)| key.clone()).collect();
+        let keys = variations.iter().map(|variation| variation.key.clone()).collect();
         let mut plan = Plan { names: names(&scenes), scenes, keys, cases: Vec::new() };
         for index in 0..plan.scenes.len() {
-            for values in combinations(&axes) {
+            for values in combinations(&variations) {
                 plan.add(index, request, &values, &solvers);
             }
         }
@@ -89,9 +100,8 @@ impl Plan {
         Ok(plan)
     }
 
-    /// All cases of a scene for some values of the keys.
+    /// Add all cases of a scene for some values of the keys.
     fn add(&mut self, index: usize, request: &Request, values: &[String], solvers: &[Solver]) {
-        let scene = &self.scenes[index];
         let (orders, mut methods) = (choices(&request.orders), choices(&request.methods));
         if request.linear {
             methods.insert(0, Some(LINEAR.to_owned()));
@@ -100,59 +110,66 @@ impl Plan {
             let mut mesh = request.all_overrides();
             mesh.extend(self.keys.iter().zip(values).map(|(key, value)| format!("{key}={value}")));
             if let Some(order) = order {
-                mesh.extend((0..scene.bodies.len()).map(|body| format!("body.{body}.order={order}")));
+                mesh.extend((0..self.scenes[index].bodies.len()).map(|body| format!("body.{body}.order={order}")));
             }
-            for (method, solver) in
-                methods.iter().flat_map(|method| solvers.iter().map(move |solver| (method.as_deref(), solver)))
-            {
-                if method == Some(LINEAR) && !solver.whole {
-                    continue;
-                }
-                for &ranks in &request.ranks {
-                    let mut key = vec![self.names[index].clone()];
-                    key.extend(values.iter().cloned());
-                    key.extend([
-                        solver.name.clone(),
-                        method.map_or_else(|| name_of(&MethodName::ALL, &scene.method.name).to_owned(), str::to_owned),
-                        order.map_or_else(|| orders_of(scene), |order| order.to_string()),
-                        ranks.to_string(),
-                    ]);
-                    let mut overrides = mesh.clone();
-                    overrides.extend(["output.vtu=false", "output.plots=false", "output.pairs=all"].map(str::to_owned));
-                    overrides.extend(solver.overrides.iter().cloned());
-                    overrides.extend(method.map(|name| match name {
-                        // a sweep that is not the last, whatever the tolerance
-                        LINEAR => {
-                            "method={name=\"robin\", robin=\"auto\", stop={residual=1e-300, iterations=1}}".to_owned()
-                        }
-                        name => format!("method.name={name}"),
-                    }));
-                    self.cases.push(Case {
-                        scene: scene.path.clone(),
-                        key,
-                        parts: Vec::new(),
-                        overrides,
-                        mesh_overrides: mesh.clone(),
-                        words: [&precise(method)[..], &request.petsc, &solver.words].concat(),
-                        ranks,
-                    });
+            for method in methods.iter().map(Option::as_deref) {
+                for solver in solvers.iter().filter(|solver| method != Some(LINEAR) || solver.is_whole) {
+                    for &ranks in &request.ranks {
+                        let choice = Choice { values, order, method, solver, ranks };
+                        let case = self.case(index, &mesh, &request.petsc, &choice);
+                        self.cases.push(case);
+                    }
                 }
             }
         }
     }
 
-    /// The scene of a name.
-    pub fn scene(&self, name: &str) -> Option<&Scene> {
-        self.names.iter().zip(&self.scenes).find(|(known, _)| *known == name).map(|(_, scene)| scene)
+    /// Return a case of a scene.
+    fn case(&self, index: usize, mesh_overrides: &[String], petsc: &[String], choice: &Choice) -> Case {
+        let scene = &self.scenes[index];
+        let &Choice { values, order, method, solver, ranks } = choice;
+        let mut key = vec![self.names[index].clone()];
+        key.extend(values.iter().cloned());
+        key.extend([
+            solver.name.clone(),
+            method.map_or_else(|| name_of(&MethodName::ALL, &scene.method.name).to_owned(), str::to_owned),
+            order.map_or_else(|| orders_of(scene), |order| order.to_string()),
+            ranks.to_string(),
+        ]);
+        let mut overrides = mesh_overrides.to_vec();
+        overrides.extend(["output.vtu=false", "output.plots=false", "output.pairs=all"].map(str::to_owned));
+        overrides.extend(solver.overrides.iter().cloned());
+        overrides.extend(method.map(|name| match name {
+            // one sweep after the start, whatever the tolerance
+            LINEAR => "method={name=\"robin\", robin=\"auto\", stop={residual=1e-300, iterations=1}}".to_owned(),
+            name => format!("method.name={name}"),
+        }));
+        // a reference cost is that of a solve to 1e-8, unless another tolerance is typed
+        let precise: &[&str] = if method == Some(LINEAR) { &["-ksp_rtol", "1e-8"] } else { &[] };
+        let precise = precise.iter().map(|&word| word.to_owned());
+        Case {
+            scene: scene.path.clone(),
+            key,
+            parts: Vec::new(),
+            overrides,
+            mesh_overrides: mesh_overrides.to_vec(),
+            petsc: precise.chain(petsc.iter().chain(&solver.petsc).cloned()).collect(),
+            ranks,
+        }
     }
 
-    /// Names of the columns of a key.
+    /// Return the scene of a name.
+    pub fn scene(&self, name: &str) -> Option<&Scene> {
+        self.names.iter().position(|known| known == name).map(|index| &self.scenes[index])
+    }
+
+    /// Return the names of the columns of a key.
     pub fn columns(&self) -> Vec<String> {
         let keys = self.keys.iter().map(String::as_str);
         std::iter::once("scene").chain(keys).chain(COLUMNS).map(str::to_owned).collect()
     }
 
-    /// Gives every case the parts of its key that differ within the plan, for labels.
+    /// Give every case the parts of its label: the values of its key that differ within the plan.
     fn shorten(&mut self) {
         let columns = self.columns();
         let differs: Vec<bool> = (0..columns.len())
@@ -168,35 +185,29 @@ impl Plan {
     }
 }
 
-/// What was asked for, one by one; once what the scene says if nothing was.
-fn choices<T: Clone>(asked: &[T]) -> Vec<Option<T>> {
-    if asked.is_empty() { vec![None] } else { asked.iter().cloned().map(Some).collect() }
-}
-
-/// Words for the yardstick: a solve that ends at 1e-8, unless another tolerance is typed.
-fn precise(method: Option<&str>) -> Vec<String> {
-    let words = ["-ksp_rtol", "1e-8"].map(str::to_owned);
-    if method == Some(LINEAR) { words.to_vec() } else { Vec::new() }
+/// Return the requested choices, or one `None`, the scene's own choice, if there are none.
+fn choices<T: Clone>(requested: &[T]) -> Vec<Option<T>> {
+    if requested.is_empty() { vec![None] } else { requested.iter().cloned().map(Some).collect() }
 }
 
 impl Case {
-    /// What tells it from the other cases of the plan.
+    /// Return a text that distinguishes it from the other cases of the plan.
     pub fn label(&self) -> String {
         self.parts.join(", ")
     }
 
-    /// The method asked for.
-    pub fn asked(&self) -> &str {
+    /// Return the method that was asked for.
+    pub fn requested_method(&self) -> &str {
         &self.key[self.key.len() - 3]
     }
 
-    /// Whether it is one linear factor-and-solve.
+    /// Return whether it is one linear factor-and-solve.
     pub fn is_linear(&self) -> bool {
-        self.asked() == LINEAR
+        self.requested_method() == LINEAR
     }
 }
 
-/// A part of a label: names of solvers and methods stand for themselves.
+/// Return a part of a label. Scenes, solvers and methods need no name of their column.
 pub(super) fn part(column: &str, value: &str) -> String {
     let last = column.rsplit('.').next().unwrap_or(column);
     match column {
@@ -207,7 +218,7 @@ pub(super) fn part(column: &str, value: &str) -> String {
     }
 }
 
-/// Name of each scene's case, or its path where two have the same.
+/// Return the name of each scene's case, or its path where two scenes have the same name.
 fn names(scenes: &[Scene]) -> Vec<String> {
     let case = |scene: &Scene| case_of(&scene.path).to_string_lossy().into_owned();
     let name = |scene: &Scene| match scenes.iter().filter(|other| case(other) == case(scene)).count() {
@@ -217,6 +228,7 @@ fn names(scenes: &[Scene]) -> Vec<String> {
     scenes.iter().map(name).collect()
 }
 
+/// Return the element orders of a scene, joined by `+`.
 fn orders_of(scene: &Scene) -> String {
     let mut orders: Vec<Order> = scene.bodies.iter().map(|body| body.order).collect();
     orders.sort();
@@ -224,13 +236,13 @@ fn orders_of(scene: &Scene) -> String {
     orders.iter().map(|order| order.degree().to_string()).collect::<Vec<_>>().join("+")
 }
 
-/// The solvers of `--solver`; all presets if there is none.
+/// Return the solvers of `--solver`, or all presets if there is none.
 fn solvers(typed: &[String]) -> Result<Vec<Solver>> {
     let preset = |name: &str| Solver {
         name: name.to_owned(),
         overrides: vec![format!("solver={name}")],
-        words: Vec::new(),
-        whole: name != "condensed",
+        petsc: Vec::new(),
+        is_whole: name != "condensed",
     };
     if typed.is_empty() {
         return Ok(Preset::ALL.iter().map(|(name, _)| preset(name)).collect());
@@ -238,8 +250,8 @@ fn solvers(typed: &[String]) -> Result<Vec<Solver>> {
     let mut solvers = Vec::new();
     for text in typed {
         if text.trim_start().starts_with('-') {
-            let words: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
-            solvers.push(Solver { name: words.join(" "), overrides: Vec::new(), words, whole: true });
+            let petsc: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
+            solvers.push(Solver { name: petsc.join(" "), overrides: Vec::new(), petsc, is_whole: true });
             continue;
         }
         for name in text.split(',').map(str::trim) {
@@ -261,7 +273,7 @@ mod tests {
         let list = solvers(&["mumps, hypre".to_owned(), "-pc_type icc -ksp_rtol 1e-9,5".to_owned()]).expect("solvers");
         let names: Vec<&str> = list.iter().map(|solver| solver.name.as_str()).collect();
         assert_eq!(names, ["mumps", "hypre", "-pc_type icc -ksp_rtol 1e-9,5"]);
-        assert_eq!(list[2].words.len(), 4);
+        assert_eq!(list[2].petsc.len(), 4);
         assert!(solvers(&["mumps,,icc".to_owned()]).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! One run as a process of its own: its words, its time, its memory.
+//! One run as a process of its own: its messages, its time and its memory.
 
 use super::plan::Case;
 use super::request::{Request, usage};
@@ -12,14 +12,14 @@ use serde_json::Value;
 use std::fs::{self, File};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use wait4::{ResUse, Wait4};
 
-/// What came of one run.
+/// The result of one run.
 pub(super) struct Run {
-    /// Status of the report, or `refused`, `timeout`, `killed`, `failed`.
+    /// Status of the report, or `refused`, `timeout`, `killed` or `failed`.
     pub status: String,
     /// The status in words.
     pub message: String,
@@ -35,32 +35,34 @@ pub(super) struct Run {
     pub last_sweep: Option<f64>,
 }
 
-/// Starts runs.
+/// The program that starts runs, and their limits.
 pub(super) struct Runner {
     program: PathBuf,
+    /// Folder of the results of all runs.
     folder: PathBuf,
     timeout: Duration,
+    /// Number of runs of each case.
     repeat: usize,
     interrupt: Interrupt,
 }
 
-/// Seconds that a process gets to end itself.
+/// Time that a process gets to end itself.
 const GRACE: Duration = Duration::from_secs(5);
 
-/// Time between looks for a signal.
-const LOOK: Duration = Duration::from_millis(100);
+/// Time between checks for a signal.
+const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Folder of the results of all runs.
+/// Name of the folder of the results of all runs.
 pub(super) const RUNS: &str = "runs";
 
-/// Longest name of a folder of a run.
-const NAME: usize = 120;
+/// Longest name of the folder of a run.
+const LONGEST_NAME: usize = 120;
 
 impl Runner {
-    /// A runner of this very program, for runs below `folder`.
+    /// Return a runner of this program, for runs below `folder`.
     ///
     /// # Errors
-    /// A time limit that is no time, a system that does not tell where the program lies.
+    /// A time limit that is no time, a system on which the path of the program cannot be found.
     pub fn new(interrupt: &Interrupt, request: &Request, folder: &Path) -> Result<Self> {
         let timeout = Duration::try_from_secs_f64(request.timeout)
             .ok()
@@ -72,12 +74,12 @@ impl Runner {
         Ok(Self { program, folder, timeout, repeat: request.repeat, interrupt })
     }
 
-    /// Folder of a run's results.
+    /// Return the folder of a run's results.
     pub fn folder(&self, case: &Case) -> PathBuf {
         folder_of(&self.folder, &case.key)
     }
 
-    /// Makes the mesh of a run. Whatever goes wrong, the run itself will say it.
+    /// Make the mesh of a run. A failure is not reported here, since the run itself fails in the same way.
     ///
     /// # Errors
     /// A file system that refuses.
@@ -88,7 +90,7 @@ impl Runner {
         self.finish(command, &self.folder(case)).map(|_| ())
     }
 
-    /// Runs a case as often as asked for, or until it fails.
+    /// Run a case as often as asked for, or until it fails.
     ///
     /// # Errors
     /// A file system that refuses.
@@ -105,6 +107,7 @@ impl Runner {
         Ok(runs)
     }
 
+    /// Run a case once.
     fn run(&self, case: &Case) -> Result<Run> {
         let folder = self.folder(case);
         let mut command = match case.ranks {
@@ -118,23 +121,23 @@ impl Runner {
             }
         };
         command.arg("solve").arg(&case.scene).arg("-o").arg(&folder);
-        command.args(case.overrides.iter().flat_map(|text| ["--set", text])).args(&case.words);
-        // one thread a rank unless the user says something else: otherwise solvers compare by their threads
+        command.args(case.overrides.iter().flat_map(|text| ["--set", text])).args(&case.petsc);
+        // one thread for each rank, unless the user has set another number: otherwise the threads of solvers are compared
         for name in ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"] {
             if std::env::var_os(name).is_none() {
                 command.env(name, "1");
             }
         }
-        // what an earlier run left must not be taken for this one's; there may be nothing
+        // results of an earlier run must not be taken for those of this run; there may be none
         let _ = fs::remove_dir_all(&folder);
         let ended = self.finish(command, &folder)?;
         let report = fs::read(folder.join("report.json")).ok();
         let report: Value = report.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
         let (status, message) = match (ended.used.as_ref(), report["status"].as_str()) {
-            (None, _) => ("failed".to_owned(), ended.said),
-            _ if ended.late => ("timeout".to_owned(), format!("not ended after {:?}", self.timeout)),
+            (None, _) => ("failed".to_owned(), ended.output),
+            _ if ended.is_late => ("timeout".to_owned(), format!("not ended after {:?}", self.timeout)),
             (_, Some(status)) => (status.to_owned(), report["message"].as_str().unwrap_or_default().to_owned()),
-            (Some(used), None) => (kind(used.status).to_owned(), words(&ended.said, used.status)),
+            (Some(used), None) => (status_of(used.status).to_owned(), message(&ended.output, used.status)),
         };
         Ok(Run {
             status,
@@ -142,60 +145,63 @@ impl Runner {
             seconds: ended.seconds,
             cpu: ended.used.as_ref().map_or(f64::NAN, |used| (used.rusage.utime + used.rusage.stime).as_secs_f64()),
             memory: ended.used.map_or(0, |used| used.rusage.maxrss),
-            report: if ended.late { Value::Null } else { report },
+            report: if ended.is_late { Value::Null } else { report },
             last_sweep: last_sweep(&folder.join("history.csv")),
         })
     }
 
-    /// Waits for a process, which is ended when its time is over; its output goes to `output.txt` in the folder.
+    /// Start a process, wait for it, and end it when its time is over. Its output goes to `output.txt` in the folder.
     fn finish(&self, mut command: Command, folder: &Path) -> Result<Ended> {
         fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create the folder", &cause))?;
         let path = folder.join("output.txt");
-        let failed = |cause: &std::io::Error| Error::file(&path, "write", cause);
-        // what has this name is replaced: a pipe would keep its writer waiting
+        let failed = |cause: std::io::Error| Error::file(&path, "write", &cause);
+        // a file of this name is replaced: a pipe would keep its writer waiting
         let _ = fs::remove_file(&path);
-        let file = File::create_new(&path).map_err(|cause| failed(&cause))?;
-        let both = file.try_clone().map_err(|cause| failed(&cause))?;
+        let file = File::create_new(&path).map_err(failed)?;
+        let both = file.try_clone().map_err(failed)?;
         command.stdin(Stdio::null()).stdout(file).stderr(both);
         let began = Instant::now();
-        let mut child = match command.spawn() {
+        let child = match command.spawn() {
             Ok(child) => child,
             Err(cause) => {
-                let said = format!("cannot start {}: {cause}", command.get_program().display());
-                return Ok(Ended { used: None, late: false, seconds: f64::NAN, said });
+                let output = format!("cannot start {}: {cause}", command.get_program().display());
+                return Ok(Ended { used: None, is_late: false, seconds: f64::NAN, output });
             }
         };
-        let id = Pid::from_raw(child.id() as i32);
-        let (send, receive) = mpsc::channel();
-        // a process that ended is told at once, without asking again and again
-        std::thread::spawn(move || send.send(child.wait4()));
-        let mut answer = receive.recv_timeout(LOOK.min(self.timeout));
-        while matches!(answer, Err(RecvTimeoutError::Timeout))
-            && began.elapsed() < self.timeout
-            && self.interrupt.asked().is_none()
-        {
-            answer = receive.recv_timeout(LOOK.min(self.timeout.saturating_sub(began.elapsed())));
-        }
-        let is_late = |answer: &Answer| matches!(answer, Err(RecvTimeoutError::Timeout));
-        let late = is_late(&answer);
-        for signal in [Signal::SIGTERM, Signal::SIGKILL] {
-            if is_late(&answer) {
-                // a process that is gone needs no signal
-                let _ = kill(id, signal);
-                answer = receive.recv_timeout(GRACE);
-            }
-        }
+        let (answer, is_late) = self.wait(child, began);
         if let Some(signal) = self.interrupt.asked() {
             let message = format!("ended by {}: the rows so far are kept", interrupt::name(signal));
             return Err(Error::new(Kind::Stopped(signal), message).help("`--resume` makes those that are missing"));
         }
         let seconds = began.elapsed().as_secs_f64();
-        let said = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();
-        Ok(Ended { used: answer.ok().and_then(|used| used.ok()), late, seconds, said })
+        let output = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();
+        Ok(Ended { used: answer.ok().and_then(|used| used.ok()), is_late, seconds, output })
+    }
+
+    /// Wait for a process. If its time is over or a signal has come, it is ended. Return its answer, and whether it had to be ended.
+    fn wait(&self, mut child: Child, began: Instant) -> (Answer, bool) {
+        let id = Pid::from_raw(child.id() as i32);
+        let (send, receive) = mpsc::channel();
+        // the thread reports the end of the process at once, without polling
+        std::thread::spawn(move || send.send(child.wait4()));
+        let is_running = |answer: &Answer| matches!(answer, Err(RecvTimeoutError::Timeout));
+        let mut answer = receive.recv_timeout(CHECK_INTERVAL.min(self.timeout));
+        while is_running(&answer) && began.elapsed() < self.timeout && self.interrupt.asked().is_none() {
+            answer = receive.recv_timeout(CHECK_INTERVAL.min(self.timeout.saturating_sub(began.elapsed())));
+        }
+        let is_late = is_running(&answer);
+        for signal in [Signal::SIGTERM, Signal::SIGKILL] {
+            if is_running(&answer) {
+                // the process may have ended meanwhile
+                let _ = kill(id, signal);
+                answer = receive.recv_timeout(GRACE);
+            }
+        }
+        (answer, is_late)
     }
 }
 
-/// Inner iterations between the last two rows of a history.
+/// Return the number of inner iterations between the last two rows of a history.
 fn last_sweep(history: &Path) -> Option<f64> {
     let mut reader = csv::Reader::from_path(history).ok()?;
     let column = reader.headers().ok()?.iter().position(|name| name == "inner_iterations")?;
@@ -204,30 +210,32 @@ fn last_sweep(history: &Path) -> Option<f64> {
     Some(last - before)
 }
 
-/// What the waiting thread tells.
+/// The answer of the thread that waits for a process.
 type Answer = Result<std::io::Result<ResUse>, RecvTimeoutError>;
 
-/// Folder of the results of a run with some key, below that of all runs.
+/// Return the folder of the results of a run with a key, below the folder of all runs.
 pub(super) fn folder_of(runs: &Path, key: &[String]) -> PathBuf {
     let name = safe_name(&key.join("_").replace(' ', "_"));
-    if name.len() <= NAME {
+    if name.len() <= LONGEST_NAME {
         return runs.join(name);
     }
-    let start: String = name.chars().take(NAME / 2).collect();
+    let start: String = name.chars().take(LONGEST_NAME / 2).collect();
     runs.join(format!("{start}-{:.12}", digest(&name)))
 }
 
-/// How a process ended.
+/// A process that has ended.
 struct Ended {
-    /// What it used; `None` if it could not be started or waited for.
+    /// Resources that it used; `None` if it could not be started or waited for.
     used: Option<ResUse>,
     /// Whether its time was over.
-    late: bool,
+    is_late: bool,
     seconds: f64,
-    said: String,
+    /// Its standard output and standard error.
+    output: String,
 }
 
-fn kind(status: ExitStatus) -> &'static str {
+/// Return the status of a run without a report.
+fn status_of(status: ExitStatus) -> &'static str {
     match (status.code(), status.signal()) {
         (_, Some(_)) => "killed",
         (Some(2..=6), _) => "refused",
@@ -235,19 +243,19 @@ fn kind(status: ExitStatus) -> &'static str {
     }
 }
 
-/// What a process that ended without a report said: its errors with their advice.
-fn words(said: &str, status: ExitStatus) -> String {
+/// Return the message of a process without a report: its errors with their advice, or else a line of its output.
+fn message(output: &str, status: ExitStatus) -> String {
     let mut found: Vec<&str> = Vec::new();
-    for line in said.lines() {
+    for line in output.lines() {
         let text = line.trim_start_matches([' ', '|', '=']).trim();
         let is_error = line.starts_with("error");
         if is_error || (!found.is_empty() && (text.starts_with("help:") || text.starts_with("note:"))) {
             found.push(text);
         }
     }
-    let mut lines = said.lines().map(str::trim).filter(|line| line.contains(char::is_alphabetic));
-    // mpiexec begins what it says with a rule, and comes to the point at once
-    let line = if said.trim_start().starts_with("---") { lines.next() } else { lines.next_back() };
+    let mut lines = output.lines().map(str::trim).filter(|line| line.contains(char::is_alphabetic));
+    // messages of mpiexec begin with a rule, and their first line says what is wrong
+    let line = if output.trim_start().starts_with("---") { lines.next() } else { lines.next_back() };
     match (found.is_empty(), line) {
         (false, _) => found.join("; "),
         (true, Some(line)) => format!("{status}: {line}"),
@@ -260,17 +268,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refusals_are_told_in_their_words() {
-        let said = "-----\nmpiexec has detected an attempt to run as root.\n\nmore\n-----\n";
+    fn refusals_are_reported_in_their_words() {
+        let output = "-----\nmpiexec has detected an attempt to run as root.\n\nmore\n-----\n";
         assert!(
-            words(said, ExitStatus::from_raw(1 << 8)).ends_with("1: mpiexec has detected an attempt to run as root.")
+            message(output, ExitStatus::from_raw(1 << 8))
+                .ends_with("1: mpiexec has detected an attempt to run as root.")
         );
-        assert!(words("one\n  two\n---\n", ExitStatus::from_raw(1 << 8)).ends_with("1: two"));
-        let said = "Title\nerror: PETSc knows no option -ksp_tpye\n |\n = help: did you mean -ksp_type?\n";
+        assert!(message("one\n  two\n---\n", ExitStatus::from_raw(1 << 8)).ends_with("1: two"));
+        let output = "Title\nerror: PETSc knows no option -ksp_tpye\n |\n = help: did you mean -ksp_type?\n";
         let status = ExitStatus::from_raw(5 << 8);
-        assert_eq!(words(said, status), "error: PETSc knows no option -ksp_tpye; help: did you mean -ksp_type?");
-        assert_eq!(kind(status), "refused");
-        assert_eq!(kind(ExitStatus::from_raw(9)), "killed");
-        assert!(words("Terminated\n\n", ExitStatus::from_raw(9)).contains("Terminated"));
+        assert_eq!(message(output, status), "error: PETSc knows no option -ksp_tpye; help: did you mean -ksp_type?");
+        assert_eq!(status_of(status), "refused");
+        assert_eq!(status_of(ExitStatus::from_raw(9)), "killed");
+        assert!(message("Terminated\n\n", ExitStatus::from_raw(9)).contains("Terminated"));
     }
 }

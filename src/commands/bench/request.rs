@@ -1,9 +1,9 @@
-//! What the user asks `winkler bench` for.
+//! The command line of `winkler bench`.
 
 use crate::error::{Error, Kind};
 use std::path::PathBuf;
 
-/// What the user typed.
+/// The command line of `winkler bench`.
 #[derive(clap::Args)]
 pub struct Request {
     /// Scene files (TOML)
@@ -60,14 +60,14 @@ pub struct Request {
 }
 
 impl Request {
-    /// Overrides of scene keys for every run.
+    /// Return the overrides of the scenes for every run.
     pub(super) fn all_overrides(&self) -> Vec<String> {
         let trust = self.trust_geo.then(|| "trust_geo=true".to_owned());
         self.overrides.iter().cloned().chain(trust).collect()
     }
 }
 
-/// A refusal of the command line.
+/// Return a refusal of the command line.
 pub(super) fn usage(message: impl Into<String>) -> Error {
     Error::new(Kind::Usage, message)
 }

@@ -5,11 +5,11 @@ use super::table::{Row, Table as Rows};
 use crate::output::{sci, seconds};
 use comfy_table::{CellAlignment, Table, presets};
 
-/// Writes a number of a row for people.
-type Writer = fn(f64) -> String;
+/// A function that returns a number as a text.
+type Format = fn(f64) -> String;
 
-/// Columns with a number: heading, name in the rows, how it is written.
-const NUMBERS: [(&str, &str, Writer); 8] = [
+/// Columns with a number: heading, name in the rows, format.
+const NUMBERS: [(&str, &str, Format); 8] = [
     ("dofs", "dofs", whole),
     ("iterations", "iterations", whole),
     ("sweeps", "sweeps", whole),
@@ -32,7 +32,7 @@ fn two(value: f64) -> String {
     sci(value, 2)
 }
 
-/// One line a row: what tells it from the others, the method that ran, and numbers that some row has.
+/// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
 pub(super) fn of(rows: &Rows, plan: &Plan) -> Table {
     let columns = plan.columns();
     let differs = |column: &usize| {
@@ -48,7 +48,7 @@ pub(super) fn of(rows: &Rows, plan: &Plan) -> Table {
     let line = |row: &Row| -> Vec<String> {
         let words = named.iter().map(|&column| row.key[column].clone());
         let words = words.chain([row.method.clone(), row.status.clone()]);
-        words.chain(numbers.iter().map(|(_, name, write)| row.number(name).map_or(String::new(), write))).collect()
+        words.chain(numbers.iter().map(|(_, name, format)| row.number(name).map_or(String::new(), format))).collect()
     };
     table.add_rows(rows.rows.iter().map(line));
     for column in table.column_iter_mut().skip(named.len() + 2) {

@@ -10,20 +10,20 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Columns of words and of the number of runs, after the key.
-const WORDS: [&str; 4] = ["runs", "status", "message", "method"];
+/// Columns of texts and of the number of runs, after the key.
+const TEXTS: [&str; 4] = ["runs", "status", "message", "method"];
 
-/// Where a number of a row comes from.
+/// The source of a number of a row.
 enum Of {
-    /// The reports of all runs, of which it is the median.
+    /// The median over the reports of all runs, by the path of the number in a report.
     Runs(&'static str),
-    /// The report of the first run.
+    /// The report of the first run, by the path of the number.
     First(&'static str),
     /// Anything else.
     Other,
 }
 
-/// Columns with a number, after the words.
+/// Columns with a number, after the texts.
 const NUMBERS: [(&str, Of); 25] = [
     ("dofs", Of::First("/dofs")),
     ("points", Of::Other),
@@ -55,23 +55,26 @@ const NUMBERS: [(&str, Of); 25] = [
 /// Columns after the numbers.
 const LAST: [&str; 2] = ["error_of", "inputs"];
 
-/// One combination and what was measured.
+/// The row of a case: what was measured.
 #[derive(Debug, Clone)]
 pub(super) struct Row {
-    /// Columns of the plan.
+    /// Values of the columns of the plan.
     pub key: Vec<String>,
+    /// Number of runs.
     runs: usize,
-    /// How it ended.
+    /// Status of the run.
     pub status: String,
+    /// The status in words.
     message: String,
     /// The method that ran; the one that was asked for where nothing ran.
     pub method: String,
+    /// Numbers by the names of their columns.
     numbers: BTreeMap<&'static str, f64>,
-    /// What the error is measured in and against; empty without an error.
+    /// The text that says what the error is measured in and against; empty without an error.
     pub error_of: String,
-    /// Digest of what the run computed with; empty if that is not known.
+    /// Digest of the inputs of the run; empty if they are not known.
     pub inputs: String,
-    /// Relative error of the displacements that the run itself told, where the scene has their closed form.
+    /// Relative error of the displacements from the report, where the scene has their closed form.
     pub displacement_error: Option<f64>,
 }
 
@@ -81,26 +84,26 @@ pub(super) struct Table<'a> {
     columns: Vec<String>,
     /// Rows so far.
     pub rows: Vec<Row>,
-    /// Rows of an earlier benchmark that are kept.
+    /// Rows of an earlier benchmark that can be reused.
     old: Vec<Row>,
     file: RowFile,
 }
 
 /// The file of the rows.
 const FILE: &str = "bench.csv";
-/// Status of a case that was not run.
+/// The status of a case that was not run.
 const SKIPPED: &str = "skipped";
-/// What the rows of the folder were made with.
+/// The file with the settings of the rows in the folder.
 const SETTINGS: &str = "bench.txt";
 
 impl Row {
-    /// The row of some runs of a case: times are medians, counts those of the first run, which all share.
+    /// Return the row of some runs of a case. Times are medians; counters are those of the first run, and all runs have the same.
     pub fn new(case: &Case, runs: &[Run]) -> Self {
         let worst = runs.iter().find(|run| !is_good(&run.status));
         let Some(first) = worst.or(runs.first()) else {
             return Self::empty(case, "failed", "nothing was run");
         };
-        // such a run stops at its one update, as it should
+        // such a run makes one update, and ends as it should
         let linear = case.is_linear() && first.status == "iteration-limit";
         let (status, message) = if linear {
             (LINEAR, "one factorisation and one solve")
@@ -112,63 +115,88 @@ impl Row {
         if let (false, Some(method)) = (case.is_linear(), first.report["method"].as_str()) {
             row.method = method.to_owned();
         }
-        let mut put = |name: &'static str, of: &dyn Fn(&Run) -> Option<f64>| {
-            let values: Vec<f64> = runs.iter().filter_map(of).filter(|value| value.is_finite()).collect();
-            if let Some(middle) = median(values) {
-                row.numbers.insert(name, middle);
-            }
-        };
-        put("seconds", &|run| Some(run.seconds));
-        put("cpu_seconds", &|run| Some(run.cpu));
-        put("memory_mb", &|run| Some(run.memory as f64 / 1e6));
-        let at = |run: &Run, path: &str| run.report.pointer(path).and_then(Value::as_f64);
-        for (name, of) in NUMBERS {
-            match of {
-                Of::Runs(path) => put(name, &|run| at(run, path)),
-                Of::First(path) => put(name, &|_| at(first, path)),
-                Of::Other => {}
-            }
-        }
-        let pairs = first.report["pairs"].as_array().map_or(&[][..], Vec::as_slice);
-        if !pairs.is_empty() {
-            let of = |pair: &Value, key: &str| pair[key].as_f64().unwrap_or(f64::NAN);
-            let theta = |pair: &Value| {
-                let both = pair["theta"].as_array().map_or(&[][..], Vec::as_slice);
-                both.iter().filter_map(Value::as_f64).product::<f64>().sqrt()
-            };
-            row.numbers.insert("points", pairs.iter().map(|pair| of(pair, "points")).sum());
-            row.numbers.insert("theta", pairs.iter().map(theta).fold(0.0, f64::max));
-            row.numbers.insert("peak_pressure", pairs.iter().map(|pair| of(pair, "peak_pressure")).fold(0.0, f64::max));
-        }
-        let times: Vec<f64> = runs.iter().map(|run| run.seconds).collect();
-        if let (true, Some(middle)) = (runs.len() > 1, median(times.clone())) {
-            let (low, high) = times.iter().fold((f64::MAX, 0.0f64), |(low, high), &t| (low.min(t), high.max(t)));
-            row.numbers.insert("spread", (high - low) / middle);
-        }
+        row.add_measured(runs);
+        row.add_reported(runs, first);
+        row.add_pairs(&first.report);
         if case.is_linear() {
-            let body_solves = at(first, "/body_solves").unwrap_or(0.0);
-            let bodies = first.report["bodies"].as_array().map_or(0, Vec::len) as f64;
-            let each = |time: &str, count: f64| row.number(time).map_or(f64::NAN, |time| time / count * bodies);
-            let all = row.number("inner_iterations").unwrap_or(0.0);
-            // the start solves with very stiff springs, which takes an iterative solver longer; one sweep solves each body once
-            let solve = match (first.last_sweep, row.number("solve_seconds")) {
-                (Some(sweep), Some(seconds)) if all > 0.0 => seconds * sweep / all,
-                _ => each("solve_seconds", body_solves),
-            };
-            let linear = at(first, "/inner_times/first").unwrap_or(f64::NAN) + solve;
-            row.numbers.extend(linear.is_finite().then_some(("linear_seconds", linear)));
+            row.add_linear(first);
         }
-        // of the bodies that have a closed form, the worst
-        let bodies = first.report["bodies"].as_array().map_or(&[][..], Vec::as_slice);
-        let worst = |key: &str| bodies.iter().filter_map(|body| body[key].as_f64()).reduce(f64::max);
-        row.displacement_error = worst("error_l2");
-        for name in ["error_h1", "error_energy"] {
-            row.numbers.extend(worst(name).map(|error| (name, error)));
-        }
+        row.add_exact_errors(&first.report);
         row
     }
 
-    /// The row of a case whose scene is refused.
+    /// Add the median of finite numbers, if there are any.
+    fn add_median(&mut self, name: &'static str, values: impl Iterator<Item = f64>) {
+        self.numbers.extend(median(values.filter(|value| value.is_finite()).collect()).map(|middle| (name, middle)));
+    }
+
+    /// Add times and memory, and the spread of the times over the runs.
+    fn add_measured(&mut self, runs: &[Run]) {
+        self.add_median("seconds", runs.iter().map(|run| run.seconds));
+        self.add_median("cpu_seconds", runs.iter().map(|run| run.cpu));
+        self.add_median("memory_mb", runs.iter().map(|run| run.memory as f64 / 1e6));
+        let times: Vec<f64> = runs.iter().map(|run| run.seconds).collect();
+        let (low, high) = times.iter().fold((f64::MAX, 0.0f64), |(low, high), &t| (low.min(t), high.max(t)));
+        if let (true, Some(middle)) = (runs.len() > 1, median(times)) {
+            self.numbers.insert("spread", (high - low) / middle);
+        }
+    }
+
+    /// Add the numbers that reports have at known paths.
+    fn add_reported(&mut self, runs: &[Run], first: &Run) {
+        for (name, source) in NUMBERS {
+            match source {
+                Of::Runs(path) => self.add_median(name, runs.iter().filter_map(|run| number_at(&run.report, path))),
+                Of::First(path) => self.add_median(name, number_at(&first.report, path).into_iter()),
+                Of::Other => {}
+            }
+        }
+    }
+
+    /// Add sums and maxima over the pairs of a report.
+    fn add_pairs(&mut self, report: &Value) {
+        let pairs = items(&report["pairs"]);
+        if pairs.is_empty() {
+            return;
+        }
+        let number = |pair: &Value, key: &str| pair[key].as_f64().unwrap_or(f64::NAN);
+        // the coupling of a pair is the geometric mean of those of its sides
+        let theta = |pair: &Value| items(&pair["theta"]).iter().filter_map(Value::as_f64).product::<f64>().sqrt();
+        self.numbers.insert("points", pairs.iter().map(|pair| number(pair, "points")).sum());
+        self.numbers.insert("theta", pairs.iter().map(theta).fold(0.0, f64::max));
+        let peaks = pairs.iter().map(|pair| number(pair, "peak_pressure"));
+        self.numbers.insert("peak_pressure", peaks.fold(0.0, f64::max));
+    }
+
+    /// Add the seconds of one linear factor-and-solve of all bodies.
+    ///
+    /// The start of the run solves with very stiff springs, which takes an iterative solver longer. The sweep therefore has the share of the
+    /// solve time that it has of the inner iterations, or without these of the body solves: one sweep solves each body once.
+    fn add_linear(&mut self, run: &Run) {
+        let all = self.number("inner_iterations").unwrap_or(0.0);
+        let solve = match (run.last_sweep, self.number("solve_seconds")) {
+            (Some(sweep), Some(seconds)) if all > 0.0 => seconds * sweep / all,
+            (_, Some(seconds)) => {
+                let body_solves = number_at(&run.report, "/body_solves").unwrap_or(0.0);
+                seconds / body_solves * items(&run.report["bodies"]).len() as f64
+            }
+            _ => f64::NAN,
+        };
+        let linear = number_at(&run.report, "/inner_times/first").unwrap_or(f64::NAN) + solve;
+        self.numbers.extend(linear.is_finite().then_some(("linear_seconds", linear)));
+    }
+
+    /// Add the largest errors of the bodies that have a closed form.
+    fn add_exact_errors(&mut self, report: &Value) {
+        let largest =
+            |key: &str| items(&report["bodies"]).iter().filter_map(|body| body[key].as_f64()).reduce(f64::max);
+        self.displacement_error = largest("error_l2");
+        for name in ["error_h1", "error_energy"] {
+            self.numbers.extend(largest(name).map(|error| (name, error)));
+        }
+    }
+
+    /// Return the row of a case whose scene is refused.
     pub fn refused(case: &Case, error: &Error) -> Self {
         let message = match error.advice() {
             Some(help) => format!("error: {}; help: {help}", error.message()),
@@ -177,12 +205,12 @@ impl Row {
         Self::empty(case, "refused", &message)
     }
 
-    /// The row of a case that is not run.
+    /// Return the row of a case that is not run.
     pub fn skipped(case: &Case, why: &str) -> Self {
         Self::empty(case, SKIPPED, why)
     }
 
-    /// Whether the run did not end in time.
+    /// Return whether the run did not end in time.
     pub fn is_late(&self) -> bool {
         self.status == "timeout"
     }
@@ -193,7 +221,7 @@ impl Row {
             runs: 0,
             status: status.to_owned(),
             message: message.to_owned(),
-            method: case.asked().to_owned(),
+            method: case.requested_method().to_owned(),
             numbers: BTreeMap::new(),
             error_of: String::new(),
             inputs: String::new(),
@@ -201,46 +229,46 @@ impl Row {
         }
     }
 
-    /// Whether the run came to its end as it should.
+    /// Return whether the run ended as it should.
     pub fn is_good(&self) -> bool {
         is_good(&self.status)
     }
 
-    /// Whether it is one linear factor-and-solve.
+    /// Return whether it is one linear factor-and-solve.
     pub fn is_linear(&self) -> bool {
         self.status == LINEAR
     }
 
-    /// A measured number.
+    /// Return the number of a column.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.numbers.get(name).copied()
     }
 
-    /// Sets the error and what it is measured in and against.
+    /// Set the error, and the text that says what it is measured in and against.
     pub fn set_error(&mut self, error: f64, what: &str) {
         self.numbers.insert("error", error);
         self.error_of = what.to_owned();
     }
 
-    /// The row as a line for the terminal.
+    /// Return the row as a line for the terminal.
     pub fn line(&self, label: &str, is_new: bool) -> String {
-        let number = |name: &str| self.number(name);
         let mut line = format!("{label}: {}", self.status);
         if !self.is_good() && !self.message.is_empty() {
             line += &format!(" ({})", self.message);
         }
-        if let Some(time) = number("seconds") {
+        if let Some(time) = self.number("seconds") {
             line += &format!(", {} s", seconds(time));
         }
-        if let (Some(dofs), Some(sweeps)) = (number("dofs"), number("sweeps")) {
+        if let (Some(dofs), Some(sweeps)) = (self.number("dofs"), self.number("sweeps")) {
             line += &format!(", {dofs} dofs, {sweeps} sweeps");
         }
-        if let Some(error) = number("error") {
+        if let Some(error) = self.number("error") {
             line += &format!(", error {}", sci(error, 2));
         }
         if is_new { line } else { line + " (kept)" }
     }
 
+    /// Return the row as fields of the file.
     fn fields(&self) -> Vec<String> {
         let mut fields = self.key.clone();
         fields.extend([self.runs.to_string(), self.status.clone(), self.message.clone(), self.method.clone()]);
@@ -256,7 +284,17 @@ fn is_good(status: &str) -> bool {
     matches!(status, "converged" | "roundoff-limited" | LINEAR)
 }
 
-/// The middle of some numbers, the mean of the two middle ones if their count is even.
+/// Return the number at a path of a report.
+fn number_at(report: &Value, path: &str) -> Option<f64> {
+    report.pointer(path).and_then(Value::as_f64)
+}
+
+/// Return the items of a list of a report; none if it is no list.
+fn items(list: &Value) -> &[Value] {
+    list.as_array().map_or(&[], Vec::as_slice)
+}
+
+/// Return the median of some numbers, which is the mean of the two middle ones if their count is even.
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
@@ -268,14 +306,13 @@ pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 impl<'a> Table<'a> {
-    /// Opens the file of a plan. With `--resume` the rows that it has already are read first, if they were made with the
-    /// same settings.
+    /// Open the file of a plan. With `--resume` its rows are read first, if they were made with the same settings.
     ///
     /// # Errors
     /// A file that cannot be written.
     pub fn open(folder: &'a Folder, plan: &Plan, request: &Request, reference: &References) -> Result<Self> {
         let mut columns = plan.columns();
-        columns.extend(WORDS.map(str::to_owned));
+        columns.extend(TEXTS.map(str::to_owned));
         columns.extend(NUMBERS.map(|(name, _)| name.to_owned()));
         columns.extend(LAST.map(str::to_owned));
         let settings = format!(
@@ -294,18 +331,18 @@ impl<'a> Table<'a> {
         let mut old = if is_known { read(folder, &columns) } else { Vec::new() };
         old.retain(|row| !matches!(row.status.as_str(), "killed" | "failed" | SKIPPED));
         folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
-        // rows that are kept are there all the time: a benchmark that is killed loses none
+        // the file has the old rows from the start, so that a benchmark that is killed loses none
         let file = RowFile::create(folder, FILE, &columns, &old.iter().map(Row::fields).collect::<Vec<_>>())?;
         Ok(Self { folder, columns, rows: Vec::new(), old, file })
     }
 
-    /// The row of a case that an earlier benchmark made from the same inputs: scenes, data and meshes may have been edited meanwhile.
-    pub fn kept(&self, case: &Case, inputs: Option<&str>) -> Option<Row> {
+    /// Return the row of a case that an earlier benchmark made from the same inputs. Scenes, data and meshes may have been edited meanwhile.
+    pub fn old_row(&self, case: &Case, inputs: Option<&str>) -> Option<Row> {
         let is_same = |row: &&Row| row.key == case.key && Some(row.inputs.as_str()) == inputs;
         self.old.iter().find(is_same).cloned()
     }
 
-    /// Whether a case differs by its mesh alone from a row that did not end in time: lists of meshes go from coarse to fine.
+    /// Return whether a case differs only by its mesh from a row that did not end in time. Lists of meshes go from coarse to fine.
     pub fn is_beyond(&self, plan: &Plan, case: &Case) -> bool {
         let is_mesh =
             |column: usize| column > 0 && plan.keys.get(column - 1).is_some_and(|key| key.starts_with("mesh."));
@@ -313,7 +350,7 @@ impl<'a> Table<'a> {
         self.rows.iter().any(|row| row.is_late() && like(row))
     }
 
-    /// Adds a row, and writes it at once if it is new: what was measured is kept whatever comes next. Why the file lacks rows, once.
+    /// Add a row. A new row is written at once, so that it is kept whatever comes next. Return the message that the file lacks rows, once.
     pub fn add(&mut self, row: Row, is_new: bool) -> Option<String> {
         if is_new {
             self.file.push(&row.fields());
@@ -322,7 +359,7 @@ impl<'a> Table<'a> {
         self.file.complaint()
     }
 
-    /// Writes all rows anew, with what only the whole table could tell.
+    /// Write all rows again, with the numbers that need the whole table.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -338,45 +375,41 @@ impl<'a> Table<'a> {
         self.folder.write(FILE, fill)
     }
 
-    /// Folder of the results of all runs.
+    /// Return the folder of the results of all runs.
     pub fn runs(&self) -> PathBuf {
         self.folder.path().join(RUNS)
     }
 
-    /// Place of a column of the key.
-    fn column(&self, name: &str) -> Option<usize> {
-        self.columns.iter().position(|column| column == name)
-    }
-
-    /// Says of every row how many linear factor-and-solves of the same bodies its set-up and iteration would pay for: by the
-    /// fastest solver with a row of the method `linear`.
+    /// Add to every row the number of linear factor-and-solves of the same bodies that take as long as its set-up and iteration.
+    ///
+    /// Their reference cost is that of the fastest solver with a row of the method `linear`.
     pub fn compare_with_linear(&mut self) {
-        let Some(solver) = self.column("solver") else { return };
+        let Some(solver) = self.columns.iter().position(|column| column == "solver") else { return };
         let same = |a: &Row, b: &Row| (0..a.key.len()).all(|k| k == solver || k == solver + 1 || a.key[k] == b.key[k]);
         let linear: Vec<Row> = self.rows.iter().filter(|row| row.is_linear()).cloned().collect();
         for row in self.rows.iter_mut().filter(|row| row.is_good() && !row.is_linear()) {
-            let yard =
+            let costs =
                 linear.iter().filter(|other| same(row, other)).filter_map(|other| other.number("linear_seconds"));
-            let (yard, own) = (yard.fold(f64::INFINITY, f64::min), ["set_up_seconds", "iterate_seconds"]);
-            let own: f64 = own.iter().filter_map(|name| row.number(name)).sum();
-            if yard.is_finite() && yard > 0.0 {
-                row.numbers.insert("linear_solves", own / yard);
+            let reference = costs.fold(f64::INFINITY, f64::min);
+            let own: f64 = ["set_up_seconds", "iterate_seconds"].iter().filter_map(|name| row.number(name)).sum();
+            if reference.is_finite() && reference > 0.0 {
+                row.numbers.insert("linear_solves", own / reference);
             }
         }
     }
 }
 
-/// The rows of the file in a folder that has these columns; none if it has others.
+/// Return the rows of the file in a folder that has these columns; none if it has others.
 fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
     let Ok(bytes) = crate::file::read(&folder.path().join(FILE)) else { return Vec::new() };
     let mut file = csv::Reader::from_reader(bytes.as_slice());
     if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
         return Vec::new();
     }
-    let keys = columns.len() - NUMBERS.len() - WORDS.len() - LAST.len();
+    let keys = columns.len() - NUMBERS.len() - TEXTS.len() - LAST.len();
     let row = |record: csv::StringRecord| {
         let numbers = NUMBERS.iter().enumerate();
-        let numbers = numbers.filter_map(|(k, &(name, _))| Some((name, record[keys + WORDS.len() + k].parse().ok()?)));
+        let numbers = numbers.filter_map(|(k, &(name, _))| Some((name, record[keys + TEXTS.len() + k].parse().ok()?)));
         Row {
             key: record.iter().take(keys).map(str::to_owned).collect(),
             runs: record[keys].parse().unwrap_or(0),
@@ -389,7 +422,7 @@ fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
             displacement_error: None,
         }
     };
-    // the last row of a benchmark that was killed may not be whole
+    // the last row of a benchmark that was killed may be incomplete
     file.records().map_while(|record| record.ok()).map(row).collect()
 }
 

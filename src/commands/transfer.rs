@@ -1,0 +1,242 @@
+//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and a check of the error estimates of both.
+
+use crate::contact::ContactPair;
+use crate::discretize::Discrete;
+use crate::estimate::Estimate;
+use crate::output::ContactTable;
+use nalgebra::DMatrix;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+/// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for each pair.
+pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
+    let model = &discrete.model;
+    let points = model.points();
+    let mut trace = vec![0.0; 2 * points];
+    for (i, (pair, table)) in model.pairs.iter().zip(tables).enumerate() {
+        for (q, weights) in neighbours(pair, table).enumerate() {
+            for (side_in_scene, column) in table.displacement.iter().enumerate() {
+                let side = discrete.sides(i)[side_in_scene];
+                trace[side * points + model.offset[i] + q] = mean(&weights, column) - pair.prescribed[side][q];
+            }
+        }
+    }
+    trace
+}
+
+/// Return the pressures at the contact points of a new mesh. A point is open if the points around it in the table are mostly open.
+pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
+    let mut pressure = Vec::new();
+    for (pair, table) in discrete.model.pairs.iter().zip(tables) {
+        let closed: Vec<f64> = table.pressure.iter().map(|&p| f64::from(p > 0.0)).collect();
+        let at = |weights: Weights| if mean(&weights, &closed) < 0.5 { 0.0 } else { mean(&weights, &table.pressure) };
+        pressure.extend(neighbours(pair, table).map(at));
+    }
+    pressure
+}
+
+/// Points of a table by their index, each with the weight that its value has in an interpolated value.
+type Weights = Vec<(usize, f64)>;
+
+/// The points of a table in a search tree, each with its index.
+type Tree = RTree<GeomWithData<[f64; 3], usize>>;
+
+fn tree(points: &[[f64; 3]]) -> Tree {
+    RTree::bulk_load(points.iter().enumerate().map(|(q, &x)| GeomWithData::new(x, q)).collect())
+}
+
+/// Return for each point of a pair the nearest points of a table. Their weights are inverse distances, scaled to the sum one.
+fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<Item = Weights> + 'a {
+    let tree = tree(&table.points);
+    // the neighbours on a curve, or around a point of a surface
+    let count = if pair.along_curve { 2 } else { 4 };
+    pair.position.iter().map(move |&x| {
+        let nearest = tree.nearest_neighbor_iter_with_distance_2(x).take(count);
+        let mut weights: Weights =
+            nearest.map(|(near, squared)| (near.data, 1.0 / squared.sqrt().max(f64::MIN_POSITIVE))).collect();
+        let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
+        weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
+        weights
+    })
+}
+
+/// The estimated errors of a solution on one mesh, to be compared with those on the next mesh.
+pub struct EstimatedSolution {
+    /// Relative errors of the pressures, one for each pair.
+    pressure: Vec<f64>,
+    /// Relative error of the normal displacements.
+    displacement: f64,
+    /// The solution, one table for each pair.
+    tables: Vec<ContactTable>,
+}
+
+impl EstimatedSolution {
+    /// Return the errors of an estimate together with its solution.
+    pub fn new(estimate: &Estimate, tables: Vec<ContactTable>) -> Self {
+        Self { pressure: estimate.pressure.clone(), displacement: estimate.displacement, tables }
+    }
+
+    /// Increase the estimate of the next mesh, whose solution is `tables`, if both estimates are too small to explain how the solutions differ.
+    ///
+    /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
+    /// both errors are too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then nothing is compared.
+    pub fn correct(&self, tables: &[ContactTable], estimate: &mut Estimate) {
+        if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
+            return;
+        }
+        let norms = norms(&self.tables, tables);
+        for (i, error) in estimate.pressure.iter_mut().enumerate() {
+            *error *= excess(&norms.pressure[i], *error, self.pressure[i]);
+        }
+        estimate.displacement *= excess(&norms.displacement, estimate.displacement, self.displacement);
+    }
+}
+
+/// Return the names of a pair's bodies, the same whichever of them carries the points.
+fn bodies(table: &ContactTable) -> [&str; 2] {
+    let mut names = table.side_names.each_ref().map(String::as_str);
+    names.sort_unstable();
+    names
+}
+
+/// Return how many times larger a difference is than the relative errors `new` and `old` explain, at least one.
+fn excess(norms: &Norms, new: f64, old: f64) -> f64 {
+    let most = new * norms.new + old * norms.old;
+    if most > 0.0 && norms.difference.is_finite() { (norms.difference / most).max(1.0) } else { 1.0 }
+}
+
+/// Norms of the solutions on two meshes and of their difference.
+struct SolutionNorms {
+    /// Norms of the pressures, one entry for each pair.
+    pressure: Vec<Norms>,
+    /// Norms of the normal displacements, all contact surfaces together.
+    displacement: Norms,
+}
+
+/// Norms over the contact surfaces: roots of weighted sums of squares.
+#[derive(Debug, Default, Clone, Copy)]
+struct Norms {
+    /// Norm of the difference of both solutions.
+    difference: f64,
+    /// Norm of the solution on the earlier mesh.
+    old: f64,
+    /// Norm of the solution on the later mesh.
+    new: f64,
+}
+
+/// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
+///
+/// The values of `new` are brought to these points by planes through the nearest points: they bend by less than what the old mesh leaves out.
+fn norms(old: &[ContactTable], new: &[ContactTable]) -> SolutionNorms {
+    let (mut pressure, mut displacement) = (Vec::new(), Norms::default());
+    for (old, new) in old.iter().zip(new) {
+        let planes = Planes { tree: tree(&new.points) };
+        let mut of_pair = Norms::default();
+        for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
+            let weights = planes.weights(point);
+            of_pair.add(*area, old.pressure[q], clamped_mean(&weights, &new.pressure));
+            for (new, old) in new.displacement.iter().zip(&old.displacement) {
+                displacement.add(*area, old[q], clamped_mean(&weights, new));
+            }
+        }
+        pressure.push(of_pair.roots());
+    }
+    SolutionNorms { pressure, displacement: displacement.roots() }
+}
+
+impl Norms {
+    /// Add the squares of two values at a point that stands for an area (a length in the plane).
+    fn add(&mut self, area: f64, old: f64, new: f64) {
+        self.difference += area * (new - old).powi(2);
+        self.old += area * old * old;
+        self.new += area * new * new;
+    }
+
+    fn roots(self) -> Self {
+        Self { difference: self.difference.sqrt(), old: self.old.sqrt(), new: self.new.sqrt() }
+    }
+}
+
+/// Scattered points whose values are brought to other points by linear functions fitted to the nearest ones.
+struct Planes {
+    tree: Tree,
+}
+
+impl Planes {
+    /// Points that a linear function is fitted to: twice the four that determine one in space.
+    const NEAREST: usize = 8;
+
+    /// Weight of the slopes in the fit, which holds them near zero.
+    ///
+    /// Points of a surface hardly differ across it, so that the data determine no slope there. Along the surface the squares of the data's
+    /// weights are some hundred times that of `SLOPES`, as each of them is one at least.
+    const SLOPES: f64 = 0.1;
+
+    /// Return the weights of the values of the nearest points in the fitted value at a point.
+    ///
+    /// The fit minimises the sum of squared misfits, each weighted by the inverse distance to the fourth.
+    fn weights(&self, at: &[f64; 3]) -> Weights {
+        let nearest: Vec<_> = self.tree.nearest_neighbor_iter_with_distance_2(*at).take(Self::NEAREST).collect();
+        let far = nearest.last().map_or(0.0, |(_, squared)| squared.sqrt());
+        if let Some((same, _)) = nearest.first().filter(|(_, squared)| squared.sqrt() <= 1e-9 * far) {
+            return vec![(same.data, 1.0)];
+        }
+        // a row for each point, then one for each slope
+        let count = nearest.len();
+        let rows = DMatrix::from_fn(count + 3, 4, |i, k| match nearest.get(i) {
+            Some((_, squared)) if k == 0 => far * far / squared,
+            Some((near, squared)) => far * (near.geom()[k - 1] - at[k - 1]) / squared,
+            None if i + 1 == count + k => Self::SLOPES,
+            None => 0.0,
+        });
+        let Ok(inverse) = rows.pseudo_inverse(f64::EPSILON) else { return vec![(nearest[0].0.data, 1.0)] };
+        let nearest = nearest.iter().enumerate();
+        nearest.map(|(i, (near, squared))| (near.data, inverse[(0, i)] * far * far / squared)).collect()
+    }
+}
+
+/// Return the fitted value, clamped to the range of the values that it is fitted to: where all points lie to one side, a plane may lead anywhere.
+fn clamped_mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
+    let values = || weights.iter().map(|(near, _)| column[*near]);
+    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    mean(weights, column).clamp(least, most)
+}
+
+fn mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
+    weights.iter().map(|(near, weight)| weight * column[*near]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_that_errors_explain_changes_none() {
+        let norms = |difference| Norms { difference, old: 2.0, new: 1.0 };
+        assert_eq!([0.1, 0.5, 1.0].map(|difference| excess(&norms(difference), 0.1, 0.2)), [1.0, 1.0, 2.0]);
+        assert_eq!([excess(&norms(0.1), 0.0, 0.0), excess(&norms(f64::NAN), 0.1, 0.1)], [1.0, 1.0]);
+    }
+
+    /// A grid of n x n points on the unit square, with pressures and displacements that are linear functions, times a factor.
+    fn table(n: usize, factor: f64) -> ContactTable {
+        let points: Vec<[f64; 3]> =
+            (0..n * n).map(|q| [(q % n) as f64, (q / n) as f64, 0.0].map(|x| x / (n - 1) as f64)).collect();
+        let linear = |points: &[[f64; 3]]| points.iter().map(|x| factor * (1.0 + x[0] + 2.0 * x[1])).collect();
+        let (pressure, displacement) = (linear(&points), [linear(&points), linear(&points)]);
+        ContactTable { weight: vec![1.0; n * n], points, pressure, displacement, ..ContactTable::default() }
+    }
+
+    #[test]
+    fn linear_functions_do_not_differ_and_others_by_what_they_do() {
+        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)]);
+        // but for the weight of the slopes
+        assert!(same.pressure[0].difference < 2e-3 * same.pressure[0].new, "{:?}", same.pressure);
+        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)]);
+        let Norms { difference, old, new } = off.pressure[0];
+        assert!((difference / new - 0.1).abs() < 2e-3 && (old / new - 1.1).abs() < 2e-3, "{:?}", off.pressure);
+        assert!((off.displacement.difference / off.displacement.new - 0.1).abs() < 2e-3);
+        // fewer points than a plane through the nearest ones takes
+        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)]).pressure[0];
+        assert!((few.difference / few.new - 0.2).abs() < 1e-12, "{few:?}");
+    }
+}
