@@ -32,33 +32,34 @@ pub(super) fn shape() -> TableShape {
         .optional("units", Text, "words for labels, such as \"mm, MPa\"; nothing is converted")
         .required(
             "mesh",
-            Either(vec![Text, mesh::shape().into_kind()]),
+            Either(vec![Text, mesh::shape().into()]),
             "a file name, or a table: mesh = { geo = \"a.geo\", set = { n = 32 } }",
         )
         .optional(
             "data",
-            Map(Box::new(data::shape("data").into_kind())),
+            Map(Box::new(data::shape("data").into())),
             "functions from files; each begins with a line [data.NAME]",
         )
-        .required("body", body::shape().into_kind().list(), "a body starts with the line [[body]]")
-        .optional("contact", contact::shape().into_kind().list(), "a contact starts with the line [[contact]]")
-        .optional("method", method::shape().into_kind(), "the iteration; Newton's method without it")
+        .required("body", body::shape().list(), "a body starts with the line [[body]]")
+        .optional("contact", contact::shape().list(), "a contact starts with the line [[contact]]")
+        .optional("method", method::shape(), "the iteration; Newton's method without it")
         .optional(
             "solver",
-            Either(vec![word(&Preset::ALL), solver_shape().into_kind()]),
+            Either(vec![word(&Preset::ALL), solver_shape().into()]),
             "the inner solver; chosen by the program without it",
         )
         .optional("estimate", Flag, "whether to estimate the error that the mesh leaves; false")
-        .optional("adapt", adapt_shape().into_kind(), "adapts the mesh to an error: adapt = { error = 1e-2 }")
-        .optional("output", output_shape().into_kind(), "what is written, and where")
+        .optional("adapt", adapt_shape(), "adapts the mesh to an error: adapt = { error = 1e-2 }")
+        .optional("output", output_shape(), "what is written, and where")
         // only `--trust-geo` sets it
         .optional("trust_geo", Flag, "")
 }
 
 fn solver_shape() -> TableShape {
+    use ValueKind::Text;
     TableShape::new("the solver").optional("preset", word(&Preset::ALL), "the inner solver of all bodies").optional(
         "options",
-        ValueKind::Text,
+        Text,
         "PETSc options that choose solvers and set their parameters: \"-ksp_rtol 1e-10\"",
     )
 }

@@ -62,14 +62,14 @@ impl TableShape {
         Self { name: name.into(), keys: Vec::new(), exclusive: Vec::new() }
     }
 
-    /// Add a key that may be left out.
-    pub fn optional(self, name: &'static str, kind: ValueKind, description: impl Into<Cow<'static, str>>) -> Self {
-        self.with(KeyShape { name, kind, description: description.into(), required: false })
+    /// Add a key that may be left out; `about` is its description.
+    pub fn optional(self, name: &'static str, kind: impl Into<ValueKind>, about: impl Into<Cow<'static, str>>) -> Self {
+        self.with(KeyShape { name, kind: kind.into(), description: about.into(), required: false })
     }
 
-    /// Add a key that must be there.
-    pub fn required(self, name: &'static str, kind: ValueKind, description: impl Into<Cow<'static, str>>) -> Self {
-        self.with(KeyShape { name, kind, description: description.into(), required: true })
+    /// Add a key that must be there; `about` is its description.
+    pub fn required(self, name: &'static str, kind: impl Into<ValueKind>, about: impl Into<Cow<'static, str>>) -> Self {
+        self.with(KeyShape { name, kind: kind.into(), description: about.into(), required: true })
     }
 
     fn with(mut self, key: KeyShape) -> Self {
@@ -93,9 +93,15 @@ impl TableShape {
         self.keys.iter().filter(|key| !key.description.is_empty())
     }
 
-    /// Return the kind of value that is a table of this shape.
-    pub fn into_kind(self) -> ValueKind {
-        ValueKind::Table(self)
+    /// Return the kind of value that is a list of tables of this shape.
+    pub fn list(self) -> ValueKind {
+        ValueKind::Table(self).list()
+    }
+}
+
+impl From<TableShape> for ValueKind {
+    fn from(shape: TableShape) -> Self {
+        Self::Table(shape)
     }
 }
 

@@ -15,61 +15,53 @@ fn one_or_components() -> ValueKind {
 
 /// Return the shape of `[[body]]`.
 pub(super) fn shape() -> TableShape {
+    use ValueKind::{Field, OneOf, Text};
     elasticity::with_constants(TableShape::new("[[body]]").required(
         "name",
-        ValueKind::Text,
+        Text,
         "group of cells, or a pattern such as \"brick_*\" for many bodies",
     ))
-    .optional("order", ValueKind::OneOf(&[1, 2]), "linear or quadratic elements; 1")
-    .optional("fix", support_shape().into_kind().list(), "supports: fix = [{ on = \"base\", x = 0, y = 0 }]")
-    .optional("load", load_shape().into_kind().list(), "loads: load = [{ on = \"top\", pressure = 10 }]")
-    .optional(
-        "spring",
-        spring_shape().into_kind().list(),
-        "springs to the ground: spring = [{ on = \"base\", stiffness = 100 }]",
-    )
-    .optional("force", ValueKind::Field.list(), "force density, one number or expression for each component")
-    .optional("exact", ValueKind::Field.list(), "known displacement to compare with")
-    .optional(
-        "region",
-        elasticity::region_shape().into_kind().list(),
-        "a region starts with the line [[body.region]]",
-    )
+    .optional("order", OneOf(&[1, 2]), "linear or quadratic elements; 1")
+    .optional("fix", support_shape().list(), "supports: fix = [{ on = \"base\", x = 0, y = 0 }]")
+    .optional("load", load_shape().list(), "loads: load = [{ on = \"top\", pressure = 10 }]")
+    .optional("spring", spring_shape().list(), "springs to the ground: spring = [{ on = \"base\", stiffness = 100 }]")
+    .optional("force", Field.list(), "force density, one number or expression for each component")
+    .optional("exact", Field.list(), "known displacement to compare with")
+    .optional("region", elasticity::region_shape().list(), "a region starts with the line [[body.region]]")
 }
 
 fn support_shape() -> TableShape {
+    use ValueKind::{Field, Flag, Text};
     TableShape::new("a support")
-        .required("on", ValueKind::Text, "boundary or points, or a pattern of such")
-        .optional("x", ValueKind::Field, "displacement along x")
-        .optional("y", ValueKind::Field, "displacement along y")
-        .optional("z", ValueKind::Field, "displacement along z, in space")
-        .optional("normal", ValueKind::Field, "displacement along the outer normal of a plane surface")
-        .optional("symmetry", ValueKind::Flag, "whether a plane surface slides in its plane: normal = 0")
-        .optional("path", ValueKind::Text, "column of the table of load steps with its factor")
+        .required("on", Text, "boundary or points, or a pattern of such")
+        .optional("x", Field, "displacement along x")
+        .optional("y", Field, "displacement along y")
+        .optional("z", Field, "displacement along z, in space")
+        .optional("normal", Field, "displacement along the outer normal of a plane surface")
+        .optional("symmetry", Flag, "whether a plane surface slides in its plane: normal = 0")
+        .optional("path", Text, "column of the table of load steps with its factor")
         .not_both(&["x", "y", "z"], &["normal", "symmetry"])
         .at_most_one(&["normal", "symmetry"])
 }
 
 fn spring_shape() -> TableShape {
+    use ValueKind::{Field, Text};
     TableShape::new("a spring")
-        .required("on", ValueKind::Text, "boundary (stiffness per area) or points")
+        .required("on", Text, "boundary (stiffness per area) or points")
         .optional("stiffness", one_or_components(), "stiffness, one for all or one for each component")
-        .optional("normal", ValueKind::Field, "stiffness along the normal alone")
+        .optional("normal", Field, "stiffness along the normal alone")
         .at_most_one(&["stiffness", "normal"])
 }
 
 fn load_shape() -> TableShape {
+    use ValueKind::{Field, Flag, Text};
     TableShape::new("a load")
-        .required("on", ValueKind::Text, "boundary, or a pattern of such")
-        .optional("pressure", ValueKind::Field, "pressure against the outer normal")
-        .optional("traction", ValueKind::Field.list(), "force per area, one for each component")
-        .optional(
-            "force",
-            ValueKind::Field.list(),
-            "total force on the whole boundary, numbers: [FX, FY], in space [FX, FY, FZ]",
-        )
-        .optional("rigid", ValueKind::Flag, "whether the boundary moves as one under the force; false")
-        .optional("path", ValueKind::Text, "column of the table of load steps with its factor")
+        .required("on", Text, "boundary, or a pattern of such")
+        .optional("pressure", Field, "pressure against the outer normal")
+        .optional("traction", Field.list(), "force per area, one for each component")
+        .optional("force", Field.list(), "total force on the whole boundary, numbers: [FX, FY], in space [FX, FY, FZ]")
+        .optional("rigid", Flag, "whether the boundary moves as one under the force; false")
+        .optional("path", Text, "column of the table of load steps with its factor")
         .at_most_one(&["pressure", "traction", "force"])
 }
 

@@ -16,7 +16,7 @@ pub(super) fn shape() -> TableShape {
         .optional("angle", Number, "largest angle in degrees between normals that face each other; 60")
         .optional("touching", Flag, "whether the distance of the meshes counts as zero; false")
         .optional("overlap", word(&Overlap::ALL), "what to do where bodies overlap before loading; \"compress\"")
-        .required("layer", layer::shape().into_kind(), layer::EXAMPLE)
+        .required("layer", layer::shape(), layer::EXAMPLE)
         .optional("reference", Field, "known contact pressure to draw and to compare with")
 }
 

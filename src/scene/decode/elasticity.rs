@@ -7,41 +7,39 @@ use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, RegionSpec
 
 /// Add the keys of the elastic constants, which bodies and regions have.
 pub(super) fn with_constants(table: TableShape) -> TableShape {
+    use ValueKind::Field;
     table
-        .optional("young", ValueKind::Field, "Young's modulus, > 0")
-        .optional("poisson", ValueKind::Field, "Poisson's ratio, between -1 and 0.5")
-        .optional(
-            "orthotropic",
-            orthotropic_shape().into_kind(),
-            "orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }",
-        )
-        .optional("anisotropic", ValueKind::Field.list(), UPPER)
-        .optional("axes", axes_shape().into_kind(), AXES)
+        .optional("young", Field, "Young's modulus, > 0")
+        .optional("poisson", Field, "Poisson's ratio, between -1 and 0.5")
+        .optional("orthotropic", orthotropic_shape(), "orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }")
+        .optional("anisotropic", Field.list(), UPPER)
+        .optional("axes", axes_shape(), AXES)
         .at_most_one(&["young", "orthotropic", "anisotropic"])
         .not_both(&["poisson"], &["orthotropic", "anisotropic"])
 }
 
 /// Return the shape of `[[body.region]]`.
 pub(super) fn region_shape() -> TableShape {
-    with_constants(TableShape::new("[[body.region]]").required("on", ValueKind::Text, "group of its cells"))
+    use ValueKind::Text;
+    with_constants(TableShape::new("[[body.region]]").required("on", Text, "group of its cells"))
 }
 
 const UPPER: &str = "C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12";
 const AXES: &str = "write first = [1, 1, 0] and second = [-1, 1, 0], or angle = \"pi/6\" and axis = [0, 0, 1]";
 
 fn orthotropic_shape() -> TableShape {
+    use ValueKind::Field;
     let table = TableShape::new("the orthotropic material");
-    Constants::ORTHOTROPIC
-        .iter()
-        .fold(table, |table, name| table.required(name, ValueKind::Field, "a constant of the material"))
+    Constants::ORTHOTROPIC.iter().fold(table, |table, name| table.required(name, Field, "a constant of the material"))
 }
 
 fn axes_shape() -> TableShape {
+    use ValueKind::Field;
     TableShape::new("the axes")
-        .optional("first", ValueKind::Field.list(), "direction of axis 1")
-        .optional("second", ValueKind::Field.list(), "direction on the side of axis 2")
-        .optional("angle", ValueKind::Field, "angle (radian) by which x, y, z are turned")
-        .optional("axis", ValueKind::Field.list(), "axis of the turn; z in the plane")
+        .optional("first", Field.list(), "direction of axis 1")
+        .optional("second", Field.list(), "direction on the side of axis 2")
+        .optional("angle", Field, "angle (radian) by which x, y, z are turned")
+        .optional("axis", Field.list(), "axis of the turn; z in the plane")
         .not_both(&["first", "second"], &["angle"])
         .at_most_one(&["first", "axis"])
 }

@@ -16,7 +16,8 @@ const TIME: &str = "time";
 
 /// Return the shape of `steps` from a file.
 pub(super) fn shape() -> TableShape {
-    TableShape::new("the load steps").required("table", ValueKind::Text, "CSV file with a column of each factor")
+    use ValueKind::Text;
+    TableShape::new("the load steps").required("table", Text, "CSV file with a column of each factor")
 }
 
 impl Decoder<'_> {

@@ -20,11 +20,7 @@ pub(super) fn shape() -> TableShape {
         .fold(TableShape::new("the layer"), with_form)
         .optional("table", Number.list().list(), POINTS)
         .optional("pressure", Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
-        .optional(
-            "asperities",
-            asperities_shape().into_kind(),
-            "a law of summits: asperities = { modulus = E*, data = \"NAME\" }",
-        )
+        .optional("asperities", asperities_shape(), "a law of summits: asperities = { modulus = E*, data = \"NAME\" }")
         .optional("up_to", Number, "compression beyond which the expression goes on linearly")
         .at_most_one(&laws)
 }
@@ -33,13 +29,14 @@ pub(super) fn shape() -> TableShape {
 fn with_form(table: TableShape, form: &'static LawForm) -> TableShape {
     let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
     let advice = format!("write {} = {{ {} }}", form.name, values.join(", "));
-    table.optional(form.name, form_shape(form).into_kind(), advice)
+    table.optional(form.name, form_shape(form), advice)
 }
 
 /// Return the shape of a law with parameters.
 fn form_shape(form: &'static LawForm) -> TableShape {
+    use ValueKind::Field;
     let table = TableShape::new(format!("the {} layer", form.name));
-    form.parameters.iter().fold(table, |table, known| table.required(known.key, ValueKind::Field, known.what))
+    form.parameters.iter().fold(table, |table, known| table.required(known.key, Field, known.what))
 }
 
 fn asperities_shape() -> TableShape {

@@ -20,49 +20,40 @@ pub(super) fn shape() -> TableShape {
             Either(vec![Number, Number.list(), word(&Gamma::NAMED)]),
             "relaxation of `robin`: a number, a list, a rule; 0.6",
         )
-        .optional(
-            "robin",
-            Either(vec![word(&COEFFICIENTS), floor_shape().into_kind()]),
-            "Robin coefficient on the zone",
-        )
+        .optional("robin", Either(vec![word(&COEFFICIENTS), floor_shape().into()]), "Robin coefficient on the zone")
         .optional("interval", Flag, "whether `robin` finds the interval of gamma at the end; false")
         .optional("depth", PositiveInteger, "earlier steps that `anderson` mixes; 5")
         .optional("linear", word(&Linear::ALL), "how linear steps are solved; chosen by the program without it")
         .optional(
             "start",
-            Either(vec![word(&STARTS), start_shape().into_kind()]),
+            Either(vec![word(&STARTS), start_shape().into()]),
             "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }",
         )
         .optional(
             "steps",
-            Either(vec![PositiveInteger, Number.list(), history::shape().into_kind()]),
+            Either(vec![PositiveInteger, Number.list(), history::shape().into()]),
             "load steps: a number, shares that end with 1, or a table",
         )
-        .optional("stop", stop_shape().into_kind(), "when to stop: stop = { residual = 1e-8 }")
+        .optional("stop", stop_shape(), "when to stop: stop = { residual = 1e-8 }")
 }
 
 fn start_shape() -> TableShape {
-    TableShape::new("the start").required(
-        "normal",
-        ValueKind::Field,
-        "outer normal displacement on every contact surface",
-    )
+    use ValueKind::Field;
+    TableShape::new("the start").required("normal", Field, "outer normal displacement on every contact surface")
 }
 
 fn floor_shape() -> TableShape {
-    TableShape::new("the Robin coefficient").required(
-        "floor",
-        ValueKind::Number,
-        "least coefficient everywhere on the contact",
-    )
+    use ValueKind::Number;
+    TableShape::new("the Robin coefficient").required("floor", Number, "least coefficient everywhere on the contact")
 }
 
 fn stop_shape() -> TableShape {
+    use ValueKind::{Flag, Number, PositiveInteger};
     TableShape::new("the stop rule")
-        .optional("residual", ValueKind::Number, "relative residual, or error of Newton's method; 1e-8")
-        .optional("increment", ValueKind::Number, "the paper's rule on the increment")
-        .optional("balanced", ValueKind::Flag, "whether a tenth of the mesh's error is enough; false")
-        .optional("iterations", ValueKind::PositiveInteger, "most iterations; 2000")
+        .optional("residual", Number, "relative residual, or error of Newton's method; 1e-8")
+        .optional("increment", Number, "the paper's rule on the increment")
+        .optional("balanced", Flag, "whether a tenth of the mesh's error is enough; false")
+        .optional("iterations", PositiveInteger, "most iterations; 2000")
 }
 
 /// Rules for the Robin coefficient by name.
