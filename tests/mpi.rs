@@ -40,17 +40,7 @@ fn two_ranks_report_what_one_reports() {
     let serial = solve(case("groove"), &[]).converged();
     let parallel = solve_on(2, case("groove"), &[]).converged();
     assert_eq!((serial.count("ranks"), parallel.count("ranks")), (1, 2));
-    let differ = [
-        "petsc",
-        "ranks",
-        "messages",
-        "times",
-        "inner_times",
-        "bodies",
-        "command",
-        "directory",
-        "last_look",
-    ];
+    let differ = ["petsc", "ranks", "messages", "times", "inner_times", "bodies", "command", "directory", "last_look"];
     let (ours, theirs) = (serial.report.as_object(), parallel.report.as_object());
     let (ours, theirs) = (ours.expect("a table"), theirs.expect("a table"));
     assert!(ours.keys().eq(theirs.keys()));

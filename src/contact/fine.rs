@@ -2,15 +2,15 @@
 //!
 //! At these points the compression of the layer and the gap are those of the points themselves, not means around the nodes.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::basis::{Carriers, PressureBasis};
 use super::near::Projections;
 use super::pair::ContactPair;
 use super::pieces::{Common, Shared};
 use super::side::{Side, length, unit};
+use crate::exchange::Plain;
 use crate::fem::{Facets, assemble, element};
 use crate::linalg::Csr;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// The integration points that both surfaces of a pair share.

@@ -1,15 +1,15 @@
 //! Contact points projected to side b: how the mean distance around a point differs from the distance at the point itself.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::pair::ContactPair;
 use super::pieces::Common;
 use super::side::{Side, length};
+use crate::exchange::Plain;
 use crate::fem::assemble::interpolate;
 use crate::fem::{element, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// The projections of the contact points of a pair to side b, one entry a point.

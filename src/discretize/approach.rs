@@ -1,6 +1,5 @@
 //! How a body moves as seen from its contact: the mean displacement of where it is loaded or held.
 
-use serde::{Deserialize, Serialize};
 use super::find::find_group;
 use crate::contact::{add, pad};
 use crate::error::Result;
@@ -8,6 +7,7 @@ use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
+use serde::{Deserialize, Serialize};
 
 /// Cosine of the largest angle between a force or a held direction and the contact's normal at which the place counts: the 60 degrees up to
 /// which facets are pairs without the key `angle`.
@@ -48,11 +48,7 @@ struct Place {
 
 impl Place {
     /// The nodes of a group.
-    fn new<const D: usize>(
-        space: &Space<D>,
-        group: &crate::mesh::Group,
-        directions: Vec<[f64; 3]>,
-    ) -> Self {
+    fn new<const D: usize>(space: &Space<D>, group: &crate::mesh::Group, directions: Vec<[f64; 3]>) -> Self {
         let facets = if group.dimension + 1 == D { Some(space.facets(group)) } else { None };
         let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
         let has_area = !areas.is_empty();

@@ -1,10 +1,10 @@
 //! Supports that move a body as one: that motion is taken out before anything is rounded.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::part::Part;
+use crate::exchange::Plain;
 use crate::fem::rigid::{self, RigidMotion};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// What supports prescribe.
 #[derive(Clone, Serialize, Deserialize)]

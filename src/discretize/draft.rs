@@ -1,15 +1,15 @@
 //! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::part::{Candidate, Part};
 use crate::contact::ContactPair;
 use crate::error::Result;
+use crate::exchange::Plain;
 use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 
 /// Share of the largest possible work below which the work of the loads is rounding.
@@ -62,12 +62,7 @@ impl<const D: usize> Draft<D> {
     ///
     /// # Errors
     /// Those of [`Part::load`].
-    pub fn new(
-        part: &Part<D>,
-        segments: Vec<Segment>,
-        pairs: &[ContactPair],
-        mesh: &Mesh<D>,
-    ) -> Result<Self> {
+    pub fn new(part: &Part<D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
         let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
             let mut all = Csr::new(part.space.dofs());
             for &Segment { pair, side } in &segments {

@@ -11,12 +11,7 @@ use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 ///
 /// # Errors
 /// Regions that are not there, lie elsewhere or overlap, and constants that make no material.
-pub fn of<const D: usize>(
-    spec: &BodySpec,
-    space: &Space<D>,
-    mesh: &Mesh<D>,
-    plane: Plane,
-) -> Result<Elasticity> {
+pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
     let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
     for (number, region) in spec.regions.iter().enumerate() {
         let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);

@@ -8,11 +8,7 @@ use super::part::Part;
 use crate::fem::rigid;
 
 /// Fixes the motions of a body that nothing feels and no load works on, and names them; `loose` becomes what is left.
-pub fn fix<const D: usize>(
-    part: &mut Part<D>,
-    draft: &Draft<D>,
-    loose: &mut Loose<D>,
-) -> Vec<String> {
+pub fn fix<const D: usize>(part: &mut Part<D>, draft: &Draft<D>, loose: &mut Loose<D>) -> Vec<String> {
     let mut fixed = Vec::new();
     if loose.unfelt.is_empty() {
         return fixed;

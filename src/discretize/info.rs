@@ -1,10 +1,10 @@
 //! What is known of bodies and pairs besides their matrices.
 
-use serde::{Deserialize, Serialize};
 use super::post::Post;
 use super::surface::ContactSurface;
 use crate::mesh::Checked;
 use crate::problem::ContactSpec;
+use serde::{Deserialize, Serialize};
 
 /// Names of the rigid motions of a body that neither supports nor smooth surfaces resist.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]

@@ -46,12 +46,7 @@ impl<const D: usize> Moving<D> {
 /// ```
 ///
 /// so that no node takes more of what is lacking than others that are loaded alike.
-pub fn balance<const D: usize>(
-    all: &[&Moving<D>],
-    works: &[f64],
-    parts: &[Part<D>],
-    drafts: &mut [Draft<D>],
-) -> bool {
+pub fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], parts: &[Part<D>], drafts: &mut [Draft<D>]) -> bool {
     let count = all.len();
     let mut products = DMatrix::zeros(count, count);
     for (body, (part, draft)) in parts.iter().zip(&*drafts).enumerate() {

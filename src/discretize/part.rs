@@ -301,14 +301,15 @@ impl<'a, const D: usize> Part<'a, D> {
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-        let mut stiffness = assemble::stiffness(&self.space, graph, &self.elasticity).map_err(|defect| match defect {
-            assemble::Defect::Inverted(cell) => {
-                let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
-                let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
-                Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
-            }
-            assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
-        })?;
+        let mut stiffness =
+            assemble::stiffness(&self.space, graph, &self.elasticity).map_err(|defect| match defect {
+                assemble::Defect::Inverted(cell) => {
+                    let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
+                    let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
+                    Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
+                }
+                assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
+            })?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
             return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));

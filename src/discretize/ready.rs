@@ -196,12 +196,7 @@ struct Assembly<'p, 'a, const D: usize> {
 }
 
 impl<const D: usize> Assembly<'_, '_, D> {
-    fn make(
-        self,
-        mesh: &Mesh<D>,
-        loads: Loads,
-        factory: &mut impl Factory,
-    ) -> Result<Made> {
+    fn make(self, mesh: &Mesh<D>, loads: Loads, factory: &mut impl Factory) -> Result<Made> {
         let Self { name, part, rows, share, left, is_first, .. } = self;
         let mut graph = self.graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
         if let Some(share) = &share {

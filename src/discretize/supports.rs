@@ -1,15 +1,15 @@
 //! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::find::{earlier, find_group, not_on_body, of_body, point};
 use crate::contact::pad;
 use crate::error::{Error, Place, Result};
+use crate::exchange::Plain;
 use crate::fem::{Facets, Frame, Space, place};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, LoadKind};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// One condition n.u = value at a node.

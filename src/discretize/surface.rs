@@ -1,10 +1,10 @@
 //! A contact surface of a pair; its mesh for output: the facets of side a, and where their values come from.
 
-use serde::{Deserialize, Serialize};
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::fem::{Facets, element};
 use crate::output::vtu::{CellKind, Grid};
 use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// One surface of a pair: facets of a body.

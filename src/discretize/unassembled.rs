@@ -136,13 +136,7 @@ impl<const D: usize> LocalBody<D> {
     }
 
     /// Restrict a body, the one with this number in its matrix, to the nodes that a rank needs; all of them if `wants_all`.
-    pub fn restrict(
-        body: &Unassembled<D>,
-        partition: &Partition,
-        number: usize,
-        rank: usize,
-        wants_all: bool,
-    ) -> Self {
+    pub fn restrict(body: &Unassembled<D>, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
         let Unassembled { part, draft, supported, .. } = body;
         let cells = match wants_all {
             true => (0..part.space.cell_count()).collect(),

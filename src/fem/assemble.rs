@@ -3,16 +3,16 @@
 //! The pattern is built once from the node graph, which holds the couplings through cells and through contact rows. Positions
 //! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::forces::NodalForces;
 use super::frame::Frame;
 use super::quadrature::{self, Parts, Rule};
 use super::space::Space;
+use crate::exchange::Plain;
 use crate::linalg::Csr;
 use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 
 /// The symmetric graph of coupled nodes of a body, as compressed rows with diagonal.
 #[derive(Debug, Clone)]

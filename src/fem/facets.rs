@@ -1,11 +1,11 @@
 //! Boundary facets of a body: their search in its cells, their orientation and their normals.
 
-use serde::{Deserialize, Serialize};
 use super::space::Space;
 use super::{cross, element, minus, pad, unit};
 use crate::linalg::dot;
 use crate::mesh::Group;
 use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// The facets of a part of a body's boundary, oriented so that [`Facets::normals`] points out of the body.

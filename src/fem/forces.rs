@@ -1,9 +1,9 @@
 //! Forces at the nodes of a body.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::{length, pad, place};
+use crate::exchange::Plain;
 use crate::linalg::{Total, dot};
+use serde::{Deserialize, Serialize};
 
 /// The forces at nodes that are not zero, since most loads act on surfaces only.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

@@ -4,9 +4,9 @@
 //! surface ties its nodes to one of them, the master, whose dofs move all of them. In v every support is a prescribed dof, and
 //! the blocks of K keep their size.
 
-use serde::{Deserialize, Serialize};
 use crate::exchange::Plain;
 use crate::linalg::Csr;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The map T from dofs v to nodal displacements u, and the transposed map for forces. Nodes without an entry have the same values

@@ -1,11 +1,11 @@
 //! Rigid motions of a body, and those that its supports leave unconstrained.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::assemble::NodalBlock;
 use super::extent::Extent;
+use crate::exchange::Plain;
 use crate::linalg::{Blocks, PART, TOLERANCE, dot};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// A rigid motion as a sum of translations and rotations about a centre. It is stored in a few numbers, whatever the number of nodes.
 #[derive(Debug, Clone, Serialize, Deserialize)]

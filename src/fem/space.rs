@@ -1,11 +1,11 @@
 //! The finite element space of one body: its nodes and cells, numbered within the body.
 
-use serde::{Deserialize, Serialize};
-use crate::exchange::Plain;
 use super::{Slope, cross, element, minus, pad};
+use crate::exchange::Plain;
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh, Numbering, datum};
 use crate::problem::order::Order;
+use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::collections::HashSet;
 

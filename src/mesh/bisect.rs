@@ -41,12 +41,7 @@ fn longest<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> usize {
 
 /// Bring the first points of an order, as many as weigh no more than `share` together, before the others; return how many they are. The time is linear,
 /// as each search halves the points among which the last of them may be.
-fn split(
-    points: &mut [u32],
-    share: u64,
-    weight: &dyn Fn(u32) -> u64,
-    order: &dyn Fn(&u32, &u32) -> Ordering,
-) -> usize {
+fn split(points: &mut [u32], share: u64, weight: &dyn Fn(u32) -> u64, order: &dyn Fn(&u32, &u32) -> Ordering) -> usize {
     let (mut open, mut before) = (0..points.len(), 0);
     while !open.is_empty() {
         let middle = open.start + open.len() / 2;
@@ -110,7 +105,10 @@ mod tests {
         let weights: Vec<u32> = (0..3000).map(|number| number % 5 + number / 1000).collect();
         for parts in [2, 3, 8, 13] {
             let mut sums = vec![0; parts];
-            bisect(&points, &weights, parts).iter().zip(&weights).for_each(|(&part, weight)| sums[part as usize] += weight);
+            bisect(&points, &weights, parts)
+                .iter()
+                .zip(&weights)
+                .for_each(|(&part, weight)| sums[part as usize] += weight);
             let (least, most) = (sums.iter().min().expect("parts"), sums.iter().max().expect("parts"));
             assert!(most - least < 30, "{sums:?}");
         }

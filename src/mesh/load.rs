@@ -70,11 +70,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
 /// Bytes by which a file shows its kind.
 const START: u64 = 1000;
 
-fn from_file<const D: usize>(
-    file: &Located<PathBuf>,
-    order: Order,
-    interrupt: &Interrupt,
-) -> Result<Loaded<D>> {
+fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let mut source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
     let mut start = Vec::new();

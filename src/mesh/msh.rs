@@ -33,11 +33,7 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<
 /// # Errors
 /// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
 /// error with the line or byte and a way out; a file that cannot be read.
-pub fn read<const D: usize>(
-    path: &Path,
-    source: Box<dyn Source + '_>,
-    maker: Maker,
-) -> Result<Mesh<D>> {
+pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Maker) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
     let cursor = &mut Cursor::new(path, source, maker != Maker::User);
     read_format(cursor)?;

@@ -1,8 +1,8 @@
 //! Physical groups: their names, and which entities of the geometry belong to them.
 
+use super::Group;
 use super::cursor::Cursor;
 use super::simplex::THINGS;
-use super::Group;
 use crate::error::Result;
 use crate::problem::body::is_in_name;
 use std::collections::{HashMap, HashSet};

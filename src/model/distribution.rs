@@ -3,10 +3,10 @@
 //! A state is (v, a): v has the dofs that this rank owns, and the rigid motion a is the same on all ranks. Every rank has a part of a force, also
 //! of the force on the rigid motion, so that work is a sum over ranks.
 
-use serde::{Deserialize, Serialize};
 use crate::exchange::{Exchange, Serial, trade};
 use crate::linalg::Csr;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
 /// The dofs of a body that one rank owns, and their places in the distributed matrix that has their rows of K. That is the matrix of all bodies, or

@@ -16,7 +16,6 @@ pub mod origin;
 pub mod rigid;
 pub mod surface;
 
-use serde::{Deserialize, Serialize};
 pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 pub use distribution::Distribution;
 pub use field::Field;
@@ -24,6 +23,7 @@ pub use joint::Joint;
 pub use layer::Layer;
 pub use linear::{LinearStep, Solution};
 pub use rigid::{Motions, Moved};
+use serde::{Deserialize, Serialize};
 
 use crate::contact::ContactPair;
 use crate::error::Result;

@@ -1,8 +1,8 @@
 //! `<body>.vtu`: meshes and fields for ParaView.
 
-use serde::{Deserialize, Serialize};
 use super::collection::escape;
 use super::tags::TagWriter;
+use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataArray, DataSet, ElementType, IOBuffer,

@@ -1,10 +1,10 @@
 //! The outer iteration: methods by name, and their settings.
 
-use serde::{Deserialize, Serialize};
 use super::history::History;
 use super::robin::{RobinRule, Zone};
 use super::stop::StopRule;
 use crate::expression::Field;
+use serde::{Deserialize, Serialize};
 
 /// The outer iteration.
 #[derive(Debug, Clone)]

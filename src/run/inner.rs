@@ -293,11 +293,7 @@ impl<'a> Inner<'a> {
             dofs: plan.dofs,
             retained: plan.retained.clone(),
         };
-        Decisions {
-            linear: self.linear,
-            dealt: self.dealt.clone(),
-            bodies: self.plans.iter().map(of_body).collect(),
-        }
+        Decisions { linear: self.linear, dealt: self.dealt.clone(), bodies: self.plans.iter().map(of_body).collect() }
     }
 
     /// Set the PETSc options of the plan.

@@ -248,7 +248,6 @@ impl Shared {
     pub fn gather(discrete: &Discrete) -> Self {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
-        let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
             let owned = slot.local.as_ref().filter(|body| body.leads());
             mine.solvers.push(owned.map_or(String::new(), |body| body.describe()));

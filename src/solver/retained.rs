@@ -4,10 +4,10 @@
 //! the node is turned to axes (n, t, ...), and only its dof along n is retained. Some more dofs are
 //! retained where supports and contact do not constrain the interior well.
 
-use serde::{Deserialize, Serialize};
 use crate::fem::rigid::AtDofs;
 use crate::linalg::{Blocks, Csr, dot};
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// Normals at a node count as parallel if the sine of their angle is at most this.

@@ -77,7 +77,8 @@ impl<'a, const D: usize> Cells<'a, D> {
         let at = mesh.in_scene(std::array::from_fn(|c| at[c]));
         let place = at[..D].iter().map(|x| x.to_string()).collect::<Vec<_>>().join(", ");
         let error = Error::mesh(&mesh.path, None, format!("body `{}`: {what} at ({place})", self.group.name));
-        let tags: Vec<String> = cells.iter().filter_map(|&cell| self.group.tags.get(cell)).map(u64::to_string).collect();
+        let tags: Vec<String> =
+            cells.iter().filter_map(|&cell| self.group.tags.get(cell)).map(u64::to_string).collect();
         match &tags[..] {
             [] => error,
             [one] => error.because(format!("it is element {one} of the mesh file")),
