@@ -13,10 +13,8 @@ pub mod folder;
 mod format;
 pub mod gmsh;
 pub mod history;
-mod largest;
 pub mod leftovers;
 mod lock;
-mod look;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "cli")]
@@ -57,12 +55,11 @@ pub use contacts::PairRow;
 pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use format::{sci, seconds, trimmed};
 pub use history::HistoryWriter;
-pub use look::LookReport;
 #[cfg(feature = "cli")]
 pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    PairReport, Report, RoundReport, busiest,
+    LookReport, PairReport, Report, RoundReport, busiest,
 };
 pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};

@@ -14,7 +14,7 @@ const SHORT: Duration = Duration::from_secs(1);
 pub struct Line(ProgressBar);
 
 impl Line {
-    /// Return a line with the name `what` of the phase and the elapsed time, shown after [`SHORT`]. If the duration in seconds
+    /// Return a line with the name `what` of the phase and the elapsed time, shown after a second. If the duration in seconds
     /// has an `estimate`, the line shows the remaining time, too.
     pub fn new(what: &str, estimate: Option<f64>) -> Self {
         let what = what.to_owned();

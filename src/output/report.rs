@@ -1,8 +1,6 @@
 //! The report of a run: `report.json`.
 
 use super::format::sci;
-use super::largest::largest;
-use super::look::LookReport;
 use super::steps::{Extent, StepReport};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -146,7 +144,7 @@ pub struct IntervalReport {
     pub upper: f64,
 }
 
-/// Wall seconds of the inner solvers.
+/// The wall seconds of the inner solvers.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct InnerTimes {
     /// Factorisations and preconditioner set-ups.
@@ -157,7 +155,24 @@ pub struct InnerTimes {
     pub solve: f64,
 }
 
-/// Estimated errors of the discretisation, relative.
+/// The relative errors that the last look found, which sums the forces anew from the displacements of a result. They are lower bounds.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct LookReport {
+    /// Error in the energy norm; null if it is not finite, like the others.
+    pub error: Option<f64>,
+    /// Error of the pressures, relative to the largest.
+    pub pressure: Option<f64>,
+    /// Out-of-balance force of a body, relative to its contact forces.
+    pub imbalance: Option<f64>,
+    /// The body or the bodies with the largest of these errors.
+    pub at: Vec<String>,
+    /// Number of cells in the sums.
+    pub cells: usize,
+    /// Wall seconds.
+    pub seconds: f64,
+}
+
+/// Estimated relative errors of the discretisation.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct EstimateReport {
     /// Error in the energy norm of bodies and layers.
@@ -315,13 +330,34 @@ pub struct PairReport {
 /// the scene gives a number, as many pairs have files of their own.
 pub const LISTED: usize = 24;
 
-/// Return the indices of the `most` pairs with the largest forces, in the order of the scene.
+/// Return the indices of the `most` pairs with the largest forces, in the order of the scene. Among equal forces the first is
+/// preferred; a force that is not finite counts as zero.
 pub fn busiest(pairs: &[PairReport], most: usize) -> Vec<usize> {
-    largest(pairs.iter().map(|pair| pair.force[0].iter().map(|f| f * f).sum()), most)
+    let squared = |pair: &PairReport| pair.force[0].iter().map(|f| f * f).sum();
+    let sizes: Vec<f64> =
+        pairs.iter().map(squared).map(|size: f64| if size.is_finite() { size } else { 0.0 }).collect();
+    let mut order: Vec<usize> = (0..sizes.len()).collect();
+    order.sort_by(|&i, &j| sizes[j].total_cmp(&sizes[i]));
+    order.truncate(most);
+    order.sort_unstable();
+    order
 }
 
 /// Format a number with `digits` after the point, or with an exponent if it is too small or too large for that.
 pub fn readable(value: f64, digits: usize) -> String {
     let size = value.abs();
     if value == 0.0 || (1e-3..1e6).contains(&size) { format!("{value:.digits$}") } else { sci(value, digits) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_keep_their_order() {
+        let pair = |force: f64| PairReport { force: [[0.0, force, 0.0], [0.0; 3]], ..PairReport::default() };
+        let pairs = [5.0, f64::NAN, -9.0, 5.0].map(pair);
+        let busiest = |most| busiest(&pairs, most);
+        assert_eq!([busiest(1), busiest(2), busiest(9)], [vec![2], vec![0, 2], vec![0, 1, 2, 3]]);
+    }
 }

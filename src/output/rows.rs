@@ -91,7 +91,7 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_full_disk_is_told_once_and_tried_again() {
+    fn a_full_disk_is_reported_once_and_tried_again() {
         let full = || File::options().write(true).open("/dev/full").unwrap();
         let failure = None;
         let mut rows = RowFile {

@@ -29,11 +29,6 @@ impl Files {
         Ok(Self { folder: folder.to_owned(), sums })
     }
 
-    /// Return the folder.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
     /// Return the path of a file.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)

@@ -1,7 +1,7 @@
 //! The last look: forces summed anew from the displacements of a result show whether the result is as good as its run reported.
 //!
-//! No solver takes part: the residual r = f - K u - B' omega p is summed over the cells, with the loads f, the stiffness K, the
-//! contact rows B, and the areas omega and pressures p of the contact points. The energy of r is bounded from below,
+//! No solver takes part: the residual r = f - K u - B' omega p is summed over the cells. Here f are the loads, K is the stiffness,
+//! B are the contact rows, and omega and p are the areas and pressures of the contact points. The energy of r is bounded from below,
 //!
 //! ```text
 //! |r|^2 = r' H^-1 r >= (r'v)^2 / v'H v       for every v,      H = K + B' omega kappa B,
@@ -24,9 +24,9 @@ use std::time::Instant;
 /// Number of trial displacements: of nodes, of hats with and without contact springs.
 const TRIALS: usize = 3;
 
-/// Factor by which the found error may exceed the one that the run reported. Runs know their errors in norms of their own, or, if they
-/// end by increments of displacements, by the error of the mesh or by rounding, from estimates over few steps. The factor covers
-/// such differences: the error of the mesh is ten times the error with which it lets a run end.
+/// Factor by which the found error may exceed the one that the run reported. Runs measure their errors in norms of their own. Runs that
+/// end by increments of displacements, by the error of the mesh or by rounding estimate them from few steps. The factor covers such
+/// differences: the error of the mesh is ten times the error with which it lets a run end.
 const ROUGHLY: f64 = 10.0;
 
 /// Relative error beyond which a number has no correct digit. A run that rounding ended there has no result.
