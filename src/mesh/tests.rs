@@ -5,7 +5,7 @@ mod damage;
 mod loading;
 
 use super::load::from_script;
-use super::{Group, Loaded, Maker, Mesh, msh, simplex};
+use super::{Group, Loaded, Mesh, msh, simplex};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
 use crate::problem::{Guard, Order};

@@ -240,11 +240,7 @@ mod tests {
     fn of(rows: &Csr, prescribed: &[(usize, f64)]) -> Retained {
         let motions = rigid::modes(&Extent::of(NODES.into_iter()));
         let at = |k: usize, dof: usize| motions[k].at(&NODES[dof / 2])[dof % 2];
-        let largest = |size: &dyn Fn(usize) -> Option<f64>| {
-            let sizes = (0..8).filter_map(|dof| Some((dof, size(dof)?)));
-            sizes.max_by(|a, b| a.1.total_cmp(&b.1))
-        };
-        Retained::new(2, rows, prescribed, AtDofs { count: 3, at: &at, largest: &largest })
+        Retained::new(2, rows, prescribed, AtDofs { count: 3, at: &at })
     }
 
     fn rows(list: &[&[(usize, f64)]]) -> Csr {

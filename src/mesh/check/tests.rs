@@ -94,9 +94,9 @@ fn good_meshes_are_counted() {
     }
 }
 
-/// Of a bar of many cubes each rank has a part of the nodes: the surface at its end is known to all, and its boundary is looked at as a whole.
+/// A bar of many cubes with a group at its end is whole, until another cube lies across it.
 #[test]
-fn ranks_have_parts_of_a_bar() {
+fn a_bar_is_looked_at_as_a_whole() {
     let count = 20;
     let corners = |i: u32| (0..4).map(move |k| [i, k & 1, k >> 1].map(f64::from));
     let mut points: Vec<[f64; 3]> = (0..=count).flat_map(corners).collect();
@@ -112,7 +112,7 @@ fn ranks_have_parts_of_a_bar() {
     let bar = with_end(points.clone(), &cells);
     for bar in [bar.clone(), quadratic(&bar)] {
         let found = check(&bar, &[("end", Duty::Acts)]).unwrap();
-        assert_eq!([found.inner, found.outer, found.parts.count, found.nodes.count], [158, 164, 1, bar.points.len()]);
+        assert_eq!([found.inner, found.outer, found.parts.count, found.points.len()], [158, 164, 1, bar.points.len()]);
     }
     // a cube of its own through a side in the middle
     let (more, others) = cube([10.3, 0.4, 0.5], points.len() as u32);
