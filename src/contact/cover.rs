@@ -3,7 +3,8 @@
 use super::basis::Carriers;
 use super::pieces::{Common, Refused};
 use super::side::{Side, length};
-use crate::fem::{area_vector, assemble, element, quadrature};
+use crate::fem::quadrature::{self, Rule};
+use crate::fem::{area_vector, assemble, element};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 
@@ -50,22 +51,24 @@ impl Coverage {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });
-        let measure = |i: usize| -> f64 {
-            let x = a.facets.coordinates(i, a.space);
-            let density = |l: &[f64]| {
-                let at = assemble::interpolate(&x, &element::values(a.facets.order, l));
-                length(area_vector(a.facets.order, &x, l)) * a.space.circle(&at)
-            };
-            rule.iter().map(|(l, weight)| weight * density(l)).sum()
-        };
         let of_facet = |i: usize| {
-            let share = covered[i] / measure(i);
+            let share = covered[i] / measure(a, i, &rule);
             let left = Left::of(share, common.refused[i]);
             let lost = if left == Left::Lost { common.refused[i].lost } else { 0 };
             Self { share, left, lost, carriers: carriers[i] }
         };
         (0..covered.len()).filter(|&i| requested(i)).map(|i| (i as u32, of_facet(i))).collect()
     }
+}
+
+/// Return the length (area) of facet `i`, in bodies of revolution the area of a ring.
+fn measure<const D: usize>(a: &Side<D>, i: usize, rule: &Rule) -> f64 {
+    let x = a.facets.coordinates(i, a.space);
+    let density = |l: &[f64]| {
+        let at = assemble::interpolate(&x, &element::values(a.facets.order, l));
+        length(area_vector(a.facets.order, &x, l)) * a.space.circle(&at)
+    };
+    rule.iter().map(|(l, weight)| weight * density(l)).sum()
 }
 
 impl Left {

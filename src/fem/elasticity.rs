@@ -36,6 +36,18 @@ pub enum Flaw {
     Twists,
 }
 
+impl Region {
+    fn new(spec: &ElasticitySpec, dimension: usize, plane: Plane) -> Result<Self, Flaw> {
+        let mut region = Self { spec: spec.clone(), constant: None };
+        if spec.is_constant() {
+            let tensor = tensor(spec, [0.0; 3], plane)?;
+            let material = material(spec, tensor, [0.0; 3], dimension, plane);
+            region.constant = Some((material, tensor.moduli(dimension, plane)));
+        }
+        Ok(region)
+    }
+}
+
 impl Elasticity {
     /// Make the elasticity of a body from its own constants (`specs[0]`) and those of its regions. `of_cell` gives the index of
     /// the spec of each cell, or is empty.
@@ -49,13 +61,7 @@ impl Elasticity {
         plane: Plane,
     ) -> Result<Self, (usize, Flaw)> {
         let region = |(index, spec): (usize, &&ElasticitySpec)| {
-            let mut region = Region { spec: (*spec).clone(), constant: None };
-            if spec.is_constant() {
-                let tensor = tensor(spec, [0.0; 3], plane).map_err(|flaw| (index, flaw))?;
-                let material = material(spec, tensor, [0.0; 3], dimension, plane);
-                region.constant = Some((material, tensor.moduli(dimension, plane)));
-            }
-            Ok(region)
+            Region::new(spec, dimension, plane).map_err(|flaw| (index, flaw))
         };
         Ok(Self { regions: specs.iter().enumerate().map(region).collect::<Result<_, _>>()?, of_cell, dimension, plane })
     }

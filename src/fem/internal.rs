@@ -84,27 +84,35 @@ pub fn forces<const D: usize>(
     let zero = || vec![0.0; count];
     let mut sums = Internal { force: vec![0.0; D * count], rounding: zero(), diagonal: zero(), bulk: zero() };
     let mut terms = zero();
-    let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
-    visit(space, elasticity, cells, |Point { cell, at, phi, gradient, weight, material }: Point<D>| {
-        let stress = material.stress(&space.slope(cell, &at, &phi, gradient, u).strain());
-        let stiffness = weight * material.norm();
-        let slope = |a: usize| size(&gradient[a]) + space.hoop(&at, phi[a]).abs();
-        let size_of_strain = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
-        let strains: f64 = cell.iter().enumerate().map(size_of_strain).sum();
-        for (a, &node) in cell.iter().enumerate() {
-            let node = node as usize;
-            let force = nodal_force(&stress, &gradient[a], space.hoop(&at, phi[a]));
-            (0..D).for_each(|c| sums.force[D * node + c] += weight * force[c]);
-            sums.rounding[node] += stiffness * slope(a) * strains;
-            sums.diagonal[node] += stiffness * slope(a).powi(2);
-            sums.bulk[node] += stiffness / space.stride as f64;
-            terms[node] += 1.0;
-        }
+    visit(space, elasticity, cells, |point: Point<D>| {
+        point.cell.iter().for_each(|&node| terms[node as usize] += 1.0);
+        sums.add(space, &point, u);
     });
     // A strain has D * stride terms, a stress has six, and a force has D for each integration point.
     let inner = (D * space.stride + 6 + D) as f64;
     sums.rounding.iter_mut().zip(terms).for_each(|(rounding, terms)| *rounding *= f64::EPSILON * (inner + terms));
     sums
+}
+
+impl Internal {
+    /// Add the forces and bounds of an integration point; `rounding` is still without the factor of eps and the lengths of sums.
+    fn add<const D: usize>(&mut self, space: &Space<D>, point: &Point<D>, u: &[f64]) {
+        let Point { cell, at, phi, gradient, weight, material } = point;
+        let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
+        let stress = material.stress(&space.slope(cell, at, phi, gradient, u).strain());
+        let stiffness = weight * material.norm();
+        let slope = |a: usize| size(&gradient[a]) + space.hoop(at, phi[a]).abs();
+        let size_of_strain = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
+        let strains: f64 = cell.iter().enumerate().map(size_of_strain).sum();
+        for (a, &node) in cell.iter().enumerate() {
+            let node = node as usize;
+            let force = nodal_force(&stress, &gradient[a], space.hoop(at, phi[a]));
+            (0..D).for_each(|c| self.force[D * node + c] += weight * force[c]);
+            self.rounding[node] += stiffness * slope(a) * strains;
+            self.diagonal[node] += stiffness * slope(a).powi(2);
+            self.bulk[node] += stiffness / space.stride as f64;
+        }
+    }
 }
 
 /// Return the force of a stress on the node of a shape function with this gradient. In a body of revolution `hoop` is the function over

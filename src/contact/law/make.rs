@@ -46,29 +46,29 @@ fn formed<L: LayerLaw + 'static>(
     position: &[[f64; 3]],
     new: fn(&[f64]) -> L,
 ) -> Result<Rc<dyn LayerLaw>> {
-    let at = |&x: &[f64; 3]| -> Result<L> { Ok(new(&parameters(form, values, x)?)) };
+    let at = |&x: &[f64; 3]| -> Result<L> {
+        let parameters = form.parameters.iter().zip(values).map(|(parameter, field)| checked(parameter, field, x));
+        Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
+    };
     match values.iter().all(Field::is_constant) {
         true => Ok(Rc::new(at(&[0.0; 3])?)),
         false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
     }
 }
 
-/// Evaluate the parameters of a form at a point.
+/// Return the value of a parameter at a point.
 ///
 /// # Errors
-/// A parameter that is not finite or out of its range.
-fn parameters(form: &LawForm, values: &[Field], x: [f64; 3]) -> Result<Vec<f64>> {
-    let checked = |(parameter, field): (&Parameter, &Field)| {
-        let value = field.eval_finite(parameter.what, x)?;
-        let Some(breach) = parameter.bounds.breach(value) else { return Ok(value) };
-        let message = format!("{} is {} at ({}, {}, {})", parameter.what, shown(value), x[0], x[1], x[2]);
-        let error = Error::new(Kind::Scene, message);
-        Err(match field.place() {
-            Some(place) => error.at(place).label(breach),
-            None => error.help(breach),
-        })
-    };
-    form.parameters.iter().zip(values).map(checked).collect()
+/// A value that is not finite or out of its range.
+fn checked(parameter: &Parameter, field: &Field, x: [f64; 3]) -> Result<f64> {
+    let value = field.eval_finite(parameter.what, x)?;
+    let Some(breach) = parameter.bounds.breach(value) else { return Ok(value) };
+    let message = format!("{} is {} at ({}, {}, {})", parameter.what, shown(value), x[0], x[1], x[2]);
+    let error = Error::new(Kind::Scene, message);
+    Err(match field.place() {
+        Some(place) => error.at(place).label(breach),
+        None => error.help(breach),
+    })
 }
 
 /// Return the diagonal of the box around all points. No layer is compressed by more.
