@@ -180,16 +180,21 @@ fn clock_with_phases(is_shown: bool) -> Clock {
     let next = move |ended: &str, estimate: Option<f64>| {
         // the old line is removed before the next one begins
         drop(line.borrow_mut().take());
-        *line.borrow_mut() = match ended {
-            "" => Some(Line::new("mesh", None)),
-            "mesh" => Some(Line::new("bodies and contact points", None)),
-            "discretize" => Some(Line::new("factorisations and start", estimate)),
-            _ => None,
-        };
+        *line.borrow_mut() = line_after(ended, estimate);
     };
     let mut clock = Clock::default();
     clock.watch = is_shown.then(|| Rc::new(next) as _);
     clock
+}
+
+/// Return the line for the phase that follows the one that has ended. `estimate` is its expected time in seconds, if that is known.
+fn line_after(ended: &str, estimate: Option<f64>) -> Option<Line> {
+    match ended {
+        "" => Some(Line::new("mesh", None)),
+        "mesh" => Some(Line::new("bodies and contact points", None)),
+        "discretize" => Some(Line::new("factorisations and start", estimate)),
+        _ => None,
+    }
 }
 
 /// Return the lines of `--verbose`: what was decided and why, and the PETSc options of each body. Collective.

@@ -50,7 +50,8 @@ pub struct Request {
 pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let variations =
         agree(session, request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>())?;
-    let cases = agree(session, cases(request, &variations))?;
+    let load = |values| Case::load(request, &variations, values);
+    let cases = agree(session, combinations(&variations).into_iter().map(load).collect::<Result<Vec<_>>>())?;
     let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
     let folder = agree(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
@@ -59,7 +60,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let bar = progress::runs(cases.len(), is_loud);
     let mut sweep = Sweep { session, interrupt, verbosity, is_loud, json, folder, bar, columns: None, table: None };
     let mut watcher = Watcher(Asking::new(interrupt, None));
-    let (mut results, mut exit, mut before) = (Results::default(), 0, None);
+    let (mut collected, mut exit, mut before) = (Results::default(), 0, None);
     for case in &cases {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
@@ -70,7 +71,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         exit = exit.max(report::exit_code(&done));
         if session.rank() == 0 {
             sweep.print_row(case, &done, &report)?;
-            results.add(case, &done, report);
+            collected.add(case, &done, report);
         }
         if matches!(done.outcome.status, Status::Paused { .. }) {
             break;
@@ -79,7 +80,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     }
     sweep.bar.finish_and_clear();
     if session.rank() == 0 {
-        sweep.finish(&cases[0].scene, results)?;
+        sweep.finish(&cases[0].scene, collected)?;
     }
     Ok(exit)
 }
@@ -93,17 +94,15 @@ struct Case {
     scene: Rc<Scene>,
 }
 
-/// Load the scenes of all runs.
-fn cases(request: &Request, variations: &[Variation]) -> Result<Vec<Case>> {
-    let case = |values: Vec<String>| {
+impl Case {
+    /// Load the scene with the values of a run.
+    fn load(request: &Request, variations: &[Variation], values: Vec<String>) -> Result<Self> {
         let mut overrides = request.scene.overrides();
-        overrides.extend(
-            variations.iter().zip(&values).map(|(Variation { key, .. }, value)| format!("--over {key}={value}")),
-        );
+        let values_of_keys = variations.iter().zip(&values);
+        overrides.extend(values_of_keys.map(|(Variation { key, .. }, value)| format!("--over {key}={value}")));
         let scene = Rc::new(crate::scene::load(&request.scene.scene, &overrides)?);
         Ok(Case { label: label(variations, &values), values, scene })
-    };
-    combinations(variations).into_iter().map(case).collect()
+    }
 }
 
 /// Return the values with the last words of their keys, or with whole keys where two have the same last word.

@@ -45,19 +45,22 @@ fn tree(points: &[[f64; 3]]) -> Tree {
     RTree::bulk_load(points.iter().enumerate().map(|(q, &x)| GeomWithData::new(x, q)).collect())
 }
 
-/// Return for each point of a pair the nearest points of a table. Their weights are inverse distances, scaled to the sum one.
+/// Return for each point of a pair the weights of the nearest points of a table.
 fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<Item = Weights> + 'a {
     let tree = tree(&table.points);
     // the neighbours on a curve, or around a point of a surface
     let count = if pair.along_curve { 2 } else { 4 };
-    pair.position.iter().map(move |&x| {
-        let nearest = tree.nearest_neighbor_iter_with_distance_2(x).take(count);
-        let mut weights: Weights =
-            nearest.map(|(near, squared)| (near.data, 1.0 / squared.sqrt().max(f64::MIN_POSITIVE))).collect();
-        let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
-        weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
-        weights
-    })
+    pair.position.iter().map(move |&x| inverse_distances(&tree, x, count))
+}
+
+/// Return the `count` points nearest to `x`. Their weights are inverse distances, scaled to the sum one.
+fn inverse_distances(tree: &Tree, x: [f64; 3], count: usize) -> Weights {
+    let nearest = tree.nearest_neighbor_iter_with_distance_2(x).take(count);
+    let mut weights: Weights =
+        nearest.map(|(near, squared)| (near.data, 1.0 / squared.sqrt().max(f64::MIN_POSITIVE))).collect();
+    let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
+    weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
+    weights
 }
 
 /// The estimated errors of a solution on one mesh, to be compared with those on the next mesh.

@@ -66,7 +66,7 @@ fn gradients_are_those_of_the_values() {
     }
 }
 
-/// Linear: second order, cubic: third, both also at the border.
+/// Linear interpolation has second order, cubic interpolation third order, both also at the border.
 #[test]
 fn interpolation_has_its_order() {
     for (interpolation, order) in [(Interpolation::Linear, 2.0), (Interpolation::Cubic, 3.0)] {
@@ -108,7 +108,6 @@ fn beyond_the_points_is_what_was_asked_for() {
     assert!((periodic([2.75, 0.0]) - 0.5 * (periodic([2.5, 0.0]) + periodic([0.5, 0.0]))).abs() < 1e-12);
 }
 
-/// A place, and the part that it makes of a file.
 #[test]
 fn texts_of_many_kinds_are_read() {
     let kinds = [
@@ -206,7 +205,6 @@ fn points_of_a_regular_grid_are_one() {
     // one is missing: triangles
     let holed: String = text.lines().skip(9).map(|line| format!("{line}\n")).collect();
     assert!(load(&holed, |spec| spec.points = true).unwrap().grid().is_none());
-    // of a profile, too
     // fields may be quoted
     assert_eq!(load("\"1\";\"2,5\"\n\"3\";\"4\"\n", |_| ()).unwrap().sample(&[1.0, 0.0]).value, 2.5);
     let even = load("0 1\n2 5\n1 3\n", |spec| spec.points = true).unwrap();
@@ -267,7 +265,7 @@ fn files_of_numpy_are_as_long_as_they_say() {
     assert!(refused(&array(&[1.0, 2.0])).contains("ends before its 3 x 1 numbers"));
     assert!(refused(&[&whole[..], b"more"].concat()).contains("has 4 bytes more than its 3 x 1 numbers"));
     for length in 0..whole.len() {
-        // of fewer bytes than a name it is a text
+        // a file shorter than the name of the format is a text
         let words = refused(&whole[..length]);
         assert!(length < 6 || words.contains("ends") || words.contains("its own words"), "{length}: {words}");
     }
@@ -276,7 +274,7 @@ fn files_of_numpy_are_as_long_as_they_say() {
     assert!(refused(&claims).contains("has 15 bytes, but a header of 4294967295 bytes by its own words"));
 }
 
-/// A wave of amplitude a and two directions: moments in closed form, of the differences with their own factor; a summit a period.
+/// Waves of amplitude a in two directions have moments in closed form, and one summit in each period. Differences have a factor of their own.
 #[test]
 fn roughness_of_waves_is_known() {
     let (a, n, period) = (0.3, 64, 2.0);

@@ -5,7 +5,7 @@
 
 use super::rows::Rows;
 use super::rule::DataSpec;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::file::other_encoding;
 
 /// Read a text.
@@ -38,14 +38,7 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
         }
         let before = rows.values.len();
         for field in fields() {
-            let value = number(field, separator).ok_or_else(|| {
-                let what = match field.is_empty() {
-                    true => format!("line {line} lacks a number between two separators"),
-                    false => format!("line {line}: `{}` is not a number", start_of(field)),
-                };
-                spec.refuse(what, "lines that are no data begin with #; decimal commas need fields parted by ; or tabs")
-            })?;
-            rows.values.push(value);
+            rows.values.push(number(field, separator).ok_or_else(|| refuse_field(spec, line, field))?);
         }
         let found = rows.values.len() - before;
         if rows.columns == 0 {
@@ -58,6 +51,15 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
         rows.lines.push(line);
     }
     Ok(rows)
+}
+
+/// Return the refusal of a field that is no number.
+fn refuse_field(spec: &DataSpec, line: u64, field: &[u8]) -> Error {
+    let what = match field.is_empty() {
+        true => format!("line {line} lacks a number between two separators"),
+        false => format!("line {line}: `{}` is not a number", start_of(field)),
+    };
+    spec.refuse(what, "lines that are no data begin with #; decimal commas need fields parted by ; or tabs")
 }
 
 /// Return the start of a field, for a message.

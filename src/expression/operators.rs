@@ -30,7 +30,7 @@ pub(super) struct Binary {
 pub(super) enum Two {
     /// A differentiable function. The second function returns its derivatives by both arguments, from the arguments and the value.
     Smooth(fn(f64, f64) -> f64, fn(f64, f64, f64) -> [f64; 2]),
-    /// A truth.
+    /// A function whose value is a truth.
     Truth(fn(f64, f64) -> f64),
     /// The choice of one argument: the first, if the condition holds, or the second.
     Pick(fn(f64, f64) -> bool),
@@ -66,7 +66,7 @@ pub(super) static UNARY: [Unary; 17] = [
     smooth("tanh", portable::tanh, |_, value| 1.0 - value * value),
 ];
 
-/// Signs.
+/// The signs, which stand before a value.
 pub(super) static SIGNS: [Unary; 2] = [smooth("-", |a| -a, |_, _| -1.0), steps("!", |a| compare(a, a, a <= 0.0))];
 
 /// Functions of two values. `min` and `max` take more values, one after another, and unlike those of `f64` they keep a NaN.

@@ -62,8 +62,7 @@ fn precedence_is_the_usual_one() {
     }
 }
 
-/// Random trees, written with parentheses only where the grammar needs them, against their own value: holds
-/// the grammar and the program made of it.
+/// Random trees, written with parentheses only where the grammar needs them, have the value of the tree: a test of grammar and program.
 #[test]
 fn random_expressions_have_their_value() {
     let mut state = 7_u64;
@@ -189,12 +188,12 @@ fn long_expressions_have_their_value_and_deep_ones_are_refused() {
     let deep = format!("{}x{}", "(".repeat(5000), ")".repeat(5000));
     assert!(parse(&deep).expect_err("deep").message().contains("nested"));
     assert!(parse(&"-".repeat(5000)).is_err());
-    // neither the parser nor the value recurs with the length, and the memory is that of the text
+    // neither the parser nor the evaluation recurs with the length, and the memory is proportional to the text
     let long = vec!["x*y"; 200_000].join(" + ");
     assert_eq!(value(&long, [2.0, 0.5, 0.0, 0.0]), 2e5);
     let wide = format!("max({})", vec!["-x"; 100_000].join(", "));
     assert_eq!(value(&wide, [2.0, 0.0, 0.0, 0.0]), -2.0);
-    // a stack of more numbers than most need
+    // needs a larger stack than usual expressions
     let nested = (0..18).fold("x".to_owned(), |inner, _| format!("(x + y*{inner})"));
     assert_eq!(value(&nested, [2.0, 1.0, 0.0, 0.0]), 38.0);
 }
@@ -259,7 +258,7 @@ fn derivatives_agree_with_differences() {
     }
 }
 
-/// Of data by the chain rule, whatever their places depend on.
+/// The chain rule holds for data, whatever variables their places depend on.
 #[test]
 fn derivatives_of_data_agree_with_differences() {
     let folder = tempfile::tempdir().unwrap();

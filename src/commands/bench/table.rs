@@ -406,24 +406,25 @@ fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
     if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
         return Vec::new();
     }
-    let keys = columns.len() - NUMBERS.len() - TEXTS.len() - LAST.len();
-    let row = |record: csv::StringRecord| {
-        let numbers = NUMBERS.iter().enumerate();
-        let numbers = numbers.filter_map(|(k, &(name, _))| Some((name, record[keys + TEXTS.len() + k].parse().ok()?)));
-        Row {
-            key: record.iter().take(keys).map(str::to_owned).collect(),
-            runs: record[keys].parse().unwrap_or(0),
-            status: record[keys + 1].to_owned(),
-            message: record[keys + 2].to_owned(),
-            method: record[keys + 3].to_owned(),
-            numbers: numbers.collect(),
-            error_of: record[columns.len() - 2].to_owned(),
-            inputs: record[columns.len() - 1].to_owned(),
-            displacement_error: None,
-        }
-    };
     // the last row of a benchmark that was killed may be incomplete
-    file.records().map_while(|record| record.ok()).map(row).collect()
+    file.records().map_while(|record| record.ok()).map(|record| row(&record)).collect()
+}
+
+/// Return the row of a record of the file.
+fn row(record: &csv::StringRecord) -> Row {
+    let keys = record.len() - NUMBERS.len() - TEXTS.len() - LAST.len();
+    let numbers = NUMBERS.iter().zip(keys + TEXTS.len()..);
+    Row {
+        key: record.iter().take(keys).map(str::to_owned).collect(),
+        runs: record[keys].parse().unwrap_or(0),
+        status: record[keys + 1].to_owned(),
+        message: record[keys + 2].to_owned(),
+        method: record[keys + 3].to_owned(),
+        numbers: numbers.filter_map(|(&(name, _), k)| Some((name, record[k].parse().ok()?))).collect(),
+        error_of: record[record.len() - 2].to_owned(),
+        inputs: record[record.len() - 1].to_owned(),
+        displacement_error: None,
+    }
 }
 
 #[cfg(test)]
