@@ -320,31 +320,6 @@ fn memory_ends_with_a_message() {
     assert!(told > 0);
 }
 
-/// The same in the set-up of hypre, which ends all ranks by itself where it gets no memory.
-#[test]
-fn memory_of_hypre_ends_with_a_message() {
-    let (scene, sets) = (case("patch-3d"), ["--set", "mesh.set={nl=24,nu=24}"]);
-    // makes the mesh
-    solve(&scene, &[&sets[..], &["--set", "solver=hypre", "--set", "method.stop={residual=0.1}"]].concat()).converged();
-    let (scratch, mut told) = (TempDir::new().expect("a temporary folder"), 0);
-    for megabytes in (340..700).step_by(10) {
-        let mut command = Command::new("sh");
-        environment(&mut command);
-        let line = format!("ulimit -v {megabytes}000; exec \"$@\"");
-        command.args(["-c", &line, "sh", common::WINKLER, "solve"]).arg(&scene).args(sets);
-        command.args(["--set", "solver=hypre", "--method", "newton"]).env("OPENBLAS_NUM_THREADS", "1");
-        command.arg("-o").arg(scratch.path());
-        let (status, _, said) = output(command, Duration::from_secs(60));
-        if said.contains("out of memory: hypre") {
-            assert!(status.code() == Some(5) && said.matches("error:").count() == 1, "{megabytes}: {said}");
-            told += 1;
-        } else if status.success() {
-            break;
-        }
-    }
-    assert!(told > 0);
-}
-
 /// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper
 /// block is carried by its supports as one.
 #[test]

@@ -1,14 +1,8 @@
 //! Ends of the process: when memory ends, one message and the code of a failing solver in place of an abort.
 
-use mpi::ffi::MPI_Comm;
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::ffi::c_int;
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-unsafe extern "C" {
-    fn PMPI_Abort(comm: MPI_Comm, code: c_int) -> c_int;
-}
 
 /// Has the system take back arrays of a megabyte and more as soon as they are freed, where the C library can: by itself that makes them part of
 /// its heap, in which holes stay. SuperLU_DIST, which PETSc brings, forbids such arrays for the whole process when it is loaded: this is said
@@ -42,26 +36,6 @@ pub fn give_back() {
     unsafe {
         libc::malloc_trim(0)
     };
-}
-
-/// The code with which hypre ends all ranks where it gets no memory.
-const HYPRE: c_int = -1;
-
-/// MPI's end of all ranks, in front of MPI's own by its profiling interface (MPI 4.0, 15.2): hypre comes here where it gets no memory, and
-/// ends with the message and the code of that.
-///
-/// # Safety
-/// That of MPI_Abort: the communicator is one.
-#[unsafe(no_mangle)]
-#[allow(non_snake_case)]
-pub unsafe extern "C" fn MPI_Abort(comm: MPI_Comm, code: c_int) -> c_int {
-    if code == HYPRE {
-        out_of_memory("hypre got none");
-        // SAFETY: as in [`Heap::given`].
-        unsafe { libc::_exit(crate::error::Kind::Solver.exit_code()) }
-    }
-    // SAFETY: the caller's promise.
-    unsafe { PMPI_Abort(comm, code) }
 }
 
 /// Says once that there is no more memory; takes none for that.

@@ -187,6 +187,13 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
                 .to_owned(),
         );
     }
+    if let Some(kernels) = session.faster_blas_kernels() {
+        warnings.push(format!(
+            "{} does not use the vector instructions of this processor: factorisations take up to three times as long; set \
+             OPENBLAS_CORETYPE={kernels}",
+            session.blas_name()
+        ));
+    }
     warnings.extend(session.left_out().iter().map(|file| {
         format!(
             "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
