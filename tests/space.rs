@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use winkler::contact::law::{self, OwnLaws};
 use winkler::contact::pieces::{self, Cut, Reach};
-use winkler::contact::{Carriers, ContactPair, Side, assemble, integrate};
+use winkler::contact::{Carriers, ContactPair, Side, assemble};
 use winkler::fem::quadrature::Parts;
 use winkler::fem::{Frame, Space, assemble as fem};
 use winkler::interrupt::Interrupt;
@@ -105,10 +105,9 @@ fn pair_on<const D: usize>(
         Side::new(groups[k], &spaces[k], facets, &free, &frame)
     };
     let (a, b) = (side(0), side(1));
-    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0), &|_| true);
-    let integrals = integrate(&a, &b, &shared, &|_| true);
+    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0));
     let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
-    let pair = assemble(&a, &b, [0, 1], integrals, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at))
+    let pair = assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at))
         .expect("a pair");
     (pair, spaces)
 }

@@ -41,13 +41,12 @@ pub enum Left {
 pub(super) const WHOLE: f64 = 1.0 - 1e-3;
 
 impl Coverage {
-    /// Return the indices and the coverage of the `requested` facets, from the common pieces and the nodes that carry points.
+    /// Return the coverage of each facet, from the common pieces and the nodes that carry points.
     pub(super) fn of<const D: usize>(
         a: &Side<D>,
         common: &Common<D>,
         carriers: &[Option<Carriers>],
-        requested: impl Fn(usize) -> bool,
-    ) -> Vec<(u32, Self)> {
+    ) -> Vec<Self> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });
@@ -57,7 +56,7 @@ impl Coverage {
             let lost = if left == Left::Lost { common.refused[i].lost } else { 0 };
             Self { share, left, lost, carriers: carriers[i] }
         };
-        (0..covered.len()).filter(|&i| requested(i)).map(|i| (i as u32, of_facet(i))).collect()
+        (0..covered.len()).map(of_facet).collect()
     }
 }
 

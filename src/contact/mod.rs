@@ -18,5 +18,5 @@ pub use basis::{Carriers, STEADY};
 pub use cover::{Coverage, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Fault, Integrals, LostPieces, OwnSurface, add, assemble, integrate, moment_in_scene};
+pub use pair::{ContactPair, Fault, LostPieces, OwnSurface, add, assemble, moment_in_scene};
 pub use side::{Side, length, unit};

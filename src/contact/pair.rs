@@ -144,36 +144,21 @@ pub enum Fault {
 /// A function from the contact points of a pair to its law.
 pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
-/// Integrals over the common pieces of two surfaces, for some nodes of side a. They include the coverage of those facets
-/// whose first node is among these.
-#[derive(Debug, Default, Serialize, Deserialize)]
-pub struct Integrals {
+/// Integrals over the common pieces of two surfaces.
+struct Integrals {
     /// Integrals of each node that carries a point.
     points: BTreeMap<u32, Accumulator>,
-    /// Facets of side a with their coverage.
-    cover: Vec<(u32, Coverage)>,
+    /// Coverage of each facet of side a.
+    cover: Vec<Coverage>,
 }
 
-impl Integrals {
-    /// Add the integrals of other nodes.
-    pub fn add(&mut self, mut others: Self) {
-        self.points.append(&mut others.points);
-        self.cover.append(&mut others.cover);
-    }
-}
-
-/// Integrate over common pieces, which must contain all facets at the `requested` nodes of side a.
+/// Integrate over common pieces.
 ///
 /// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet, where
 /// phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the dual basis
 /// of the whole triangle. A partially covered facet on which this basis has unsteady means takes the hat functions of its
 /// vertices instead.
-pub fn integrate<const D: usize>(
-    a: &Side<D>,
-    b: &Side<D>,
-    common: &Common<D>,
-    requested: &dyn Fn(&u32) -> bool,
-) -> Integrals {
+fn integrate<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>) -> Integrals {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut carriers = vec![None; a.facets.count()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
@@ -181,12 +166,11 @@ pub fn integrate<const D: usize>(
         let nodes = a.facets.facet(facet);
         let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
         carriers[facet] = Some(basis.carriers());
-        let requested: Vec<bool> = nodes.iter().map(requested).collect();
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let psi = element::values(b.facets.order, &point.at_b);
             let others = b.facets.facet(point.facet_b);
-            for (i, &node) in nodes.iter().enumerate().filter(|(i, _)| requested[*i]) {
+            for (i, &node) in nodes.iter().enumerate() {
                 let mu = point.weight * basis.value(i, &phi, &point.at_a);
                 if mu == 0.0 {
                     continue;
@@ -199,10 +183,10 @@ pub fn integrate<const D: usize>(
             }
         }
     }
-    Integrals { points, cover: Coverage::of(a, common, &carriers, |facet| requested(&a.facets.facet(facet)[0])) }
+    Integrals { points, cover: Coverage::of(a, common, &carriers) }
 }
 
-/// Assemble the arrays of a pair from the integrals over the common pieces of its surfaces.
+/// Assemble the arrays of a pair from the common pieces of its surfaces.
 ///
 /// `bodies` are the indices of the bodies of side a and b. `gap(x)` is added to the distance of the meshes. `law` makes the
 /// layer's law for the contact points.
@@ -213,13 +197,11 @@ pub fn assemble<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
     bodies: [usize; 2],
-    integrals: Integrals,
+    common: &Common<D>,
     gap: &dyn Fn([f64; 3]) -> f64,
     law: &LawMaker,
 ) -> Result<ContactPair, Fault> {
-    let Integrals { points, mut cover } = integrals;
-    cover.sort_unstable_by_key(|entry| entry.0);
-    let cover: Vec<Coverage> = cover.into_iter().map(|(_, coverage)| coverage).collect();
+    let Integrals { points, cover } = integrate(a, b, common);
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
     let nodes = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
     if nodes.is_empty() {
@@ -331,7 +313,7 @@ pub fn add(sum: &mut [f64; 3], v: [f64; 3]) {
 const NOISE: f64 = 1e-9;
 
 /// Integrals of mu_q and of its products with the gap and with the shape functions of either side.
-#[derive(Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default)]
 struct Accumulator {
     weight: f64,
     gap: f64,

@@ -119,7 +119,7 @@ fn meeting<const D: usize>(
         };
         let (rule, side_a, side_b) = (&rules[possible.rule], side(0), side(1));
         let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
-        let pieces = cut(&side_a, &side_b, &reach, &|_| true).points;
+        let pieces = cut(&side_a, &side_b, &reach).points;
         let mut facets: Meeting = pieces.iter().map(|point| [point.facet_a as u32, point.facet_b as u32]).collect();
         facets.sort_unstable();
         facets.dedup();

@@ -130,15 +130,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
 
     /// Make the pair; also its integration points, if they are asked for (`fine`).
     fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
-        let mut common = cut(&self.a, &self.b, &self.reach, &|_| true);
+        let mut common = cut(&self.a, &self.b, &self.reach);
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
         let Self { origin, spec, bodies, a, b, swapped, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
-        let integrals = contact::integrate(&a, &b, &common, &|_| true);
-        let pair = contact::assemble(&a, &b, bodies, integrals, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
+        let pair = contact::assemble(&a, &b, bodies, &common, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
         let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
         if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
             let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));

@@ -44,8 +44,8 @@ pub struct Common<const D: usize> {
     pub refused: Vec<Refused>,
 }
 
-/// A function that finds the common pieces of two surfaces on the requested facets of side a.
-pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach, &dyn Fn(usize) -> bool) -> Common<D>;
+/// A function that finds the common pieces of two surfaces.
+pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Common<D>;
 
 /// The failure of a search for a point on a facet: it did not converge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,13 +6,13 @@ use crate::fem::{area_vector, element, minus, quadrature};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
-/// Return the common pieces of two plane curves on the `requested` facets of side a.
-pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach, requested: &dyn Fn(usize) -> bool) -> Common<2> {
+/// Return the common pieces of two plane curves.
+pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
-    for i in (0..a.facets.count()).filter(|&i| requested(i)) {
+    for i in 0..a.facets.count() {
         let facet = Curve::of(a, i);
         let refused = &mut common.refused[i];
         let near = search.around(a, i, reach).into_iter().map(|index| (index, Curve::of(b, index)));

@@ -29,14 +29,14 @@ const ON_FACET: f64 = 0.1;
 /// parts that cover the facet must be smaller than that. An eighth was enough on twelve parts of machines, five of which had lost pieces.
 const PARTS: [usize; 4] = [1, 2, 4, 8];
 
-/// Return the common pieces of two surfaces in space on the `requested` facets of side a.
-pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach, requested: &dyn Fn(usize) -> bool) -> Common<3> {
+/// Return the common pieces of two surfaces in space.
+pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = quadrature::simplex(3, if quadratic { 5 } else { 2 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
-    for i in (0..a.facets.count()).filter(|&i| requested(i)) {
+    for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let pieces = facing(&facet, &facets_b, &search.around(a, i, reach), reach, refused);
