@@ -1,7 +1,7 @@
 //! Forces and moments on a body at the end: loads, contacts, supports, springs, rigid surfaces, and what their sum lacks.
 
-use super::local::Local;
-use super::supports::Held;
+use super::owned::OwnedPart;
+use super::supports::Constraints;
 use crate::contact::{add, pad};
 use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble};
 use crate::linalg::Csr;
@@ -37,11 +37,11 @@ pub struct Balance {
 /// What it takes to find the forces on the own nodes of a part of a body.
 pub struct Forces<const D: usize> {
     /// The part.
-    pub part: Local<D>,
+    pub part: OwnedPart<D>,
     /// Its elasticity.
     pub elasticity: Rc<Elasticity>,
     /// Its supports and rigid surfaces.
-    pub held: Rc<Held<D>>,
+    pub held: Rc<Constraints<D>>,
     /// Its springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Number of supports in the scene.
@@ -99,7 +99,7 @@ impl<const D: usize> Forces<D> {
 
     /// What holds the own nodes of supports and rigid surfaces, in their order.
     fn reactions(&self, u: &[f64], known: &[f64]) -> Vec<(u32, [f64; D])> {
-        let Local { space, own, .. } = &self.part;
+        let OwnedPart { space, own, .. } = &self.part;
         let mut held = vec![false; own.len()];
         let nodes = self.held.nodes().filter(|&node| own[node as usize]);
         nodes.for_each(|node| held[node as usize] = true);
@@ -120,7 +120,7 @@ impl<const D: usize> Forces<D> {
 /// Sums forces at own nodes.
 struct Sum<'a, const D: usize> {
     size: [f64; 2],
-    part: &'a Local<D>,
+    part: &'a OwnedPart<D>,
 }
 
 impl<const D: usize> Sum<'_, D> {

@@ -1,28 +1,28 @@
 //! Which nodes of bodies are coupled with which in their matrix: the work and the memory that each takes.
 
-use super::draft::Draft;
+use super::interface::Interface;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::fem::NodeGraph;
 use std::cell::OnceCell;
 use std::collections::HashMap;
 
-/// Couplings of the nodes of all bodies, found when they are first asked for.
+/// Couplings of the nodes of all bodies, found when they are first requested.
 pub struct Coupled<'a, const D: usize> {
     parts: &'a [Part<'a, D>],
-    drafts: &'a [Draft<D>],
+    interfaces: &'a [Interface<D>],
     graphs: Vec<OnceCell<NodeGraph>>,
 }
 
 impl<'a, const D: usize> Coupled<'a, D> {
     /// Prepare to look at these bodies.
-    pub fn new(parts: &'a [Part<'a, D>], drafts: &'a [Draft<D>]) -> Self {
-        Self { parts, drafts, graphs: vec![OnceCell::new(); parts.len()] }
+    pub fn new(parts: &'a [Part<'a, D>], interfaces: &'a [Interface<D>]) -> Self {
+        Self { parts, interfaces, graphs: vec![OnceCell::new(); parts.len()] }
     }
 
     /// Return which nodes of a body K couples.
     pub fn graph(&self, body: usize) -> &NodeGraph {
-        let (part, rows) = (&self.parts[body], &self.drafts[body].rows);
+        let (part, rows) = (&self.parts[body], &self.interfaces[body].rows);
         self.graphs[body].get_or_init(|| NodeGraph::with_rows(&part.space, rows, &part.held.frame))
     }
 
@@ -47,7 +47,7 @@ impl<'a, const D: usize> Coupled<'a, D> {
         all
     }
 
-    /// Return the graphs that were asked for.
+    /// Return the graphs that were requested.
     pub fn into_graphs(self) -> Vec<Option<NodeGraph>> {
         self.graphs.into_iter().map(OnceCell::into_inner).collect()
     }

@@ -1,6 +1,6 @@
 //! The nodes of bodies over the ranks: each node of bodies in one matrix has one owner, and a number in that matrix.
 
-use super::draft::Draft;
+use super::interface::Interface;
 use super::part::Part;
 use crate::exchange::Serial;
 use crate::fem::{Couplings, ElasticBody, Interpolation, Space};
@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. Known on the first rank.
+/// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. BodyFacts on the first rank.
 pub struct Partition {
     /// Their numbers in the scene, in increasing order.
     pub bodies: Vec<usize>,
@@ -125,14 +125,14 @@ impl Partition {
         &self,
         number: usize,
         part: &Part<D>,
-        draft: &Draft<D>,
+        interface: &Interface<D>,
         cells: &[usize],
         rank: usize,
     ) -> Vec<u32> {
         let Part { space, held, .. } = part;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
         let of_cells = space.corners(cells).into_iter();
-        let of_rows = [&draft.rows, &draft.nodal_rows].into_iter().flat_map(|rows| &rows.col);
+        let of_rows = [&interface.rows, &interface.nodal_rows].into_iter().flat_map(|rows| &rows.col);
         let of_rows = of_rows.map(|&dof| dof as u32 / D as u32);
         let masters = held.frame.master.values().copied();
         Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(masters))

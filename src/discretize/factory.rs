@@ -22,7 +22,7 @@ pub struct Outline<'a> {
     pub prescribed: &'a [(usize, f64)],
     /// Rigid motions of the free body.
     pub motions: AtDofs<'a>,
-    /// Which of its nodes K couples, made when it is first asked for.
+    /// Which of its nodes K couples, made when it is first requested.
     pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
@@ -68,7 +68,7 @@ pub struct Assembled<'a> {
     pub dimension: usize,
     /// K, f and supports: of all dofs, or of those of this rank.
     pub body: ElasticBody,
-    /// How the dofs are dealt out, if they are.
+    /// How the dofs are distributed, if they are.
     pub distribution: Option<Distribution>,
     /// All contact rows of the body, pair by pair. Columns: its dofs, or those of the nodes that this rank knows.
     pub rows: Csr,
@@ -78,6 +78,6 @@ pub struct Assembled<'a> {
     /// Those that its supports leave, of these dofs.
     pub left: Vec<FreeMotion>,
     /// Interpolation of its displacements from linear ones, if it was wanted. Rows: the dofs of `body`; columns: of this body alone, or of
-    /// all where dofs are dealt out.
+    /// all where dofs are distributed.
     pub interpolation: Option<Interpolation>,
 }

@@ -3,7 +3,7 @@
 //! Each body is held by its neighbours then, and all of them are not. As with the motions of one body ([`gauge`]) there is a
 //! solution if the loads do no work on such a motion: one node of one body is fixed against it, without reaction.
 
-use super::draft::{Draft, Loose, NO_WORK};
+use super::interface::{Interface, Unconstrained, NO_WORK};
 use super::gauge;
 use super::info::{Balanced, Gauged};
 use super::missed;
@@ -31,7 +31,7 @@ pub struct Fixed<const D: usize> {
     /// Motions of several bodies.
     pub mechanisms: Vec<Mechanism>,
     /// The motions left to each body.
-    pub loose: Vec<Loose<D>>,
+    pub unconstrained: Vec<Unconstrained<D>>,
     /// Loads that were balanced.
     pub balanced: Vec<Balanced>,
 }
@@ -39,15 +39,15 @@ pub struct Fixed<const D: usize> {
 /// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left.
 pub fn fix<const D: usize>(
     parts: &mut [Part<D>],
-    drafts: &mut [Draft<D>],
+    interfaces: &mut [Interface<D>],
     pairs: &[ContactPair],
     mesh: &Mesh<D>,
 ) -> Fixed<D> {
-    let loose = parts.iter().zip(&*drafts).map(|(part, draft)| draft.loose(part)).collect();
+    let unconstrained = parts.iter().zip(&*interfaces).map(|(part, interface)| interface.unconstrained(part)).collect();
     let (found, balanced) = (Vec::new(), Vec::new());
-    let mut search = Search { parts, drafts, pairs, mesh, loose, found, balanced };
-    for group in groups(search.drafts.len(), pairs) {
-        if group.iter().all(|&body| !search.loose[body].left.is_empty()) {
+    let mut search = Search { parts, interfaces, pairs, mesh, unconstrained, found, balanced };
+    for group in groups(search.interfaces.len(), pairs) {
+        if group.iter().all(|&body| !search.unconstrained[body].left.is_empty()) {
             let all = search.of_group(&group);
             search.balance(&all);
             if !search.works_on(&all) {
@@ -56,13 +56,13 @@ pub fn fix<const D: usize>(
         }
     }
     (0..search.parts.len()).for_each(|body| search.balance(&search.of_one(body)));
-    let bodies = search.parts.iter_mut().zip(&*search.drafts).zip(&mut search.loose);
-    let fixed: Vec<_> = bodies.map(|((part, draft), loose)| gauge::fix(part, draft, loose)).collect();
+    let bodies = search.parts.iter_mut().zip(&*search.interfaces).zip(&mut search.unconstrained);
+    let fixed: Vec<_> = bodies.map(|((part, interface), unconstrained)| gauge::fix(part, interface, unconstrained)).collect();
     let gauged = fixed.into_iter().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
     }
-    Fixed { gauged, mechanisms: search.found, loose: search.loose, balanced: search.balanced }
+    Fixed { gauged, mechanisms: search.found, unconstrained: search.unconstrained, balanced: search.balanced }
 }
 
 /// Bodies that pairs connect, two at least, in the order of the first of them.
@@ -81,17 +81,17 @@ struct Rows {
     segments: Vec<Vec<Segment>>,
     /// Points of each pair.
     points: Vec<usize>,
-    /// Share of each point in its pair, so that motions count alike wherever they are felt.
+    /// Share of each point in its pair, so that motions count alike wherever they are resisted.
     weight: Vec<f64>,
 }
 
 impl Rows {
-    /// Of bodies in the order of `drafts`.
-    fn new<'d, const D: usize>(drafts: impl Iterator<Item = &'d Draft<D>>, pairs: &[ContactPair]) -> Self {
+    /// Of bodies in the order of `interfaces`.
+    fn new<'d, const D: usize>(interfaces: impl Iterator<Item = &'d Interface<D>>, pairs: &[ContactPair]) -> Self {
         let mut rows = Self { segments: Vec::new(), points: Vec::new(), weight: Vec::new() };
         let mut number = HashMap::new();
-        for draft in drafts {
-            let own = draft.segments.iter().map(|segment| {
+        for interface in interfaces {
+            let own = interface.segments.iter().map(|segment| {
                 let pair = *number.entry(segment.pair).or_insert_with(|| {
                     let weight = &pairs[segment.pair].weight;
                     let all: f64 = weight.iter().sum();
@@ -114,11 +114,11 @@ impl Rows {
 
 struct Search<'p, 's, const D: usize> {
     parts: &'p mut [Part<'s, D>],
-    drafts: &'p mut [Draft<D>],
+    interfaces: &'p mut [Interface<D>],
     pairs: &'p [ContactPair],
     mesh: &'p Mesh<D>,
     /// The motions that supports and springs leave to each body now.
-    loose: Vec<Loose<D>>,
+    unconstrained: Vec<Unconstrained<D>>,
     found: Vec<Mechanism>,
     balanced: Vec<Balanced>,
 }
@@ -126,13 +126,13 @@ struct Search<'p, 's, const D: usize> {
 impl<const D: usize> Search<'_, '_, D> {
     /// Contact rows of some bodies.
     fn rows(&self, bodies: &[usize]) -> Rows {
-        Rows::new(bodies.iter().map(|&body| &self.drafts[body]), self.pairs)
+        Rows::new(bodies.iter().map(|&body| &self.interfaces[body]), self.pairs)
     }
 
     /// The rigid motions of some bodies as one.
     fn as_one(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
         let parts = || bodies.iter().map(|&body| &self.parts[body]);
-        let extent = parts().fold(Extent::default(), |all, part| all.join(&part.known.extent));
+        let extent = parts().fold(Extent::default(), |all, part| all.join(&part.facts.extent));
         rigid::of(&extent, parts().any(|part| part.space.axisymmetric))
     }
 
@@ -143,19 +143,19 @@ impl<const D: usize> Search<'_, '_, D> {
         let count = all.len();
         let mut held = DMatrix::zeros(count, count);
         for &body in group {
-            let at_corners = |motion: &RigidMotion<D>| motion.nodal(self.parts[body].known.extent.corners());
-            let left: Vec<Vec<f64>> = self.loose[body].left.iter().map(at_corners).collect();
+            let at_corners = |motion: &RigidMotion<D>| motion.nodal(self.parts[body].facts.extent.corners());
+            let left: Vec<Vec<f64>> = self.unconstrained[body].left.iter().map(at_corners).collect();
             let off: Vec<Vec<f64>> = all.iter().map(|motion| rest(&at_corners(motion), &left)).collect();
             held += DMatrix::from_fn(count, count, |i, j| dot(&off[i], &off[j]) / off[i].len() as f64);
         }
         let traces: Vec<Vec<Motion>> =
-            group.iter().map(|&body| self.drafts[body].motions(&self.parts[body], &all)).collect();
+            group.iter().map(|&body| self.interfaces[body].motions(&self.parts[body], &all)).collect();
         let rows = self.rows(group);
-        let felt = rows.feel(traces.iter().map(Vec::as_slice));
+        let resisted = rows.feel(traces.iter().map(Vec::as_slice));
         let moving = |weights: DVector<f64>| {
             // all bodies move by the same motion
-            let amounts = DVector::from_fn(felt.count(), |i, _| weights[i % count]);
-            let square: f64 = felt.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
+            let amounts = DVector::from_fn(resisted.count(), |i, _| weights[i % count]);
+            let square: f64 = resisted.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
             let motion = rigid::combine(&all, &weights);
             let error = square.sqrt() / weights.amax();
             Moving { bodies: group.to_vec(), name: motion.name.clone(), motions: vec![motion; group.len()], error }
@@ -170,21 +170,21 @@ impl<const D: usize> Search<'_, '_, D> {
     /// Motions of some of these bodies that contact does not feel, all others at rest; none if contact does not feel a motion of
     /// one of them alone.
     fn of_some(&self, bodies: &[usize]) -> Vec<Moving<D>> {
-        if bodies.iter().any(|&body| !self.loose[body].unfelt.is_empty()) {
+        if bodies.iter().any(|&body| !self.unconstrained[body].unresisted.is_empty()) {
             return Vec::new();
         }
         let rows = self.rows(bodies);
-        let felt = rows.feel(bodies.iter().map(|&body| &self.loose[body].motions[..]));
-        let factor = felt.springs(&rows.weight).factor(TOLERANCE);
+        let resisted = rows.feel(bodies.iter().map(|&body| &self.unconstrained[body].motions[..]));
+        let factor = resisted.springs(&rows.weight).factor(TOLERANCE);
         let moving = |entries: &Vec<(usize, f64)>| {
             let mut moving = Moving { bodies: Vec::new(), motions: Vec::new(), name: String::new(), error: 0.0 };
             let mut each = Vec::new();
             let entries: Vec<(usize, f64)> = entries.iter().filter(|(_, a)| a.abs() > PART).copied().collect();
-            for own in entries.chunk_by(|a, b| felt.body_of(a.0) == felt.body_of(b.0)) {
-                let (at, body) = (felt.body_of(own[0].0), bodies[felt.body_of(own[0].0)]);
-                let left = &self.loose[body].left;
+            for own in entries.chunk_by(|a, b| resisted.body_of(a.0) == resisted.body_of(b.0)) {
+                let (at, body) = (resisted.body_of(own[0].0), bodies[resisted.body_of(own[0].0)]);
+                let left = &self.unconstrained[body].left;
                 let mut weights = DVector::zeros(left.len());
-                own.iter().for_each(|&(motion, amount)| weights[motion - felt.of_body(at).start] = amount);
+                own.iter().for_each(|&(motion, amount)| weights[motion - resisted.of_body(at).start] = amount);
                 let motion = rigid::sum(left, &weights);
                 each.push(format!("{} of {}", motion.name, self.parts[body].spec.name.value));
                 moving.bodies.push(body);
@@ -198,7 +198,7 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// The name of a motion that moves its bodies like one.
     fn name_as_one(&self, moving: &Moving<D>) -> Option<String> {
-        let corners = |body: usize| self.parts[body].known.extent.corners();
+        let corners = |body: usize| self.parts[body].facts.extent.corners();
         let each = moving.bodies.iter().zip(&moving.motions);
         let each: Vec<f64> = each.flat_map(|(&body, motion)| motion.nodal(corners(body))).collect();
         let whole = self.as_one(&moving.bodies);
@@ -213,7 +213,7 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Fixes what motions of some bodies are left, until there are none, loads work on one, or one cannot be fixed.
     fn fix_some(&mut self) {
-        let every: Vec<usize> = (0..self.drafts.len()).collect();
+        let every: Vec<usize> = (0..self.interfaces.len()).collect();
         loop {
             let mut all = self.of_some(&every);
             self.balance(&all);
@@ -240,12 +240,12 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Fixes the motions of a body along its own surface on which no load works, besides those that are `fixed` already.
     fn fix_round(&mut self, body: usize, mut fixed: Vec<String>) -> Gauged {
-        if self.loose[body].left.is_empty() || !self.loose[body].unfelt.is_empty() {
+        if self.unconstrained[body].left.is_empty() || !self.unconstrained[body].unresisted.is_empty() {
             return Gauged { fixed, spinning: Vec::new() };
         }
-        let points = Points::of(&self.drafts[body], self.pairs);
+        let points = Points::of(&self.interfaces[body], self.pairs);
         loop {
-            let round = points.along_surface(&self.loose[body].left);
+            let round = points.along_surface(&self.unconstrained[body].left);
             // the centre of a load is known no better than that of the meshed body
             let moving = |motion: RigidMotion<D>| Moving {
                 bodies: vec![body],
@@ -301,14 +301,14 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
     fn work(&self, moving: &Moving<D>) -> f64 {
-        let [work, largest] = moving.works(self.parts, self.drafts);
+        let [work, largest] = moving.works(self.parts, self.interfaces);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
     }
 
     /// Balance the loads on motions that nothing holds, if what they lack on each is no more than what the mesh may miss of them.
     fn balance(&mut self, all: &[Moving<D>]) {
         // bodies without loads have nothing to balance
-        let works_on = |moving: &Moving<D>| moving.works(self.parts, self.drafts);
+        let works_on = |moving: &Moving<D>| moving.works(self.parts, self.interfaces);
         let (all, works): (Vec<&Moving<D>>, Vec<[f64; 2]>) =
             all.iter().map(|moving| (moving, works_on(moving))).filter(|(_, [_, largest])| *largest > 0.0).unzip();
         let shares = || works.iter().map(|[work, largest]| work.abs() / largest.max(f64::MIN_POSITIVE));
@@ -319,12 +319,12 @@ impl<const D: usize> Search<'_, '_, D> {
             return;
         }
         let lacking: Vec<f64> = works.iter().map(|[work, _]| *work).collect();
-        if moving::balance(&all, &lacking, self.parts, self.drafts) {
+        if moving::balance(&all, &lacking, self.parts, self.interfaces) {
             for (moving, share) in all.iter().zip(shares()).filter(|(_, share)| *share > NO_WORK) {
                 self.note_balanced(moving, share);
             }
             for body in all.iter().flat_map(|moving| &moving.bodies) {
-                self.loose[*body] = self.drafts[*body].loose(&self.parts[*body]);
+                self.unconstrained[*body] = self.interfaces[*body].unconstrained(&self.parts[*body]);
             }
         }
     }
@@ -348,7 +348,7 @@ impl<const D: usize> Search<'_, '_, D> {
         let (mut share, mut quadrature) = (moving.error, 0.0);
         for (&body, motion) in moving.bodies.iter().zip(&moving.motions) {
             let part = &self.parts[body];
-            share = share.max(missed::by_facets(part, &self.drafts[body], self.pairs, self.mesh));
+            share = share.max(missed::by_facets(part, &self.interfaces[body], self.pairs, self.mesh));
             quadrature += missed::by_quadrature(part, motion, self.mesh);
         }
         share * largest + quadrature
@@ -356,27 +356,27 @@ impl<const D: usize> Search<'_, '_, D> {
 
     /// The motions of a body that no contact feels.
     fn of_one(&self, body: usize) -> Vec<Moving<D>> {
-        let Loose { left, unfelt, .. } = &self.loose[body];
+        let Unconstrained { left, unresisted, .. } = &self.unconstrained[body];
         let moving = |(name, weights): &(String, DVector<f64>)| {
             let motions = vec![rigid::combine(left, weights)];
             Moving { bodies: vec![body], motions, name: name.clone(), error: 0.0 }
         };
-        unfelt.iter().map(moving).collect()
+        unresisted.iter().map(moving).collect()
     }
 
     /// Fixes a motion at one node of the largest body that has one where the motion is not small; returns the body.
     fn pin(&mut self, moving: &Moving<D>) -> Option<usize> {
         let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| {
-            Some((body, self.drafts[body].candidate(&self.parts[body], motion)?))
+            Some((body, self.interfaces[body].candidate(&self.parts[body], motion)?))
         };
         let mut all: Vec<(usize, Candidate)> =
             moving.bodies.iter().zip(&moving.motions).filter_map(candidate).collect();
         let most = all.iter().map(|(_, found)| found.size).fold(0.0, f64::max);
         all.retain(|(_, found)| found.size > NEAR * most);
-        let size = |body: usize| self.parts[body].known.extent.size();
+        let size = |body: usize| self.parts[body].facts.extent.size();
         let (body, found) = all.into_iter().rev().max_by(|a, b| size(a.0).total_cmp(&size(b.0)))?;
         self.parts[body].fix(&found);
-        self.loose[body] = self.drafts[body].loose(&self.parts[body]);
+        self.unconstrained[body] = self.interfaces[body].unconstrained(&self.parts[body]);
         Some(body)
     }
 }

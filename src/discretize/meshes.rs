@@ -1,6 +1,6 @@
 //! What an estimate of the error asks of meshes, without their dimension.
 
-use super::supports::Held;
+use super::supports::Constraints;
 use crate::contact::Fine;
 use crate::fem::{Elasticity, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
@@ -98,7 +98,7 @@ pub struct Shape<const D: usize> {
     /// Its modulus against pressure on its contact surfaces, E/(1 - nu^2) if isotropic.
     pub modulus: f64,
     /// Its supports, which choose the dofs.
-    pub held: Rc<Held<D>>,
+    pub held: Rc<Constraints<D>>,
     /// See [`Meshes::unloaded`].
     pub unloaded: Vec<f64>,
     /// The rigid motions that its supports leave, in the order of [`Motions::with_springs`](crate::model::Motions::with_springs).

@@ -1,6 +1,6 @@
 //! What a mesh may miss of the loads of a body, so that loads which balance on the true surfaces do not on the facets.
 
-use super::draft::Draft;
+use super::interface::Interface;
 use super::find::find_group;
 use super::part::Part;
 use crate::contact::ContactPair;
@@ -13,13 +13,13 @@ const HALVES: f64 = 2.0;
 
 /// The share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all surfaces: those in contact
 /// stand for it.
-pub fn by_facets<const D: usize>(part: &Part<D>, draft: &Draft<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> f64 {
+pub fn by_facets<const D: usize>(part: &Part<D>, interface: &Interface<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> f64 {
     let groups = part.spec.load.iter().filter_map(|load| find_group(mesh, &load.on, &[D - 1], "load").ok());
     let on_groups = groups.map(|group| turn::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
     if part.spec.force.is_none() {
         return on_groups;
     }
-    let points = draft.segments.iter().flat_map(|segment| &pairs[segment.pair].surface[segment.side]);
+    let points = interface.segments.iter().flat_map(|segment| &pairs[segment.pair].surface[segment.side]);
     // facets differ from their mean by half of the angle between them
     points.map(|point| turn::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
 }

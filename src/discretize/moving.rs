@@ -1,6 +1,6 @@
 //! Rigid motions of some bodies together, and loads that are to do no work on them.
 
-use super::draft::Draft;
+use super::interface::Interface;
 use super::part::Part;
 use crate::fem::RigidMotion;
 use crate::linalg::dot;
@@ -20,10 +20,10 @@ pub struct Moving<const D: usize> {
 
 impl<const D: usize> Moving<D> {
     /// Return the work of the loads on the motion, and the largest that forces of their sizes could do.
-    pub fn works(&self, parts: &[Part<D>], drafts: &[Draft<D>]) -> [f64; 2] {
+    pub fn works(&self, parts: &[Part<D>], interfaces: &[Interface<D>]) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (&body, motion) in self.bodies.iter().zip(&self.motions) {
-            let works = drafts[body].load.works(|node| parts[body].at_dofs(motion, node));
+            let works = interfaces[body].load.works(|node| parts[body].at_dofs(motion, node));
             (0..2).for_each(|k| sums[k] += works[k]);
         }
         sums
@@ -46,13 +46,13 @@ impl<const D: usize> Moving<D> {
 /// ```
 ///
 /// so that no node takes more of what is lacking than others that are loaded alike.
-pub fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], parts: &[Part<D>], drafts: &mut [Draft<D>]) -> bool {
+pub fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], parts: &[Part<D>], interfaces: &mut [Interface<D>]) -> bool {
     let count = all.len();
     let mut products = DMatrix::zeros(count, count);
-    for (body, (part, draft)) in parts.iter().zip(&*drafts).enumerate() {
+    for (body, (part, interface)) in parts.iter().zip(&*interfaces).enumerate() {
         let motions: Vec<(usize, &RigidMotion<D>)> =
             all.iter().enumerate().filter_map(|(j, moving)| Some((j, moving.of(body)?))).collect();
-        for (node, force) in draft.nodal_load.iter().filter(|_| !motions.is_empty()) {
+        for (node, force) in interface.nodal_load.iter().filter(|_| !motions.is_empty()) {
             let size = dot(&force, &force).sqrt();
             let at = motions.iter().map(|(j, motion)| (*j, motion.at(&part.space.nodes[node as usize])));
             let at: Vec<(usize, [f64; D])> = at.collect();
@@ -63,7 +63,7 @@ pub fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], parts: &[Part<
     }
     let Some(factor) = products.cholesky() else { return false };
     let amounts = factor.solve(&DVector::from_column_slice(works));
-    for (body, (part, draft)) in parts.iter().zip(drafts).enumerate() {
+    for (body, (part, interface)) in parts.iter().zip(interfaces).enumerate() {
         let moved = |x: &[f64; D]| {
             let mut sum = [0.0; D];
             for (moving, amount) in all.iter().zip(amounts.iter()) {
@@ -72,7 +72,7 @@ pub fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], parts: &[Part<
             }
             sum
         };
-        draft.change_loads(part, moved);
+        interface.change_loads(part, moved);
     }
     true
 }

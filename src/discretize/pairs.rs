@@ -21,7 +21,7 @@ pub struct Contact<const D: usize> {
     pub origin: Origin,
     /// The arrays of the method.
     pub pair: ContactPair,
-    /// Its integration points, if they were asked for.
+    /// Its integration points, if they were requested.
     pub fine: Option<Fine<D>>,
     /// Whether side a (which carries the points) is the second of the two that the scene names.
     pub swapped: bool,
@@ -128,7 +128,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, reach }
     }
 
-    /// Make the pair; also its integration points, if they are asked for (`fine`).
+    /// Make the pair; also its integration points, if they are requested (`fine`).
     fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.spec.touching {

@@ -1,8 +1,8 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
 use super::find::{Values, find_group, not_on_body, point, without_area};
-use super::known::Known;
-use super::supports::Held;
+use super::facts::BodyFacts;
+use super::supports::Constraints;
 use super::{elastic, springs};
 use crate::contact;
 use crate::error::{Error, Result};
@@ -26,13 +26,13 @@ pub struct Part<'a, const D: usize> {
     /// Its finite element space.
     pub space: Space<D>,
     /// What supports and rigid surfaces hold.
-    pub held: Held<D>,
+    pub held: Constraints<D>,
     /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Elasticity of its cells.
     pub elasticity: Rc<Elasticity>,
     /// Facts of the whole body.
-    pub known: Known,
+    pub facts: BodyFacts,
 }
 
 /// A dof that can be fixed against a motion.
@@ -53,12 +53,12 @@ impl<'a, const D: usize> Part<'a, D> {
         mesh: &Mesh<D>,
         space: Space<D>,
         elasticity: Rc<Elasticity>,
-        known: Known,
+        facts: BodyFacts,
     ) -> Result<Self> {
-        let held = Held::new(spec, &space, mesh)?;
+        let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        Ok(Self { spec, space, held, springs, elasticity, known })
+        Ok(Self { spec, space, held, springs, elasticity, facts })
     }
 
     /// Displacements of all dofs in a rigid motion.
@@ -68,7 +68,7 @@ impl<'a, const D: usize> Part<'a, D> {
 
     /// The rigid motions of the free body.
     pub fn free(&self) -> Vec<RigidMotion<D>> {
-        rigid::of(&self.known.extent, self.space.axisymmetric)
+        rigid::of(&self.facts.extent, self.space.axisymmetric)
     }
 
     /// What a rigid motion does at the dofs of a node.

@@ -3,7 +3,7 @@
 use super::approach::Outer;
 use super::elastic;
 use super::find::{find_group, point};
-use super::known::Known;
+use super::facts::BodyFacts;
 use super::part::Part;
 use super::verify::{self, Verified};
 use crate::error::{Error, Result};
@@ -29,10 +29,10 @@ pub fn parts<'a, const D: usize>(
         let space = space(spec, mesh, scene.plane)?;
         let checked = &checked[index];
         let elasticity = elastic::of(spec, &space, mesh, scene.plane)?;
-        let known = known(spec, &space, &elasticity, checked.points.clone());
-        let mut part = Part::new(spec, mesh, space, Rc::new(elasticity), known)?;
+        let facts = facts(spec, &space, &elasticity, checked.points.clone());
+        let mut part = Part::new(spec, mesh, space, Rc::new(elasticity), facts)?;
         let resultant = |load: &_| part.resultant(load, mesh);
-        part.known.outer = Outer::new(spec, &part.space, mesh, &resultant)?;
+        part.facts.outer = Outer::new(spec, &part.space, mesh, &resultant)?;
         verify::held(&part, &checked.parts, mesh)?;
         parts.push(part);
     }
@@ -57,7 +57,7 @@ fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Resul
 }
 
 /// Return facts of a body whose nodes are these `points` of the mesh.
-fn known<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> Known {
+fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> BodyFacts {
     let cells = space.cell_count();
     let volume = (0..cells).map(|cell| space.share(cell)).collect::<Total>().value();
     let moduli = match spec.regions.is_empty() && elasticity.is_constant() {
@@ -65,5 +65,5 @@ fn known<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elastic
         false => elastic::moduli(space, elasticity, 0..cells).map(|sum| sum / volume),
     };
     let extent = Extent::of(space.nodes.iter().copied());
-    Known { points, extent, cells, volume, moduli, outer: Outer::default() }
+    BodyFacts { points, extent, cells, volume, moduli, outer: Outer::default() }
 }

@@ -3,7 +3,7 @@
 use super::carried::Supported;
 use super::couplings::Coupled;
 use super::distribute::Partition;
-use super::draft::Draft;
+use super::interface::Interface;
 use super::factory::{Factory, Outline};
 use super::part::Part;
 use crate::contact::ContactPair;
@@ -16,22 +16,22 @@ use crate::fem::rigid::AtDofs;
 /// Those of [`Factory::plan`].
 pub fn plan<const D: usize, F: Factory>(
     parts: &[Part<D>],
-    drafts: &[Draft<D>],
+    interfaces: &[Interface<D>],
     supported: &[Supported<D>],
     coupled: &Coupled<D>,
     factory: &mut F,
 ) -> Result<F::Plan> {
-    // what is asked of a body is found then
+    // facts of a body are found when they are requested
     let graphs: Vec<_> = (0..parts.len()).map(|body| move || coupled.graph(body)).collect();
-    let at = |body: usize| move |k: usize, dof: usize| parts[body].dof_of(&drafts[body].free[k], dof);
+    let at = |body: usize| move |k: usize, dof: usize| parts[body].dof_of(&interfaces[body].free[k], dof);
     let at: Vec<_> = (0..parts.len()).map(at).collect();
     let outline = |body: usize| Outline {
         name: &parts[body].spec.name.value,
         dimension: D,
         order: parts[body].space.order,
-        rows: &drafts[body].rows,
+        rows: &interfaces[body].rows,
         prescribed: &supported[body].prescribed,
-        motions: AtDofs { count: drafts[body].free.len(), at: &at[body] },
+        motions: AtDofs { count: interfaces[body].free.len(), at: &at[body] },
         graph: &graphs[body],
     };
     factory.plan(&(0..parts.len()).map(outline).collect::<Vec<_>>())

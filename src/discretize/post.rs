@@ -12,7 +12,7 @@ use crate::fem::{norms, strain, strain::Strained, stress};
 use crate::output::{BodyField, CellKind};
 use crate::problem::BodySpec;
 
-/// A part of a body, asked with states of the dofs of its nodes, whatever the dimension.
+/// A part of a body, evaluated for states of the dofs of its nodes, whatever the dimension.
 pub trait Post {
     /// Displacements and stresses of the cells that this rank shows. `bent` is the same state without the rigid
     /// motion that supports leave: beside a large one the digits of the deformation are few.
@@ -55,7 +55,7 @@ pub trait Post {
 /// [`Post`] in `D` dimensions.
 pub struct OnPart<const D: usize> {
     name: String,
-    /// Known displacements, if the scene has them.
+    /// BodyFacts displacements, if the scene has them.
     exact: Option<Vec<Expression>>,
     outer: Outer,
     forces: Forces<D>,
@@ -90,15 +90,15 @@ impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
         let Forces { part, elasticity, .. } = &self.forces;
         let (u, space) = (self.nodal(v), &part.space);
-        let (told, shown) = space.part(part.told());
+        let (owned, shown) = space.part(part.owned());
         let stress = stress::nodal(space, elasticity, &self.nodal(bent));
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
             name: self.name.clone(),
-            points: told.nodes.iter().map(|&x| told.in_scene(x)).collect(),
+            points: owned.nodes.iter().map(|&x| owned.in_scene(x)).collect(),
             cell: CellKind::simplex(D, space.order.degree()),
-            connectivity: told.cells,
+            connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
             von_mises: stress.iter().map(stress::von_mises).collect(),
             principal: stress.iter().map(stress::principal).collect(),
@@ -108,7 +108,7 @@ impl<const D: usize> Post for OnPart<D> {
 
     fn strain(&self, bent: &[f64]) -> Strained {
         let part = &self.forces.part;
-        strain::largest(&part.space, part.told(), &self.nodal(bent))
+        strain::largest(&part.space, part.owned(), &self.nodal(bent))
     }
 
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
@@ -152,7 +152,7 @@ impl<const D: usize> Post for OnPart<D> {
                 gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
             }
         };
-        let norms = norms::error(&part.space, part.told(), elasticity, &self.nodal(v), &at);
+        let norms = norms::error(&part.space, part.owned(), elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
     }
 }

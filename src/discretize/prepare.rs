@@ -3,7 +3,7 @@
 use super::carried::{Supported, supported};
 use super::couplings::Coupled;
 use super::distribute::Partition;
-use super::draft::{self, Draft};
+use super::interface::{self, Interface};
 use super::elastic;
 use super::factory::Factory;
 use super::info::{Balanced, ContactInfo};
@@ -116,37 +116,37 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mesh = &verified.mesh;
     let mut parts = parts(scene, verified, bodies)?;
     let Paired { pairs, contacts, fine } = pair_surfaces(scene, mesh, cut, &parts, keep)?;
-    let mut drafts = draft_bodies(&parts, &pairs, mesh)?;
-    let Fixed { gauged, mechanisms, loose, balanced } = mechanism::fix(&mut parts, &mut drafts, &pairs, mesh);
+    let mut interfaces = interfaces_of(&parts, &pairs, mesh)?;
+    let Fixed { gauged, mechanisms, unconstrained, balanced } = mechanism::fix(&mut parts, &mut interfaces, &pairs, mesh);
     let supported: Vec<Supported<D>> =
-        parts.iter().zip(&drafts).map(|(part, draft)| supported(part, &draft.free)).collect();
-    let coupled = Coupled::new(&parts, &drafts);
-    let plan = plan(&parts, &drafts, &supported, &coupled, factory)?;
+        parts.iter().zip(&interfaces).map(|(part, interface)| supported(part, &interface.free)).collect();
+    let coupled = Coupled::new(&parts, &interfaces);
+    let plan = plan(&parts, &interfaces, &supported, &coupled, factory)?;
     let partitions = partitions(&parts, &coupled, &pairs, factory, ranks);
     let graphs = coupled.into_graphs();
     let owners = owners(&parts, &partitions, ranks);
 
-    let mut drafts = drafts.into_iter();
+    let mut interfaces = interfaces.into_iter();
     let mut supported = supported.into_iter();
     let mut graphs = graphs.into_iter();
     let mut gauged = gauged.into_iter();
-    let mut loose = loose.into_iter();
+    let mut unconstrained = unconstrained.into_iter();
     let mut whole = Vec::new();
     for (part, (owner, ranks)) in parts.into_iter().zip(owners) {
-        let (draft, supported, loose) = (next(&mut drafts), next(&mut supported), next(&mut loose));
+        let (interface, supported, unconstrained) = (next(&mut interfaces), next(&mut supported), next(&mut unconstrained));
         whole.push(Unassembled {
-            load: draft.nodal_load.sum(),
+            load: interface.nodal_load.sum(),
             warning: warning(&part, scene.plane),
             unloaded: if keep { part.unloaded(mesh)? } else { Vec::new() },
-            on_dofs: place_of(&partitions, whole.len()).map(|_| OnDofs::new(&part, &draft, &supported, &loose)),
+            on_dofs: place_of(&partitions, whole.len()).map(|_| OnDofs::new(&part, &interface, &supported, &unconstrained)),
             part,
-            draft,
+            interface,
             supported,
             graph: next(&mut graphs),
             owner,
             ranks,
             gauged: next(&mut gauged),
-            loose,
+            unconstrained,
         });
     }
     let checked = whole.iter().zip(&*verified.checked);
@@ -185,9 +185,9 @@ fn pair_surfaces<const D: usize>(
     Ok(paired)
 }
 
-fn draft_bodies<const D: usize>(parts: &[Part<D>], pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Draft<D>>> {
-    let drafts = parts.iter().zip(draft::segments(parts.len(), pairs));
-    drafts.map(|(part, segments)| Draft::new(part, segments, pairs, mesh)).collect()
+fn interfaces_of<const D: usize>(parts: &[Part<D>], pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Interface<D>>> {
+    let interfaces = parts.iter().zip(interface::segments(parts.len(), pairs));
+    interfaces.map(|(part, segments)| Interface::new(part, segments, pairs, mesh)).collect()
 }
 
 /// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. Bodies that are not distributed stay whole, and each

@@ -184,15 +184,15 @@ impl<const D: usize> Lines<'_, D> {
         what: &str,
         kinds: impl Fn(&T) -> &'k [usize],
     ) -> Result<Vec<Vec<T>>> {
-        let mut dealt = vec![Vec::new(); self.lying.len()];
+        let mut given = vec![Vec::new(); self.lying.len()];
         for line in lines {
             let name = on(&mut line.clone()).clone();
             if !is_pattern(&self.table.name.value) && !is_open(&name.value) {
-                dealt.iter_mut().for_each(|own| own.push(line.clone()));
+                given.iter_mut().for_each(|own| own.push(line.clone()));
                 continue;
             }
-            let before: usize = dealt.iter().map(Vec::len).sum();
-            for ((own, groups), body) in dealt.iter_mut().zip(&self.lying).zip(self.names) {
+            let before: usize = given.iter().map(Vec::len).sum();
+            for ((own, groups), body) in given.iter_mut().zip(&self.lying).zip(self.names) {
                 let wanted = Located::new(name.value.replace(BODY, body), name.place.clone());
                 let wanted = pattern(&wanted)?;
                 let kinds = kinds(line);
@@ -204,12 +204,12 @@ impl<const D: usize> Lines<'_, D> {
                     line
                 }));
             }
-            let after: usize = dealt.iter().map(Vec::len).sum();
-            if before == after && !dealt.is_empty() {
+            let after: usize = given.iter().map(Vec::len).sum();
+            if before == after && !given.is_empty() {
                 return Err(self.acts_nowhere(&name, what, kinds(line)));
             }
         }
-        Ok(dealt)
+        Ok(given)
     }
 
     /// The refusal of a line that acts on no body.

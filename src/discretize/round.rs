@@ -11,7 +11,7 @@
 //! between the facets, so the motion of a round body along itself has at most s_q on every mesh. That motion is found from the normals, weighted by 1/s_q, and is
 //! off by as much again. On flat facets s_q is rounding, and no motion passes that contact feels.
 
-use super::draft::Draft;
+use super::interface::Interface;
 use crate::contact::ContactPair;
 use crate::fem::{RigidMotion, rigid};
 use crate::linalg::{Blocks, TOLERANCE, dot};
@@ -37,12 +37,12 @@ pub struct Points<const D: usize>(Vec<Point<D>>);
 
 impl<const D: usize> Points<D> {
     /// Collect the points of all pairs of a body.
-    pub fn of(draft: &Draft<D>, pairs: &[ContactPair]) -> Self {
+    pub fn of(interface: &Interface<D>, pairs: &[ContactPair]) -> Self {
         let weights = |segment: &Segment| pairs[segment.pair].weight.iter();
-        let all: f64 = draft.segments.iter().flat_map(weights).sum();
+        let all: f64 = interface.segments.iter().flat_map(weights).sum();
         let first = |x: [f64; 3]| std::array::from_fn(|c| x[c]);
         let mut points = Vec::new();
-        for segment in &draft.segments {
+        for segment in &interface.segments {
             let surface = pairs[segment.pair].surface[segment.side].iter();
             points.extend(surface.zip(weights(segment)).map(|(point, weight)| Point {
                 at: first(point.at),

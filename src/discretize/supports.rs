@@ -27,7 +27,7 @@ type Direction<const D: usize> = ([f64; D], Option<usize>);
 /// What the supports and rigid surfaces of a body come to.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
-pub struct Held<const D: usize> {
+pub struct Constraints<const D: usize> {
     /// Coordinates in which conditions are prescribed dofs.
     pub frame: Frame<D>,
     /// Prescribed dofs and their values.
@@ -41,14 +41,14 @@ pub struct Held<const D: usize> {
 /// Directions whose sine is below this are the same.
 const PARALLEL: f64 = 1e-8;
 
-impl<const D: usize> Held<D> {
+impl<const D: usize> Constraints<D> {
     /// Collects the conditions of a body's supports on its nodes.
     ///
     /// # Errors
     /// Groups that are missing or not on the body, values that are not finite, surfaces that are no planes, and supports or
     /// rigid loads that contradict each other.
     pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<Self> {
-        let mut held = Held::default();
+        let mut held = Constraints::default();
         held.tie(spec, space, mesh)?;
         let mut conditions = held.symmetry(space);
         for (support, fix) in spec.fix.iter().enumerate() {

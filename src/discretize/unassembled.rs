@@ -2,11 +2,11 @@
 
 use super::carried::Supported;
 use super::distribute::{Partition, Share};
-use super::draft::{Draft, Loose};
+use super::interface::{Interface, Unconstrained};
 use super::info::{BodyInfo, Gauged};
-use super::known::Known;
+use super::facts::BodyFacts;
 use super::part::Part;
-use super::supports::Held;
+use super::supports::Constraints;
 use crate::contact::{self, ContactPair};
 use crate::exchange::Plain;
 use crate::fem::{NodalBlock, NodalForces, NodeGraph, Space, place};
@@ -22,10 +22,10 @@ pub struct Unassembled<'a, const D: usize> {
     /// Its space, supports and springs.
     pub part: Part<'a, D>,
     /// Its contact rows and loads.
-    pub draft: Draft<D>,
+    pub interface: Interface<D>,
     /// What its supports prescribe.
     pub supported: Supported<D>,
-    /// Which nodes K couples, if the choice of solvers has asked for it.
+    /// Which nodes K couples, if the choice of solvers has requested it.
     pub graph: Option<NodeGraph>,
     /// Rank that owns the body, or most of it.
     pub owner: usize,
@@ -38,7 +38,7 @@ pub struct Unassembled<'a, const D: usize> {
     /// Rigid motions that nothing but its mesh resists.
     pub gauged: Gauged,
     /// The rigid motions that supports and springs leave it.
-    pub loose: Loose<D>,
+    pub unconstrained: Unconstrained<D>,
     /// Nodal forces that the quadrature of its loads misses, if estimates ask for them.
     pub unloaded: Vec<f64>,
     /// The same motions on all dofs, if these are distributed.
@@ -55,10 +55,10 @@ pub struct OnDofs {
 }
 
 impl OnDofs {
-    /// Look at a body under its loads; `loose` has the motions.
-    pub fn new<const D: usize>(part: &Part<D>, draft: &Draft<D>, supported: &Supported<D>, loose: &Loose<D>) -> Self {
-        let load = part.load_vector(&draft.nodal_load);
-        let (products, works) = part.products(&loose.left, &supported.prescribed, &load);
+    /// Look at a body under its loads; `unconstrained` has the motions.
+    pub fn new<const D: usize>(part: &Part<D>, interface: &Interface<D>, supported: &Supported<D>, unconstrained: &Unconstrained<D>) -> Self {
+        let load = part.load_vector(&interface.nodal_load);
+        let (products, works) = part.products(&unconstrained.left, &supported.prescribed, &load);
         Self { products, works }
     }
 }
@@ -72,7 +72,7 @@ pub struct SharedBody<const D: usize> {
     /// Its contact rows, pair by pair.
     pub segments: Vec<Segment>,
     /// The rigid motions that supports and springs leave it.
-    pub loose: Loose<D>,
+    pub unconstrained: Unconstrained<D>,
     /// Its modulus along the normals of its contact surfaces.
     pub modulus: f64,
     /// Its depth behind them.
@@ -90,11 +90,11 @@ pub struct LocalBody<const D: usize> {
     /// Number of the constants of each cell; empty if the body has no regions.
     pub regions: Vec<usize>,
     /// Its supports and rigid surfaces.
-    pub held: Held<D>,
+    pub held: Constraints<D>,
     /// Its springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Facts of the whole body, and where these nodes come from.
-    pub known: Known,
+    pub facts: BodyFacts,
     /// Its contact rows for dofs.
     pub rows: Csr,
     /// The same for displacements of nodes.
@@ -116,17 +116,17 @@ pub struct LocalBody<const D: usize> {
 impl<const D: usize> LocalBody<D> {
     /// Take all of a body.
     pub fn whole(body: Unassembled<D>, is_owned: bool) -> Self {
-        let Unassembled { part, draft, supported, unloaded, .. } = body;
+        let Unassembled { part, interface, supported, unloaded, .. } = body;
         let cells = if part.spec.regions.is_empty() { 0 } else { part.space.cell_count() };
         Self {
             regions: (0..cells).map(|cell| part.elasticity.region(cell)).collect(),
             space: part.space,
             held: part.held,
             springs: part.springs,
-            known: part.known,
-            rows: draft.rows,
-            nodal_rows: draft.nodal_rows,
-            load: draft.nodal_load,
+            facts: part.facts,
+            rows: interface.rows,
+            nodal_rows: interface.nodal_rows,
+            load: interface.nodal_load,
             supported,
             works: None,
             share: None,
@@ -137,12 +137,12 @@ impl<const D: usize> LocalBody<D> {
 
     /// Restrict a body, the one with this number in its matrix, to the nodes that a rank needs; all of them if `wants_all`.
     pub fn restrict(body: &Unassembled<D>, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
-        let Unassembled { part, draft, supported, .. } = body;
+        let Unassembled { part, interface, supported, .. } = body;
         let cells = match wants_all {
             true => (0..part.space.cell_count()).collect(),
             false => partition.cells(number, part, rank),
         };
-        let nodes = partition.nodes(number, part, draft, &cells, rank);
+        let nodes = partition.nodes(number, part, interface, &cells, rank);
         let here = |node: u32| place(&nodes, node);
         let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
         let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
@@ -160,10 +160,10 @@ impl<const D: usize> LocalBody<D> {
             regions: regions.collect(),
             held: part.held.on(&nodes),
             springs: springs.collect(),
-            known: part.known.on(&nodes),
-            rows: rows_here(&draft.rows),
-            nodal_rows: rows_here(&draft.nodal_rows),
-            load: draft.nodal_load.only(is_assembled).on(&nodes),
+            facts: part.facts.on(&nodes),
+            rows: rows_here(&interface.rows),
+            nodal_rows: rows_here(&interface.nodal_rows),
+            load: interface.nodal_load.only(is_assembled).on(&nodes),
             supported: Supported {
                 carried: supported.carried.clone(),
                 prescribed: supported.prescribed.iter().filter_map(prescribed_here).collect(),
@@ -171,7 +171,7 @@ impl<const D: usize> LocalBody<D> {
             works: on_dofs.map(|on| on.works.clone()),
             is_owned: true,
             unloaded: body.unloaded.clone(),
-            share: Some(partition.share::<D>(number, nodes, &draft.rows, products, rank)),
+            share: Some(partition.share::<D>(number, nodes, &interface.rows, products, rank)),
         }
     }
 }
@@ -186,11 +186,11 @@ struct Scales {
 
 impl<const D: usize> Unassembled<'_, D> {
     fn scales(&self, pairs: &[ContactPair]) -> Scales {
-        let of_body = || self.draft.segments.iter().map(|segment| &pairs[segment.pair]);
+        let of_body = || self.interface.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
         Scales {
-            modulus: dot(&self.part.known.moduli, &along_axes(of_body())),
-            depth: self.part.known.volume / surface,
+            modulus: dot(&self.part.facts.moduli, &along_axes(of_body())),
+            depth: self.part.facts.volume / surface,
         }
     }
 
@@ -199,8 +199,8 @@ impl<const D: usize> Unassembled<'_, D> {
         let Scales { modulus, depth } = self.scales(pairs);
         SharedBody {
             info: self.info(checked, modulus, depth),
-            segments: self.draft.segments.clone(),
-            loose: self.loose.clone(),
+            segments: self.interface.segments.clone(),
+            unconstrained: self.unconstrained.clone(),
             modulus,
             depth,
             carried: self.carried(),
@@ -209,16 +209,16 @@ impl<const D: usize> Unassembled<'_, D> {
 
     /// Return the traces on its contact rows of the rigid motion that supports give it.
     fn carried(&self) -> Vec<f64> {
-        let rows = &self.draft.rows;
+        let rows = &self.interface.rows;
         let Some(motion) = &self.supported.carried else { return vec![0.0; rows.rows()] };
         let at = |q: usize| rows.row(q).map(|(dof, b)| b * self.part.dof_of(motion, dof)).sum();
         (0..rows.rows()).map(at).collect()
     }
 
     fn info(&self, checked: &Checked, modulus: f64, depth: f64) -> BodyInfo {
-        let Self { part, loose, .. } = self;
+        let Self { part, unconstrained, .. } = self;
         let spec = part.spec;
-        let is_held = loose.motions.len() == loose.unfelt.len() && depth.is_finite();
+        let is_held = unconstrained.motions.len() == unconstrained.unresisted.len() && depth.is_finite();
         let mut load = self.load;
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut load, total));
         BodyInfo {
@@ -226,12 +226,12 @@ impl<const D: usize> Unassembled<'_, D> {
             datum: contact::pad(part.space.datum),
             nodes: part.space.nodes.len(),
             points: Vec::new(),
-            cells: part.known.cells,
+            cells: part.facts.cells,
             facets: Checked { points: Vec::new(), ..checked.clone() },
             dofs: part.space.dofs(),
             supported: part.held.supported(),
-            left_by_supports: loose.left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: loose.unfelt.iter().map(|(name, _)| name.clone()).collect(),
+            left_by_supports: unconstrained.left.iter().map(|motion| motion.name.clone()).collect(),
+            left_by_all: unconstrained.unresisted.iter().map(|(name, _)| name.clone()).collect(),
             gauged: self.gauged.clone(),
             warning: self.warning.clone(),
             stiffness: if is_held { modulus / depth } else { 0.0 },

@@ -194,7 +194,7 @@ impl<const D: usize> Forces<D> {
     pub fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
         let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.held.frame.displacements(field)).collect();
         let n = fields.len();
-        let mut products = internal::products(&self.part.space, &self.elasticity, self.part.told(), &nodal);
+        let mut products = internal::products(&self.part.space, &self.elasticity, self.part.owned(), &nodal);
         for block in self.springs.iter().flatten().filter(|block| self.part.own[block.nodes[0] as usize]) {
             let [a, b] = block.nodes.map(|node| D * node as usize);
             for (i, row) in block.block.iter().enumerate() {

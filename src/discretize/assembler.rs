@@ -3,15 +3,15 @@
 use super::balance::Forces;
 use super::carried::Supported;
 use super::distribute::Share;
-use super::draft::Loose;
+use super::interface::Unconstrained;
 use super::elastic;
 use super::factory::{Assembled, Factory};
 use super::info::BodyInfo;
-use super::local::Local;
+use super::owned::OwnedPart;
 use super::meshes::Shape;
 use super::part::Part;
 use super::post::{OnPart, Post};
-use super::supports::Held;
+use super::supports::Constraints;
 use super::unassembled::{LocalBody, SharedBody};
 use crate::error::Result;
 use crate::fem::{FreeMotion, NodalForces, NodeGraph, RigidMotion, Space, rigid};
@@ -22,7 +22,7 @@ use crate::problem::{BodySpec, Plane};
 use std::rc::Rc;
 
 /// A body before its matrix is assembled, as one rank sees it.
-pub struct Ready<'a, const D: usize> {
+pub struct Assembler<'a, const D: usize> {
     /// What the scene says.
     pub spec: &'a BodySpec,
     /// Kind of a plane problem.
@@ -52,7 +52,7 @@ struct Made {
     row_stiffness: Vec<f64>,
 }
 
-impl<const D: usize> Ready<'_, D> {
+impl<const D: usize> Assembler<'_, D> {
     /// Assemble the body and make it one that solves, with its mesh if this rank has it; its report learns how to evaluate displacements.
     ///
     /// # Errors
@@ -65,13 +65,13 @@ impl<const D: usize> Ready<'_, D> {
         counts: &mut Counts,
     ) -> Result<Finished<D>> {
         let Self { spec, plane, shared, local, graph } = self;
-        let SharedBody { mut info, segments, loose, modulus, depth, .. } = shared;
-        let Loose { left, motions, sprung, unsupported, .. } = loose;
+        let SharedBody { mut info, segments, unconstrained, modulus, depth, .. } = shared;
+        let Unconstrained { left, motions, sprung, unsupported, .. } = unconstrained;
         let (mut made, mut shape) = (Made::default(), None);
         if let Some(local) = local {
             let elasticity = Rc::new(elastic::of_regions(spec, local.regions, D, plane)?);
-            let LocalBody { space, held, springs, known, .. } = local;
-            let part = Part { spec, space, held, springs, elasticity: elasticity.clone(), known };
+            let LocalBody { space, held, springs, facts, .. } = local;
+            let part = Part { spec, space, held, springs, elasticity: elasticity.clone(), facts };
             let (unloaded, motions) = (local.unloaded, unsupported);
             let (space, held) = match local.is_owned {
                 false => (Rc::new(part.space), Rc::new(part.held)),
@@ -141,14 +141,14 @@ fn tell_displacements<const D: usize>(
     rows: Csr,
     load: &NodalForces<D>,
     own: Vec<bool>,
-) -> Result<(Rc<Space<D>>, Rc<Held<D>>)> {
+) -> Result<(Rc<Space<D>>, Rc<Constraints<D>>)> {
     let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
     let (space, held) = (Rc::new(part.space), Rc::new(part.held));
     let is_whole = info.ranks.len() == 1 && !own.contains(&false);
-    let here = Local { space: space.clone(), own };
+    let here = OwnedPart { space: space.clone(), own };
     info.points = match is_whole {
-        true => part.known.points,
-        false => space.part(here.told()).1.iter().map(|&node| part.known.points[node as usize]).collect(),
+        true => part.facts.points,
+        false => space.part(here.owned()).1.iter().map(|&node| part.facts.points[node as usize]).collect(),
     };
     let forces = Forces {
         rows,
@@ -156,13 +156,13 @@ fn tell_displacements<const D: usize>(
         supports: part.spec.fix.len(),
         load: load.all(space.nodes.len()),
         rigid,
-        extent: part.known.extent,
+        extent: part.facts.extent,
         nodes: info.nodes,
         held: held.clone(),
         elasticity: part.elasticity,
         part: here,
     };
-    info.post = Some(Box::new(OnPart::new(part.spec, part.known.outer, forces)?) as Box<dyn Post>);
+    info.post = Some(Box::new(OnPart::new(part.spec, part.facts.outer, forces)?) as Box<dyn Post>);
     Ok((space, held))
 }
 
@@ -217,7 +217,7 @@ impl<const D: usize> Assembly<'_, '_, D> {
         });
         // multigrid must know motions with hardly any strain: far from the axis a ring is nearly as soft against radial displacements and turns of its
         // section as a plane body
-        let smooth = || rigid::modes(&part.known.extent).iter().map(|motion| part.dofs_of(motion)).collect();
+        let smooth = || rigid::modes(&part.facts.extent).iter().map(|motion| part.dofs_of(motion)).collect();
         let local = factory.make(Assembled {
             name: name.to_owned(),
             dimension: D,

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Facts of a whole body, and where its nodes come from.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Known {
+pub struct BodyFacts {
     /// The number of each node among the points of the mesh.
     pub points: Vec<u32>,
     /// How many nodes the body has, and where.
@@ -21,7 +21,7 @@ pub struct Known {
     pub outer: Outer,
 }
 
-impl Known {
+impl BodyFacts {
     /// Restrict to some nodes, sorted, which get the numbers of their places.
     pub fn on(&self, nodes: &[u32]) -> Self {
         Self {

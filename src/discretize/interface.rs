@@ -17,7 +17,7 @@ pub const NO_WORK: f64 = 1e-9;
 
 /// A body before it is assembled.
 #[derive(Clone)]
-pub struct Draft<const D: usize> {
+pub struct Interface<const D: usize> {
     /// Its contact rows, pair by pair.
     pub segments: Vec<Segment>,
     /// These rows; columns: its dofs.
@@ -35,7 +35,7 @@ pub struct Draft<const D: usize> {
 /// The rigid motions that supports and springs leave to a body.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
-pub struct Loose<const D: usize> {
+pub struct Unconstrained<const D: usize> {
     /// Combinations of those of the free body.
     pub left: Vec<RigidMotion<D>>,
     /// As contact and loads see them.
@@ -45,7 +45,7 @@ pub struct Loose<const D: usize> {
     /// Combinations of those of the free body that supports alone leave.
     pub unsupported: Vec<RigidMotion<D>>,
     /// Combinations of the motions that no contact row feels: name and weights.
-    pub unfelt: Vec<(String, DVector<f64>)>,
+    pub unresisted: Vec<(String, DVector<f64>)>,
 }
 
 /// Which contact rows each body has, pair by pair.
@@ -57,7 +57,7 @@ pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
     segments
 }
 
-impl<const D: usize> Draft<D> {
+impl<const D: usize> Interface<D> {
     /// A body with its contact rows and loads.
     ///
     /// # Errors
@@ -103,16 +103,16 @@ impl<const D: usize> Draft<D> {
     }
 
     /// What supports and springs leave to the body now.
-    pub fn loose(&self, part: &Part<D>) -> Loose<D> {
+    pub fn unconstrained(&self, part: &Part<D>) -> Unconstrained<D> {
         let at = |k: usize, node: u32| self.free[k].at(&part.space.nodes[node as usize]);
         let left = part.left(self.free.len(), &at);
         let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
         let motions = self.motions(part, &left);
-        let unfelt = felt_by_none(&motions);
+        let unresisted = unresisted(&motions);
         let sprung = part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
         let unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
         let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(part, &all), stiffness });
-        Loose { left, motions, sprung, unsupported, unfelt }
+        Unconstrained { left, motions, sprung, unsupported, unresisted }
     }
 
     /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.
@@ -127,10 +127,10 @@ impl<const D: usize> Draft<D> {
 }
 
 /// Combinations of motions that no contact row feels: name and weights.
-fn felt_by_none(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
-    let felt = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
+fn unresisted(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
+    let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
     let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
     let names = || motions.iter().map(|motion| motion.name.as_str());
     let named = |weights: DVector<f64>| (joint::combined(names(), weights.iter().copied()), weights);
-    Blocks::free(&felt, rows as f64, TOLERANCE).into_iter().map(named).collect()
+    Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
 }
