@@ -56,7 +56,7 @@ pub(super) enum PressureBasis {
 /// facet. A mean may amplify this error up to the k h^2/2 by which the surface bends along a facet, which is four times as
 /// much. Fully covered facets have ratios of 5/3 to 2.4, and up to four beside an axis. One more allows for curved facets and
 /// for sums of |mu| over few points.
-pub const STEADY: f64 = 5.0;
+const STEADY: f64 = 5.0;
 
 impl PressureBasis {
     /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration

@@ -14,7 +14,7 @@ pub mod pieces;
 pub mod side;
 
 pub use crate::fem::{cross, pad};
-pub use basis::{Carriers, STEADY};
+pub use basis::Carriers;
 pub use cover::{Coverage, Left};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};

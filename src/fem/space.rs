@@ -10,7 +10,7 @@ use std::cell::OnceCell;
 use std::collections::HashSet;
 
 /// Share of the largest radius up to which a node lies on the axis of a body of revolution.
-pub const ON_AXIS: f64 = 1e-10;
+const ON_AXIS: f64 = 1e-10;
 
 /// The nodes and cells of one body. Nodes are numbered in order of first appearance in the cells, so that neighbours in the mesh
 /// file stay neighbours in memory.
