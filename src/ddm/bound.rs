@@ -7,7 +7,7 @@
 //! |u - u_exact|_K^2 / 2  <=  F1(u) - min F1  <=  gap = sum omega ( P(c) + P*(p) - c p ),      c = B u - d,
 //! ```
 //!
-//! Each term of the gap is zero on the graph of the law and positive beside it. The bound needs no spectrum, no history and no constants.
+//! Each term of the gap is zero on the graph of the law and positive elsewhere. The bound needs no spectrum, no history and no constants.
 
 use super::path::Equilibrium;
 use super::scale::Scale;
@@ -30,7 +30,7 @@ pub struct OffLaws {
 }
 
 impl OffLaws {
-    /// Measure the distance of `places` where the bodies have these compressions, n, which are known but for their `roundoff`, n.
+    /// Measure the distance of the layer states `places` where the bodies have these compressions, n, which are known but for their `roundoff`, n.
     pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], roundoff: &[f64]) -> Self {
         let mut off = Self::default();
         // bodies and layer answer an error of a compression like springs in series; a steep law alone would make any pressure of it

@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::model::sample::two_pairs;
 
-    /// Steps of two points with p = 4 c and two with p = c^2, of which one opens.
+    /// Steps of two points with p = 4 c and two with p = c^2; one of these opens.
     #[test]
     fn a_step_ends_when_pressures_have_settled() {
         let model = two_pairs();

@@ -92,7 +92,7 @@ mod tests {
         // a residual that rises will not fall, whatever the spectrum says
         let risen = Forecast::new(&rows(1.1, 12), 1e-8, Some(0.8)).expect("a forecast");
         assert!((risen.factor - 1.1).abs() < 1e-12 && risen.iterations == f64::INFINITY, "{risen:?}");
-        // too short a history tells nothing, a longer one its mean
+        // a short history gives no factor, a longer one its mean
         assert_eq!(left(None), None);
         let seen = Forecast::new(&rows(0.5, 20), 0.5f64.powi(24), None).expect("a forecast");
         assert!((seen.factor - 0.5).abs() < 1e-12 && (4.0..=5.0).contains(&seen.iterations), "{seen:?}");

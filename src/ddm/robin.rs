@@ -43,6 +43,7 @@ pub(super) fn iterate(
         run.model.robin(&weight)?;
         let last = run.memory.last.take();
         let sweep = match run.memory.sweep.take() {
+            // the sweep at which the run paused
             Some(sweep) => sweep,
             None => {
                 let relaxed = last.as_ref().and_then(|last| Some((&last.sweep, last.relaxed?)));
@@ -50,6 +51,7 @@ pub(super) fn iterate(
                 run.memory.sweeper.sweep(run.model, &u, &layer, &weight, relaxed, asked)?
             }
         };
+        // the first iterate of a run that goes on was checked before the pause
         if k == run.rows.len() {
             let step = last.as_ref().map_or((None, f64::NAN), |last| (Some(&last.moved[..]), last.length));
             let at = run.after_sweep(&u, &layer, &sweep, step, acceleration.amplification().sqrt());

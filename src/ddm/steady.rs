@@ -81,7 +81,7 @@ mod tests {
         near.note(2e-8, &[1.0]);
         assert!((near.missing(1e-8, &[1.5], 1.5) - 0.5).abs() < 1e-12);
         assert_eq!(near.missing(3e-8, &[1.5], 1.5), 0.5);
-        // what a start far off every scale had to lose tells nothing
+        // a change from pressures above the peak gives no estimate
         let mut wild = Steady::default();
         wild.note(1.0, &[1e30]);
         assert!(wild.missing(1e-10, &[1.0], 1.0) < 1.1e-10);

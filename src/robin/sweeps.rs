@@ -200,7 +200,7 @@ impl<'a> Gradients<'a> {
         let mut sums = [local_dot(&image, &p.states), local_dot(&self.r, &p.states)];
         model.exchange.sum(&mut sums);
         let (curvature, slope) = (sums[0] + dot(&spring, &closing), sums[1]);
-        // p'Gp is at least r'z: a direction of which deflation leaves only rounding has no curvature beside it
+        // p'Gp is at least r'z, so if deflation leaves only rounding of p, its curvature is negligible compared with r'z
         if !(slope > 0.0 && curvature > f64::EPSILON * rz) {
             return false;
         }
