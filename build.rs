@@ -1,4 +1,4 @@
-//! Finds PETSc and its MUMPS, refuses what cannot serve, and makes the Rust declarations of the functions that we call.
+//! Find PETSc and its MUMPS, refuse unsuitable ones, and generate the Rust declarations of the functions that the binding calls.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::process::exit;
 #[path = "src/petsc/requirements.rs"]
 mod requirements;
 
-/// All that the binding calls; a function that is missing here does not exist for the crate.
+/// All functions of PETSc that the binding calls. Other functions are not declared.
 const FUNCTIONS: &[&str] = &[
     "ISCreateGeneral",
     "ISDestroy",
@@ -141,7 +141,7 @@ const FUNCTIONS: &[&str] = &[
     "VecSetBlockSize",
 ];
 
-/// Ends the build with a sentence; cargo shows what a failed build script wrote.
+/// End the build with a sentence; cargo shows the output of a build script that fails.
 fn refuse(sentence: &str) -> ! {
     eprintln!("\n{sentence}\n");
     exit(1)
@@ -176,8 +176,9 @@ fn main() {
     declare(&[&petsc.include_paths[..], &mumps].concat());
 }
 
-/// File of the shared library of PETSc under the name that its programs ask for (`libpetsc.so.3.18`). It is opened when a run
-/// first needs PETSc, not linked: it brings a hundred libraries, whose loading takes longer than a small scene.
+/// Return the shared library of PETSc, under the name that programs link (`libpetsc.so.3.18`).
+///
+/// It is not linked, but opened when a run first needs PETSc: it brings a hundred libraries, whose loading takes longer than a small scene.
 fn library(petsc: &pkg_config::Library) -> PathBuf {
     let name = petsc.libs.iter().find(|name| name.starts_with("petsc"));
     let plain = format!("lib{}{}", name.map_or("petsc", String::as_str), env::consts::DLL_SUFFIX);
@@ -194,7 +195,7 @@ fn library(petsc: &pkg_config::Library) -> PathBuf {
     versions.min_by_key(|path| path.as_os_str().len()).unwrap_or(file)
 }
 
-/// Links MUMPS itself, whose Schur complement PETSc does not hand on in full, and returns the folder of its header.
+/// Link MUMPS itself, whose Schur complement PETSc does not return in full, and return the folder of its header.
 fn mumps(petsc: &[PathBuf]) -> Vec<PathBuf> {
     let own = env::var_os("MUMPS_DIR").filter(|root| !root.is_empty()).map(PathBuf::from);
     let folders = own.iter().map(|root| root.join("include")).chain(petsc.iter().cloned());
@@ -209,7 +210,7 @@ fn mumps(petsc: &[PathBuf]) -> Vec<PathBuf> {
     vec![folder]
 }
 
-/// PETSc by its pkg-config file: the one of PETSC_DIR and PETSC_ARCH where these are set, else the system's.
+/// Find PETSc by its pkg-config file: that of PETSC_DIR and PETSC_ARCH if these are set, otherwise that of the system.
 fn find() -> pkg_config::Library {
     if let Some(root) = env::var_os("PETSC_DIR").filter(|root| !root.is_empty()).map(PathBuf::from) {
         let build = root.join(env::var_os("PETSC_ARCH").unwrap_or_default());
@@ -226,7 +227,7 @@ fn find() -> pkg_config::Library {
         // SAFETY: the build script has one thread.
         unsafe { env::set_var("PKG_CONFIG_PATH", joined) };
     }
-    // Old releases install PETSc.pc only; newer ones both names.
+    // old releases install PETSc.pc only, and newer ones both names
     let found = ["PETSc", "petsc"].map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name));
     let name = match found {
         [Ok(_), _] => "PETSc",
@@ -237,8 +238,10 @@ fn find() -> pkg_config::Library {
     probed.unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
 }
 
-/// Writes the declarations to the build folder: `petsc.rs` has the functions of PETSc as fields of `Library`, found when its
-/// file is opened, `mumps.rs` the function of MUMPS, which is linked.
+/// Write the declarations to the build folder.
+///
+/// `petsc.rs` has the functions of PETSc as fields of `Library`, which are looked up when its file is opened. `mumps.rs` has the function of
+/// MUMPS, which is linked.
 fn declare(petsc: &[PathBuf]) {
     let mpi = ["mpi-c", "ompi-c", "mpi", "ompi", "mpich"]
         .iter()
@@ -254,7 +257,7 @@ fn declare(petsc: &[PathBuf]) {
     };
     let mut library = common()
         .header("src/petsc/wrapper.h")
-        // One type for communicators in the whole crate: that of the `mpi` crate.
+        // the type of communicators in the whole crate is that of the `mpi` crate
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
         .allowlist_type("(InsertMode|KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool|ScatterMode)")

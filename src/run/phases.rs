@@ -18,7 +18,7 @@ use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, Mechanism};
 use crate::output::sci;
 use crate::parallel::{Ranks, agree};
-use crate::petsc::{Session, give_back, keep_apart, keep_at_hand};
+use crate::petsc::Session;
 use crate::problem::{Linear, Order};
 use crate::scene::Scene;
 use crate::solver::options;
@@ -51,13 +51,10 @@ pub fn build_with(
     clock: &mut Clock,
 ) -> Result<Built> {
     agree(session, options::refuse_log(session))?;
-    let built = match scene.dimension.value {
+    match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
-    };
-    // solvers find the memory of the mesh free
-    give_back();
-    built
+    }
 }
 
 /// What [`build`] does where the dimension matters.
@@ -381,13 +378,10 @@ fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Resul
 /// Failures of PETSc; not converging is a status of the outcome.
 pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
-    keep_at_hand();
     let done = match ready.built.scene.method.steps.is_empty() {
         true => keep::solve(ready, true, keep),
         false => steps::iterate(ready, keep, clock),
-    };
-    keep_apart();
-    let done = done?;
+    }?;
     clock.phase("iterate");
     Ok(done)
 }
