@@ -75,7 +75,7 @@ fn set(tree: &mut Node, source: &Arc<Source>, start: usize) -> Result<()> {
     let new = value(source, equals + 1)?;
     let mut node = tree;
     for (depth, span) in path.iter().enumerate() {
-        let parent = &text[start..span.start.saturating_sub(1).max(start)];
+        let parent = text[start..span.start].trim_end().trim_end_matches('.').trim_end();
         let before_number = path.get(depth + 1).is_some_and(|next| is_number(&text[next.clone()]));
         node = child(node, &Step { name: &text[span.clone()], place: at(span.clone()), parent, before_number })?;
     }

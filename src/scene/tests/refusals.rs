@@ -186,6 +186,8 @@ fn refusals_of_overrides_point_into_them() {
     #[rustfmt::skip]
     let cases = [
         ("contact.7.layer=1", "7", "`contact` has 1 item, there is no number 7", "number 0"),
+        // a blank that has two bytes
+        ("contact.\u{a0}7.layer=1", "7", "`contact` has 1 item, there is no number 7", "number 0"),
         ("body.2.young=1", "2", "`body` has 2 items, there is no number 2", "0 to 1"),
         ("body.uper.young=1", "uper", "`body` is a list of 2 items; `uper` is no number", "their names: lower, upper"),
         ("contact.0.between.lower=1", "lower", "`contact.0.between` is a list of 2 items; `lower` is no number", "0 to 1"),
