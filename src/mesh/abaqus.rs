@@ -235,9 +235,27 @@ impl Model {
         }
     }
 
-    /// All groups, each a physical one on an entity of its own: what is in several groups is written for each.
+    /// Return the mesh in Gmsh's format 2.2, each group as a physical one on an entity of its own: an element of several groups is written for each.
     fn write(&self) -> Said<String> {
-        let mut groups: Vec<(usize, &str, Vec<Numbered>)> = Vec::new();
+        let mut groups = self.element_groups()?;
+        groups.extend(self.facet_groups()?);
+        let points = |nodes: &[u64]| nodes.iter().map(|&node| (15, vec![node])).collect();
+        groups.extend(self.node_sets.iter().map(|(set, nodes)| Written { dimension: 0, name: set, elements: points(nodes) }));
+        groups.retain(|group| !group.elements.is_empty());
+        let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
+        write_names(&groups, &mut text);
+        let _ = writeln!(text, "$Nodes\n{}", self.nodes.len());
+        for (tag, [x, y, z]) in &self.nodes {
+            let _ = writeln!(text, "{tag} {x:?} {y:?} {z:?}");
+        }
+        text.push_str("$EndNodes\n");
+        self.write_elements(&groups, &mut text)?;
+        Ok(text)
+    }
+
+    /// Return the groups of element sets.
+    fn element_groups(&self) -> Said<Vec<Written<'_>>> {
+        let mut groups = Vec::new();
         for (set, tags) in &self.element_sets {
             let mut of_dimension: BTreeMap<usize, Vec<Numbered>> = BTreeMap::new();
             for tag in tags {
@@ -255,11 +273,17 @@ impl Model {
             if of_dimension.len() > 1 {
                 return Err(format!("the element set `{set}` has elements of several dimensions"));
             }
-            groups.extend(of_dimension.into_iter().map(|(dimension, elements)| (dimension, set.as_str(), elements)));
+            let written = |(dimension, elements)| Written { dimension, name: set, elements };
+            groups.extend(of_dimension.into_iter().map(written));
         }
+        Ok(groups)
+    }
+
+    /// Return the groups of surfaces, whose elements are faces of cells.
+    fn facet_groups(&self) -> Said<Vec<Written<'_>>> {
+        let mut groups = Vec::new();
         for (surface, faces) in &self.surfaces {
-            let mut facets = Vec::new();
-            let mut dimension = 0;
+            let mut group = Written { dimension: 0, name: surface, elements: Vec::new() };
             for &(tag, face) in faces {
                 let (kind, nodes) = self
                     .elements
@@ -270,42 +294,26 @@ impl Model {
                     .faces
                     .get(face - 1)
                     .ok_or_else(|| format!("element {tag} in `{surface}` has no face S{face}"))?;
-                dimension = kind.dimension - 1;
-                facets.push((kind.facet(face.len()), face.iter().map(|&at| nodes[at]).collect()));
+                group.dimension = kind.dimension - 1;
+                group.elements.push((kind.facet(face.len()), face.iter().map(|&at| nodes[at]).collect()));
             }
-            groups.push((dimension, surface, facets));
+            groups.push(group);
         }
-        for (set, nodes) in &self.node_sets {
-            groups.push((0, set, nodes.iter().map(|&node| (15, vec![node])).collect()));
-        }
-        groups.retain(|(.., elements)| !elements.is_empty());
-        let mut used: Vec<&str> = groups.iter().map(|(_, name, _)| *name).collect();
-        used.sort_unstable();
-        // an element set and a node set may have one name: cells first
-        let is_twice = |name: &str| used.windows(2).any(|pair| pair[0] == name && pair[1] == name);
-        let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
-        let _ = writeln!(text, "$PhysicalNames\n{}", groups.len());
-        for (tag, (dimension, name, _)) in groups.iter().enumerate() {
-            let suffix = if *dimension == 0 && is_twice(name) { "_nodes" } else { "" };
-            let _ = writeln!(text, "{dimension} {} \"{name}{suffix}\"", tag + 1);
-        }
-        let _ = writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", self.nodes.len());
-        for (tag, [x, y, z]) in &self.nodes {
-            let _ = writeln!(text, "{tag} {x:?} {y:?} {z:?}");
-        }
-        let total: usize = groups.iter().map(|(.., elements)| elements.len()).sum();
-        let _ = writeln!(text, "$EndNodes\n$Elements\n{total}");
+        Ok(groups)
+    }
+
+    /// Write the elements of all groups; those of group k have the physical and elementary tag k + 1.
+    fn write_elements(&self, groups: &[Written], text: &mut String) -> Said<()> {
+        let total: usize = groups.iter().map(|group| group.elements.len()).sum();
+        let _ = writeln!(text, "$Elements\n{total}");
         let mut number = 0;
-        for (tag, (.., elements)) in groups.iter().enumerate() {
-            for (kind, nodes) in elements {
+        for (tag, group) in (1..).zip(groups) {
+            for (kind, nodes) in &group.elements {
                 number += 1;
-                let _ = write!(text, "{number} {kind} 2 {0} {0}", tag + 1);
+                let _ = write!(text, "{number} {kind} 2 {tag} {tag}");
                 for node in nodes {
                     if !self.nodes.contains_key(node) {
-                        return Err(format!(
-                            "an element of `{}` has the node {node}, which is not there",
-                            groups[tag].1
-                        ));
+                        return Err(format!("an element of `{}` has the node {node}, which is not there", group.name));
                     }
                     let _ = write!(text, " {node}");
                 }
@@ -313,6 +321,26 @@ impl Model {
             }
         }
         text.push_str("$EndElements\n");
-        Ok(text)
+        Ok(())
     }
+}
+
+/// A group as it is written.
+struct Written<'a> {
+    dimension: usize,
+    name: &'a str,
+    elements: Vec<Numbered>,
+}
+
+/// Write the names of groups. An element set and a node set may have one name: then the name of the node set is another one.
+fn write_names(groups: &[Written], text: &mut String) {
+    let mut used: Vec<&str> = groups.iter().map(|group| group.name).collect();
+    used.sort_unstable();
+    let is_twice = |name: &str| used.windows(2).any(|pair| pair[0] == name && pair[1] == name);
+    let _ = writeln!(text, "$PhysicalNames\n{}", groups.len());
+    for (tag, Written { dimension, name, .. }) in (1..).zip(groups) {
+        let suffix = if *dimension == 0 && is_twice(name) { "_nodes" } else { "" };
+        let _ = writeln!(text, "{dimension} {tag} \"{name}{suffix}\"");
+    }
+    text.push_str("$EndPhysicalNames\n");
 }

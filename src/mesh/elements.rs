@@ -67,16 +67,25 @@ pub fn read<const D: usize>(
         let message = format!("$Elements announces {total} elements and holds {seen}");
         return Err(cursor.error_at(start, message));
     }
-    // Either alone is allowed. Both are a block with the number of another entity.
-    let with: HashSet<_> = heads.into_iter().map(|(dimension, tag, _)| (dimension, tag)).collect();
-    if let Some((head, dimension, tag)) = again
-        && let Some(without) = physical.without(dimension, |entity| with.contains(&entity))
-    {
-        let thing = thing(dimension);
-        let message = format!("elements of {thing} {tag} stand in two blocks, and those of {thing} {without} in none");
-        return Err(cursor.error_at(head, message).help("the file is damaged: save the mesh again with Gmsh"));
+    if let Some((head, dimension, tag)) = again {
+        refuse_another_number(cursor, physical, heads, head, (dimension, tag))?;
     }
     Ok((common_order, in_parts))
+}
+
+/// Refuse two blocks of one entity, the second at `position`, where another entity has none: one block has the number of the other. Either alone is allowed.
+fn refuse_another_number(
+    cursor: &Cursor,
+    physical: &Physical,
+    heads: HashSet<(usize, i32, i32)>,
+    position: usize,
+    (dimension, tag): (usize, i32),
+) -> Result<()> {
+    let with: HashSet<_> = heads.into_iter().map(|(dimension, tag, _)| (dimension, tag)).collect();
+    let Some(without) = physical.without(dimension, |entity| with.contains(&entity)) else { return Ok(()) };
+    let thing = thing(dimension);
+    let message = format!("elements of {thing} {tag} stand in two blocks, and those of {thing} {without} in none");
+    Err(cursor.error_at(position, message).help("the file is damaged: save the mesh again with Gmsh"))
 }
 
 /// The head of a block of elements.

@@ -8,7 +8,7 @@ use signal_hook::consts::SIGXFSZ;
 use std::fs::File;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::UNIX_EPOCH;
 
 /// The installed Gmsh.
@@ -65,6 +65,34 @@ impl Gmsh {
     /// Gmsh fails; its own messages are the causes. It takes more time or memory than it may. A signal, or a limit on the size of files, ends it.
     pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
         let bytes = guard::bytes(task.guard);
+        let said = home.join("said");
+        let mut command = self.command(task, output, home, bytes)?;
+        let file = |cause| Error::file(&said, "write", &cause);
+        let out = File::create(&said).map_err(file)?;
+        command.stderr(out.try_clone().map_err(file)?).stdout(out);
+        let end = guard::run(&mut command, task.guard.seconds, &said, task.interrupt)
+            .map_err(|cause| Error::file(&self.program, "run", &cause))?;
+        let refuse = |message: String| Error::mesh(task.shown, None, message);
+        match end {
+            End::TimedOut => Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds))
+                .help("a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`")),
+            End::Talked => {
+                let repeated = "Gmsh repeats its errors about this script without end".to_owned();
+                let help = "end each file that it merges with a line break, without which Gmsh reads beyond the end";
+                Err(because(refuse(repeated), &complaints(&words(&said))).help(help))
+            }
+            End::Asked(signal) => Err(interrupt::ended(signal)),
+            End::Itself(status) if status.signal() == Some(SIGXFSZ) => {
+                Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
+                    .help("there is a limit on the size of files (ulimit -f)"))
+            }
+            End::Itself(status) if status.success() && output.is_file() => Ok(()),
+            End::Itself(status) => Err(failure(task, status, &words(&said), bytes)),
+        }
+    }
+
+    /// Return the command that meshes a script with so many `bytes` of memory.
+    fn command(&self, task: &Task, output: &Path, home: &Path, bytes: Option<u64>) -> Result<Command> {
         let mut command = guard::command(&self.program, bytes);
         let order = if task.order == Order::P1 { "1" } else { "2" };
         match task.is_mesh {
@@ -81,10 +109,6 @@ impl Gmsh {
         // An absolute path cannot be taken for an option.
         let script = std::path::absolute(task.script).map_err(|cause| Error::file(task.script, "find", &cause))?;
         command.arg("-o").arg(output).arg(script);
-        let said = home.join("said");
-        let file = |cause| Error::file(&said, "write", &cause);
-        let out = File::create(&said).map_err(file)?;
-        command.stderr(out.try_clone().map_err(file)?).stdout(out);
         command.env("GMSH_HOME", home).stdin(Stdio::null());
         // A Gmsh built with MPI must not think that it is one of our ranks.
         for (name, _) in std::env::vars_os() {
@@ -93,46 +117,31 @@ impl Gmsh {
                 command.env_remove(&name);
             }
         }
-        let end = guard::run(&mut command, task.guard.seconds, &said, task.interrupt)
-            .map_err(|cause| Error::file(&self.program, "run", &cause))?;
-        let refuse = |message: String| Error::mesh(task.shown, None, message);
-        let status = match end {
-            End::TimedOut => {
-                return Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds)).help(
-                    "a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`",
-                ));
-            }
-            End::Talked => {
-                let repeated = "Gmsh repeats its errors about this script without end".to_owned();
-                let help = "end each file that it merges with a line break, without which Gmsh reads beyond the end";
-                return Err(because(refuse(repeated), &complaints(&words(&said))).help(help));
-            }
-            End::Asked(signal) => return Err(interrupt::ended(signal)),
-            End::Itself(status) if status.signal() == Some(SIGXFSZ) => {
-                return Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
-                    .help("there is a limit on the size of files (ulimit -f)"));
-            }
-            End::Itself(status) if status.success() && output.is_file() => return Ok(()),
-            End::Itself(status) => status,
-        };
-        let said = words(&said);
-        if is_out_of_memory(status, &said) {
-            let most = bytes.map_or(String::new(), |bytes| format!(" of {:.1} GB", bytes as f64 / 1e9));
-            return Err(refuse(format!("Gmsh needs more memory for this script than it may take{most}"))
-                .help("ask for fewer elements; to give it more set `memory`, in GB, in `mesh`"));
-        }
-        let error = refuse(match (status.success(), task.is_mesh) {
-            (true, false) => "Gmsh ran this script to its end but wrote no mesh".to_owned(),
-            (true, true) => "Gmsh finds no mesh in this file".to_owned(),
-            (false, false) => format!("Gmsh cannot mesh this script ({status})"),
-            (false, true) => format!("Gmsh cannot read this mesh ({status})"),
-        });
-        let again = match task.is_mesh {
-            true => format!("gmsh {}", task.shown.display()),
-            false => format!("gmsh -{} {}", task.dimension, task.shown.display()),
-        };
-        let causes = complaints(&said);
-        Err(if causes.is_empty() { error.help(format!("see what it says: {again}")) } else { because(error, &causes) })
+        Ok(command)
+    }
+}
+
+/// Return the error of a Gmsh that ended by itself without a mesh, after it has `said` this.
+fn failure(task: &Task, status: ExitStatus, said: &str, bytes: Option<u64>) -> Error {
+    let refuse = |message: String| Error::mesh(task.shown, None, message);
+    if is_out_of_memory(status, said) {
+        let most = bytes.map_or(String::new(), |bytes| format!(" of {:.1} GB", bytes as f64 / 1e9));
+        return refuse(format!("Gmsh needs more memory for this script than it may take{most}"))
+            .help("ask for fewer elements; to give it more set `memory`, in GB, in `mesh`");
+    }
+    let error = refuse(match (status.success(), task.is_mesh) {
+        (true, false) => "Gmsh ran this script to its end but wrote no mesh".to_owned(),
+        (true, true) => "Gmsh finds no mesh in this file".to_owned(),
+        (false, false) => format!("Gmsh cannot mesh this script ({status})"),
+        (false, true) => format!("Gmsh cannot read this mesh ({status})"),
+    });
+    let again = match task.is_mesh {
+        true => format!("gmsh {}", task.shown.display()),
+        false => format!("gmsh -{} {}", task.dimension, task.shown.display()),
+    };
+    match &complaints(said)[..] {
+        [] => error.help(format!("see what it says: {again}")),
+        causes => because(error, causes),
     }
 }
 

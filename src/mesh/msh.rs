@@ -45,29 +45,10 @@ pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Ma
     while !cursor.at_end() {
         let start = cursor.position();
         let line = cursor.line()?;
-        let Some(section) = line.strip_prefix('$') else {
-            return Err(cursor
-                .error_at(start, "a section such as `$Nodes` should begin here")
-                .help("the file is damaged, or has something behind its end: save the mesh again with Gmsh"));
+        let Some(section) = enter(cursor, start, &line, &mut seen)? else {
+            cursor.skip_section()?;
+            continue;
         };
-        cursor.enter(section);
-        match section {
-            // Each needs those before it, and once.
-            "PhysicalNames" | "Entities" | "Nodes" | "Elements" => {
-                if has(&seen, section) {
-                    return Err(cursor.error_at(start, format!("the section ${section} stands twice")));
-                }
-                seen.push(section.to_owned());
-            }
-            "PartitionedEntities" => {
-                let error = cursor.error_at(start, "the mesh is partitioned");
-                return Err(error.help("save it in one piece: the program divides it among the ranks itself"));
-            }
-            _ => {
-                cursor.skip_section()?;
-                continue;
-            }
-        }
         match (section, &nodes) {
             ("PhysicalNames", _) => physical.read_names(cursor, D)?,
             ("Entities", _) => physical.read_entities(cursor)?,
@@ -89,6 +70,30 @@ pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Ma
             let error = Error::mesh(path, None, "there are no elements");
             Err(error.help("the file was cut short, or nothing was meshed"))
         }
+    }
+}
+
+/// Enter the section that a line at `start` begins; return its name, none if nothing in it is needed. Each of those in use may be `seen` once.
+fn enter<'l>(cursor: &mut Cursor, start: usize, line: &'l str, seen: &mut Vec<String>) -> Result<Option<&'l str>> {
+    let Some(section) = line.strip_prefix('$') else {
+        return Err(cursor
+            .error_at(start, "a section such as `$Nodes` should begin here")
+            .help("the file is damaged, or has something behind its end: save the mesh again with Gmsh"));
+    };
+    cursor.enter(section);
+    match section {
+        "PhysicalNames" | "Entities" | "Nodes" | "Elements" => {
+            if seen.iter().any(|before| before == section) {
+                return Err(cursor.error_at(start, format!("the section ${section} stands twice")));
+            }
+            seen.push(section.to_owned());
+            Ok(Some(section))
+        }
+        "PartitionedEntities" => {
+            let error = cursor.error_at(start, "the mesh is partitioned");
+            Err(error.help("save it in one piece: the program divides it among the ranks itself"))
+        }
+        _ => Ok(None),
     }
 }
 
