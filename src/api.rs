@@ -3,8 +3,8 @@
 //! Lengths and stresses are in any consistent units; forces are in stress times length squared, in the plane for a thickness of one length.
 //! Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.
 //!
-//! In the example two squares of side 1 with Young's modulus 100 and Poisson's ratio 0 are pressed together by a pressure of 1, through a
-//! layer whose pressure is 50 times its compression. Each square becomes 1/100 shorter, and the layer 1/50 thinner.
+//! In the example two squares of side 1 are pressed together by a pressure of 1. They have Young's modulus 100 and Poisson's ratio 0; the
+//! pressure in the layer is 50 times its compression. Each square becomes 1/100 shorter, and the layer 1/50 thinner.
 //!
 //! ```
 //! use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshArrays, Scene, Session, solve};

@@ -70,7 +70,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         let report = report::report(session, &done, &results::recover(&done), &clock);
         exit = exit.max(report::exit_code(&done));
         if session.rank() == 0 {
-            sweep.print_row(case, &done, &report)?;
+            sweep.write_row(case, &done, &report)?;
             collected.add(case, &done, report);
         }
         if matches!(done.outcome.status, Status::Paused { .. }) {
@@ -176,7 +176,7 @@ impl Sweep<'_> {
     }
 
     /// Write the row of a run to the table, and print how the run ended.
-    fn print_row(&mut self, case: &Case, done: &Done, report: &Report) -> Result<()> {
+    fn write_row(&mut self, case: &Case, done: &Done, report: &Report) -> Result<()> {
         if let Some(table) = &mut self.table {
             table.push(&line(&case.values, report, case.scene.dimension.value));
             table.complaint().iter().for_each(|text| self.bar.suspend(|| eprintln!("warning: {text}")));
@@ -207,6 +207,7 @@ impl Sweep<'_> {
     }
 }
 
+/// Return the columns of the table.
 fn header(variations: &[Variation], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
@@ -222,6 +223,7 @@ fn header(variations: &[Variation], built: &Built) -> Vec<String> {
     header
 }
 
+/// Return the row of a run.
 fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
     let mut line = values.to_vec();
@@ -255,7 +257,7 @@ fn refuse_other_columns(columns: &[String], header: &[String], label: &str) -> R
     .help("sweep over values that leave them as they are; the rows so far are kept"))
 }
 
-/// What all runs together are printed and drawn from.
+/// The results of all runs, from which reports are printed and plots are drawn.
 #[derive(Default)]
 struct Results {
     reports: Vec<Report>,

@@ -82,7 +82,8 @@ impl EstimatedSolution {
     /// Increase the estimate of the next mesh, whose solution is `tables`, if both estimates are too small to explain how the solutions differ.
     ///
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
-    /// both errors are too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then nothing is compared.
+    /// both errors are too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then nothing is
+    /// compared.
     pub fn correct(&self, tables: &[ContactTable], estimate: &mut Estimate) {
         if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
             return;
