@@ -35,7 +35,7 @@
 //! ```
 
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
-pub use crate::ddm::acceleration::Here;
+pub use crate::ddm::acceleration::Iterate;
 pub use crate::ddm::gamma::GammaRule;
 pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
 pub use crate::error::{Error, Kind, Result};
@@ -49,7 +49,7 @@ pub use crate::problem::{
     SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Zone,
 };
 pub use crate::robin::Ritz;
-pub use crate::run::keep::Keep;
+pub use crate::run::recorder::Recorder;
 pub use crate::scene::Scene;
 
 use crate::estimate::Estimate;
@@ -79,7 +79,7 @@ pub fn solve(session: &Session, scene: Scene) -> Result<Solution> {
 ///
 /// # Errors
 /// Those of [`solve`].
-pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Keep) -> Result<Solution> {
+pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Recorder) -> Result<Solution> {
     scene.check()?;
     run::refuse_other_scenes(session, &[&scene])?;
     let (interrupt, mut clock) = (Interrupt::default(), Clock::default());

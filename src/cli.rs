@@ -4,10 +4,10 @@ mod ranks;
 
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
-use crate::exchange::tell;
+use crate::exchange::broadcast;
 use crate::interrupt::Interrupt;
 use crate::output::{make_folder, say};
-use crate::parallel::{Ranks, agree};
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::report;
 use crate::solver::options;
@@ -191,7 +191,7 @@ pub fn run(words: Vec<OsString>) -> i32 {
         (command, None) => without_session(&interrupt, command, petsc),
         // only the first rank runs a command that is not parallel
         (command, Some(session)) => {
-            tell(&Ranks::new(&session), || Ok(without_session(&interrupt, command, petsc))).unwrap_or(1)
+            broadcast(&Ranks::new(&session), || Ok(without_session(&interrupt, command, petsc))).unwrap_or(1)
         }
     }
 }
@@ -290,7 +290,7 @@ fn with_session(session: Option<Session>, petsc: &[String], interrupt: &Interrup
     };
     let ended = session
         .start_petsc(petsc)
-        .and_then(|()| agree(&session, options::refuse_traps(&session)))
+        .and_then(|()| collectively(&session, options::refuse_traps(&session)))
         .and_then(|()| dispatch(&session, interrupt, command));
     match ended {
         Ok(code) => match session.finish() {

@@ -1,30 +1,30 @@
 //! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
 
 mod approach;
+mod assembler;
 mod auto;
 mod balance;
 mod carried;
 mod couplings;
 mod distribute;
-mod interface;
 mod elastic;
 mod factory;
+mod facts;
 mod find;
 mod gauge;
 mod info;
-mod facts;
-mod owned;
+mod interface;
 mod mechanism;
 pub mod meshes;
 mod missed;
 mod moving;
+mod owned;
 mod pairs;
 mod part;
 mod parts;
 mod plan;
 mod post;
 mod prepare;
-mod assembler;
 pub mod resolution;
 mod roster;
 mod round;
@@ -37,11 +37,12 @@ mod verify;
 
 use crate::contact::{self, law};
 use crate::error::Result;
-use crate::exchange::{Exchange, Plain, scatter, tell};
+use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::linalg::axpy;
 use crate::model::{Mechanism, Model};
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
+use assembler::{Assembler, Counts, Finished};
 pub use balance::{Balance, Resultant};
 pub use factory::{Assembled, Factory, Outline};
 pub use find::point;
@@ -49,7 +50,6 @@ pub use info::{Balanced, BodyInfo, ContactInfo, Gauged};
 use meshes::{Kept, Meshes};
 pub use post::Post;
 use prepare::{Locals, Shared, Whole, prepare};
-use assembler::{Counts, Finished, Assembler};
 use std::rc::Rc;
 pub use surface::ContactSurface;
 use unassembled::LocalBody;
@@ -101,7 +101,7 @@ where
     [[f64; D]; D]: Plain,
 {
     let mut prepared = None;
-    let shared = tell(&*exchange, || {
+    let shared = broadcast(&*exchange, || {
         let (shared, whole) = prepare(scene, verified, bodies, cut, keep, exchange.ranks(), factory)?;
         prepared = Some(whole);
         Ok(shared)

@@ -15,7 +15,7 @@ use crate::error::{Error, Kind, Result};
 use crate::model::field::residual;
 use crate::model::surface::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
-use held::Held;
+use held::HoldingSprings;
 use layer::LayerError;
 use std::rc::Rc;
 
@@ -69,7 +69,7 @@ pub fn estimate(
     drop(recovered);
     let mut bodies: Vec<f64> = local.cells.iter().map(|cells| cells.iter().sum()).collect();
     model.exchange.sum(&mut bodies);
-    let held = Held::of(model, layer);
+    let held = HoldingSprings::of(model, layer);
     held.balance(meshes, model, &mut local.loads);
     let LocalErrors { cells, mut loads, layers, mean_error } = local;
     to_dofs(meshes, model, &mut loads);

@@ -14,16 +14,16 @@ pub trait Exchange {
     /// Return the number of this rank, from 0.
     fn rank(&self) -> usize;
     /// Return the bytes of every rank, in the order of the ranks (MPI_Allgather).
-    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
+    fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
     /// Return the bytes of the first rank (MPI_Bcast).
-    fn tell(&self, mine: Vec<u8>) -> Vec<u8>;
+    fn broadcast(&self, mine: Vec<u8>) -> Vec<u8>;
     /// Send `mine[k]` to rank k, and return the bytes from every rank, in the order of the ranks (MPI_Alltoall).
-    fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
+    fn all_to_all(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
     /// Send bytes to one other rank, which has to receive them from this one. Not collective.
     fn send(&self, to: usize, bytes: &[u8]);
     /// Receive the bytes that another rank sends to this one. Not collective.
     fn receive(&self, from: usize) -> Vec<u8>;
-    /// Return the number of sums, shares and trades between several ranks so far.
+    /// Return the number of sums, gathers and exchanges between several ranks so far.
     fn messages(&self) -> usize;
 }
 
@@ -45,21 +45,21 @@ pub fn scatter<T: Plain>(exchange: &dyn Exchange, mut part: impl FnMut(usize) ->
 }
 
 /// Return the value of every rank, in the order of the ranks (all_gather). Collective.
-pub fn share<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
+pub fn all_gather<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {
         return vec![mine];
     }
-    exchange.share(pack(&mine)).into_iter().map(received).collect()
+    exchange.all_gather(pack(&mine)).into_iter().map(received).collect()
 }
 
 /// Send `mine[k]` to rank k, and return the values from every rank, in the order of the ranks (all_to_all). Collective.
-pub fn trade<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
+pub fn all_to_all<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
     if exchange.ranks() == 1 {
         return mine;
     }
     // values are packed and dropped one after the other, which limits the memory
     let packed = mine.into_iter().map(|mine| pack(&mine)).collect();
-    exchange.trade(packed).into_iter().map(received).collect()
+    exchange.all_to_all(packed).into_iter().map(received).collect()
 }
 
 /// Return the data of a message; the bytes are freed.
@@ -85,15 +85,18 @@ pub fn asked(sums: &[f64]) -> u8 {
 ///
 /// # Errors
 /// The error of the first rank, there; on the other ranks an error of the same kind without a message.
-pub fn tell<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
+pub fn broadcast<T: Serialize + DeserializeOwned>(
+    exchange: &dyn Exchange,
+    mine: impl FnOnce() -> Result<T>,
+) -> Result<T> {
     if exchange.rank() == 0 {
         let found = mine();
         if exchange.ranks() > 1 {
-            exchange.tell(pack(&found.as_ref().map_err(|error| error.kind().exit_code())));
+            exchange.broadcast(pack(&found.as_ref().map_err(|error| error.kind().exit_code())));
         }
         return found;
     }
-    unpack::<Result<T, i32>>(&exchange.tell(Vec::new()))?.map_err(Error::silent)
+    unpack::<Result<T, i32>>(&exchange.broadcast(Vec::new()))?.map_err(Error::silent)
 }
 
 /// Pack plain data into bytes; numbers keep all their digits.
@@ -123,13 +126,13 @@ impl Exchange for Serial {
     fn rank(&self) -> usize {
         0
     }
-    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+    fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
         vec![mine]
     }
-    fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
+    fn broadcast(&self, mine: Vec<u8>) -> Vec<u8> {
         mine
     }
-    fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+    fn all_to_all(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
         mine
     }
     fn send(&self, _to: usize, _bytes: &[u8]) {}
@@ -175,7 +178,7 @@ pub mod crowd {
 
     impl Exchange for Member<'_> {
         fn sum(&self, values: &mut [f64]) {
-            let all = self.share(pack(&&*values));
+            let all = self.all_gather(pack(&&*values));
             values.fill(0.0);
             for other in all {
                 let other: Vec<f64> = unpack(&other).expect("numbers");
@@ -189,13 +192,13 @@ pub mod crowd {
         fn rank(&self) -> usize {
             self.rank
         }
-        fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
-            self.trade(vec![mine; self.ranks])
+        fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+            self.all_to_all(vec![mine; self.ranks])
         }
-        fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
-            self.share(mine).swap_remove(0)
+        fn broadcast(&self, mine: Vec<u8>) -> Vec<u8> {
+            self.all_gather(mine).swap_remove(0)
         }
-        fn trade(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+        fn all_to_all(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
             self.common.slots.lock().expect("slots")[self.rank] = mine;
             self.common.barrier.wait();
             let all = self.common.slots.lock().expect("slots").iter().map(|of| of[self.rank].clone()).collect();
@@ -223,7 +226,7 @@ pub mod crowd {
 
 #[cfg(test)]
 mod tests {
-    use super::{Kind, crowd, scatter, tell};
+    use super::{Kind, broadcast, crowd, scatter};
     use crate::error::Error;
 
     /// The first rank alone makes the parts, one for each rank.
@@ -245,7 +248,7 @@ mod tests {
     #[test]
     fn errors_of_the_first_rank_are_those_of_all() {
         let found = crowd::on(3, |exchange| {
-            let error = tell::<u8>(exchange, || Err(Error::new(Kind::Mesh, "flat"))).expect_err("an error");
+            let error = broadcast::<u8>(exchange, || Err(Error::new(Kind::Mesh, "flat"))).expect_err("an error");
             (error.kind().exit_code(), error.is_silent())
         });
         let code = Kind::Mesh.exit_code();

@@ -1,7 +1,7 @@
 //! Owner ranks of bodies, and messages between ranks by the `mpi` crate.
 
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, pack, share};
+use crate::exchange::{Exchange, all_gather, pack};
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
 use mpi::point_to_point::send_receive_into;
@@ -55,7 +55,7 @@ impl Exchange for Ranks {
         self.session.rank()
     }
 
-    fn share(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+    fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
         if self.session.size() == 1 {
             return vec![mine];
         }
@@ -64,11 +64,11 @@ impl Exchange for Ranks {
         (0..self.session.size()).map(of_rank).collect()
     }
 
-    fn tell(&self, mine: Vec<u8>) -> Vec<u8> {
+    fn broadcast(&self, mine: Vec<u8>) -> Vec<u8> {
         self.broadcast(0, mine)
     }
 
-    fn trade(&self, mut mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
+    fn all_to_all(&self, mut mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
         let (world, rank, ranks) = (self.session.world(), self.session.rank(), self.session.size());
         self.count_message();
         let lengths: Vec<u64> = mine.iter().map(|bytes| bytes.len() as u64).collect();
@@ -152,7 +152,7 @@ pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<D
     if largest[0] == !largest[1] {
         return Vec::new();
     }
-    let all = share(&Ranks::new(session), facts.clone());
+    let all = all_gather(&Ranks::new(session), facts.clone());
     let mut found = Vec::new();
     for (rank, other) in all.iter().enumerate().skip(1) {
         let names: BTreeSet<&String> = other.keys().chain(all[0].keys()).collect();
@@ -167,7 +167,7 @@ pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<D
 ///
 /// # Errors
 /// As described.
-pub fn agree<T>(session: &Session, result: Result<T>) -> Result<T> {
+pub fn collectively<T>(session: &Session, result: Result<T>) -> Result<T> {
     if session.size() == 1 {
         return result;
     }

@@ -93,7 +93,7 @@ impl LayerLaw for Lazy {
 struct Lost;
 
 impl GammaRule for Lost {
-    fn gamma(&mut self, _here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, _here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Ok(f64::NAN)
     }
 }
@@ -107,7 +107,7 @@ impl Observer for Watching {
     }
 }
 
-impl Keep for Watching {}
+impl Recorder for Watching {}
 
 /// One test for all that needs PETSc: a process has one session.
 #[test]

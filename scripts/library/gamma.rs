@@ -6,7 +6,7 @@
 
 use std::f64::consts::PI;
 use std::path::Path;
-use winkler::api::{Gamma, GammaRule, Here, MethodName, MethodSpec, Result, Ritz, Session, Unbounded, solve};
+use winkler::api::{Gamma, GammaRule, Iterate, MethodName, MethodSpec, Result, Ritz, Session, Unbounded, solve};
 
 /// Steps after which the rule begins anew.
 const CYCLE: usize = 4;
@@ -15,7 +15,7 @@ const CYCLE: usize = 4;
 struct Chebyshev;
 
 impl GammaRule for Chebyshev {
-    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Iterate, ritz: &mut Ritz) -> Result<f64, Unbounded> {
         let Some((low, high)) = ritz.known() else { return Ok(0.6) };
         let angle = PI * ((here.k % CYCLE) as f64 + 0.5) / CYCLE as f64;
         Ok(2.0 / (high + low + (high - low) * angle.cos()))

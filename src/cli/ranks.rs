@@ -1,7 +1,7 @@
 //! The refusal of ranks that were started with different command lines. They would wait for each other without end.
 
 use crate::error::{Error, Kind, Result, few};
-use crate::exchange::{share, tell};
+use crate::exchange::{all_gather, broadcast};
 use crate::parallel::{Ranks, differences};
 use crate::petsc::Session;
 use std::collections::{BTreeMap, BTreeSet};
@@ -20,7 +20,7 @@ pub(super) fn refuse_other_words(session: &Session, words: &[OsString]) -> Resul
     let mut facts =
         BTreeMap::from([(PROGRAM.to_owned(), env!("CARGO_PKG_VERSION").to_owned()), (WORDS.to_owned(), words)]);
     let variables = VARIABLES.map(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()));
-    let first = tell(&Ranks::new(session), || Ok(variables.clone()))?;
+    let first = broadcast(&Ranks::new(session), || Ok(variables.clone()))?;
     for ((name, own), first) in VARIABLES.iter().zip(variables).zip(first) {
         // a launcher need not pass variables on to other machines: a rank without a variable has that of the first rank
         facts.extend(own.or(first).map(|value| ((*name).to_owned(), value)));
@@ -29,7 +29,7 @@ pub(super) fn refuse_other_words(session: &Session, words: &[OsString]) -> Resul
     let Some(what) = [PROGRAM, WORDS].into_iter().chain(VARIABLES).find(|what| different.contains(*what)) else {
         return Ok(());
     };
-    let values = share(&Ranks::new(session), facts.remove(what).unwrap_or_default());
+    let values = all_gather(&Ranks::new(session), facts.remove(what).unwrap_or_default());
     let kind = if VARIABLES.contains(&what) { Kind::Solver } else { Kind::Usage };
     let mut error = Error::new(kind, format!("the ranks were started with different {}", plural(what)));
     for text in few(groups(&values)) {

@@ -8,11 +8,11 @@ use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
-use crate::exchange::tell;
+use crate::exchange::broadcast;
 use crate::interrupt::Interrupt;
 use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
-use crate::parallel::{Ranks, agree};
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::history::History;
 use crate::problem::{MeshSource, MethodName, method};
@@ -124,7 +124,7 @@ impl Plan {
         };
         let is_nested = matches!(plan.scene.method.start, method::Start::Nested);
         if plan.adapts() || is_nested {
-            agree(session, plan.refuse_finished_mesh())?;
+            collectively(session, plan.refuse_finished_mesh())?;
         }
         if plan.adapts() {
             Rc::make_mut(&mut plan.scene).estimate = true;
@@ -156,7 +156,7 @@ impl Plan {
     /// Begin an adaptation with the mesh that an earlier adaptation ended with, or with a coarse one.
     fn begin_coarse(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
         // the cache of another rank may have other sizes
-        let mut view = tell(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
+        let mut view = broadcast(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
         if view.is_none() {
             let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
             view = sized(session, &self.scene, coarse, interrupt, clock)?;

@@ -5,7 +5,7 @@
 
 use crate::ddm::{Row, Start, State};
 use crate::error::{Error, Kind, Result};
-use crate::exchange::{Exchange, share, tell};
+use crate::exchange::{Exchange, all_gather, broadcast};
 use crate::file::digest;
 use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
@@ -92,7 +92,7 @@ impl Checkpoint {
     /// There is none, or it is damaged, of another version, or of another scene.
     pub fn read(exchange: &dyn Exchange, folder: &Path, scene: &Scene) -> Result<Self> {
         let path = folder.join(FILE);
-        let bytes = tell(exchange, || {
+        let bytes = broadcast(exchange, || {
             crate::file::read(&path).map_err(|error| {
                 error.help("name the folder of results of a run that was interrupted, or had `--checkpoint`")
             })
@@ -154,7 +154,7 @@ fn gather(model: &Model, field: &Field) -> Vec<Vec<f64>> {
         all.iter_mut().zip(other).filter(|(own, _)| own.is_empty()).for_each(|(own, other)| *own = other);
         all
     };
-    share(&*model.exchange, states).into_iter().reduce(fill).unwrap_or_default()
+    all_gather(&*model.exchange, states).into_iter().reduce(fill).unwrap_or_default()
 }
 
 /// Return the state of a body with all of its dofs on the rank that owns the body; on other ranks it is empty.

@@ -21,7 +21,7 @@ use crate::output::{LISTED, Verbosity};
 use crate::petsc::Session;
 use crate::problem::{MethodName, name_of};
 use crate::run::report::{Shared, solvers_in_words};
-use crate::run::{self, Clock, Ready};
+use crate::run::{self, Clock, Prepared};
 use crate::scene::Scene;
 use clap::Args;
 use std::cell::RefCell;
@@ -169,7 +169,7 @@ fn case_of(path: &Path) -> &OsStr {
 /// # Errors
 /// Refusals of the scene, or of scenes that are not the same on all ranks.
 pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Rc<Scene>> {
-    let scene = crate::parallel::agree(session, crate::scene::load(path, overrides).map(Rc::new))?;
+    let scene = crate::parallel::collectively(session, crate::scene::load(path, overrides).map(Rc::new))?;
     run::refuse_other_scenes(session, &[&*scene])?;
     Ok(scene)
 }
@@ -201,7 +201,7 @@ fn line_after(ended: &str, estimate: Option<f64>) -> Option<Line> {
 ///
 /// # Errors
 /// When PETSc is out of memory.
-fn decisions(session: &Session, ready: &Ready) -> Result<Vec<String>> {
+fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
     let built = &ready.built;
     let (scene, discrete) = (&built.scene, &built.discrete);
     let solvers = Shared::gather(discrete).solvers;

@@ -7,16 +7,16 @@ use super::{SceneArgs, VerbosityArgs, clock_with_phases, decisions, flags, folde
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
-use crate::exchange::share;
+use crate::exchange::all_gather;
 use crate::interrupt::Interrupt;
 use crate::output::progress::Line;
 use crate::output::{
     Checksums, Folder, HistoryWriter, IterationTable, Report, StepTable, Verbosity, say, warning_lines,
 };
-use crate::parallel::{Ranks, agree};
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
-use crate::run::asking::{is_snapshot, signal};
-use crate::run::{self, All, Asking, Clock, Done, Keep, Ready, measure, report};
+use crate::run::requests::{is_snapshot, signal};
+use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, measure, report};
 use std::path::{Path, PathBuf};
 
 /// The command line of `winkler solve`.
@@ -67,11 +67,11 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let mut clock = clock_with_phases(is_loud);
     let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
-    let checkpoint = agree(session, request.restart.as_ref().map(read).transpose())?;
-    let folder = agree(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
+    let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
+    let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
     let mut plan = Plan::new(session, scene, checkpoint, interrupt, &mut clock)?;
     // only one rank measures the time between checkpoints
-    let asking = Asking::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
+    let asking = Requests::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
     let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
     let mut solver = Solver {
@@ -104,7 +104,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
 struct Solver<'s> {
     session: &'s Session,
     interrupt: &'s Interrupt,
-    asking: &'s Asking,
+    asking: &'s Requests,
     folder: &'s Folder,
     /// Whether this rank is the first one, which writes.
     first: bool,
@@ -134,7 +134,7 @@ impl Solver<'_> {
     fn solve(&mut self, plan: &mut Plan) -> Result<Round> {
         let Self { session, interrupt, folder, .. } = *self;
         let built = plan.build(session, interrupt, &mut self.clock)?;
-        let begin = agree(session, plan.begin(&built))?;
+        let begin = collectively(session, plan.begin(&built))?;
         let ready = run::set_up(session, built, begin, &mut self.clock)?;
         let all = session.options().all()?;
         let is_monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
@@ -171,7 +171,7 @@ impl Solver<'_> {
     }
 
     /// Open the tables of a round. If those of a later mesh cannot be written, the run goes on without them, since its results are worth more.
-    fn open_tables(&mut self, ready: &Ready) -> Result<Tables> {
+    fn open_tables(&mut self, ready: &Prepared) -> Result<Tables> {
         if !self.first {
             return Ok(Tables::default());
         }
@@ -234,7 +234,7 @@ impl Solver<'_> {
             self.print(&report, &done, code)?;
         }
         tables.and(written)?;
-        agree(session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
+        collectively(session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
         Ok(code)
     }
 
@@ -286,7 +286,7 @@ fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
 
 /// Write the page of the results when all ranks have written their fields. Collective.
 fn write_page(done: &Done, path: &Path, first: bool) -> Result<()> {
-    share(&*done.model().exchange, ());
+    all_gather(&*done.model().exchange, ());
     if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 
@@ -301,7 +301,7 @@ struct Tables {
 
 impl Tables {
     /// Open the tables of a round. The table of load steps begins with those of another process.
-    fn open(folder: &Folder, ready: &Ready) -> Result<Self> {
+    fn open(folder: &Folder, ready: &Prepared) -> Result<Self> {
         let (built, history) = (&ready.built, &ready.built.scene.method.steps);
         let bodies: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
         let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
@@ -330,7 +330,7 @@ struct Watcher<'a> {
     /// The tables in files.
     tables: Tables,
     folder: &'a Folder,
-    asking: &'a Asking,
+    asking: &'a Requests,
     session: &'a Session,
     plan: &'a Plan,
     clock: Clock,
@@ -366,7 +366,7 @@ impl Watcher<'_> {
     }
 }
 
-impl Keep for Watcher<'_> {
+impl Recorder for Watcher<'_> {
     fn state(&mut self, done: &Done) {
         let Status::Paused { asked } = done.outcome.status else { return };
         let is_due = signal(asked).is_some() || !is_snapshot(asked);

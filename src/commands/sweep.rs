@@ -13,11 +13,11 @@ use crate::output::steps::{contact_column, vector_columns, vector_fields};
 use crate::output::{
     ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
 };
-use crate::parallel::{Ranks, agree};
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::method::{MethodName, MethodSpec};
 use crate::run::words::numbered;
-use crate::run::{self, Asking, Begin, Built, Clock, Done, Keep, Ready, measure, report, results};
+use crate::run::{self, Begin, Built, Clock, Done, Prepared, Recorder, Requests, measure, report, results};
 use crate::scene::Scene;
 use crate::solver::options;
 use indicatif::ProgressBar;
@@ -49,17 +49,17 @@ pub struct Request {
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
 pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let variations =
-        agree(session, request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>())?;
+        collectively(session, request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>())?;
     let load = |values| Case::load(request, &variations, values);
-    let cases = agree(session, combinations(&variations).into_iter().map(load).collect::<Result<Vec<_>>>())?;
+    let cases = collectively(session, combinations(&variations).into_iter().map(load).collect::<Result<Vec<_>>>())?;
     let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
-    let folder = agree(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
+    let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
     let (json, verbosity) = (request.scene.json, request.verbosity.verbosity());
     let is_loud = session.rank() == 0 && !json && verbosity != Verbosity::Quiet;
     let bar = progress::runs(cases.len(), is_loud);
     let mut sweep = Sweep { session, interrupt, verbosity, is_loud, json, folder, bar, columns: None, table: None };
-    let mut watcher = Watcher(Asking::new(interrupt, None));
+    let mut watcher = Watcher(Requests::new(interrupt, None));
     let (mut collected, mut exit, mut before) = (Results::default(), 0, None);
     for case in &cases {
         let mut clock = Clock::default();
@@ -117,7 +117,7 @@ fn label(variations: &[Variation], values: &[String]) -> String {
 }
 
 /// An observer that passes signals on, and writes no rows.
-struct Watcher(Asking);
+struct Watcher(Requests);
 
 impl Observer for Watcher {
     fn row(&mut self, _row: &Row) {}
@@ -127,7 +127,7 @@ impl Observer for Watcher {
     }
 }
 
-impl Keep for Watcher {}
+impl Recorder for Watcher {}
 
 /// The sweep under way: what it prints and the table that it writes.
 struct Sweep<'a> {
@@ -156,12 +156,12 @@ impl Sweep<'_> {
         case: &Case,
         before: Option<Done>,
         clock: &mut Clock,
-    ) -> Result<Ready> {
+    ) -> Result<Prepared> {
         let session = self.session;
         let built = build(session, case.scene.clone(), before, self.interrupt, clock)?;
         let header = header(variations, &built);
         let columns = self.columns.get_or_insert_with(|| header.clone());
-        agree(session, refuse_other_columns(columns, &header, &case.label))?;
+        collectively(session, refuse_other_columns(columns, &header, &case.label))?;
         let ready = run::set_up(session, built, Begin::default(), clock)?;
         if session.rank() == 0 && self.table.is_none() {
             // before anything is computed that could be lost

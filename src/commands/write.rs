@@ -7,7 +7,7 @@ use crate::ddm::Outcome;
 use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
-use crate::exchange::share;
+use crate::exchange::all_gather;
 use crate::linalg::bounds;
 use crate::output::{
     Checksums, Color, ConvergenceSeries, Folder, LISTED, PairReport, PairRow, Plot, Report, Series, StepReport, Style,
@@ -56,7 +56,7 @@ impl ResultFiles<'_> {
             Ok(folder) => folder,
             Err(error) => {
                 // the other ranks wait for this one below
-                share(&*done.model().exchange, ());
+                all_gather(&*done.model().exchange, ());
                 return (self.new_report(&recovered, clock, &change), Err(error));
             }
         };
@@ -83,7 +83,7 @@ impl ResultFiles<'_> {
         report.times.clone_from(&clock.times);
         report.memory.clone_from(&clock.memory);
         // the checksums need the files of all ranks
-        share(&*done.model().exchange, ());
+        all_gather(&*done.model().exchange, ());
         if first {
             written = written.and(self.report(&folder, &mut report, fields));
             written = written.and(Checksums::save(&folder, report.files.iter().filter(|name| self.is_final(name))));

@@ -42,11 +42,7 @@ pub(super) const WHOLE: f64 = 1.0 - 1e-3;
 
 impl Coverage {
     /// Return the coverage of each facet, from the common pieces and the nodes that carry points.
-    pub(super) fn of<const D: usize>(
-        a: &Side<D>,
-        common: &Common<D>,
-        carriers: &[Option<Carriers>],
-    ) -> Vec<Self> {
+    pub(super) fn of<const D: usize>(a: &Side<D>, common: &Common<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });

@@ -7,7 +7,7 @@
 //! update      u <- u + gamma z                                                (42)
 //! ```
 
-use super::acceleration::{Acceleration, Here, Step};
+use super::acceleration::{Acceleration, Iterate, Step};
 use super::memory::Last;
 use super::run::{End, Run};
 use super::stop::Status;
@@ -64,7 +64,7 @@ pub(super) fn iterate(
             }
         }
         let residual = run.rows[k].residual;
-        let mut here = Here { model: run.model, k, layer: &layer, weight: &weight, sweep: &sweep, residual };
+        let mut here = Iterate { model: run.model, k, layer: &layer, weight: &weight, sweep: &sweep, residual };
         let (direction, length, relaxed) = match acceleration.step(&mut here)? {
             Step::Unbounded => {
                 return end(Status::Unbounded { moving: Vec::new() }, u, layer, weight, run);

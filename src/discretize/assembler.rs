@@ -3,12 +3,12 @@
 use super::balance::Forces;
 use super::carried::Supported;
 use super::distribute::Share;
-use super::interface::Unconstrained;
 use super::elastic;
 use super::factory::{Assembled, Factory};
 use super::info::BodyInfo;
-use super::owned::OwnedPart;
+use super::interface::Unconstrained;
 use super::meshes::Shape;
+use super::owned::OwnedPart;
 use super::part::Part;
 use super::post::{OnPart, Post};
 use super::supports::Constraints;

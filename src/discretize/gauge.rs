@@ -8,7 +8,11 @@ use super::part::Part;
 use crate::fem::rigid;
 
 /// Fixes the motions of a body that nothing feels and no load works on, and names them; `unconstrained` becomes what is left.
-pub fn fix<const D: usize>(part: &mut Part<D>, interface: &Interface<D>, unconstrained: &mut Unconstrained<D>) -> Vec<String> {
+pub fn fix<const D: usize>(
+    part: &mut Part<D>,
+    interface: &Interface<D>,
+    unconstrained: &mut Unconstrained<D>,
+) -> Vec<String> {
     let mut fixed = Vec::new();
     if unconstrained.unresisted.is_empty() {
         return fixed;

@@ -3,9 +3,9 @@
 //! Each body is held by its neighbours then, and all of them are not. As with the motions of one body ([`gauge`]) there is a
 //! solution if the loads do no work on such a motion: one node of one body is fixed against it, without reaction.
 
-use super::interface::{Interface, Unconstrained, NO_WORK};
 use super::gauge;
 use super::info::{Balanced, Gauged};
+use super::interface::{Interface, NO_WORK, Unconstrained};
 use super::missed;
 use super::moving::{self, Moving};
 use super::part::{Candidate, Part};
@@ -57,7 +57,8 @@ pub fn fix<const D: usize>(
     }
     (0..search.parts.len()).for_each(|body| search.balance(&search.of_one(body)));
     let bodies = search.parts.iter_mut().zip(&*search.interfaces).zip(&mut search.unconstrained);
-    let fixed: Vec<_> = bodies.map(|((part, interface), unconstrained)| gauge::fix(part, interface, unconstrained)).collect();
+    let fixed: Vec<_> =
+        bodies.map(|((part, interface), unconstrained)| gauge::fix(part, interface, unconstrained)).collect();
     let gauged = fixed.into_iter().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();
@@ -155,7 +156,8 @@ impl<const D: usize> Search<'_, '_, D> {
         let moving = |weights: DVector<f64>| {
             // all bodies move by the same motion
             let amounts = DVector::from_fn(resisted.count(), |i, _| weights[i % count]);
-            let square: f64 = resisted.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
+            let square: f64 =
+                resisted.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
             let motion = rigid::combine(&all, &weights);
             let error = square.sqrt() / weights.amax();
             Moving { bodies: group.to_vec(), name: motion.name.clone(), motions: vec![motion; group.len()], error }

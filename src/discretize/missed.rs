@@ -1,7 +1,7 @@
 //! What a mesh may miss of the loads of a body, so that loads which balance on the true surfaces do not on the facets.
 
-use super::interface::Interface;
 use super::find::find_group;
+use super::interface::Interface;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::fem::{RigidMotion, turn};
@@ -13,7 +13,12 @@ const HALVES: f64 = 2.0;
 
 /// The share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all surfaces: those in contact
 /// stand for it.
-pub fn by_facets<const D: usize>(part: &Part<D>, interface: &Interface<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> f64 {
+pub fn by_facets<const D: usize>(
+    part: &Part<D>,
+    interface: &Interface<D>,
+    pairs: &[ContactPair],
+    mesh: &Mesh<D>,
+) -> f64 {
     let groups = part.spec.load.iter().filter_map(|load| find_group(mesh, &load.on, &[D - 1], "load").ok());
     let on_groups = groups.map(|group| turn::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
     if part.spec.force.is_none() {

@@ -46,7 +46,12 @@ impl<const D: usize> Moving<D> {
 /// ```
 ///
 /// so that no node takes more of what is lacking than others that are loaded alike.
-pub fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], parts: &[Part<D>], interfaces: &mut [Interface<D>]) -> bool {
+pub fn balance<const D: usize>(
+    all: &[&Moving<D>],
+    works: &[f64],
+    parts: &[Part<D>],
+    interfaces: &mut [Interface<D>],
+) -> bool {
     let count = all.len();
     let mut products = DMatrix::zeros(count, count);
     for (body, (part, interface)) in parts.iter().zip(&*interfaces).enumerate() {

@@ -1,7 +1,7 @@
 //! One body of the scene on its mesh: space, supports, loads, stiffness.
 
-use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::facts::BodyFacts;
+use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::supports::Constraints;
 use super::{elastic, springs};
 use crate::contact;

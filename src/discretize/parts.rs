@@ -2,8 +2,8 @@
 
 use super::approach::Outer;
 use super::elastic;
-use super::find::{find_group, point};
 use super::facts::BodyFacts;
+use super::find::{find_group, point};
 use super::part::Part;
 use super::verify::{self, Verified};
 use crate::error::{Error, Result};

@@ -3,8 +3,8 @@
 use super::carried::Supported;
 use super::couplings::Coupled;
 use super::distribute::Partition;
-use super::interface::Interface;
 use super::factory::{Factory, Outline};
+use super::interface::Interface;
 use super::part::Part;
 use crate::contact::ContactPair;
 use crate::error::Result;

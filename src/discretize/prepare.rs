@@ -3,10 +3,10 @@
 use super::carried::{Supported, supported};
 use super::couplings::Coupled;
 use super::distribute::Partition;
-use super::interface::{self, Interface};
 use super::elastic;
 use super::factory::Factory;
 use super::info::{Balanced, ContactInfo};
+use super::interface::{self, Interface};
 use super::mechanism::{self, Fixed};
 use super::pairs::{self, Origin};
 use super::part::Part;
@@ -117,7 +117,8 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mut parts = parts(scene, verified, bodies)?;
     let Paired { pairs, contacts, fine } = pair_surfaces(scene, mesh, cut, &parts, keep)?;
     let mut interfaces = interfaces_of(&parts, &pairs, mesh)?;
-    let Fixed { gauged, mechanisms, unconstrained, balanced } = mechanism::fix(&mut parts, &mut interfaces, &pairs, mesh);
+    let Fixed { gauged, mechanisms, unconstrained, balanced } =
+        mechanism::fix(&mut parts, &mut interfaces, &pairs, mesh);
     let supported: Vec<Supported<D>> =
         parts.iter().zip(&interfaces).map(|(part, interface)| supported(part, &interface.free)).collect();
     let coupled = Coupled::new(&parts, &interfaces);
@@ -133,12 +134,14 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mut unconstrained = unconstrained.into_iter();
     let mut whole = Vec::new();
     for (part, (owner, ranks)) in parts.into_iter().zip(owners) {
-        let (interface, supported, unconstrained) = (next(&mut interfaces), next(&mut supported), next(&mut unconstrained));
+        let (interface, supported, unconstrained) =
+            (next(&mut interfaces), next(&mut supported), next(&mut unconstrained));
         whole.push(Unassembled {
             load: interface.nodal_load.sum(),
             warning: warning(&part, scene.plane),
             unloaded: if keep { part.unloaded(mesh)? } else { Vec::new() },
-            on_dofs: place_of(&partitions, whole.len()).map(|_| OnDofs::new(&part, &interface, &supported, &unconstrained)),
+            on_dofs: place_of(&partitions, whole.len())
+                .map(|_| OnDofs::new(&part, &interface, &supported, &unconstrained)),
             part,
             interface,
             supported,
@@ -185,7 +188,11 @@ fn pair_surfaces<const D: usize>(
     Ok(paired)
 }
 
-fn interfaces_of<const D: usize>(parts: &[Part<D>], pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Interface<D>>> {
+fn interfaces_of<const D: usize>(
+    parts: &[Part<D>],
+    pairs: &[ContactPair],
+    mesh: &Mesh<D>,
+) -> Result<Vec<Interface<D>>> {
     let interfaces = parts.iter().zip(interface::segments(parts.len(), pairs));
     interfaces.map(|(part, segments)| Interface::new(part, segments, pairs, mesh)).collect()
 }

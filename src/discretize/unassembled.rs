@@ -2,9 +2,9 @@
 
 use super::carried::Supported;
 use super::distribute::{Partition, Share};
-use super::interface::{Interface, Unconstrained};
-use super::info::{BodyInfo, Gauged};
 use super::facts::BodyFacts;
+use super::info::{BodyInfo, Gauged};
+use super::interface::{Interface, Unconstrained};
 use super::part::Part;
 use super::supports::Constraints;
 use crate::contact::{self, ContactPair};
@@ -56,7 +56,12 @@ pub struct OnDofs {
 
 impl OnDofs {
     /// Look at a body under its loads; `unconstrained` has the motions.
-    pub fn new<const D: usize>(part: &Part<D>, interface: &Interface<D>, supported: &Supported<D>, unconstrained: &Unconstrained<D>) -> Self {
+    pub fn new<const D: usize>(
+        part: &Part<D>,
+        interface: &Interface<D>,
+        supported: &Supported<D>,
+        unconstrained: &Unconstrained<D>,
+    ) -> Self {
         let load = part.load_vector(&interface.nodal_load);
         let (products, works) = part.products(&unconstrained.left, &supported.prescribed, &load);
         Self { products, works }

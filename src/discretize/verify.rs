@@ -4,7 +4,7 @@ use super::find::point;
 use super::part::Part;
 use super::roster::{self, Lying};
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, tell};
+use crate::exchange::{Exchange, broadcast};
 use crate::fem::{Extent, RigidMotion, rigid};
 use crate::mesh::{Asked, Checked, Duty, Group, LENGTHS, Mesh, Parts};
 use crate::problem::body::BodySpec;
@@ -50,7 +50,7 @@ pub fn verify<const D: usize>(
     read: impl FnOnce() -> Result<Mesh<D>>,
 ) -> Result<Verified<D>> {
     let mut verified = None;
-    let head = tell(exchange, || {
+    let head = broadcast(exchange, || {
         let (found, lying) = check(scene, read()?)?;
         let head = Head::of(&found, lying);
         verified = Some(found);

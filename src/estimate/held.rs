@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 const CARRIED: f64 = 1e-2;
 
 /// The motions n_k of all bodies that springs only hold, as amounts of the motions of each body.
-pub struct Held {
+pub struct HoldingSprings {
     motions: Vec<DVector<f64>>,
     /// How far the solution goes along each.
     amounts: DVector<f64>,
@@ -24,7 +24,7 @@ pub struct Held {
     pub energy: f64,
 }
 
-impl Held {
+impl HoldingSprings {
     /// Find the motions that neither the closed contacts of `layer` nor supports resist, and on which springs carry next to nothing.
     pub fn of(model: &Model, layer: &Layer) -> Self {
         let none = || Self { motions: Vec::new(), amounts: DVector::zeros(0), energy: 0.0 };

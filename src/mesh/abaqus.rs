@@ -125,11 +125,11 @@ fn count<T: std::str::FromStr>(word: &str) -> std::result::Result<T, String> {
     word.trim().parse().map_err(|_| format!("`{}` is no number", word.trim()))
 }
 
-type Said<T> = std::result::Result<T, String>;
+type TextResult<T> = std::result::Result<T, String>;
 
 impl Model {
     /// Opens a keyword.
-    fn begin(&mut self, line: &str) -> Said<Data> {
+    fn begin(&mut self, line: &str) -> TextResult<Data> {
         let mut words = line.split(',').map(str::trim);
         let keyword = words.next().unwrap_or_default().to_ascii_uppercase();
         let options: Vec<(String, String)> = words
@@ -169,7 +169,7 @@ impl Model {
     }
 
     /// Reads a data line.
-    fn read(&mut self, data: Data, line: &str) -> Said<Data> {
+    fn read(&mut self, data: Data, line: &str) -> TextResult<Data> {
         let continues = line.ends_with(',');
         let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
         match data {
@@ -236,11 +236,15 @@ impl Model {
     }
 
     /// Return the mesh in Gmsh's format 2.2, each group as a physical one on an entity of its own: an element of several groups is written for each.
-    fn write(&self) -> Said<String> {
+    fn write(&self) -> TextResult<String> {
         let mut groups = self.element_groups()?;
         groups.extend(self.facet_groups()?);
         let points = |nodes: &[u64]| nodes.iter().map(|&node| (15, vec![node])).collect();
-        groups.extend(self.node_sets.iter().map(|(set, nodes)| Written { dimension: 0, name: set, elements: points(nodes) }));
+        groups.extend(self.node_sets.iter().map(|(set, nodes)| Written {
+            dimension: 0,
+            name: set,
+            elements: points(nodes),
+        }));
         groups.retain(|group| !group.elements.is_empty());
         let mut text = String::from("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
         write_names(&groups, &mut text);
@@ -254,7 +258,7 @@ impl Model {
     }
 
     /// Return the groups of element sets.
-    fn element_groups(&self) -> Said<Vec<Written<'_>>> {
+    fn element_groups(&self) -> TextResult<Vec<Written<'_>>> {
         let mut groups = Vec::new();
         for (set, tags) in &self.element_sets {
             let mut of_dimension: BTreeMap<usize, Vec<Numbered>> = BTreeMap::new();
@@ -280,7 +284,7 @@ impl Model {
     }
 
     /// Return the groups of surfaces, whose elements are faces of cells.
-    fn facet_groups(&self) -> Said<Vec<Written<'_>>> {
+    fn facet_groups(&self) -> TextResult<Vec<Written<'_>>> {
         let mut groups = Vec::new();
         for (surface, faces) in &self.surfaces {
             let mut group = Written { dimension: 0, name: surface, elements: Vec::new() };
@@ -303,7 +307,7 @@ impl Model {
     }
 
     /// Write the elements of all groups; those of group k have the physical and elementary tag k + 1.
-    fn write_elements(&self, groups: &[Written], text: &mut String) -> Said<()> {
+    fn write_elements(&self, groups: &[Written], text: &mut String) -> TextResult<()> {
         let total: usize = groups.iter().map(|group| group.elements.len()).sum();
         let _ = writeln!(text, "$Elements\n{total}");
         let mut number = 0;

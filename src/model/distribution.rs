@@ -3,7 +3,7 @@
 //! A state is (v, a): v has the dofs that this rank owns, and the rigid motion a is the same on all ranks. Every rank has a part of a force, also
 //! of the force on the rigid motion, so that work is a sum over ranks.
 
-use crate::exchange::{Exchange, Serial, trade};
+use crate::exchange::{Exchange, Serial, all_to_all};
 use crate::linalg::Csr;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -54,13 +54,13 @@ impl Distribution {
 
     /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every rank. Collective.
     pub fn near(&self, own: &[f64]) -> Vec<f64> {
-        let requested = trade(&*self.exchange, self.near.iter().map(|(_, rows)| rows.clone()).collect());
+        let requested = all_to_all(&*self.exchange, self.near.iter().map(|(_, rows)| rows.clone()).collect());
         let value = |row: u32| own[row as usize - self.first];
         let answers = requested.into_iter().map(|rows| rows.into_iter().map(value).collect::<Vec<f64>>());
         let ghosts: usize = self.near.iter().map(|(positions, _)| positions.len()).sum();
         let mut known = vec![0.0; self.places.len() + ghosts];
         self.places.iter().zip(own).for_each(|(&at, &value)| known[at as usize] = value);
-        for ((positions, _), values) in self.near.iter().zip(trade(&*self.exchange, answers.collect())) {
+        for ((positions, _), values) in self.near.iter().zip(all_to_all(&*self.exchange, answers.collect())) {
             positions.iter().zip(values).for_each(|(&at, value)| known[at as usize] = value);
         }
         known

@@ -15,7 +15,7 @@ use super::stages::Done;
 use crate::ddm::linear::resisting;
 use crate::ddm::{Inaccuracy, Row, Status, Whose};
 use crate::discretize::Unbalanced;
-use crate::exchange::share;
+use crate::exchange::all_gather;
 use crate::linalg::{axpy, dot};
 use crate::model::BodySlot;
 use nalgebra::{DMatrix, DVector};
@@ -180,7 +180,7 @@ fn forces_on_hats(done: &Done, found: &[Option<Unbalanced>]) -> Vec<Vec<f64>> {
         let found = found.as_ref().filter(|found| !found.force.is_empty());
         mine.push(found.map_or(Vec::new(), |found| info.post().on_hats(found)));
     }
-    let mut ranks = share(&*done.model().exchange, mine).into_iter();
+    let mut ranks = all_gather(&*done.model().exchange, mine).into_iter();
     let mut all = ranks.next().unwrap_or_default();
     for rank in ranks {
         for (all, mine) in all.iter_mut().zip(rank) {

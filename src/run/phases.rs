@@ -2,8 +2,8 @@
 
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
-use super::keep::{self, Keep};
-use super::stages::{Begin, Built, Done, Ready};
+use super::recorder::{self, Recorder};
+use super::stages::{Begin, Built, Done, Prepared};
 use super::words::in_words;
 use super::{method, steps};
 use crate::contact::pieces::{self, Cut};
@@ -17,7 +17,7 @@ use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, Mechanism};
 use crate::output::sci;
-use crate::parallel::{Ranks, agree};
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::{Linear, Order};
 use crate::scene::Scene;
@@ -50,7 +50,7 @@ pub fn build_with(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    agree(session, options::refuse_log(session))?;
+    collectively(session, options::refuse_log(session))?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
@@ -119,12 +119,12 @@ where
         scene.method.steps.apply(step, &mut bodies);
         let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        agree(session, scene_options(session, scene, &names))?;
+        collectively(session, scene_options(session, scene, &names))?;
         let mut inner = Inner::new(session, scene, &names, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
         let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
-        let mut discrete = agree(session, discrete)?;
+        let mut discrete = collectively(session, discrete)?;
         discrete.share();
         // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
@@ -173,7 +173,7 @@ fn verified<const D: usize>(
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);
     let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
-    Ok((agree(session, verified)?, file))
+    Ok((collectively(session, verified)?, file))
 }
 
 fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
@@ -306,7 +306,7 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
 ///
 /// # Errors
 /// Unknown PETSc options, a start that is not finite, failures of PETSc.
-pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Ready> {
+pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Prepared> {
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
     let Begin { start, steps, earlier } = begin;
@@ -316,7 +316,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         None => Start::Automatic,
     };
     let mut full = start.clone();
-    let method = agree(session, method::make(session, &mut built, &mut full))?;
+    let method = collectively(session, method::make(session, &mut built, &mut full))?;
     if scene.method.steps.is_empty() {
         // what the set-up found is the start of the run; load steps have other loads
         start = full;
@@ -338,7 +338,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         options::show_help(session)?;
     }
     clock.phase("set-up");
-    Ok(Ready { built, method, start, steps, earlier, warnings })
+    Ok(Prepared { built, method, start, steps, earlier, warnings })
 }
 
 /// Warnings of options that no solver with one of these `names` has read, but for those that are `known`.
@@ -368,7 +368,7 @@ fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Resul
             }
         }
     }
-    agree(session, unknown)?;
+    collectively(session, unknown)?;
     Ok(warnings)
 }
 
@@ -376,10 +376,10 @@ fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Resul
 ///
 /// # Errors
 /// Failures of PETSc; not converging is a status of the outcome.
-pub fn iterate(ready: Ready, interrupt: &Interrupt, keep: &mut dyn Keep, clock: &mut Clock) -> Result<Done> {
+pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
     let done = match ready.built.scene.method.steps.is_empty() {
-        true => keep::solve(ready, true, keep),
+        true => recorder::solve(ready, true, keep),
         false => steps::iterate(ready, keep, clock),
     }?;
     clock.phase("iterate");

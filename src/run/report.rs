@@ -4,13 +4,13 @@ use super::clock::Clock;
 use super::ended::{All, Look};
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
-use super::{asking, balance, beyond, measure, preflight, results};
+use super::{balance, beyond, measure, preflight, requests, results};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Reached, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Kind, few};
 use crate::estimate::Estimate;
-use crate::exchange::share;
+use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, LookReport, PairReport,
@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
         Status::Converged | Status::RoundoffLimited if verdict::step_warnings(&done.steps).is_empty() => 0,
-        Status::Paused { asked } => asking::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
+        Status::Paused { asked } => requests::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
@@ -37,7 +37,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     add_outcome(&mut report, outcome, model);
     add_counters(&mut report, &shared, outcome);
     report.messages = model.exchange.messages();
-    report.memory_of_ranks = share(&*model.exchange, clock.memory.clone());
+    report.memory_of_ranks = all_gather(&*model.exchange, clock.memory.clone());
     report.steps = done.steps.clone();
     if let Some(look) = &done.look {
         add_look(&mut report, look_report(look, discrete, model), &outcome.status);
@@ -253,7 +253,7 @@ impl Shared {
             mine.solvers.push(owned.map_or(String::new(), |body| body.describe()));
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
         }
-        share(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()
+        all_gather(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()
     }
 
     /// Merge the data of another rank.

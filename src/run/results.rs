@@ -5,7 +5,7 @@ use super::ended::{All, Recovered};
 use super::stages::Done;
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Result, few};
-use crate::exchange::share;
+use crate::exchange::all_gather;
 use crate::fem::strain::{self, Strained};
 use crate::linalg::{around, bounds};
 use crate::model::{Body, BodySlot};
@@ -168,7 +168,7 @@ fn gather(discrete: &Discrete, recovered: &All) -> Vec<Option<Extremes>> {
         mine.extend(recovered.as_ref().map(|recovered| (body, Extremes::new(info, recovered))));
     }
     let mut all: Vec<Option<Extremes>> = discrete.bodies.iter().map(|_| None).collect();
-    for (body, part) in share(&*discrete.model.exchange, mine).into_iter().flatten() {
+    for (body, part) in all_gather(&*discrete.model.exchange, mine).into_iter().flatten() {
         all[body] = Some(match all[body].take() {
             Some(before) => before.merged(part),
             None => part,

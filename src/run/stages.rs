@@ -1,4 +1,4 @@
-//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Ready`], [`Done`].
+//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`].
 
 use super::clock::Clock;
 use super::ended::{All, Look};
@@ -38,12 +38,12 @@ pub struct Built {
     pub warnings: Vec<String>,
     /// Function that prepares the problem of another leg of the load history; none if this problem serves all load steps. On a leg,
     /// all loads are proportional.
-    pub again: Option<Again>,
+    pub again: Option<Reprepare>,
 }
 
 /// A function that prepares the problem with the loads of another leg of a history. Its arguments are the first step of the leg, the
 /// start, the condensed bodies of the leg before, and the clock. Collective.
-pub type Again = Rc<dyn Fn(usize, Begin, Vec<BodySlot>, &mut Clock) -> Result<Ready>>;
+pub type Reprepare = Rc<dyn Fn(usize, Begin, Vec<BodySlot>, &mut Clock) -> Result<Prepared>>;
 
 /// The start of a run that continues one on another mesh or in another process.
 #[derive(Default)]
@@ -57,7 +57,7 @@ pub struct Begin {
 }
 
 /// A problem that is prepared for its first iteration, with the method set up and a start.
-pub struct Ready {
+pub struct Prepared {
     /// The problem.
     pub built: Built,
     /// The method with its solvers, all set up.
@@ -117,9 +117,9 @@ impl Built {
 
 impl Done {
     /// Return the same problem and method, prepared for another run that starts from this outcome.
-    pub fn go_on(self, start: impl FnOnce(Outcome) -> Start) -> Ready {
+    pub fn go_on(self, start: impl FnOnce(Outcome) -> Start) -> Prepared {
         let Self { built, method, outcome, steps, earlier, warnings, .. } = self;
-        Ready { built, method, start: start(outcome), steps, earlier, warnings }
+        Prepared { built, method, start: start(outcome), steps, earlier, warnings }
     }
 
     /// Return the model of the discrete problem.

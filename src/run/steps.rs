@@ -7,11 +7,11 @@
 
 use super::clock::Clock;
 use super::ended::{self, All};
-use super::keep::{self, Keep};
 use super::measure;
+use super::recorder::{self, Recorder};
 use super::report::Shared;
 use super::results;
-use super::stages::{Begin, Done, Ready};
+use super::stages::{Begin, Done, Prepared};
 use super::verdict::{message, status_name};
 use crate::contact::law::{LayerLaw, Scaled};
 use crate::ddm::{Method, Observer, Outcome, Row, Start, Status};
@@ -29,7 +29,7 @@ use std::rc::Rc;
 ///
 /// # Errors
 /// Failures of the solver library, and loads that a body cannot have.
-pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Result<Done> {
+pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     let scene = ready.built.scene.clone();
     let history = &scene.method.steps;
     let mut all = Steps::new(keep, &ready);
@@ -40,7 +40,7 @@ pub fn iterate(mut ready: Ready, keep: &mut dyn Keep, clock: &mut Clock) -> Resu
         let (last, factor) = (all.step == history.steps.len(), all.factor);
         scale_loads(&mut ready.built.discrete.model, &all.laws, factor);
         ready.start = start(ready.start, &mut ready.method, &ready.built.discrete, &scene, [before, factor])?;
-        let mut done = keep::solve(ready, last, &mut all)?;
+        let mut done = recorder::solve(ready, last, &mut all)?;
         let interrupted = matches!(done.outcome.status, Status::Paused { .. });
         if interrupted && !last {
             let (step, count) = (all.step, history.steps.len());
@@ -108,7 +108,7 @@ fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
 
 /// An observer that passes rows and results on in the units of the scene, with iterations numbered through all steps.
 struct Steps<'a> {
-    keep: &'a mut dyn Keep,
+    keep: &'a mut dyn Recorder,
     history: History,
     /// Laws at the full load.
     laws: Vec<Rc<dyn LayerLaw>>,
@@ -132,7 +132,7 @@ struct Steps<'a> {
 
 impl<'a> Steps<'a> {
     /// Continue after the steps that another process has solved.
-    fn new(keep: &'a mut dyn Keep, ready: &Ready) -> Self {
+    fn new(keep: &'a mut dyn Recorder, ready: &Prepared) -> Self {
         ready.earlier.iter().for_each(|row| keep.row(row));
         let last = ready.earlier.last().cloned().unwrap_or_default();
         let iterations = ready.steps.iter().map(|step| step.iterations).sum();
@@ -176,7 +176,7 @@ impl<'a> Steps<'a> {
     }
 
     /// End a leg and return the problem of the next one, which begins with the pressures of this one. Collective.
-    fn end_leg(&mut self, mut done: Done, of_step: &Outcome, usable: bool, clock: &mut Clock) -> Result<Ready> {
+    fn end_leg(&mut self, mut done: Done, of_step: &Outcome, usable: bool, clock: &mut Clock) -> Result<Prepared> {
         clock.phase("iterate");
         self.end_step(&mut done, of_step);
         self.counts += Shared::gather(&done.built.discrete).counts;
@@ -243,7 +243,7 @@ impl Observer for Steps<'_> {
     }
 }
 
-impl Keep for Steps<'_> {
+impl Recorder for Steps<'_> {
     fn state(&mut self, done: &Done) {
         self.keep.state(done);
     }

@@ -2,7 +2,7 @@
 
 use super::RigidSpace;
 use crate::error::Result;
-use crate::exchange::share;
+use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable};
 use crate::model::{BodySlot, Distribution, Matrices, Model};
 use serde::{Deserialize, Serialize};
@@ -256,7 +256,7 @@ fn gather(model: &Model) -> Option<Vec<Gathered>> {
         let (motions, traces) = (motions.to_vec(), traces.to_vec());
         Some(Gathered { stiffness: stiffness.clone(), rows: rows.clone(), motions, traces })
     });
-    let mut all = share(&*model.exchange, local.collect::<Vec<_>>());
+    let mut all = all_gather(&*model.exchange, local.collect::<Vec<_>>());
     let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
     (0..model.bodies.len()).map(of).collect()
 }

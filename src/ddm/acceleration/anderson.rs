@@ -1,6 +1,6 @@
 //! Anderson acceleration of the sweep, safeguarded by F1.
 
-use super::{Acceleration, Here, Step};
+use super::{Acceleration, Iterate, Step};
 use crate::error::Result;
 use crate::model::field::Field;
 use crate::model::line::Line;
@@ -68,7 +68,7 @@ impl Acceleration for Anderson {
         "anderson"
     }
 
-    fn step(&mut self, here: &mut Here) -> Result<Step> {
+    fn step(&mut self, here: &mut Iterate) -> Result<Step> {
         let closed: Vec<bool> = here.layer.compression.iter().map(|&c| c > 0.0).collect();
         let z = &here.sweep.correction;
         if closed != self.closed {

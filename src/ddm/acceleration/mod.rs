@@ -17,7 +17,7 @@ use crate::model::layer::Layer;
 use crate::robin::{Ritz, Sweep};
 
 /// The present iterate.
-pub struct Here<'a> {
+pub struct Iterate<'a> {
     /// The problem. Its bodies carry the Robin term of this iterate.
     pub model: &'a mut Model,
     /// Number of the iterate.
@@ -32,7 +32,7 @@ pub struct Here<'a> {
     pub residual: f64,
 }
 
-impl Here<'_> {
+impl Iterate<'_> {
     /// Return r'z over all bodies.
     pub fn decrement(&self) -> f64 {
         self.sweep.decrement.iter().sum()
@@ -58,7 +58,7 @@ pub trait Acceleration {
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn step(&mut self, here: &mut Here) -> Result<Step>;
+    fn step(&mut self, here: &mut Iterate) -> Result<Step>;
 
     /// Return the Ritz values on the span of its directions, which estimate the spectrum of G^-1 F1''.
     fn ritz(&mut self) -> &mut Ritz;

@@ -1,6 +1,6 @@
 //! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
 
-use super::{Acceleration, Here, Step};
+use super::{Acceleration, Iterate, Step};
 use crate::ddm::forecast::gradients_factor;
 use crate::error::Result;
 use crate::model::field::{Field, local_dot};
@@ -29,7 +29,7 @@ impl Acceleration for Conjugate {
         "ncg"
     }
 
-    fn step(&mut self, here: &mut Here) -> Result<Step> {
+    fn step(&mut self, here: &mut Iterate) -> Result<Step> {
         let closed: Vec<bool> = here.layer.compression.iter().map(|&c| c > 0.0).collect();
         let z = &here.sweep.correction;
         let mut direction = z.clone();

@@ -1,6 +1,6 @@
 //! The paper's iteration: u <- u + gamma z.
 
-use super::{Acceleration, Here, Step};
+use super::{Acceleration, Iterate, Step};
 use crate::ddm::gamma::GammaRule;
 use crate::error::Result;
 use crate::robin::Ritz;
@@ -27,7 +27,7 @@ impl Acceleration for Relaxed {
         "robin"
     }
 
-    fn step(&mut self, here: &mut Here) -> Result<Step> {
+    fn step(&mut self, here: &mut Iterate) -> Result<Step> {
         let size = here.decrement().sqrt();
         // with a fixed gamma the slowest mode remains, and the corrections decrease by its factor 1 - gamma lambda_min
         if let Some((before, gamma)) = self.last {

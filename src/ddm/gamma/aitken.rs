@@ -1,6 +1,6 @@
 //! Aitken's rule.
 
-use super::{GammaRule, Here, LineSearch, Ritz, Unbounded};
+use super::{GammaRule, Iterate, LineSearch, Ritz, Unbounded};
 use crate::linalg::dot;
 
 /// gamma^k = -gamma^{k-1} z^{k-1}.(z^k - z^{k-1}) / |z^k - z^{k-1}|^2 on the traces: the secant of the fixed point map.
@@ -12,7 +12,7 @@ pub struct Aitken {
 }
 
 impl GammaRule for Aitken {
-    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Iterate, ritz: &mut Ritz) -> Result<f64, Unbounded> {
         let z = &here.sweep.correction.trace;
         let secant = self.last.as_ref().map(|(gamma, before)| {
             let change: Vec<f64> = z.iter().zip(before).map(|(z, before)| z - before).collect();

@@ -1,6 +1,6 @@
 //! The rule of Barzilai and Borwein.
 
-use super::{GammaRule, Here, Ritz, Unbounded};
+use super::{GammaRule, Iterate, Ritz, Unbounded};
 use crate::linalg::dot;
 use crate::model::line::Line;
 use std::collections::VecDeque;
@@ -35,7 +35,7 @@ struct Last {
 }
 
 impl GammaRule for BarzilaiBorwein {
-    fn gamma(&mut self, here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         let quotient = self.last.as_ref().map(|last| {
             // s = gamma z, G s = gamma r, y = K s + B' (change of force)
             let stiffer: Vec<f64> = here.layer.force.iter().zip(&last.force).map(|(now, then)| now - then).collect();

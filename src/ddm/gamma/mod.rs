@@ -10,7 +10,7 @@ pub use barzilai::BarzilaiBorwein;
 pub use search::LineSearch;
 pub use spectral::Spectral;
 
-use super::acceleration::Here;
+use super::acceleration::Iterate;
 use super::forecast::{best_factor, relaxed_factor};
 use crate::model::line::Unbounded;
 use crate::problem::own::Own;
@@ -22,7 +22,7 @@ pub trait GammaRule {
     ///
     /// # Errors
     /// [`Unbounded`] if F1 falls for ever along the correction.
-    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded>;
+    fn gamma(&mut self, here: &mut Iterate, ritz: &mut Ritz) -> Result<f64, Unbounded>;
 
     /// Return the factor by which an iteration reduces the slowest mode, if the rule has one. The spectrum of G^-1 F1'' lies in (low, high).
     fn factor(&self, _spectrum: (f64, f64)) -> Option<f64> {
@@ -47,7 +47,7 @@ pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 pub struct Stationary(pub f64);
 
 impl GammaRule for Stationary {
-    fn gamma(&mut self, _here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, _here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Ok(self.0)
     }
 
@@ -65,7 +65,7 @@ impl GammaRule for Stationary {
 pub struct Schedule(pub Vec<f64>);
 
 impl GammaRule for Schedule {
-    fn gamma(&mut self, here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Ok(self.0[here.k.min(self.0.len() - 1)])
     }
 

@@ -1,6 +1,6 @@
 //! Exact line search.
 
-use super::{GammaRule, Here, Ritz, Unbounded, best_factor};
+use super::{GammaRule, Iterate, Ritz, Unbounded, best_factor};
 use crate::model::line::Line;
 
 /// gamma^k minimises F1 along the correction. F1 is convex, so it falls in every step.
@@ -8,7 +8,7 @@ use crate::model::line::Line;
 pub struct LineSearch;
 
 impl GammaRule for LineSearch {
-    fn gamma(&mut self, here: &mut Here, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
         Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction).minimize(1e-6)
     }
 

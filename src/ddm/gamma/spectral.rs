@@ -1,6 +1,6 @@
 //! The best stationary gamma, from estimates of the bounds of the spectrum of G^-1 F1'' during the run.
 
-use super::{GammaRule, Here, LineSearch, Ritz, Unbounded, best_factor};
+use super::{GammaRule, Iterate, LineSearch, Ritz, Unbounded, best_factor};
 use crate::ddm::forecast::best_gamma;
 
 /// gamma = 2 / (lambda_min + lambda_max) with the estimated bounds; exact line search until there are estimates.
@@ -11,7 +11,7 @@ pub struct Spectral {
 }
 
 impl GammaRule for Spectral {
-    fn gamma(&mut self, here: &mut Here, ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, here: &mut Iterate, ritz: &mut Ritz) -> Result<f64, Unbounded> {
         // the estimate is out of date if the residual grows or the contact changes
         let steady =
             self.last.is_some_and(|(residual, closed)| here.residual < residual && here.layer.closed == closed);

@@ -1,14 +1,14 @@
 //! Runs that pause: who watches them and keeps what they have, and how they go on.
 
-use super::asking;
 use super::ended::All;
-use super::stages::{Done, Ready};
+use super::requests;
+use super::stages::{Done, Prepared};
 use super::{look, results};
 use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
 use crate::error::Result;
 
 /// An observer that keeps what a run has. All calls are collective; what cannot be written is no reason to end the run.
-pub trait Keep: Observer {
+pub trait Recorder: Observer {
     /// Keeps the state of a run, or of its load step, from which it can go on.
     fn state(&mut self, _done: &Done) {}
 
@@ -20,16 +20,16 @@ pub trait Keep: Observer {
     fn results(&mut self, _done: &mut Done) {}
 }
 
-impl Keep for Silent {}
+impl Recorder for Silent {}
 
 /// Solves through all pauses until a rule or a signal ends the run. At the full load it may end at the error of the discretisation,
 /// and the interval of gamma is found if the scene asks for it.
-pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> {
+pub fn solve(mut ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
     if let Start::Continue(state) = &ready.start {
         state.rows.iter().for_each(|row| keep.row(row));
     }
     loop {
-        let Ready { mut built, mut method, start, steps, earlier, warnings } = ready;
+        let Prepared { mut built, mut method, start, steps, earlier, warnings } = ready;
         let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval && full);
         let mut settings = Settings { stop, interval, balance: built.balance().filter(|_| full), start };
         let outcome = ddm::solve(&mut built.discrete.model, &mut method, &mut settings, keep)?;
@@ -42,10 +42,10 @@ pub fn solve(mut ready: Ready, full: bool, keep: &mut dyn Keep) -> Result<Done> 
             return Ok(done);
         };
         keep.state(&done);
-        if asking::signal(asked).is_some() {
+        if requests::signal(asked).is_some() {
             return Ok(done);
         }
-        if asking::is_snapshot(asked) {
+        if requests::is_snapshot(asked) {
             keep.results(&mut done);
         }
         ready = done.go_on(|outcome| Start::Continue(outcome.into_state()));

@@ -11,14 +11,14 @@ const CHECKPOINT: u8 = SNAPSHOT << 1;
 const _: () = assert!(CHECKPOINT == 1 << (ASKS - 1), "a message has as many kinds");
 
 /// Signals, and the time for the next checkpoint.
-pub struct Asking {
+pub struct Requests {
     interrupt: Interrupt,
     /// Time between checkpoints, on the rank that keeps it.
     every: Option<Duration>,
     last: Cell<Instant>,
 }
 
-impl Asking {
+impl Requests {
     /// Asks for a checkpoint after every `minutes`, if there are any.
     pub fn new(interrupt: &Interrupt, minutes: Option<f64>) -> Self {
         let every = minutes.and_then(|minutes| Duration::try_from_secs_f64(60.0 * minutes).ok());
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn time_asks_for_checkpoints_and_nothing_else() {
-        let asking = |minutes| Asking::new(&Interrupt::default(), minutes).bits();
+        let asking = |minutes| Requests::new(&Interrupt::default(), minutes).bits();
         assert_eq!([asking(None), asking(Some(1e9)), asking(Some(0.0))], [0, 0, CHECKPOINT]);
         assert_eq!((signal(CHECKPOINT | SNAPSHOT), is_snapshot(CHECKPOINT)), (None, false));
         let told = [0b111, 0b110, 0b100].map(signal_name);
