@@ -108,18 +108,18 @@ where
     })?;
     let Shared { bodies: shared, mut pairs, contacts, mechanisms, balanced, fine, plan } = shared;
     let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
+    let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
         factory.adopt(plan)?;
         for (pair, contact) in pairs.iter_mut().zip(&contacts) {
             pair.law = law::make(&contact.spec.layer, &scene.laws, &pair.position)?;
         }
     }
-    let locals = give(prepared, &exchange)?;
     let carried: Vec<Vec<f64>> = shared.iter().map(|body| body.carried.clone()).collect();
     let (mut slots, mut infos, mut shapes, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Counts::default());
     for ((spec, shared), (local, graph)) in bodies.iter().zip(shared).zip(locals) {
-        let ready = Assembler { spec, plane: scene.plane, shared, local, graph };
-        let Finished { slot, info, shape } = ready.make(&verified.mesh, exchange.rank(), factory, &mut counts)?;
+        let body = Assembler { spec, plane: scene.plane, shared, local, graph };
+        let Finished { slot, info, shape } = body.make(&verified.mesh, exchange.rank(), factory, &mut counts)?;
         slots.push(slot);
         infos.push(info);
         shapes.extend(shape);

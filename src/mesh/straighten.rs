@@ -10,7 +10,7 @@ use crate::problem::order::Order;
 
 impl<const D: usize> Mesh<D> {
     /// Make the edges of all folded cells straight, until no cell is folded, and count the cells in [`Mesh::straightened`]. Neighbours share the edges: a
-    /// cell that is folded by that follows. Cells that other ranks have taken already are not looked at.
+    /// cell that is folded by that follows.
     pub fn straighten(&mut self) {
         if self.order == Order::P1 {
             return;
