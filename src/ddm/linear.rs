@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::model::linear::{Failure, LinearStep, System, Trial};
-use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::rigid::Motions;
 use crate::model::surface::surface_slopes;
 use crate::model::{Field, Layer, Model};
 
@@ -45,7 +45,7 @@ pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
     let motions = Motions::of(model);
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
-        let mut free = motions.springs(&springs).factor(TOLERANCE).kernel();
+        let mut free = motions.springs(&springs).factor().kernel();
         if free.is_empty() {
             break;
         }

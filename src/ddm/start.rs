@@ -22,7 +22,7 @@ use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::line::{self, Unbounded};
-use crate::model::rigid::{Motions, Moved, PART, TOLERANCE};
+use crate::model::rigid::{Motions, Moved, PART};
 use crate::model::surface::{contact_slopes, in_series, surface_slopes};
 use nalgebra::DVector;
 
@@ -149,7 +149,7 @@ impl Rigid<'_> {
         }
         let mut stiffness = self.motions.springs(&all);
         self.ground.stored().for_each(|(i, j, block)| stiffness.add(i, j, block));
-        stiffness.factor(TOLERANCE).solve(load)
+        stiffness.factor().solve(load)
     }
 
     /// Find the minimum by Newton's method with line search, from these amounts.

@@ -177,7 +177,7 @@ impl<const D: usize> Search<'_, '_, D> {
         }
         let rows = self.rows(bodies);
         let resisted = rows.feel(bodies.iter().map(|&body| &self.unconstrained[body].motions[..]));
-        let factor = resisted.springs(&rows.weight).factor(TOLERANCE);
+        let factor = resisted.springs(&rows.weight).factor();
         let moving = |entries: &Vec<(usize, f64)>| {
             let mut moving = Moving { bodies: Vec::new(), motions: Vec::new(), name: String::new(), error: 0.0 };
             let mut each = Vec::new();

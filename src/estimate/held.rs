@@ -6,7 +6,7 @@
 
 use crate::discretize::meshes::Meshes;
 use crate::linalg::dot;
-use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::rigid::Motions;
 use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 
@@ -40,7 +40,7 @@ impl HoldingSprings {
             let could = motion.iter().zip(acting.iter()).map(|(amount, size)| (amount * size).abs()).sum::<f64>();
             motion.dot(&ground.multiply(motion)) > 0.0 && motion.dot(&loads).abs() <= CARRIED * could
         };
-        let mut motions = all.springs(&layer.springs(model)).factor(TOLERANCE).kernel();
+        let mut motions = all.springs(&layer.springs(model)).factor().kernel();
         motions.retain(only_holds);
         let pulls: Vec<DVector<f64>> = motions.iter().map(|motion| ground.multiply(motion)).collect();
         let stiffness = DMatrix::from_fn(motions.len(), motions.len(), |i, j| motions[i].dot(&pulls[j]));

@@ -310,9 +310,9 @@ impl Factor {
 }
 
 impl Blocks {
-    /// Factor the matrix and find its kernel: see [`Factor`]. `tolerance` is [`TOLERANCE`] unless there is a reason for another.
-    pub fn factor(&self, tolerance: f64) -> Factor {
-        Factor::new(self, unit_diagonal(self, tolerance), tolerance)
+    /// Factor the matrix and find its kernel: see [`Factor`].
+    pub fn factor(&self) -> Factor {
+        Factor::new(self, unit_diagonal(self), TOLERANCE)
     }
 
     /// Return a basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`. `full` is the entry of a motion that is fully
@@ -340,10 +340,10 @@ struct Run {
 }
 
 /// Return 1/root of each diagonal entry, zero where the entry is rounding.
-fn unit_diagonal(matrix: &Blocks, tolerance: f64) -> Vec<f64> {
+fn unit_diagonal(matrix: &Blocks) -> Vec<f64> {
     let of = |i: usize| {
         let diagonal = matrix.diagonal(i).diagonal();
-        let least = tolerance * tolerance * diagonal.iter().copied().fold(0.0, f64::max);
+        let least = TOLERANCE * TOLERANCE * diagonal.iter().copied().fold(0.0, f64::max);
         let scale = |value: &f64| if *value > least { value.sqrt().recip() } else { 0.0 };
         diagonal.iter().map(scale).collect::<Vec<f64>>()
     };

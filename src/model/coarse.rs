@@ -6,7 +6,7 @@
 //! HZ = B'D BZ takes only sums over contact points. Z'HZ has one block for each body and one for each two bodies in contact. Motions that no spring resists
 //! are left out.
 
-use super::rigid::{Motions, TOLERANCE};
+use super::rigid::Motions;
 use super::{Exchange, Model, Motion, Segment};
 use crate::linalg::{Factor, axpy, dot, fit};
 use nalgebra::DVector;
@@ -77,7 +77,7 @@ pub struct Coarse {
 impl Coarse {
     /// Factor Z'HZ for `springs`, the diagonal of D, one entry a contact point.
     pub fn new(space: Rc<Space>, springs: &[f64]) -> Self {
-        let factor = space.motions().springs(springs).factor(TOLERANCE);
+        let factor = space.motions().springs(springs).factor();
         Self { space, springs: springs.to_vec(), factor }
     }
 

@@ -11,7 +11,7 @@ use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::line::zero;
 use crate::model::linear::Trial;
-use crate::model::rigid::{Motions, TOLERANCE};
+use crate::model::rigid::Motions;
 
 /// Bounds of F1'' in the norm of the Robin form G over a level set: `lower` G <= F1'' <= `upper` G.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
     let Some((_, upper)) = spectrum(model, &most, &start)? else { return Ok(None) };
     let springs = model.forces(&least);
     let motions = Motions::of(model);
-    let lower = match motions.springs(&springs).factor(TOLERANCE).rank() < motions.count() {
+    let lower = match motions.springs(&springs).factor().rank() < motions.count() {
         true => 0.0,
         false => spectrum(model, &least, &start)?.map_or(0.0, |(low, _)| low),
     };
