@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Let the C library return arrays of a megabyte and more to the system as soon as they are freed.
 ///
-/// By itself the C library takes such arrays from its heap after some time, where holes remain. SuperLU_DIST, which PETSc brings, forbids
-/// separate arrays for the whole process when it is loaded, so this is called again then. Without both calls the peak memory is larger:
-/// 154 MB for 134 MB (`flange`), 351 for 332 (`groove-held` with n = 128), 680 for 656 (`hertz-sphere`, condensed), 181 for 176 (by hypre).
+/// By itself the C library soon takes such arrays from its heap, where holes remain. SuperLU_DIST, which PETSc brings, even forbids separate
+/// arrays for the whole process when it is loaded, so this is called again then. Without any call of this module the peak memory is larger:
+/// 153 MB for 133 (`flange`), 351 for 331 (`groove-held` with n = 128), 676 for 656 (`groove3d` with n = 48 by hypre), 178 for 177
+/// (`hertz-sphere` by hypre). A difference in time is not measurable.
 pub fn keep_apart() {
     #[cfg(target_env = "gnu")]
     // SAFETY: parameters of the C library, and values that it accepts.
