@@ -4,9 +4,9 @@
 //! needed: the library that has them depends on the installation, and only OpenBLAS has those with `openblas_`, which are public.
 //!
 //! OpenBLAS chooses its kernels by the model number of the processor. For a model newer than itself it may choose those for the first
-//! processors with SSE3. On a Xeon of 2023 `hertz-sphere` with n = 6 and quadratic elements
-//! takes 84 CPU s with them and 30 with those for AVX-512. On an EPYC `groove3d` with n = 12 takes 1.19 CPU s by MUMPS with them and 0.92 with
-//! those for AVX2. So a run warns, with the variable to set.
+//! processors with SSE3. On a Xeon of 2023 `hertz-sphere` with n = 6 and quadratic elements takes 84 CPU s with these and 30 with those for
+//! AVX-512. On an EPYC `groove3d` with n = 12 takes 1.19 CPU s by MUMPS with these and 0.92 with those for AVX2. So a run warns, with the
+//! variable to set.
 
 use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};

@@ -61,7 +61,7 @@ mod words;
 pub use around::Subspace;
 pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
-pub use heap::{Heap, keep_apart, leave};
+pub use heap::{Heap, keep_apart, keep_at_hand, leave};
 pub use ksp::{Ksp, Solved};
 pub use matrix::Matrix;
 pub use metis::nested_dissection;

@@ -18,7 +18,7 @@ use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, Mechanism};
 use crate::output::sci;
 use crate::parallel::{Ranks, collectively};
-use crate::petsc::Session;
+use crate::petsc::{Session, keep_apart, keep_at_hand};
 use crate::problem::{Linear, Order};
 use crate::scene::Scene;
 use crate::solver::options;
@@ -378,10 +378,13 @@ fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Resul
 /// Failures of PETSc; not converging is a status of the outcome.
 pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
+    keep_at_hand();
     let done = match ready.built.scene.method.steps.is_empty() {
         true => recorder::solve(ready, true, keep),
         false => steps::iterate(ready, keep, clock),
-    }?;
+    };
+    keep_apart();
+    let done = done?;
     clock.phase("iterate");
     Ok(done)
 }
