@@ -21,7 +21,7 @@ pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
 
 /// Return the folders that may hold the cache, best first. $WINKLER_CACHE stands alone if it is set. Otherwise they are
 /// $XDG_CACHE_HOME/winkler, ~/.cache/winkler and a folder of this user for temporary files. Folders that others can write to
-/// are excluded.
+/// are excluded, $WINKLER_CACHE too; the others then take its place.
 pub fn folders() -> Vec<PathBuf> {
     choose(|name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from))
 }

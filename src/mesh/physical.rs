@@ -38,8 +38,8 @@ impl Physical {
         self.entities.get(&(dimension, tag)).map(Vec::as_slice)
     }
 
-    /// Return the first entity of a dimension that belongs to a group and for which `has`, which tells whether it has elements,
-    /// is false.
+    /// Return the first entity of a dimension that belongs to a group and has no elements. `has` tells whether an entity, given by
+    /// dimension and tag, has elements.
     pub fn without(&self, dimension: usize, has: impl Fn((usize, i32)) -> bool) -> Option<i32> {
         let of = self.entities.iter().filter(|(entity, groups)| entity.0 == dimension && !groups.is_empty());
         of.map(|(entity, _)| *entity).filter(|entity| !has(*entity)).map(|(_, tag)| tag).min()

@@ -117,7 +117,7 @@ fn of_unit_size(vertices: &[[f64; 3]]) -> [[f64; 3]; 4] {
         *edge = std::array::from_fn(|c| vertex[c] - vertices[0][c]);
     }
     let largest = scaled.iter().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
-    // The scale is applied as two roots, since the reciprocal of a tiny number overflows.
+    // The root of the scale is applied twice, since the reciprocal of a tiny number overflows.
     let root = if largest > 0.0 { (-0.5 * largest.log2()).round().exp2() } else { 1.0 };
     scaled.iter_mut().flatten().for_each(|x| *x = *x * root * root);
     scaled
