@@ -10,8 +10,9 @@ use crate::linalg::{bounds, pad};
 use std::cmp::Ordering;
 use std::ops::Range;
 
-/// Return the part of each point, from 0 to `parts - 1`. The weights of all parts are equal to within the weight of one point.
-/// All points are cut across the longest side of the box around them, then those on either side likewise.
+/// Return the part of each point, from 0 to `parts - 1`. All points are cut across the longest side of the box around them,
+/// then those on either side likewise. Each cut divides the weight in proportion to the parts on its sides, to within the
+/// weight of one point.
 pub fn bisect<const D: usize>(points: &[[f64; D]], weight: &[u32], parts: usize) -> Vec<u32> {
     let mut part_of = vec![0; points.len()];
     let all: Vec<u32> = (0..points.len() as u32).collect();
@@ -100,7 +101,7 @@ mod tests {
         assert!(parts::<2>(&[], 3).is_empty());
     }
 
-    /// Parts have equal weights to within that of one point, whatever the weights of the points.
+    /// Parts have equal weights to within those of a few points, whatever the weights of the points.
     #[test]
     fn parts_weigh_the_same() {
         let points: Vec<[f64; 3]> =
