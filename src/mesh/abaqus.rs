@@ -1,14 +1,15 @@
-//! Input files of Abaqus and CalculiX (`.inp`) as Gmsh's format 2.2, which Debian's Gmsh reads: nodes, elements, and named sets.
+//! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 2.2, which Debian's Gmsh reads: nodes, elements, and named
+//! sets.
 //!
-//! Element sets become groups of cells or facets, surfaces (`*SURFACE, TYPE=ELEMENT`) groups of facets, and node sets groups of points.
-//! Names are written small, with `_` for what no name has. All other keywords are passed over.
+//! Element sets become groups of cells or facets, surfaces (`*SURFACE, TYPE=ELEMENT`) groups of facets, and node sets groups of
+//! points. Names are written in lower case. Characters that no name can have become `_`. All other keywords are skipped.
 
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
 
-/// What is known of a kind of element: Gmsh's number, and the vertices of its faces S1, S2, ... in the order of Abaqus.
+/// A kind of element: Gmsh's number, and the vertices of its faces S1, S2, ... in the order of Abaqus.
 struct Kind {
     number: u8,
     nodes: usize,
@@ -27,11 +28,11 @@ const HEXAHEDRON: &[&[usize]] =
     &[&[0, 1, 2, 3], &[4, 7, 6, 5], &[0, 4, 5, 1], &[1, 5, 6, 2], &[2, 6, 7, 3], &[3, 7, 4, 0]];
 
 impl Kind {
-    /// The kind that a TYPE names, if it can be used.
+    /// Return the kind that a TYPE names, if it can be used.
     fn of(name: &str) -> Option<Kind> {
         let kind = |number, nodes, dimension, faces| Some(Kind { number, nodes, dimension, faces });
         let (family, digits) = match name.find(|c: char| c.is_ascii_digit()) {
-            // C3D8R, M3D4: the number of nodes stands behind the D
+            // In C3D8R and M3D4 the number of nodes follows the D.
             _ if name.starts_with("C3D") || name.starts_with("M3D") || name.starts_with("SFM3D") => {
                 name.split_at(name.find('D')? + 1)
             }
@@ -51,7 +52,7 @@ impl Kind {
         }
     }
 
-    /// Gmsh's number for a face of so many nodes.
+    /// Return Gmsh's type number of a face with this number of nodes.
     fn facet(&self, nodes: usize) -> u8 {
         match (self.dimension, nodes) {
             (2, 2) => 1,
@@ -63,25 +64,25 @@ impl Kind {
     }
 }
 
-/// An element: its kind, and its nodes.
+/// An element: the index of its kind, and the tags of its nodes.
 type Element = (usize, Vec<u64>);
 
-/// The same with Gmsh's number of its kind.
+/// An element with Gmsh's number of its kind, and the tags of its nodes.
 type Numbered = (u8, Vec<u64>);
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Default)]
 struct Model {
     nodes: BTreeMap<u64, [f64; 3]>,
     elements: BTreeMap<u64, Element>,
     kinds: Vec<Kind>,
-    /// Elements, nodes, and faces (element or set, face) by the names of their sets.
+    /// Elements, nodes, and faces (element, number of the face) by the names of their sets.
     element_sets: BTreeMap<String, Vec<u64>>,
     node_sets: BTreeMap<String, Vec<u64>>,
     surfaces: BTreeMap<String, Vec<(u64, usize)>>,
 }
 
-/// The data lines that follow a keyword.
+/// The kind of data lines that follow a keyword.
 enum Data {
     Nodes(Option<String>),
     Elements { kind: usize, set: Option<String>, open: Vec<u64> },
@@ -90,10 +91,11 @@ enum Data {
     Other,
 }
 
-/// The file in Gmsh's format 2.2.
+/// Return the file in Gmsh's format 2.2.
 ///
 /// # Errors
-/// Lines that are none of Abaqus, parts and assemblies, elements of other kinds, sets of what is not there; with the line.
+/// A line is not one of Abaqus. The file has parts or assemblies, or elements of other kinds. A set has members that do not
+/// exist. Errors in a line name it.
 pub fn convert(path: &Path, text: &str) -> Result<String> {
     let mut model = Model::default();
     let mut data = Data::Other;
@@ -115,7 +117,7 @@ pub fn convert(path: &Path, text: &str) -> Result<String> {
     model.write().map_err(|message| Error::mesh(path, None, message))
 }
 
-/// A name as groups have it.
+/// Return a name in the form that groups have.
 fn name(word: &str) -> String {
     let small = word.trim().trim_matches('"').to_ascii_lowercase();
     small.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
@@ -128,7 +130,7 @@ fn count<T: std::str::FromStr>(word: &str) -> std::result::Result<T, String> {
 type TextResult<T> = std::result::Result<T, String>;
 
 impl Model {
-    /// Opens a keyword.
+    /// Start a keyword: return the kind of its data lines.
     fn begin(&mut self, line: &str) -> TextResult<Data> {
         let mut words = line.split(',').map(str::trim);
         let keyword = words.next().unwrap_or_default().to_ascii_uppercase();
@@ -168,7 +170,7 @@ impl Model {
         })
     }
 
-    /// Reads a data line.
+    /// Read a data line.
     fn read(&mut self, data: Data, line: &str) -> TextResult<Data> {
         let continues = line.ends_with(',');
         let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
@@ -235,7 +237,8 @@ impl Model {
         }
     }
 
-    /// Return the mesh in Gmsh's format 2.2, each group as a physical one on an entity of its own: an element of several groups is written for each.
+    /// Return the mesh in Gmsh's format 2.2. Each group is a physical one on an entity of its own, so an element of several
+    /// groups is written once for each.
     fn write(&self) -> TextResult<String> {
         let mut groups = self.element_groups()?;
         groups.extend(self.facet_groups()?);
@@ -306,7 +309,7 @@ impl Model {
         Ok(groups)
     }
 
-    /// Write the elements of all groups; those of group k have the physical and elementary tag k + 1.
+    /// Write the elements of all groups. Those of group k have the physical and elementary tag k + 1.
     fn write_elements(&self, groups: &[Written], text: &mut String) -> TextResult<()> {
         let total: usize = groups.iter().map(|group| group.elements.len()).sum();
         let _ = writeln!(text, "$Elements\n{total}");
@@ -329,14 +332,14 @@ impl Model {
     }
 }
 
-/// A group as it is written.
+/// A group in the form in which it is written.
 struct Written<'a> {
     dimension: usize,
     name: &'a str,
     elements: Vec<Numbered>,
 }
 
-/// Write the names of groups. An element set and a node set may have one name: then the name of the node set is another one.
+/// Write the names of groups. If an element set and a node set have the same name, that of the node set gets a suffix.
 fn write_names(groups: &[Written], text: &mut String) {
     let mut used: Vec<&str> = groups.iter().map(|group| group.name).collect();
     used.sort_unstable();

@@ -1,4 +1,4 @@
-//! A mesh that a Rust program brings as arrays.
+//! A mesh that a Rust program supplies as arrays.
 
 use super::{Group, Mesh, simplex};
 use crate::error::{Error, Result};
@@ -9,11 +9,12 @@ use std::path::Path;
 /// Name in messages, where meshes from files have their path.
 const NAME: &str = "mesh arrays";
 
-/// The mesh of these arrays, cells turned to positive volume. Points keep their numbers.
+/// Return the mesh of these arrays, with cells turned to positive volume. Points keep their numbers.
 ///
 /// # Errors
-/// Coordinates that are not finite, points off the plane if `D` is 2, groups without a name or simplices, with numbers of points that
-/// do not exist, with simplices without extent, of dimension above `D`; two groups of one name; an `order` above that of the arrays.
+/// A coordinate is not finite, or a point is off the plane if `D` is 2. A group has no name or no simplices, or two groups have
+/// the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension above `D`. `order`
+/// is above that of the arrays.
 pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
     let MeshArrays { points, order: own, groups } = arrays;
     if *own < order {
@@ -73,7 +74,7 @@ fn refuse(message: impl Into<String>) -> Error {
 mod tests {
     use super::*;
 
-    /// Two triangles of the unit square, the second one inside out, and its lower side.
+    /// Return two triangles of the unit square, with the second one inverted, and its lower side.
     fn square() -> MeshArrays {
         let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [9.0, 9.0, 0.0]];
         MeshArrays::new(points).group("all", 2, vec![0, 1, 2, 0, 3, 2]).group("low", 1, vec![1, 0])

@@ -1,16 +1,18 @@
-//! Points over ranks by their places: recursive bisection of coordinates.
+//! A partition of points over ranks: recursive bisection of coordinates.
 //!
-//! Points of two bodies that lie together in a contact are in one part, or in parts next to each other.
+//! Points of two bodies that lie together in a contact are in the same part, or in neighbouring parts.
 //!
-//! Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54, 54; hertz-sphere n = 26, edge = 1, P1 53, 58,
-//! 57, 52, 55; flange 110, 109, 109, 113, 107. Parts that METIS made of the graph of the nodes took as many to some per cent.
+//! Iterations of all linear steps with hypre on 1, 2, 3, 5, 8 ranks: groove3d n = 24 50, 53, 54, 54, 54; hertz-sphere n = 26,
+//! edge = 1, P1 53, 58, 57, 52, 55; flange 110, 109, 109, 113, 107. Partitions by METIS of the graph of the nodes took as many,
+//! within some per cent.
 
 use crate::linalg::{bounds, pad};
 use std::cmp::Ordering;
 use std::ops::Range;
 
-/// Return the part of each point, of so many `parts` of equal weight to that of one point: all points are cut across the longest side of the box around them,
-/// then those on either side likewise.
+/// Return the part of each point, from 0 to `parts - 1`. All points are cut across the longest side of the box around them,
+/// then those on either side likewise. Each cut divides the weight in proportion to the parts on its sides, to within the
+/// weight of one point.
 pub fn bisect<const D: usize>(points: &[[f64; D]], weight: &[u32], parts: usize) -> Vec<u32> {
     let mut part_of = vec![0; points.len()];
     let all: Vec<u32> = (0..points.len() as u32).collect();
@@ -39,8 +41,8 @@ fn longest<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> usize {
     (0..D).rev().max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0)
 }
 
-/// Bring the first points of an order, as many as weigh no more than `share` together, before the others; return how many they are. The time is linear,
-/// as each search halves the points among which the last of them may be.
+/// Move the first points of an order to the front, as many as together weigh no more than `share`, and return their number. The
+/// time is linear, since each step halves the range in which the last of these points may be.
 fn split(points: &mut [u32], share: u64, weight: &dyn Fn(u32) -> u64, order: &dyn Fn(&u32, &u32) -> Ordering) -> usize {
     let (mut open, mut before) = (0..points.len(), 0);
     while !open.is_empty() {
@@ -59,7 +61,8 @@ fn split(points: &mut [u32], share: u64, weight: &dyn Fn(u32) -> u64, order: &dy
     open.start
 }
 
-/// The order of two points with their numbers along an axis; planes of equal coordinates are cut along the other axes.
+/// Compare two points, given with their numbers, along an axis. Points with equal coordinates are compared along the other
+/// axes, and then by number.
 fn compare<const D: usize>(axis: usize, a: (&[f64; D], u32), b: (&[f64; D], u32)) -> Ordering {
     let along = (0..D).map(|k| (axis + k) % D).map(|c| a.0[c].total_cmp(&b.0[c]));
     along.fold(Ordering::Equal, Ordering::then).then(a.1.cmp(&b.1))
@@ -73,8 +76,8 @@ mod tests {
         bisect(points, &vec![1; points.len()], count)
     }
 
-    /// A long box is cut across; points of a plane, of which a whole number of parts has not room, along the next axis; parts differ by one
-    /// point at most, and are those of any order of the points.
+    /// A long box is cut across. A plane of points that does not belong to one part as a whole is cut along the next axis.
+    /// Parts differ by at most one point and do not depend on the order of the points.
     #[test]
     fn boxes_are_cut_across() {
         let points: Vec<[f64; 3]> =
@@ -84,20 +87,21 @@ mod tests {
         let fifths = parts(&points, 5);
         let counts: Vec<usize> = (0..5).map(|part| fifths.iter().filter(|&&of| of == part).count()).collect();
         assert_eq!(counts, [96; 5]);
-        // planes of the lower half weigh twice as much: two thirds of the weight, below the ninth of 24 planes
+        // Planes of the lower half weigh twice as much and have two thirds of the weight. Half of the weight is that of the
+        // first nine of 24 planes.
         let weights: Vec<u32> = points.iter().map(|x| if x[2] < 12.0 { 2 } else { 1 }).collect();
         let halves = bisect(&points, &weights, 2);
         assert!(points.iter().zip(&halves).all(|(x, &half)| (x[2] < 9.0) == (half == 0)));
         let back: Vec<[f64; 3]> = points.iter().rev().copied().collect();
         assert!(parts(&back, 5).iter().rev().eq(&fifths));
-        // two points of a place may be in two parts, and more parts than points leave some empty
+        // Two points at the same position may be in two parts, and more parts than points leave some parts empty.
         assert_eq!(parts(&[[0.0, 0.0]; 2], 2), [0, 1]);
         let few = parts(&[[0.0], [1.0]], 5);
         assert!(few[0] < few[1] && few[1] < 5);
         assert!(parts::<2>(&[], 3).is_empty());
     }
 
-    /// Parts have the same weight to that of one point, whatever the weights.
+    /// Parts have equal weights to within those of a few points, whatever the weights of the points.
     #[test]
     fn parts_weigh_the_same() {
         let points: Vec<[f64; 3]> =

@@ -1,4 +1,4 @@
-//! The cache of meshes that Gmsh made: one file for each script, set of numbers, order, dimension and Gmsh.
+//! The cache of meshes that Gmsh made, with one file for each combination of script, numbers, order, dimension and Gmsh.
 
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
@@ -11,16 +11,17 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Name of the file in the cache for what a mesh was made from, beginning with that of its script. It changes with how this program calls
-/// Gmsh.
+/// Return the name of the file in the cache for a mesh with these inputs. It begins with the name of the script. The digest
+/// includes a version, which changes with the way this program calls Gmsh.
 pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    // 128 bits are plenty.
+    // A prefix of 128 bits is long enough.
     format!("{stem}-{:.32}.msh", digest(&("winkler mesh 3", made_from)))
 }
 
-/// Return the folders that may hold the cache, best first: $WINKLER_CACHE alone, or else $XDG_CACHE_HOME/winkler,
-/// ~/.cache/winkler and a folder of this user for temporary files. Folders into which others may put files are left out.
+/// Return the folders that may hold the cache, best first. $WINKLER_CACHE stands alone if it is set. Otherwise they are
+/// $XDG_CACHE_HOME/winkler, ~/.cache/winkler and a folder of this user for temporary files. Folders that others can write to
+/// are excluded, $WINKLER_CACHE too; the others then take its place.
 pub fn folders() -> Vec<PathBuf> {
     choose(|name| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from))
 }
@@ -46,38 +47,39 @@ fn is_of_others(data: &Metadata) -> bool {
 /// The bit of a mode that lets everybody write.
 const WRITABLE_BY_ALL: u32 = 0o002;
 
-/// Return whether a folder that exists, or the link to it, is another user's or may be written by everybody: a mesh in it may be
-/// anybody's, and would be the answer to another problem.
+/// Return whether a folder that exists, or the link to it, belongs to another user or can be written by everybody. Anybody
+/// might have put a mesh there, which would then answer another problem.
 fn is_open_to_others(folder: &Path) -> bool {
     [std::fs::symlink_metadata(folder), std::fs::metadata(folder)].iter().flatten().any(is_of_others)
 }
 
-/// Open a file of the cache, unless it is another user's.
+/// Open a file of the cache, unless another user owns it or everybody can write to it.
 pub fn open(path: &Path) -> Option<File> {
     let file = File::open(path).ok()?;
     file.metadata().ok().filter(|data| !is_of_others(data)).map(|_| file)
 }
 
-/// Bytes that a disk must still take after a mesh failed, else it was full: some pages, more than what the end of a file leaves.
+/// Bytes that the disk must still accept after a mesh failed; otherwise it was full. They are some pages, more than the end of
+/// a file leaves free.
 const ROOM: usize = 1 << 16;
 
-/// A folder of one process inside the cache, gone with its last use: files are finished there and then moved, so that
-/// nobody ever reads half a file. What a killed process left is removed by the next one.
+/// A folder of one process inside the cache, removed when it is dropped. Files are finished there and then moved, so that
+/// nobody ever reads half a file. The next process removes what a killed process left behind.
 pub struct Workshop {
     cache: PathBuf,
     folder: PathBuf,
-    /// Locked as long as the process lives: the sign that the folder is in use.
+    /// Lock that is held as long as the process lives, to show that the folder is in use.
     _lock: Option<File>,
 }
 
-/// How names of workshops begin.
+/// Prefix of the names of workshops.
 const PREFIX: &str = "tmp-";
 
-/// Age from which a workshop without a lock belongs to nobody; where the file system knows no locks, all are without.
+/// Age from which a workshop without a lock counts as abandoned. On file systems without locks no workshop has one.
 const OLD: Duration = Duration::from_secs(24 * 3600);
 
 impl Workshop {
-    /// Opens one in the first of the folders where that is possible.
+    /// Open a workshop in the first of the folders where that is possible.
     ///
     /// # Errors
     /// No folder can be written.
@@ -87,7 +89,7 @@ impl Workshop {
         let mut failure = None;
         for cache in folders {
             let folder = cache.join(&name);
-            // nobody else writes there, whatever the umask
+            // The mode keeps others from writing there, whatever the umask.
             match DirBuilder::new().recursive(true).mode(0o755).create(&folder) {
                 Ok(()) => {
                     remove_left(cache);
@@ -100,12 +102,13 @@ impl Workshop {
         Err(error.help("meshes are kept there: name a folder that can be written in $WINKLER_CACHE"))
     }
 
-    /// The folder to work in.
+    /// Return the folder to work in.
     pub fn path(&self) -> &Path {
         &self.folder
     }
 
-    /// The error of a mesh that could not be made, or that of the disk, if it is full: then Gmsh leaves half a file.
+    /// Return the error of a mesh that could not be made. If the disk is full, return that error instead, because Gmsh then
+    /// leaves half a file.
     pub fn blame(&self, error: Error) -> Error {
         if error.kind() != Kind::Mesh {
             return error;
@@ -121,7 +124,7 @@ impl Workshop {
         }
     }
 
-    /// Moves a finished file into the cache, over an older one, and gives its place there.
+    /// Move a finished file into the cache, over an older one, and return its path there.
     ///
     /// # Errors
     /// The file system refuses.
@@ -134,7 +137,7 @@ impl Workshop {
     }
 }
 
-/// Locks a workshop. The file takes its name when it is locked, so that nobody finds it unlocked before.
+/// Lock a workshop. The file gets its final name after it is locked, so that nobody finds it unlocked before.
 fn lock(folder: &Path) -> Option<File> {
     let new = folder.join("new-lock");
     let file = File::create(&new).ok()?;
@@ -142,7 +145,7 @@ fn lock(folder: &Path) -> Option<File> {
     std::fs::rename(&new, folder.join("lock")).ok().map(|()| file)
 }
 
-/// Removes the workshops in a cache that nobody uses any more. What cannot be removed stays.
+/// Remove the workshops in a cache that nobody uses any more. A folder that cannot be removed stays.
 fn remove_left(cache: &Path) {
     for entry in std::fs::read_dir(cache).into_iter().flatten().flatten() {
         let folder = entry.path();
@@ -164,7 +167,7 @@ fn remove_left(cache: &Path) {
 
 impl Drop for Workshop {
     fn drop(&mut self) {
-        // What cannot be removed is litter, not an error.
+        // A folder that cannot be removed is litter, not an error.
         let _ = std::fs::remove_dir_all(&self.folder);
     }
 }
@@ -183,7 +186,7 @@ mod tests {
         assert!(last.len() == 1 && last[0].ends_with(format!("winkler-{}", geteuid())), "{last:?}");
     }
 
-    /// Others may have written what lies in a folder that is open to all, or have made a file that is theirs.
+    /// Others may have written the files of a folder that is open to all. They may also have made a file that they own.
     #[test]
     fn what_others_may_have_written_is_not_used() {
         let base = tempfile::tempdir().unwrap();
@@ -208,12 +211,12 @@ mod tests {
         set(&file, 0o666);
         assert!(open(&file).is_none());
         set(&file, 0o644);
-        // only root gives files away
+        // Only root can give files away.
         if std::os::unix::fs::chown(&file, Some(54_321), None).is_ok() {
             assert!(open(&file).is_none());
             std::os::unix::fs::chown(&own, Some(54_321), None).unwrap();
             assert!(!chosen(&own).contains(&own));
-            // nor is a link that another user made
+            // A link that another user made is not used either.
             let theirs = base.path().join("theirs");
             std::os::unix::fs::symlink(make("target", 0o755), &theirs).unwrap();
             std::os::unix::fs::lchown(&theirs, Some(54_321), None).unwrap();
@@ -235,7 +238,7 @@ mod tests {
         assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), "no mesh");
         let left = std::fs::read_dir(workshop.path()).unwrap().map(|entry| entry.unwrap().file_name());
         assert_eq!(left.collect::<Vec<_>>(), ["lock"]);
-        // a folder that takes nothing any more is at fault, if the mesh is
+        // If the folder accepts no more files, the error of a mesh becomes that of the disk.
         std::fs::remove_dir_all(workshop.path()).unwrap();
         assert_eq!(blamed(Error::new(Kind::Solver, "no memory")), "no memory");
         assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), format!("cannot write the mesh to {}", good.display()));

@@ -1,47 +1,49 @@
-//! A place in the bytes of a `.msh` file that reads numbers, written as text or binary, and says where it is.
+//! A reader of the numbers of a `.msh` file, text or binary, that knows its position for messages.
 
 use crate::error::{Error, Result};
 use std::cell::RefCell;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Reads a `.msh` file from front to back, a window of it at a time.
+/// A reader of a `.msh` file from front to back, one window at a time.
 pub struct Cursor<'a> {
-    /// The file that the user knows: it stands in messages.
+    /// The file that the user knows, for messages.
     pub path: &'a Path,
     /// The file, or its bytes.
     source: RefCell<Box<dyn Source + 'a>>,
-    /// Bytes of the whole file.
+    /// Size of the whole file in bytes.
     length: usize,
-    /// What of it is in memory.
+    /// The part of the file that is in memory.
     window: Vec<u8>,
-    /// Where the window begins in the file.
+    /// Position of the window in the file.
     first: usize,
-    /// Where the next number starts in the window.
+    /// Position of the next number in the window.
     at: usize,
-    /// Whether numbers are binary; the `$MeshFormat` section says so.
+    /// Whether numbers are binary, as the `$MeshFormat` section says.
     pub binary: bool,
     /// Name of the section being read, without `$`; empty between sections.
     pub section: String,
-    /// Whether `path` is a script that the bytes were made from, so that lines in them mean nothing to the user.
+    /// Whether the bytes were made from the file at `path`, so that lines in them mean nothing to the user.
     made: bool,
-    /// Why the file cannot be read any more.
+    /// The reason why the file cannot be read any more, if there is one.
     failed: Option<io::Error>,
 }
 
-/// A file, or bytes like those of one.
+/// A file, or bytes that are read like a file.
 pub trait Source: Read + Seek {}
 
 impl<T: Read + Seek> Source for T {}
 
-/// Bytes of a window. From 2^12 to 2^24 two cubes of 48^3 are read and checked in 1.41 to 1.43 s; 2^28 takes 1.47 s and 13 MB more.
+/// Bytes of a window. From 2^12 to 2^24, two cubes of 48^3 are read and checked in 1.41 to 1.43 s. With 2^28 it takes 1.47 s
+/// and 13 MB more.
 const WINDOW: usize = 1 << 20;
 
-/// Bytes of a line or word at most, which is what Gmsh itself reads of a line: what is longer is not worth a search through the whole file.
+/// Largest number of bytes of a line or word. Gmsh itself reads no more of a line, and a longer one is not worth a search
+/// through the whole file.
 const LONGEST: usize = 1024;
 
 impl<'a> Cursor<'a> {
-    /// A cursor at the start of a file.
+    /// Make a cursor at the start of a file. `made` tells whether the bytes were made from the file at `path`.
     pub fn new(path: &'a Path, mut source: Box<dyn Source + 'a>, made: bool) -> Self {
         let (length, failed) = match source.seek(SeekFrom::End(0)) {
             Ok(length) => (length as usize, None),
@@ -51,12 +53,12 @@ impl<'a> Cursor<'a> {
         Cursor { path, source, length, window: Vec::new(), first: 0, at: 0, binary: false, section, made, failed }
     }
 
-    /// Where the next number starts.
+    /// Return the position in the file at which the next number starts.
     pub fn position(&self) -> usize {
         self.first + self.at
     }
 
-    /// The next bytes: so many at least, unless the file ends before.
+    /// Return the bytes that follow: at least `count`, unless the file ends before.
     fn ahead(&mut self, count: usize) -> &[u8] {
         if self.window.len() - self.at < count && self.first + self.window.len() < self.length {
             self.window.drain(..self.at);
@@ -67,7 +69,7 @@ impl<'a> Cursor<'a> {
             let read =
                 source.seek(SeekFrom::Start(start)).and_then(|_| source.take(wanted).read_to_end(&mut self.window));
             if !matches!(read, Ok(1..)) {
-                // it was cut meanwhile, or cannot be read
+                // The file was cut meanwhile, or cannot be read.
                 self.length = self.first + self.window.len();
                 self.failed = read.err();
             }
@@ -75,13 +77,15 @@ impl<'a> Cursor<'a> {
         &self.window[self.at..]
     }
 
+    /// Check that no read has failed.
+    ///
     /// # Errors
     /// The file could not be read to its end.
     pub fn intact(&mut self) -> Result<()> {
         self.failed.take().map_or(Ok(()), |cause| Err(Error::file(self.path, "read", &cause)))
     }
 
-    /// An error at a position: it names the line of a text file, section and byte of a binary one.
+    /// Return an error at a position. It names the line of a text file, or the section and byte of a binary one.
     pub fn error_at(&self, position: usize, message: impl Into<String>) -> Error {
         let message = message.into();
         if let Some(cause) = &self.failed {
@@ -97,7 +101,7 @@ impl<'a> Cursor<'a> {
         Error::mesh(self.path, self.line_at(position).ok(), message)
     }
 
-    /// The line of a position, counted from the start of the file.
+    /// Return the line of a position, counted from the start of the file.
     fn line_at(&self, position: usize) -> io::Result<usize> {
         let mut source = self.source.borrow_mut();
         source.seek(SeekFrom::Start(0))?;
@@ -105,7 +109,7 @@ impl<'a> Cursor<'a> {
         before.filter(|byte| matches!(byte, Ok(b'\n'))).try_fold(1, |line, byte| byte.map(|_| line + 1))
     }
 
-    /// An error where the cursor is.
+    /// Return an error at the position of the cursor.
     pub fn error(&self, message: impl Into<String>) -> Error {
         self.error_at(self.position(), message)
     }
@@ -115,7 +119,7 @@ impl<'a> Cursor<'a> {
         self.error(format!("the file ends within {section}")).help("it was cut short: save the mesh again with Gmsh")
     }
 
-    /// Skips white space, lines too; tells whether the file ends there.
+    /// Skip white space, including line breaks, and return whether the file ends there.
     pub fn at_end(&mut self) -> bool {
         loop {
             match self.ahead(1).first() {
@@ -126,7 +130,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The rest of the line, trimmed, and on to the next one. Headers and names are lines in binary files too.
+    /// Return the rest of the line, trimmed, and go to the next one. Headers and names are lines in binary files, too.
     pub fn line(&mut self) -> Result<String> {
         let rest = self.ahead(LONGEST);
         let (length, end) = (rest.len(), rest.iter().take(LONGEST).position(|byte| *byte == b'\n'));
@@ -143,13 +147,13 @@ impl<'a> Cursor<'a> {
         Ok(line)
     }
 
-    /// Enters the section of this name.
+    /// Enter the section of this name.
     pub fn enter(&mut self, section: &str) {
         self.section.clear();
         self.section.push_str(section);
     }
 
-    /// Leaves the section, over its closing line.
+    /// Leave the section by its closing line.
     pub fn leave(&mut self) -> Result<()> {
         let start = self.position();
         let ok = !self.at_end() && self.line().is_ok_and(|line| line.strip_prefix("$End") == Some(&*self.section));
@@ -161,7 +165,7 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// Jumps over what is left of the section and leaves it.
+    /// Skip the rest of the section and leave it.
     pub fn skip_section(&mut self) -> Result<()> {
         let (end, start) = (format!("$End{}", self.section), self.position());
         loop {
@@ -178,14 +182,14 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Goes to the start of a record: in text, over blank lines.
+    /// Go to the start of a record. In text this skips blank lines.
     pub fn begin(&mut self) {
         if !self.binary {
             self.at_end();
         }
     }
 
-    /// Ends a record: in text, the line must end here.
+    /// End a record. In text the line must end here.
     pub fn end(&mut self) -> Result<()> {
         if self.binary {
             return Ok(());
@@ -207,7 +211,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// The next bytes of a binary file.
+    /// Return the next `N` bytes of a binary file.
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
         let Some(&bytes) = self.ahead(N).first_chunk() else {
             return Err(self.ends_early());
@@ -216,7 +220,7 @@ impl<'a> Cursor<'a> {
         Ok(bytes)
     }
 
-    /// The next word of a text file, on this line, as a number.
+    /// Return the next word on this line of a text file as a number. `what` names the expected kind in messages.
     fn number<T: std::str::FromStr>(&mut self, what: &str) -> Result<T> {
         self.skip_blanks();
         let rest = self.ahead(LONGEST);
@@ -238,17 +242,17 @@ impl<'a> Cursor<'a> {
         Ok(number)
     }
 
-    /// The next `int`.
+    /// Read the next `int`.
     pub fn int(&mut self) -> Result<i32> {
         if self.binary { self.take().map(i32::from_le_bytes) } else { self.number("a whole number") }
     }
 
-    /// The next `size_t`: a count or a tag.
+    /// Read the next `size_t`: a count or a tag.
     pub fn size(&mut self) -> Result<u64> {
         if self.binary { self.take().map(u64::from_le_bytes) } else { self.number("a whole number, not negative") }
     }
 
-    /// The next `double`, finite.
+    /// Read the next `double`, which must be finite.
     pub fn real(&mut self) -> Result<f64> {
         let start = self.position();
         let value: f64 = if self.binary { self.take().map(f64::from_le_bytes)? } else { self.number("a number")? };
@@ -258,17 +262,17 @@ impl<'a> Cursor<'a> {
         Err(self.error_at(start, format!("a coordinate is {value}")))
     }
 
-    /// Skips a `double` that need not be finite: the box around an entity without nodes is not.
+    /// Skip a `double` that need not be finite. The box around an entity without nodes is not finite.
     pub fn bound(&mut self) -> Result<()> {
         if self.binary { self.take::<8>().map(|_| ()) } else { self.number::<f64>("a number").map(|_| ()) }
     }
 
-    /// The next `size_t` as the count of things that take at least so many `numbers` in text, `bytes` in binary: what
-    /// the rest of the file cannot hold is refused before anything is allocated for it.
+    /// Read the next `size_t` as a count of records. Each takes at least `numbers` numbers in text, or `bytes` bytes in binary.
+    /// A count that the rest of the file cannot hold is refused before anything is allocated for it.
     pub fn count(&mut self, numbers: usize, bytes: usize) -> Result<usize> {
         let start = self.position();
         let count = self.size()?;
-        // A number in text is a digit and a separator; the last separator may be missing.
+        // A number in text is at least a digit and a separator; the last separator may be missing.
         let each = if self.binary { bytes } else { 2 * numbers };
         let most = (self.length - self.position() + 1) / each.max(1);
         match usize::try_from(count) {
@@ -279,7 +283,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Skips records that nobody needs: lines of a text file, `bytes` each in a binary one.
+    /// Skip records that nobody needs: `count` lines of a text file, or `count` times `bytes` bytes of a binary one.
     pub fn skip_records(&mut self, count: usize, bytes: usize) -> Result<()> {
         if self.binary {
             let length = count.checked_mul(bytes).filter(|length| *length <= self.length - self.position());
@@ -301,7 +305,7 @@ impl<'a> Cursor<'a> {
         Ok(())
     }
 
-    /// Goes to another position, such as one seen before, for a closer look.
+    /// Go to another position in the file, such as an earlier one that needs a closer look.
     pub fn rewind(&mut self, position: usize) {
         match position.checked_sub(self.first).filter(|at| *at <= self.window.len()) {
             Some(at) => self.at = at,

@@ -1,21 +1,23 @@
 //! The point from which the coordinates of a mesh are measured, if the mesh lies far from the origin of its scene.
 //!
-//! A coordinate of size X has an absolute error of eps X. Differences of coordinates are exact or nearly so, but products,
-//! interpolations and sums of coordinates round relative to X, not to the body. Subtracting a datum near the mesh once, where
-//! the mesh enters, makes all of these relative to the mesh. Coordinates of the scene return in expressions and in output alone.
+//! A coordinate of size X has an absolute error of eps X, where eps is the relative rounding error. Differences of coordinates
+//! are exact or nearly so. Products, interpolations and sums of coordinates round relative to X, not to the size of the body.
+//! The datum lies near the mesh and is subtracted once, where the mesh is loaded. All of these then round relative to the size
+//! of the mesh. Coordinates of the scene return in expressions and in output alone.
 
 use super::Mesh;
 use crate::linalg::{bounds, pad};
 
-/// A mesh whose centre is nearer than this many of its sizes to the origin keeps its coordinates: at most three bits are lost
-/// there, and scenes near the origin have the numbers that they always had.
+/// Distance of the centre of a mesh from the origin, in sizes of the mesh, below which the mesh keeps its coordinates. At most
+/// three bits are lost there, and the numbers of scenes near the origin do not change.
 const FAR: f64 = 4.0;
 
-/// Return the datum for points in a box: along each axis zero, or a point near the middle of the box if the origin is far away. `along` says along
-/// which axes the origin may move: in a body of revolution the radius is measured from the axis.
+/// Return the datum for points in a box `[low, high]`. Along each axis it is zero, or a point near the middle of the box if the
+/// origin is far away. `along` tells along which axes the origin may move: in a body of revolution the radius is measured from
+/// the axis.
 ///
-/// The datum is a multiple of a power of two that does not exceed the size of the box. Coordinates are multiples of a smaller power, or
-/// have no digits within the box, so that subtracting the datum, and adding it again, is exact.
+/// The datum is a multiple of a power of two that does not exceed the size of the box. Coordinates are multiples of a smaller
+/// power, or have no digits within the box. The datum is therefore subtracted and added again without error.
 pub fn of<const D: usize>([low, high]: [[f64; 3]; 2], along: [bool; D]) -> [f64; D] {
     let size = (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     let unit = size.log2().floor().exp2();
@@ -27,7 +29,8 @@ pub fn of<const D: usize>([low, high]: [[f64; 3]; 2], along: [bool; D]) -> [f64;
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Measure the coordinates from a datum near the mesh if the origin is far away; see the module. `along` says along which axes the origin may move.
+    /// Measure the coordinates from a datum near the mesh if the origin is far away; see the module. `along` tells along which
+    /// axes the origin may move.
     pub fn measure_nearby(&mut self, along: [bool; D]) {
         self.datum = of(bounds(self.points.iter().copied().map(pad)), along);
         for x in &mut self.points {
@@ -51,7 +54,7 @@ pub fn rounding<'a, const D: usize>(datum: &[f64; D], points: impl IntoIterator<
 mod tests {
     use super::*;
 
-    /// Near the origin nothing moves; far away the datum is near the middle, and every coordinate comes back to the last bit.
+    /// Near the origin nothing moves. Far away the datum is near the middle, and every coordinate is recovered to the last bit.
     #[test]
     fn a_datum_is_exact() {
         let near = [[-1.0, 3.0, 0.0], [1.0, 5.0, 2.0]];
@@ -69,7 +72,7 @@ mod tests {
                 assert!(local.abs() <= 2.0 * size);
             }
         }
-        // without extent, or without numbers
+        // The boxes have no extent, or contain no points.
         assert_eq!(of::<3>([[9.0; 3]; 2], [true; 3]), [0.0; 3]);
         assert_eq!(of::<3>([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], [true; 3]), [0.0; 3]);
     }

@@ -9,14 +9,15 @@ use crate::error::Result;
 use crate::problem::order::Order;
 use std::collections::HashSet;
 
-/// Elements that are read before they go to their groups, so that a large block is not in memory twice.
+/// Number of elements that are read before they go to their groups, so that a large block is not in memory twice.
 const SLICE: usize = 1 << 10;
 
-/// Reads the section's contents into the groups; gives the order of the elements, if there is one but points, and how many were split.
+/// Read the contents of the section into the groups. Return the order of the elements, which is `None` if there are only
+/// points, and the number of elements that were split.
 ///
 /// # Errors
-/// Malformed text, elements in a group that are no simplices of order 1 or 2 or mix both, nodes that do not exist,
-/// degenerate simplices, nodes off the plane if `D` is 2.
+/// The text is malformed. Elements in a group are not simplices of order 1 or 2, or mix both orders. A node does not exist, or
+/// it lies off the plane if `D` is 2. A simplex is degenerate.
 pub fn read<const D: usize>(
     cursor: &mut Cursor,
     nodes: &Nodes,
@@ -73,7 +74,8 @@ pub fn read<const D: usize>(
     Ok((common_order, in_parts))
 }
 
-/// Refuse two blocks of one entity, the second at `position`, where another entity has none: one block has the number of the other. Either alone is allowed.
+/// Refuse two blocks of one entity, the second at `position`, if another entity has no block: then one block has the number of
+/// the other. Either alone is allowed.
 fn refuse_another_number(
     cursor: &Cursor,
     physical: &Physical,
@@ -94,12 +96,12 @@ struct Head {
     dimension: usize,
     /// Number of the entity.
     tag: i32,
-    /// Gmsh's number of the type of element.
+    /// Gmsh's number of the element type.
     number: i32,
     shape: &'static str,
-    /// Nodes of an element.
+    /// Number of nodes of an element.
     stride: usize,
-    /// Elements.
+    /// Number of elements.
     count: usize,
 }
 
@@ -115,7 +117,7 @@ impl Head {
             let message = format!("elements of Gmsh's type {number} cannot be used");
             return Err(cursor.error_at(position, message).help(SIMPLICES));
         };
-        // also where nobody needs them: the block may be one of another dimension whose head is damaged
+        // This is checked even in blocks that nobody needs. The block may be one of another dimension whose head is damaged.
         if simplex::dimension(shape) != dimension {
             let message = format!("{shape} elements cannot be those of {} {tag}", thing(dimension));
             let help = "the file is damaged: save the mesh again with Gmsh";
@@ -126,7 +128,8 @@ impl Head {
         Ok(Self { position, dimension, tag, number, shape, stride, count })
     }
 
-    /// What its elements are read as, and how they are split, if they are; `name` is that of a group with them.
+    /// Return the kind of simplex as which the elements are read, and how they are split, if they are. `name` is that of a
+    /// group with them.
     fn kind(&self, cursor: &Cursor, name: &str) -> Result<(Kind, Option<Split>)> {
         let split = Split::of_type(self.number).filter(|split| split.dimension == self.dimension);
         let whole = Kind::of_type(self.number).filter(|kind| kind.dimension == self.dimension);
@@ -139,27 +142,28 @@ impl Head {
     }
 }
 
-/// What Gmsh calls an entity of this dimension.
+/// Return Gmsh's word for an entity of this dimension.
 fn thing(dimension: usize) -> String {
     THINGS[dimension].to_lowercase()
 }
 
-/// What to do about elements that are not simplices of order 1 or 2.
+/// The advice about elements that are not simplices of order 1 or 2.
 const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2, or quadrangles, hexahedra, prisms and pyramids of order 1: `gmsh -order 1`";
 
 /// Elements of one entity, all of one kind.
 struct Block<'a> {
-    /// What the simplices are.
+    /// Kind of the simplices.
     kind: Kind,
-    /// How the elements are split into them, if they are none.
+    /// How the elements are split into simplices, if they are none themselves.
     split: Option<Split>,
     count: usize,
-    /// Name of a group it belongs to, for messages.
+    /// Name of a group with the block, for messages.
     name: &'a str,
 }
 
 impl Block<'_> {
-    /// Reads the elements: our point numbers in our order, cells turned to positive volume; and their tags.
+    /// Read the elements. Return the connectivity, `stride` point numbers per simplex in our local order, and the tag of each
+    /// simplex. Cells are turned to positive volume.
     fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<(Vec<u32>, Vec<u64>)> {
         let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = Vec::with_capacity(self.count * stride);

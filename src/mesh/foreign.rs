@@ -8,15 +8,16 @@ use std::path::{Path, PathBuf};
 /// Kinds of file with the shape of bodies.
 const SHAPES: [&str; 6] = ["step", "stp", "iges", "igs", "brep", "stl"];
 
-/// Kinds of file with a mesh that Gmsh reads, whatever is in them.
+/// Kinds of file with a mesh that Gmsh reads, whatever their contents.
 const MESHES: [&str; 6] = ["unv", "bdf", "nas", "mesh", "med", "inp"];
 
-/// Whether a file has the shape of bodies, by its name.
+/// Return whether a file has the shape of bodies, by its name.
 pub fn is_shape(path: &Path) -> bool {
     is_kind(path, &SHAPES)
 }
 
-/// Whether the bytes of a file are a mesh that Gmsh converts first: one of another program, or of another version of its own format.
+/// Return whether a file holds a mesh that Gmsh converts first: one of another program, or of another version of Gmsh's own
+/// format.
 pub fn is_mesh(path: &Path, bytes: &[u8]) -> bool {
     let version = bytes.strip_prefix(b"$MeshFormat").map(|rest| rest.trim_ascii_start());
     is_kind(path, &MESHES)
@@ -24,19 +25,21 @@ pub fn is_mesh(path: &Path, bytes: &[u8]) -> bool {
         || version.is_some_and(|version| ["2", "4 ", "4.0 "].iter().any(|old| version.starts_with(old.as_bytes())))
 }
 
-/// Writes a script that draws the shape in a file, every volume, surface and point a group called by kind and number (in the plane surfaces,
-/// curves and points), into the folder `work`; gives its path. Elements are of the `size`, if there is one.
+/// Write a script into the folder `work` that loads the shape in a file and names its groups, and return its path.
+///
+/// Every volume, surface and point becomes a group with a name of its kind and number. In the plane these are surfaces, curves
+/// and points. Elements have the given `size`, if there is one.
 ///
 /// # Errors
 /// The folder cannot be written.
 pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, work: &Path) -> Result<PathBuf> {
     let kind = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    // a name of our own: that of the user may have any signs
+    // The copy has a name of our own, since the user's may contain any characters.
     let copy = format!("shape.{kind}");
     write(&work.join(&copy), bytes)?;
     let mut text = format!("Merge \"{copy}\";\n");
     if kind == "stl" {
-        // a bend of more than 40 degrees ends a surface
+        // A surface ends at a bend of more than 40 degrees.
         text += "ClassifySurfaces{40*Pi/180, 1, 1, Pi};\nCreateGeometry;\n";
         if dimension == 3 {
             text += "all() = Surface{:};\nSurface Loop(1) = {all()};\nVolume(1) = {1};\n";
@@ -57,10 +60,10 @@ pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, wo
     write(&made, text.as_bytes()).map(|()| made)
 }
 
-/// Writes a mesh of another program into the folder `work` in a form that Gmsh reads; gives its path.
+/// Write a mesh of another program into the folder `work` in a form that Gmsh reads, and return its path.
 ///
 /// # Errors
-/// A file that is no such mesh; a folder that cannot be written.
+/// The file is not such a mesh, or the folder cannot be written.
 pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBuf> {
     let path = &file.value;
     if is_kind(path, &["inp"]) {
@@ -68,7 +71,7 @@ pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBu
         let made = work.join("mesh.msh");
         return write(&made, text.as_bytes()).map(|()| made);
     }
-    // what began like a mesh of Gmsh must not be read as a script, whatever its name
+    // A file that begins like a mesh of Gmsh must not be read as a script, whatever its name.
     let kind = match is_kind(path, &MESHES) {
         true => path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase(),
         false => "msh".to_owned(),

@@ -1,4 +1,4 @@
-//! Calls the program Gmsh.
+//! Calls of the program Gmsh.
 
 use super::guard::{self, End};
 use crate::error::{Error, Kind, Result};
@@ -16,28 +16,28 @@ pub struct Gmsh {
     program: PathBuf,
 }
 
-/// What Gmsh is to mesh.
+/// A script for Gmsh to mesh, with the settings of the run.
 pub struct Task<'a> {
     /// The script.
     pub script: &'a Path,
     /// The script that the user wrote.
     pub shown: &'a Path,
-    /// Numbers to set in it.
+    /// Names and values of the numbers to set in the script.
     pub set: &'a [(String, f64)],
-    /// Whether the script is a mesh already, which is only to be written in another form.
+    /// Whether the script is already a mesh, which is only to be written in another form.
     pub is_mesh: bool,
     /// Dimension of the cells.
     pub dimension: usize,
     /// Order of the elements.
     pub order: Order,
-    /// What it may take.
+    /// Limits of time and memory.
     pub guard: &'a Guard,
-    /// What may end it.
+    /// Signals that may end the run.
     pub interrupt: &'a Interrupt,
 }
 
 impl Gmsh {
-    /// Looks for `gmsh` in $PATH.
+    /// Find `gmsh` in $PATH.
     ///
     /// # Errors
     /// It is not there.
@@ -48,8 +48,8 @@ impl Gmsh {
         })
     }
 
-    /// What tells this Gmsh from others: its path, size and time of change. Asking for its version would take longer
-    /// than to read a mesh from the cache.
+    /// Return a text that distinguishes this Gmsh from others: its path, size and time of change. To ask for its version would
+    /// take longer than to read a mesh from the cache.
     pub fn identity(&self) -> String {
         let data = std::fs::metadata(&self.program).ok();
         let time =
@@ -58,11 +58,14 @@ impl Gmsh {
         format!("{} {size} {}", self.program.display(), time.unwrap_or_default().as_nanos())
     }
 
-    /// Meshes a script into the file `output`. `home` is an empty folder, read instead of the user's own Gmsh options: they would
-    /// change meshes without changing the key in the cache. What Gmsh says goes to a file there.
+    /// Mesh a script into the file `output`.
+    ///
+    /// `home` is an empty folder that Gmsh reads instead of the user's own Gmsh options, which would change meshes without a
+    /// change of the key in the cache. The output of Gmsh goes to a file there.
     ///
     /// # Errors
-    /// Gmsh fails; its own messages are the causes. It takes more time or memory than it may. A signal, or a limit on the size of files, ends it.
+    /// Gmsh fails; its own messages are the causes. It exceeds its limit of time or memory. A signal, or a limit on the size of
+    /// files, ends it.
     pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
         let bytes = guard::bytes(task.guard);
         let said = home.join("said");
@@ -91,7 +94,7 @@ impl Gmsh {
         }
     }
 
-    /// Return the command that meshes a script with so many `bytes` of memory.
+    /// Return the command that meshes a script with at most `bytes` of memory.
     fn command(&self, task: &Task, output: &Path, home: &Path, bytes: Option<u64>) -> Result<Command> {
         let mut command = guard::command(&self.program, bytes);
         let order = if task.order == Order::P1 { "1" } else { "2" };
@@ -106,11 +109,11 @@ impl Gmsh {
         for (name, value) in task.set {
             command.args(["-setnumber", name, &value.to_string()]);
         }
-        // An absolute path cannot be taken for an option.
+        // An absolute path cannot be mistaken for an option.
         let script = std::path::absolute(task.script).map_err(|cause| Error::file(task.script, "find", &cause))?;
         command.arg("-o").arg(output).arg(script);
         command.env("GMSH_HOME", home).stdin(Stdio::null());
-        // A Gmsh built with MPI must not think that it is one of our ranks.
+        // A Gmsh that is built with MPI must not take itself for one of our ranks.
         for (name, _) in std::env::vars_os() {
             let text = name.to_string_lossy();
             if ["OMPI_", "PMIX_", "PMI_", "PRTE_", "HYDI_", "MPIR_"].iter().any(|prefix| text.starts_with(prefix)) {
@@ -121,7 +124,8 @@ impl Gmsh {
     }
 }
 
-/// Return the error of a Gmsh that ended by itself without a mesh, after it has `said` this.
+/// Return the error of a Gmsh that ended by itself without a mesh. `said` is its output, and `bytes` the memory that it was
+/// allowed.
 fn failure(task: &Task, status: ExitStatus, said: &str, bytes: Option<u64>) -> Error {
     let refuse = |message: String| Error::mesh(task.shown, None, message);
     if is_out_of_memory(status, said) {
@@ -145,7 +149,7 @@ fn failure(task: &Task, status: ExitStatus, said: &str, bytes: Option<u64>) -> E
     }
 }
 
-/// What a program wrote into a file.
+/// Return the output that a program wrote into a file.
 fn words(said: &Path) -> String {
     String::from_utf8_lossy(&std::fs::read(said).unwrap_or_default()).into_owned()
 }
@@ -154,13 +158,13 @@ fn because(error: Error, causes: &[String]) -> Error {
     causes.iter().fold(error, Error::because)
 }
 
-/// Whether a program ended for want of memory: the C++ library gave up, the loader did, or the system.
+/// Return whether a program ended for lack of memory. The C++ library, the loader or the system may have ended it.
 fn is_out_of_memory(status: ExitStatus, said: &str) -> bool {
     const WORDS: [&str; 4] = ["bad_alloc", "failed to map segment", "annot allocate memory", "ut of memory"];
     !status.success() && (status.signal() == Some(9) || WORDS.iter().any(|words| said.contains(words)))
 }
 
-/// Gmsh's errors, each once, without its summary.
+/// Return Gmsh's errors, each once, without its summary.
 fn complaints(said: &str) -> Vec<String> {
     const MOST: usize = 8;
     let mut found: Vec<String> = Vec::new();
@@ -170,7 +174,7 @@ fn complaints(said: &str) -> Vec<String> {
         };
         let text = text.trim();
         if text.starts_with("----") {
-            // The summary repeats what was said, and comes last.
+            // The summary comes last and repeats earlier messages.
             break;
         }
         if found.len() < MOST && !found.iter().any(|known| known == text) {

@@ -1,4 +1,4 @@
-//! The groups of a mesh by name; and compact numbering: points that no group uses go.
+//! The groups of a mesh by name, and a compact numbering that drops the points of no group.
 
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -13,30 +13,30 @@ pub struct Group {
     pub dimension: usize,
     /// Points per simplex.
     pub stride: usize,
-    /// Point numbers, `stride` per simplex. Only cells have an orientation that means something.
+    /// Point numbers, `stride` per simplex. The orientation is meaningful for cells only.
     pub connectivity: Vec<u32>,
     /// Numbers of the simplices in the file, for messages; empty if they have none.
     pub tags: Vec<u64>,
 }
 
 impl Group {
-    /// Number of simplices.
+    /// Return the number of simplices.
     pub fn len(&self) -> usize {
         self.connectivity.len() / self.stride
     }
 
-    /// Whether there is no simplex; never so in a mesh that was read.
+    /// Return whether there is no simplex, which is never so in a mesh that was read.
     pub fn is_empty(&self) -> bool {
         self.connectivity.is_empty()
     }
 
-    /// The simplices, each as its `stride` point numbers.
+    /// Return the simplices, each as a slice of `stride` point numbers.
     pub fn simplices(&self) -> std::slice::ChunksExact<'_, u32> {
         self.connectivity.chunks_exact(self.stride)
     }
 }
 
-/// The groups of a mesh, in the order of the file, found by their names, which are unique.
+/// The groups of a mesh, in the order of the file, with an index by their unique names.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Groups {
     list: Vec<Group>,
@@ -44,17 +44,17 @@ pub struct Groups {
 }
 
 impl Groups {
-    /// The group of a name.
+    /// Return the group with this name.
     pub fn named(&self, name: &str) -> Option<&Group> {
         self.place(name).map(|place| &self.list[place])
     }
 
-    /// The place of the group of a name.
+    /// Return the index of the group with this name.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.place.get(name).copied()
     }
 
-    /// The groups alone.
+    /// Return the groups without the index.
     pub fn into_list(self) -> Vec<Group> {
         self.list
     }
@@ -74,21 +74,21 @@ impl Deref for Groups {
     }
 }
 
-/// For the simplices; names stay what they are.
+/// This gives access to the simplices. Names must not change, since the index holds them.
 impl DerefMut for Groups {
     fn deref_mut(&mut self) -> &mut [Group] {
         &mut self.list
     }
 }
 
-/// Which of so many points the groups use; every number in them is below it.
+/// Return for each of `count` points whether a group uses it. Every point number in the groups is below `count`.
 pub fn used(groups: &[Group], count: usize) -> Vec<bool> {
     let mut used = vec![false; count];
     groups.iter().flat_map(|group| &group.connectivity).for_each(|&point| used[point as usize] = true);
     used
 }
 
-/// The number of each point among those that are used.
+/// Return the number of each used point among all used points. The entries of other points are meaningless.
 pub fn compact(used: &[bool]) -> Vec<u32> {
     let mut next = 0;
     let number = |used: &bool| {
@@ -98,7 +98,7 @@ pub fn compact(used: &[bool]) -> Vec<u32> {
     used.iter().map(number).collect()
 }
 
-/// Renumbers the points that are used, in their old order, and gives the old number of each new one.
+/// Renumber the used points in their old order, and return the old number of each new one.
 pub fn renumber(groups: &mut [Group], used: Vec<bool>) -> impl Iterator<Item = usize> + use<> {
     let number = compact(&used);
     for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {

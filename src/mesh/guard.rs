@@ -1,4 +1,4 @@
-//! Runs a program with limits of time and memory, which ends with this one.
+//! Programs that run with limits of time and memory, and end with this program.
 
 use crate::file::bytes_in_proc;
 use crate::interrupt::Interrupt;
@@ -8,35 +8,36 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// How a guarded program ended.
+/// The way in which a guarded program ended.
 pub enum End {
-    /// By itself.
+    /// It ended by itself.
     Itself(ExitStatus),
-    /// It took too long.
+    /// It exceeded the limit of time.
     TimedOut,
-    /// It wrote more words than anybody reads.
+    /// It wrote more output than anybody reads.
     Talked,
-    /// A signal asked for its end.
+    /// This signal requested the end.
     Asked(i32),
 }
 
-/// A program of $PATH.
+/// Return the path of a program in $PATH.
 pub fn find(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path).map(|folder| folder.join(name)).find(|program| program.is_file())
 }
 
-/// Bytes that a guarded program may take: of what is free unless the user says it; no limit where the system does not tell.
+/// Return the bytes of memory that a guarded program may take: the user's limit, or else the memory that is available. Return
+/// `None`, which is no limit, if the system does not tell.
 pub fn bytes(guard: &Guard) -> Option<u64> {
     match guard.gigabytes {
         Some(gigabytes) => Some((gigabytes * 1e9) as u64),
-        // what programs can take without swapping
+        // This is what programs can take without swapping.
         None => bytes_in_proc("/proc/meminfo", "MemAvailable"),
     }
 }
 
-/// A command for a program that the system ends with the thread that starts it, and that may take so many bytes. Both are left to
-/// tools of util-linux, and left out where they are missing.
+/// Return a command for a program that may take at most `bytes` of memory. The system ends the program with the thread that
+/// starts it. Tools of util-linux do both, and a limit whose tool is missing is omitted.
 pub fn command(program: &Path, bytes: Option<u64>) -> Command {
     let mut words: Vec<PathBuf> = Vec::new();
     if let (Some(tool), Some(bytes)) = (find("prlimit"), bytes) {
@@ -51,13 +52,15 @@ pub fn command(program: &Path, bytes: Option<u64>) -> Command {
     command
 }
 
-/// Longest pause between two looks at the program.
+/// Longest pause between two checks of the program.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// Bytes that a program may say: half a million lines. Gmsh repeats some errors for ever, 25 MB of them in a second.
+/// Largest number of bytes of output, which is half a million lines. Gmsh repeats some errors for ever, with 25 MB of them in a
+/// second.
 const MOST_SAID: u64 = 1 << 25;
 
-/// Runs a command, whose words go to the file `said`, to its end, to a signal, or to `limit` seconds.
+/// Run a command until it ends, a signal arrives, it exceeds `limit` seconds, or its output is too long. The output goes to the
+/// file `said`.
 ///
 /// # Errors
 /// The program cannot be started.
@@ -77,7 +80,7 @@ pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt
             child.wait()?;
             break end;
         }
-        // a twentieth of the time so far is lost at most
+        // At most a twentieth of the time so far is lost.
         std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
     };
     Ok(end)
@@ -100,7 +103,7 @@ mod tests {
         let ended = |command: &mut Command, limit| run(command, limit, silent, &Interrupt::default());
         assert!(matches!(ended(&mut sleep(None), 0.1), Ok(End::TimedOut)));
         assert!(began.elapsed() < Duration::from_secs(4));
-        // no program can be loaded into a hundred kilobytes
+        // No program can be loaded into a hundred kilobytes.
         assert!(matches!(ended(&mut sleep(Some(100_000)), 9.0), Ok(End::Itself(status)) if !status.success()));
         assert!(began.elapsed() < Duration::from_secs(4));
     }
@@ -119,7 +122,7 @@ mod tests {
         let parent = || {
             let child = sleep(None).spawn().expect("a child");
             let name = || std::fs::read_to_string(format!("/proc/{}/comm", child.id())).unwrap_or_default();
-            // until then it is one of the tools that start it
+            // Until it has this name, the process is one of the tools that start it.
             while name() != "sleep\n" {
                 std::thread::sleep(Duration::from_millis(1));
             }

@@ -1,12 +1,14 @@
-//! What a script depends on besides the files that it reads: variables of the environment, whose values belong to the key of its mesh,
-//! and what nobody knows before Gmsh runs it, so that its mesh cannot be kept.
+//! The inputs that a script depends on besides the files that it reads.
+//!
+//! The values of environment variables belong to the key of its mesh in the cache. Other inputs are unknown before Gmsh runs,
+//! so a mesh that depends on them cannot be cached.
 
 use super::tokens::Token;
 use super::trust::{READ, RUN};
 use std::collections::BTreeSet;
 
-/// Words of Gmsh that give other values in another run or in another place: the clock, the memory, random numbers, whether a file is
-/// there, and where the script and the program lie.
+/// Words of Gmsh whose values differ between runs or places. They stand for the clock, the memory, random numbers, whether a
+/// file exists, and the paths of the script and the program.
 const CHANGING: [&str; 11] = [
     "Cpu",
     "Memory",
@@ -24,17 +26,17 @@ const CHANGING: [&str; 11] = [
 /// The variable that this program sets for Gmsh, to another value each time.
 const HOME: &str = "GMSH_HOME";
 
-/// What a script depends on besides files.
+/// The inputs of a script besides files.
 #[derive(Debug, Default)]
 pub struct Inputs {
-    /// Names of the variables of the environment that it reads.
+    /// Names of the environment variables that the script reads.
     pub variables: BTreeSet<String>,
-    /// The first word whose value is not known before Gmsh runs, if there is one.
+    /// The first word whose value is unknown before Gmsh runs, if there is one.
     pub unknown: Option<String>,
 }
 
 impl Inputs {
-    /// Add those of a piece of the script.
+    /// Add the inputs of a part of the script.
     pub fn note(&mut self, tokens: &[Token]) {
         use Token::{Name, Sign, Text};
         for (at, token) in tokens.iter().enumerate() {

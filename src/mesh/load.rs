@@ -1,4 +1,4 @@
-//! From what the scene names to a mesh: Gmsh, or the cache, or a file.
+//! The way from the scene's mesh source to a mesh: by Gmsh, from the cache, or from a file.
 
 use super::cache::{self, Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
@@ -13,41 +13,40 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// A mesh and where it came from.
+/// A mesh and its origin.
 #[derive(Debug, Clone)]
 pub struct Loaded<const D: usize> {
     /// The mesh.
     pub mesh: Mesh<D>,
-    /// Where it came from.
+    /// Where the mesh came from.
     pub origin: Origin,
-    /// The `.msh` file that was read: the user's own, or the one in the cache; empty for arrays.
+    /// The `.msh` file that was read: the user's own, or the one in the cache. It is empty for arrays.
     pub file: PathBuf,
-    /// SHA-256 of its contents; empty for arrays.
+    /// SHA-256 of the contents of the file; empty for arrays.
     pub digest: String,
-    /// Why it is not taken from the cache, where that is so, in words.
+    /// The reason, in words, why the mesh cannot be taken from the cache, if there is one.
     pub unkept: Option<String>,
 }
 
-/// Where a mesh came from.
+/// The origin of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// The `.msh` file that the scene names, or arrays.
     File,
-    /// The cache: Gmsh had meshed the same script with the same numbers before.
+    /// The cache: Gmsh meshed the same script with the same numbers before.
     Cache,
-    /// Gmsh, just now.
+    /// Gmsh, in this run.
     Gmsh,
 }
 
-/// Loads the mesh of a scene for displacements of an order, unless a signal ends it.
+/// Load the mesh of a scene for displacements of an order, unless a signal ends it.
 ///
-/// A `.geo` script is meshed with that order by Gmsh, unless the cache has the result. A `.msh` file of order 2 serves
-/// order 1 without its mid-edge points.
+/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A `.msh` file of order 2 serves order 1
+/// without its mid-edge points. Folded quadratic cells become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
-/// A file that cannot be read, a number that the script does not take, Gmsh missing or failing, a mesh that is not one
-/// of named simplices in `D` dimensions (see [`parse`](super::parse)), or of too low an order; the signal.
-/// Quadratic cells that are folded become straight ([`Mesh::straightened`]).
+/// A file cannot be read, or the script does not take a number. Gmsh is missing or fails. The mesh is not one of named
+/// simplices in `D` dimensions (see [`parse`](super::parse)), or its order is too low. A signal arrives.
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
@@ -67,7 +66,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
     Ok(loaded)
 }
 
-/// Bytes by which a file shows its kind.
+/// Number of bytes at the start of a file that show its kind.
 const START: u64 = 1000;
 
 fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
@@ -103,7 +102,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     Ok(loaded)
 }
 
-/// Refuses text of Gmsh whose lines are none for it.
+/// Refuse text of Gmsh whose line ends Gmsh does not read.
 fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
     let end = start.iter().position(|byte| matches!(byte, b'\r' | b'\n'));
     let is_old_mac = end.is_some_and(|at| start[at] == b'\r' && start.get(at + 1) != Some(&b'\n'));
@@ -114,7 +113,7 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
     }
 }
 
-/// A mesh of another program, or of another version of Gmsh's format, as Gmsh writes it.
+/// Return a mesh of another program, or of another version of Gmsh's format, as Gmsh converts it.
 fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let gmsh = Gmsh::find()?;
@@ -122,7 +121,7 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
     let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
     let parse = |file: &mut Digested<File>| {
         msh::read(path, Box::new(file), Maker::Other).map_err(|error| match error.advice() {
-            // what helps a script helps nobody here
+            // Advice for scripts does not help with the file of another program.
             Some(advice) if !advice.contains("Physical") => error,
             _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
         })
@@ -137,8 +136,10 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
     kept(&name, None, &folders(), parse, make).map_err(|error| error.at(&file.place))
 }
 
-/// The mesh of this name in the cache, which is in one of `folders`; or what `make` makes of it in a folder to work in, and in a file there. If
-/// `unkept` says why the name does not tell all that the mesh is made from, it is made anew.
+/// Return the mesh `name` from the cache, which is in one of `folders`, or make it.
+///
+/// `make` gets a folder to work in and the path of the file that it must write there. `unkept` gives a reason why the name does
+/// not identify all that the mesh is made from; then the mesh is always made anew.
 fn kept<const D: usize>(
     name: &str,
     unkept: Option<String>,
@@ -150,7 +151,7 @@ fn kept<const D: usize>(
         let mut source = Digested::new(file);
         parse(&mut source).map(|mesh| (mesh, source.digest()))
     };
-    // A file of the cache that cannot be read or is damaged is as good as none.
+    // A file of the cache that cannot be read or is damaged counts as absent.
     for folder in folders.iter().filter(|_| unkept.is_none()) {
         let cached = folder.join(name);
         if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| parse(file).ok()) {
@@ -161,13 +162,13 @@ fn kept<const D: usize>(
     let made = workshop.path().join(name);
     let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
     let mesh = make(workshop.path(), &made).and_then(|()| parse(open()?));
-    // half a file is no fault of the script
+    // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
     Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)?, digest, unkept })
 }
 
-/// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. None if there is more
-/// that it depends on, or a file that cannot be read.
+/// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
+/// the mesh depends on more, or if a file cannot be read.
 pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<String> {
     match source {
         MeshSource::Geo { file, set, sizes, guard, .. } => {
@@ -185,7 +186,8 @@ fn script(path: &Path) -> Result<Script> {
     if foreign::is_shape(path) { Script::of_shape(path) } else { Script::read(path) }
 }
 
-/// Return the name in the cache of the mesh of a script: with these numbers set in it, sizes to follow, and limits.
+/// Return the name in the cache of the mesh of a script, with the numbers that are set in it, the sizes to follow, and the
+/// limits.
 fn key(
     path: &Path,
     script: &Script,
@@ -193,14 +195,14 @@ fn key(
     order: Order,
     (set, sizes, guard): (&[(String, f64)], Option<&str>, &Guard),
 ) -> Result<String> {
-    // one thread or many: the same algorithm
+    // The algorithm depends on whether a number of threads is given, not on the number.
     let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
     let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
     let made_from = (Gmsh::find()?.identity(), asked, files, script.is_ended(), script.inputs.environment());
     Ok(file_name(made_from, path))
 }
 
-/// Meshes a script on one rank.
+/// Mesh a script on one rank.
 #[cfg(test)]
 pub(super) fn from_script<const D: usize>(
     file: &Located<PathBuf>,
@@ -213,8 +215,8 @@ pub(super) fn from_script<const D: usize>(
     meshed(file, numbers, sizes, order, guard, folders)
 }
 
-/// Meshes a script, with the cache in one of `folders`; `set` are the numbers set in it, and where they stand if that is not where the
-/// script is named.
+/// Mesh a script, with the cache in one of `folders`. `set` holds the numbers to set in it. `places` holds their places in the
+/// scene, where these differ from that of the script.
 fn meshed<const D: usize>(
     file: &Located<PathBuf>,
     (set, places): (&[(String, f64)], &[Place]),
@@ -253,7 +255,8 @@ fn meshed<const D: usize>(
     kept(&name, unkept, folders, |file| checked(path, file, order), make)
 }
 
-/// For a script whose last line is not ended: one in the folder `work` that includes it.
+/// Return the path of a script in the folder `work` that includes the one at `path`, or `None` if the last line of that script
+/// is ended.
 fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
     if script.is_ended() {
         return Ok(None);
@@ -264,7 +267,7 @@ fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
     std::fs::write(&made, text).map_err(|cause| Error::file(&made, "write", &cause)).map(|()| Some(made))
 }
 
-/// Keeps the sizes of a mesh that an adaptation ended with: `purpose` is all that it was for, scene and error.
+/// Keep the final sizes of an adaptation in the cache. `purpose` identifies all that the mesh was made for, scene and error.
 ///
 /// # Errors
 /// The cache cannot be written.
@@ -276,7 +279,7 @@ pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
     workshop.publish(&made, &name).map(|_| ())
 }
 
-/// The sizes that an earlier adaptation for the same `purpose` ended with.
+/// Return the final sizes of an earlier adaptation for the same `purpose`.
 pub fn recall_final(purpose: &str) -> Option<String> {
     let name = final_name(purpose);
     folders().iter().find_map(|folder| std::io::read_to_string(cache::open(&folder.join(&name))?).ok())
@@ -286,7 +289,7 @@ fn final_name(purpose: &str) -> String {
     file_name(purpose, Path::new("sizes")) + ".pos"
 }
 
-/// The mesh in a file that Gmsh made from a script, of the order asked for.
+/// Return the mesh in a file that Gmsh made from a script, provided that it has the requested order.
 fn checked<const D: usize>(path: &Path, file: &mut Digested<File>, order: Order) -> Result<Mesh<D>> {
     let mesh: Mesh<D> = msh::read(path, Box::new(file), Maker::Script)?;
     if mesh.order == order {

@@ -1,16 +1,18 @@
-//! Cells in an order in which neighbours stand together.
+//! An order of cells that keeps neighbours together in memory.
 //!
-//! Gmsh lists tetrahedra as its Delaunay kernel found them, and nodes are numbered as cells come. A product with the stiffness
-//! matrix then jumps through memory. Along Morton's curve through the centres of the cells it does not.
+//! Gmsh lists tetrahedra in the order in which its Delaunay kernel found them, and nodes are numbered in the order of the
+//! cells. A product with the stiffness matrix then jumps through memory. With cells in the order of Morton's curve through
+//! their centres it does not.
 
 use super::{Group, Mesh};
 use crate::linalg::{bounds, pad};
 
-/// Bits of a coordinate in a place on the curve: three of them fit 64.
+/// Bits of a coordinate in a position on the curve. Three coordinates fit 64 bits.
 const BITS: u32 = 21;
 
 impl<const D: usize> Mesh<D> {
-    /// Sort the cells of each group along Morton's curve. Structured meshes in the plane come in a good order already.
+    /// Sort the cells of each group along Morton's curve. Structured meshes in the plane already have a good order, so only
+    /// cells in space are sorted.
     pub fn sort_cells(&mut self) {
         if D < 3 {
             return;
@@ -28,7 +30,7 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// Sort the simplices of a group by a key, equal ones as they were.
+/// Sort the simplices of a group by a key. Simplices with equal keys keep their order.
 fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) {
     let mut order: Vec<(u64, u32)> = group.simplices().zip(0..).map(|(simplex, i)| (key(simplex), i)).collect();
     order.sort_unstable();
@@ -40,7 +42,7 @@ fn sort(group: &mut Group, key: impl Fn(&[u32]) -> u64) {
     }
 }
 
-/// The bits of a number with two zeros before each.
+/// Return a number with two zeros inserted before each of its bits.
 fn spread(x: u64) -> u64 {
     (0..BITS).fold(0, |spread, bit| spread | (x >> bit & 1) << (3 * bit))
 }
@@ -58,7 +60,7 @@ mod tests {
 
     #[test]
     fn neighbours_come_one_after_the_other() {
-        // cells on a line, in an order that jumps
+        // The cells lie on a line, in an order that jumps.
         let at = [3, 0, 2, 1];
         let cell = |i: usize| {
             [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|x| [x[0] + i as f64, x[1], x[2]])

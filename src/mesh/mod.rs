@@ -1,8 +1,8 @@
 //! Simplicial meshes with named groups, from Gmsh.
 //!
-//! [`load`] is the way in: a `.geo` script or a file of another program's geometry is meshed by Gmsh, once, and kept in a cache; so is a
-//! mesh of another format, which Gmsh converts; a `.msh` file (format 4.1, text or binary) is read as it is; arrays of a Rust program are
-//! checked. Everything downstream sees a [`Mesh`] only.
+//! [`load`] is the entry point. Gmsh meshes a `.geo` script or a file of another program's geometry once, and the cache keeps
+//! the result. A mesh of another format is converted by Gmsh and cached, too. A `.msh` file (format 4.1, text or binary) is
+//! read directly. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
 
 mod abaqus;
 mod arrays;
@@ -50,64 +50,65 @@ use crate::linalg::pad;
 use crate::problem::order::Order;
 use std::path::PathBuf;
 
-/// Lengths of a mesh that a run computes with: those of atoms and of galaxies are between 1e-40 and 1e40 in all units in use, and sixth powers of
-/// these, which areas and volumes of cells lead to, are numbers still.
+/// Lengths of a mesh that a run computes with. The lengths of atoms and of galaxies lie between 1e-40 and 1e40 in all units in
+/// use. Areas and volumes of cells lead to sixth powers of lengths, which are still finite and nonzero in this range.
 pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 
 /// A mesh: points and named groups of simplices.
 ///
-/// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower
-/// dimension. Local numbering is VTK's: vertices first, then for `Order::P2` mid-edges in the order
-/// `01` (line), `01 12 02` (triangle), `01 12 02 03 13 23` (tetrahedron).
+/// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower dimension. The
+/// local numbering is VTK's: vertices come first. For `Order::P2` mid-edges follow in the order `01` (line), `01 12 02`
+/// (triangle), `01 12 02 03 13 23` (tetrahedron).
 ///
-/// No simplex is degenerate (its measure is above 1e-12 of its longest edge to its dimension), cells have positive
-/// volume, group names are unique, no group is empty, and coordinates are finite.
+/// No simplex is degenerate: its measure is above 1e-12 times its longest edge to the power of its dimension. Cells have
+/// positive volume, group names are unique, no group is empty, and coordinates are finite.
 #[derive(Debug, Clone)]
 pub struct Mesh<const D: usize> {
     /// The file that the user named (`.geo` or `.msh`), for messages.
     pub path: PathBuf,
-    /// Coordinates of the points relative to `datum`, in the order of the file; only those that some group uses, all of arrays.
+    /// Coordinates of the points relative to `datum`, in the order of the file. A mesh from a file keeps only points that some
+    /// group uses, a mesh from arrays keeps all.
     pub points: Vec<[f64; D]>,
-    /// The point of the scene from which coordinates are measured; the scene's own origin unless the mesh is far from it
+    /// The point of the scene from which coordinates are measured. It is the origin of the scene unless the mesh is far from it
     /// ([`Mesh::measure_nearby`]).
     pub datum: [f64; D],
-    /// Order of all elements (points have none).
+    /// Order of all elements; points have none.
     pub order: Order,
     /// Named groups, in the order of the file.
     pub groups: Groups,
-    /// Quadrangles, hexahedra, prisms and pyramids in them that were split into simplices.
+    /// Number of quadrangles, hexahedra, prisms and pyramids that were split into simplices.
     pub split: usize,
-    /// Quadratic cells whose edges were made straight, since the curved boundary folded them.
+    /// Number of quadratic cells whose edges were made straight because the curved boundary folded them.
     pub straightened: usize,
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Return the mesh of these points and groups of simplices of one order, measured from the scene's own origin.
+    /// Return the mesh of these points and groups of simplices of one order, measured from the origin of the scene.
     pub fn new(path: PathBuf, points: Vec<[f64; D]>, order: Order, groups: Groups) -> Self {
         Self { path, points, datum: [0.0; D], order, groups, split: 0, straightened: 0 }
     }
 
-    /// The group of a name, of whatever dimension.
+    /// Return the group with this name, of any dimension.
     pub fn group(&self, name: &str) -> Option<&Group> {
         self.groups.named(name)
     }
 
-    /// Names of the groups of a dimension, in the order of the file.
+    /// Return the names of the groups of a dimension, in the order of the file.
     pub fn group_names(&self, dimension: usize) -> impl Iterator<Item = &str> {
         self.groups.iter().filter(move |group| group.dimension == dimension).map(|group| group.name.as_str())
     }
 
-    /// Return the coordinates (x, y, z) that a point has in the scene.
+    /// Return the coordinates (x, y, z) of a point in the scene.
     pub fn in_scene(&self, x: [f64; D]) -> [f64; 3] {
         pad(datum::in_scene(&self.datum, x))
     }
 
-    /// Forgets the numbers of elements in the file, which messages of the checks name.
+    /// Drop the numbers of the elements in the file, which only messages of the checks need.
     pub fn forget_tags(&mut self) {
         self.groups.iter_mut().for_each(|group| group.tags = Vec::new());
     }
 
-    /// The mesh of the same simplices without mid-edge points; a copy if there are none.
+    /// Return the mesh of the same simplices without mid-edge points. Without such points the result is a copy.
     pub fn lower_order(&self) -> Mesh<D> {
         let mut groups = self.groups.clone();
         for group in groups.iter_mut() {

@@ -1,4 +1,4 @@
-//! Reader of Gmsh's `.msh` 4.1, text and binary, into a [`Mesh`].
+//! A reader of Gmsh's `.msh` 4.1, text and binary, that makes a [`Mesh`].
 
 use super::cursor::{Cursor, Source};
 use super::nodes::Nodes;
@@ -9,30 +9,30 @@ use crate::error::{Error, Result};
 use crate::problem::order::Order;
 use std::path::Path;
 
-/// Who made the bytes of a mesh.
+/// The maker of the bytes of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Maker {
-    /// The user: lines in them mean something, and groups have names.
+    /// The user. Line numbers are meaningful in messages, and groups have names.
     User,
     /// Gmsh, from a script.
     Script,
-    /// Gmsh, from a file of another program, which may have no names.
+    /// Gmsh, from a file of another program, whose groups may have no names.
     Other,
 }
 
-/// Reads the bytes of a `.msh` file. Cells are numbered as in the file; see the module.
+/// Read the bytes of a `.msh` file. Cells are in the order of the file, with the local numbering of [`Mesh`].
 ///
 /// # Errors
-/// Input that is no mesh, with the file and the line.
+/// The input is not a mesh. The error names the file and the line.
 pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
     read(path, Box::new(std::io::Cursor::new(bytes)), maker)
 }
 
-/// Reads a `.msh` file from its start, some of it at a time; `path` stands in messages: what `maker` made the file from.
+/// Read a `.msh` file from its start, one window at a time. `path` stands in messages and is what `maker` made the file from.
 ///
 /// # Errors
-/// Everything that makes the file no mesh of named simplices in `D` dimensions is a [`Kind::Mesh`](crate::error::Kind)
-/// error with the line or byte and a way out; a file that cannot be read.
+/// The file cannot be read, or it is not a mesh of named simplices in `D` dimensions. The latter is a
+/// [`Kind::Mesh`](crate::error::Kind) error with the line or byte and a way out.
 pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Maker) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
     let cursor = &mut Cursor::new(path, source, maker != Maker::User);
@@ -73,7 +73,8 @@ pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Ma
     }
 }
 
-/// Enter the section that a line at `start` begins; return its name, none if nothing in it is needed. Each of those in use may be `seen` once.
+/// Enter the section that the line at `start` begins. Return its name, or `None` if nothing in it is needed. `seen` collects
+/// the sections in use, each of which may occur once.
 fn enter<'l>(cursor: &mut Cursor, start: usize, line: &'l str, seen: &mut Vec<String>) -> Result<Option<&'l str>> {
     let Some(section) = line.strip_prefix('$') else {
         return Err(cursor
@@ -97,7 +98,7 @@ fn enter<'l>(cursor: &mut Cursor, start: usize, line: &'l str, seen: &mut Vec<St
     }
 }
 
-/// Reads `$MeshFormat`, the first section but for comments.
+/// Read `$MeshFormat`, which is the first section except for comments.
 fn read_format(cursor: &mut Cursor) -> Result<()> {
     let save_again = |error: Error, path: &Path| {
         error.help(format!("save it as 4.1: gmsh {} -save -format msh41 -o new.msh", path.display()))
@@ -150,7 +151,7 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
     cursor.leave()
 }
 
-/// The mesh, once all sections are read.
+/// Make the mesh after all sections are read.
 fn finish<const D: usize>(
     path: &Path,
     physical: Physical,

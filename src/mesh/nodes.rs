@@ -1,4 +1,4 @@
-//! The `$Nodes` section: coordinates, and from Gmsh's node tags to our numbers.
+//! The `$Nodes` section: coordinates, and the map from Gmsh's node tags to our numbers.
 
 use super::cursor::Cursor;
 use crate::error::{Error, Result};
@@ -8,20 +8,20 @@ use std::collections::HashMap;
 pub struct Nodes {
     /// Coordinates (x, y, z).
     pub points: Vec<[f64; 3]>,
-    /// Largest |z| of a point that counts as in the plane z = 0: 1e-12 of the size of the mesh.
+    /// Largest |z| of a point that counts as in the plane z = 0: 1e-12 times the size of the mesh.
     pub flat: f64,
     numbers: Numbers,
     blocks: Vec<Block>,
 }
 
-/// Where the coordinates of a run of nodes stand in the file.
+/// A block of consecutive nodes, with the position of their coordinates in the file.
 struct Block {
     first: usize,
     position: usize,
     bytes: usize,
 }
 
-/// From tags to numbers. Gmsh's tags are nearly contiguous; others may write any.
+/// A map from tags to numbers. Gmsh's tags are nearly contiguous; other programs may write any.
 enum Numbers {
     Dense { least: u64, number: Vec<u32> },
     Sparse(HashMap<u64, u32>),
@@ -30,10 +30,10 @@ enum Numbers {
 const NONE: u32 = u32::MAX;
 
 impl Nodes {
-    /// Reads the section's contents.
+    /// Read the contents of the section.
     ///
     /// # Errors
-    /// Malformed text, a coordinate that is no number, a tag that stands twice.
+    /// The text is malformed, a coordinate is not a number, or a tag occurs twice.
     pub fn read(cursor: &mut Cursor) -> Result<Nodes> {
         cursor.begin();
         let start = cursor.position();
@@ -89,7 +89,7 @@ impl Nodes {
         Ok(nodes)
     }
 
-    /// Our number of the node with this tag.
+    /// Return our number of the node with this tag.
     pub fn number(&self, tag: u64) -> Option<u32> {
         match &self.numbers {
             Numbers::Dense { least, number } => {
@@ -100,7 +100,7 @@ impl Nodes {
         }
     }
 
-    /// An error that names the place of a node's coordinates in the file.
+    /// Return an error that names the position of a node's coordinates in the file.
     pub fn error_at(&self, cursor: &mut Cursor, number: usize, message: String) -> Error {
         let block = &self.blocks[self.blocks.partition_point(|block| block.first <= number) - 1];
         cursor.enter("Nodes");
@@ -114,11 +114,11 @@ impl Nodes {
 }
 
 impl Numbers {
-    /// No tags yet, in the form that suits those to come.
+    /// Return a map without entries, in the form that suits these tags.
     fn empty(tags: &[u64]) -> Numbers {
         let least = tags.iter().copied().min().unwrap_or(0);
         let span = tags.iter().copied().max().unwrap_or(0) - least;
-        // A table of at most four slots a node is faster and smaller than a map.
+        // A table with at most four slots per node is faster and smaller than a map.
         if span < 4 * tags.len() as u64 + 1024 {
             Numbers::Dense { least, number: vec![NONE; span as usize + 1] }
         } else {
@@ -126,7 +126,7 @@ impl Numbers {
         }
     }
 
-    /// Gives a tag its number; tells whether it had one already. The tag is one of those given to `empty`.
+    /// Set the number of a tag, one of those given to `empty`. Return whether it already had one.
     fn insert(&mut self, tag: u64, new: u32) -> bool {
         match self {
             Numbers::Dense { least, number } => {
@@ -138,7 +138,7 @@ impl Numbers {
     }
 }
 
-/// Longest side of the box around the points.
+/// Return the longest side of the box around the points.
 fn size(points: &[[f64; 3]]) -> f64 {
     let [low, high] = crate::linalg::bounds(points.iter().copied());
     (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max)

@@ -1,23 +1,25 @@
-//! From numbers of points to others, of a body or of a rank: its size is that of these, as a mesh may have thousands.
+//! A map from point numbers to the numbers of a body or of a rank. Its size is that of the body or of the rank's part, since a
+//! mesh may have thousands of bodies.
 
-/// No node has this number.
+/// The entry of a point that is not a node.
 const ABSENT: u32 = u32::MAX;
 
 /// The node of each point of a body.
 #[derive(Debug, Clone, Default)]
 pub struct Numbering {
-    /// Points of the body, sorted; empty if `node` has an entry for every point from `first` on.
+    /// Points of the body, sorted. The list is empty if `node` has an entry for every point from `first` on.
     points: Vec<u32>,
     first: u32,
     node: Vec<u32>,
 }
 
-/// A table with an entry for every point between the first and the last may have this many times more entries than corners of
-/// cells name points. About six cells meet at a node of triangles and 24 at one of tetrahedra, so it is no larger than the cells.
+/// Largest ratio of the entries of a table to the corners of cells, counted in every cell. The table has an entry for every
+/// point between the first and the last one. About six cells meet at a node of triangles and 24 at one of tetrahedra, so the
+/// table is no larger than the cells.
 const SPARSE: usize = 2;
 
 impl Numbering {
-    /// The points that cells name, each as often as they like, none with a node yet.
+    /// Make a numbering for the points that cells name, with any repetitions. No point has a node yet.
     pub fn new(named: impl Iterator<Item = u32> + Clone) -> Self {
         let (count, first, last) =
             named.clone().fold((0, u32::MAX, 0), |(count, low, high), p| (count + 1, low.min(p), high.max(p)));
@@ -34,7 +36,7 @@ impl Numbering {
         Self { node: vec![ABSENT; points.len()], points, first }
     }
 
-    /// The points that are named, each as often as it likes, numbered in increasing order.
+    /// Make a numbering of the points that are named, with any repetitions, in increasing order of the points.
     pub fn in_order(named: impl Iterator<Item = u32> + Clone) -> Self {
         let mut numbering = Self::new(named.clone());
         named.for_each(|point| {
@@ -51,12 +53,12 @@ impl Numbering {
         self.points.binary_search(&point).ok()
     }
 
-    /// The node of a point, if it is one of the body.
+    /// Return the node of a point, if it is one of the body.
     pub fn get(&self, point: u32) -> Option<u32> {
         self.place(point).map(|place| self.node[place]).filter(|&node| node != ABSENT)
     }
 
-    /// The node of a point that cells name; `next` if it has none yet. Whether it had none.
+    /// Return the node of a point that cells name, and whether it is new. A point without a node gets the node `next`.
     pub fn number(&mut self, point: u32, next: u32) -> (u32, bool) {
         let Some(place) = self.place(point) else { return (ABSENT, false) };
         let node = &mut self.node[place];
@@ -67,7 +69,7 @@ impl Numbering {
         (*node, is_new)
     }
 
-    /// The points of the body, in the order of the mesh.
+    /// Return the points of the body, in the order of the mesh.
     pub fn points(&self) -> impl Iterator<Item = u32> {
         let at = |place: usize| self.points.get(place).copied().unwrap_or(self.first + place as u32);
         (0..self.node.len()).filter(|&place| self.node[place] != ABSENT).map(at)

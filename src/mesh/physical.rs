@@ -1,4 +1,4 @@
-//! Physical groups: their names, and which entities of the geometry belong to them.
+//! Physical groups: their names, and the entities of the geometry that belong to them.
 
 use super::Group;
 use super::cursor::Cursor;
@@ -7,37 +7,39 @@ use crate::error::Result;
 use crate::problem::body::is_in_name;
 use std::collections::{HashMap, HashSet};
 
-/// The groups of a file, and who belongs to them.
+/// The groups of a file, and the entities that belong to them.
 #[derive(Default)]
 pub struct Physical {
-    /// The groups, empty until the elements are read.
+    /// The groups, which are empty until the elements are read.
     pub groups: Vec<Group>,
-    /// From dimension and physical tag to the place in `groups`.
+    /// Index in `groups` by dimension and physical tag.
     group_of: HashMap<(usize, i32), usize>,
-    /// From dimension and tag of an entity of the geometry to the groups it belongs to.
+    /// Indices in `groups` of the groups of each entity of the geometry, by its dimension and tag.
     entities: HashMap<(usize, i32), Vec<usize>>,
-    /// Whether groups without a name are called by their kind and number, and where a dimension has none each entity is one.
+    /// Whether groups without a name get one from their kind and number. If no group of a dimension has a name, each of its
+    /// entities without a group becomes one.
     named_by_number: bool,
 }
 
 impl Physical {
-    /// No groups yet; `named_by_number` if groups without a name are called by their kind and number.
+    /// Start without groups. `named_by_number` tells whether groups without a name get one from their kind and number.
     pub fn new(named_by_number: bool) -> Self {
         Self { named_by_number, ..Self::default() }
     }
 
-    /// The first group without elements.
+    /// Return the first group without elements.
     pub fn empty(&self) -> Option<&Group> {
-        // those of other programs are left out
+        // Empty groups of other programs are not reported, because they are dropped.
         self.groups.iter().filter(|_| !self.named_by_number).find(|group| group.is_empty())
     }
 
-    /// Places in `groups` of those that an entity belongs to; `None` if the file does not list the entity.
+    /// Return the indices in `groups` of the groups of an entity, or `None` if the file does not list the entity.
     pub fn members(&self, dimension: usize, tag: i32) -> Option<&[usize]> {
         self.entities.get(&(dimension, tag)).map(Vec::as_slice)
     }
 
-    /// The first entity of a dimension in a group of which `has` says that it has no elements.
+    /// Return the first entity of a dimension that belongs to a group and has no elements. `has` tells whether an entity, given by
+    /// dimension and tag, has elements.
     pub fn without(&self, dimension: usize, has: impl Fn((usize, i32)) -> bool) -> Option<i32> {
         let of = self.entities.iter().filter(|(entity, groups)| entity.0 == dimension && !groups.is_empty());
         of.map(|(entity, _)| *entity).filter(|entity| !has(*entity)).map(|(_, tag)| tag).min()
@@ -53,7 +55,8 @@ impl Physical {
         }
     }
 
-    /// `$PhysicalNames`: lines of dimension, tag and quoted name, in binary files too.
+    /// Read `$PhysicalNames`, which has lines of dimension, tag and quoted name, in binary files too. `space` is the dimension
+    /// of the scene.
     pub fn read_names(&mut self, cursor: &mut Cursor, space: usize) -> Result<()> {
         let start = cursor.position();
         let count = cursor.line()?.parse::<usize>();
@@ -93,14 +96,15 @@ impl Physical {
         Ok(())
     }
 
-    /// A group called by its kind and number; its place.
+    /// Add a group with a name of its kind and number, and return its index.
     fn call(&mut self, dimension: usize, number: i32) -> usize {
         self.groups.push(empty(format!("{}_{number}", THINGS[dimension].to_lowercase()), dimension));
         self.group_of.insert((dimension, number), self.groups.len() - 1);
         self.groups.len() - 1
     }
 
-    /// The groups. Other programs leave groups empty, and give groups of cells names that no body can have.
+    /// Return the groups. Other programs leave groups empty and give groups of cells names that no body can have. Such empty
+    /// groups are dropped, and such names are replaced.
     pub fn finished(self, space: usize) -> Vec<Group> {
         let mut groups = self.groups;
         if self.named_by_number {
@@ -113,7 +117,7 @@ impl Physical {
         groups
     }
 
-    /// `$Entities`: which physical groups each point, curve, surface and volume of the geometry belongs to.
+    /// Read `$Entities`, which lists the physical groups of each point, curve, surface and volume of the geometry.
     pub fn read_entities(&mut self, cursor: &mut Cursor) -> Result<()> {
         let named: [bool; 4] =
             std::array::from_fn(|dimension| self.groups.iter().any(|group| group.dimension == dimension));
@@ -128,7 +132,7 @@ impl Physical {
                 cursor.begin();
                 let start = cursor.position();
                 let tag = cursor.int()?;
-                // The entity's place, or the corners of the box around it.
+                // These are the coordinates of a point, or the corners of the box around the entity.
                 for _ in 0..if dimension == 0 { 3 } else { 6 } {
                     cursor.bound()?;
                 }
@@ -168,12 +172,12 @@ impl Physical {
     }
 }
 
-/// A group without elements; its stride is final once the first of them are seen.
+/// Return a group without elements. Its stride is final when the first elements are added.
 fn empty(name: String, dimension: usize) -> Group {
     Group { name, dimension, stride: dimension + 1, connectivity: Vec::new(), tags: Vec::new() }
 }
 
-/// A name as bodies have it.
+/// Return a name in the form that bodies have.
 fn of_body(name: &str) -> String {
     let small = name.to_ascii_lowercase();
     let word: String = small.chars().map(|c| if is_in_name(c) { c } else { '_' }).collect();

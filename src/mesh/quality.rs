@@ -1,21 +1,21 @@
-//! Shape of the cells of a mesh.
+//! The shape of the cells of a mesh.
 
 use super::{Group, Mesh};
 
-/// Shape of the cells of a group by their mean ratio: 1 for an equilateral simplex, near 0 for a flat one.
+/// The shape of the cells of a group by their mean ratio, which is 1 for an equilateral simplex and near 0 for a flat one.
 ///
-/// In the plane 4 sqrt(3) area / (sum of squared edges), in space 12 (3 volume)^(2/3) / (sum of squared edges); vertices
-/// only, so curved edges count as straight.
+/// In the plane the mean ratio is 4 sqrt(3) area / (sum of squared edges), in space 12 (3 volume)^(2/3) / (sum of squared
+/// edges). It uses the vertices only, so curved edges count as straight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quality {
-    /// The worst cell.
+    /// Mean ratio of the worst cell.
     pub least: f64,
-    /// Mean of all cells.
+    /// Mean over all cells.
     pub mean: f64,
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Shape of the cells of a group; meaningless for groups of lower dimension.
+    /// Return the shape of the cells of a group. The result is meaningless for groups of lower dimension.
     pub fn quality(&self, group: &Group) -> Quality {
         let (mut least, mut sum) = (f64::INFINITY, 0.0);
         for cell in group.simplices() {
@@ -27,7 +27,7 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// Mean ratio of a simplex given by its first D + 1 vertices.
+/// Return the mean ratio of the simplex given by the first D + 1 vertices.
 fn mean_ratio<const D: usize>(vertices: &[[f64; D]; 4]) -> f64 {
     let edge = |i: usize, j: usize| -> [f64; D] { std::array::from_fn(|c| vertices[j][c] - vertices[i][c]) };
     let mut squares = 0.0;
@@ -36,7 +36,7 @@ fn mean_ratio<const D: usize>(vertices: &[[f64; D]; 4]) -> f64 {
             squares += edge(i, j).iter().map(|x| x * x).sum::<f64>();
         }
     }
-    // D! times the measure: the determinant of the edges from the first vertex
+    // The determinant of the edges from the first vertex is D! times the measure.
     let jacobian = nalgebra::DMatrix::from_fn(D, D, |row, column| edge(0, row + 1)[column]).determinant().abs();
     match D {
         2 => 2.0 * 3f64.sqrt() * jacobian / squares,

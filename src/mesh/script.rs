@@ -1,5 +1,5 @@
-//! What a `.geo` script says, as far as it matters before Gmsh runs it: which files it reads, and which numbers can
-//! be set from outside.
+//! The facts about a `.geo` script that matter before Gmsh runs it: which files it reads, and which numbers can be set from
+//! outside.
 //!
 //! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
 
@@ -13,27 +13,27 @@ use std::path::{Path, PathBuf};
 /// A script and all files that it reads.
 #[derive(Debug, Default)]
 pub struct Script {
-    /// The contents of the script itself and of every file it names, in the order they are met.
+    /// Contents of the script itself and of every file that it names, in order of first appearance.
     pub files: Vec<Vec<u8>>,
-    /// What it depends on besides.
+    /// Other inputs that the script depends on.
     pub inputs: Inputs,
     /// Names that take a number from outside.
     settable: BTreeSet<String>,
-    /// Names of constants whose number is set under another name, and that name.
+    /// Pairs of a constant and the other name under which its number is set.
     aliases: Vec<(String, String)>,
-    /// Names that the script gives a value itself.
+    /// Names to which the script itself assigns a value.
     assigned: BTreeSet<String>,
     /// All names.
     mentioned: BTreeSet<String>,
-    /// What its user must trust it for, and the file.
+    /// The file and the command for which the user must trust the script, if there is one.
     breach: Option<(PathBuf, trust::Breach)>,
 }
 
 impl Script {
-    /// Reads the script and what it includes or merges.
+    /// Read the script and the files that it includes or merges.
     ///
     /// # Errors
-    /// A script that cannot be read. Included files that do not exist are left to Gmsh to report.
+    /// The script cannot be read. Gmsh reports included files that do not exist.
     pub fn read(path: &Path) -> Result<Script> {
         let mut script = Script::default();
         path.canonicalize().map_err(|cause| Error::file(path, "read", &cause))?;
@@ -43,8 +43,8 @@ impl Script {
         while let Some(path) = found.get(next).cloned() {
             next += 1;
             let bytes = crate::file::read(&path)?;
-            // Gmsh looks for a file beside the one that names it. Every quoted name of a file counts, so that
-            // `Merge "part.step"` and the like need no list of commands.
+            // Gmsh looks for a file beside the one that names it. Every quoted name of a file counts, so that `Merge
+            // "part.step"` and the like need no list of commands.
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
             let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
@@ -67,23 +67,25 @@ impl Script {
         Ok(script)
     }
 
-    /// The shape of another program, which Gmsh reads as data: what is in it is no script.
+    /// Read the shape of another program. Gmsh reads it as data, so nothing in it is a script.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// The file cannot be read.
     pub fn of_shape(path: &Path) -> Result<Script> {
         Ok(Script { files: vec![crate::file::read(path)?], ..Script::default() })
     }
 
-    /// Whether its last line is ended. Gmsh leaves the last command out else, without a word, unless another script includes it.
+    /// Return whether the last line is ended. Otherwise Gmsh silently omits the last command, unless another script includes
+    /// this one.
     pub fn is_ended(&self) -> bool {
         self.files.first().is_none_or(|text| text.ends_with(b"\n"))
     }
 
-    /// Notes the names in a piece of the script.
+    /// Record the names in a part of the script.
     fn note(&mut self, tokens: &[Token]) {
         use Token::{Name, Sign, Text};
-        // Depth of brackets inside `DefineConstant[ ... ]`, 0 outside; and the constant being defined there.
+        // The depth counts brackets inside `DefineConstant[ ... ]` and is 0 outside. The constant is the one being defined
+        // there.
         let mut depth = 0;
         let mut constant: Option<&str> = None;
         for (at, token) in tokens.iter().enumerate() {
@@ -126,10 +128,10 @@ impl Script {
         }
     }
 
-    /// Checks that the script does nothing to the machine but describe bodies.
+    /// Check that the script does nothing to the machine except describe bodies.
     ///
     /// # Errors
-    /// What it does, with the line.
+    /// The script does more. The error says what, with the line.
     pub fn judge(&self, file: &Located<PathBuf>) -> Result<()> {
         let Some((path, breach)) = &self.breach else { return Ok(()) };
         let shown = if path.file_name() == file.value.file_name() { &file.value } else { path };
@@ -138,10 +140,10 @@ impl Script {
             .help("Gmsh runs a script as a program: read it, and if you trust it give --trust-geo"))
     }
 
-    /// Checks that a number set from outside arrives.
+    /// Check that a number set from outside takes effect.
     ///
     /// # Errors
-    /// A name that the script never mentions, or one that it overwrites.
+    /// The script never mentions the name, or it overwrites the value.
     pub fn check(&self, name: &str, file: &Path, place: &Place) -> Result<()> {
         if self.settable.contains(name) {
             return Ok(());
@@ -168,14 +170,15 @@ impl Script {
     }
 }
 
-/// Return the path of a file in its folder, links to the folder resolved and one to the file itself not: Gmsh looks for what a script
-/// names beside the link. Scripts may include each other along ever longer paths, which are the same then.
+/// Return the path of a file with the links of its folder resolved. A link to the file itself is not resolved, because Gmsh
+/// looks for other files beside the link. Scripts may include each other along ever longer paths, which become equal in this
+/// form.
 fn located(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     Some(folder.canonicalize().ok()?.join(path.file_name()?))
 }
 
-/// Return the file of options beside a file, which Gmsh runs as a script after it has opened or merged the file.
+/// Return the file of options beside a file. Gmsh runs it as a script after it has opened or merged the file.
 fn options_of(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".opt");
@@ -239,7 +242,7 @@ mod tests {
         assert_eq!(script.files.len(), 3);
     }
 
-    /// Gmsh reads `a.geo.opt` after `a.geo`, and what is named in a script that is a link lies beside the link.
+    /// Gmsh reads `a.geo.opt` after `a.geo`. It looks for the files that a linked script names beside the link.
     #[test]
     fn files_are_found_where_gmsh_finds_them() {
         let folder = tempfile::tempdir().unwrap();

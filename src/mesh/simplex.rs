@@ -1,9 +1,9 @@
-//! Facts about single simplices: sizes, orientation, Gmsh's numbering.
+//! Properties of single simplices: sizes, orientation, Gmsh's numbering.
 
 use crate::problem::order::Order;
 use nalgebra::Vector3;
 
-/// What Gmsh calls things of dimension 0 to 3, as in `Physical Surface`.
+/// Gmsh's words for entities of dimension 0 to 3, as in `Physical Surface`.
 pub const THINGS: [&str; 4] = ["Point", "Curve", "Surface", "Volume"];
 
 /// A simplex type of Gmsh.
@@ -18,7 +18,7 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// The simplex that an element type number of Gmsh stands for, if it is one we compute with.
+    /// Return the simplex that an element type number of Gmsh stands for, if this program computes with it.
     pub fn of_type(number: i32) -> Option<Kind> {
         let (dimension, order, stride) = match number {
             15 => (0, None, 1),
@@ -33,13 +33,13 @@ impl Kind {
         Some(Kind { dimension, order, stride })
     }
 
-    /// The linear simplex of a dimension from 1 on.
+    /// Return the linear simplex of a dimension from 1 on.
     pub fn linear(dimension: usize) -> Kind {
         Kind { dimension, order: Some(Order::P1), stride: dimension + 1 }
     }
 }
 
-/// What Gmsh calls an element type and its number of nodes, for types 1 to 31.
+/// Return Gmsh's name of an element type and its number of nodes, for types 1 to 31.
 pub fn type_name(number: i32) -> Option<(&'static str, usize)> {
     const NODES: [usize; 31] =
         [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56];
@@ -57,7 +57,7 @@ pub fn type_name(number: i32) -> Option<(&'static str, usize)> {
     Some((name, nodes))
 }
 
-/// Dimension of elements that [`type_name`] calls so.
+/// Return the dimension of elements with a name from [`type_name`].
 pub fn dimension(name: &str) -> usize {
     match name {
         "point" => 0,
@@ -67,15 +67,15 @@ pub fn dimension(name: &str) -> usize {
     }
 }
 
-/// Puts the points of a simplex from Gmsh's order into ours; they differ in the quadratic tetrahedron only, where
-/// Gmsh has mid-edge 23 before 13.
+/// Reorder the points of a simplex from Gmsh's order to ours. They differ only in the quadratic tetrahedron, where Gmsh has
+/// mid-edge 23 before 13.
 pub fn from_gmsh_order(simplex: &mut [u32]) {
     if simplex.len() == 10 {
         simplex.swap(8, 9);
     }
 }
 
-/// Turns a cell inside out: exchanges its last two vertices and the mid-edges that go with them.
+/// Invert the orientation of a cell: exchange its last two vertices and the mid-edges that go with them.
 fn mirror(cell: &mut [u32]) {
     match cell.len() {
         3 => cell.swap(1, 2),
@@ -93,7 +93,7 @@ fn mirror(cell: &mut [u32]) {
     }
 }
 
-/// Turns a simplex of these points to positive volume if it is a cell of `space`; false if it has no extent.
+/// Turn a simplex to positive volume if it is a cell of `space`. Return `false` if it has no extent.
 pub fn turn(simplex: &mut [u32], points: &[[f64; 3]], dimension: usize, space: usize) -> bool {
     let mut vertices = [[0.0; 3]; 4];
     vertices.iter_mut().zip(&simplex[..=dimension]).for_each(|(vertex, point)| *vertex = points[*point as usize]);
@@ -109,22 +109,22 @@ pub fn turn(simplex: &mut [u32], points: &[[f64; 3]], dimension: usize, space: u
     true
 }
 
-/// Up to four vertices seen from the first and scaled, exactly, by a power of two such that the largest difference of coordinates is near one:
-/// powers of lengths neither vanish nor overflow then.
+/// Translate the first of up to four vertices to the origin and scale them by a power of two, which is exact. The largest
+/// difference of coordinates is then near one, so that powers of lengths neither vanish nor overflow.
 fn of_unit_size(vertices: &[[f64; 3]]) -> [[f64; 3]; 4] {
     let mut scaled = [[0.0; 3]; 4];
     for (edge, vertex) in scaled.iter_mut().zip(vertices) {
         *edge = std::array::from_fn(|c| vertex[c] - vertices[0][c]);
     }
     let largest = scaled.iter().flatten().fold(0.0f64, |most, x| most.max(x.abs()));
-    // by its root, since the reciprocal of a tiny number overflows
+    // The root of the scale is applied twice, since the reciprocal of a tiny number overflows.
     let root = if largest > 0.0 { (-0.5 * largest.log2()).round().exp2() } else { 1.0 };
     scaled.iter_mut().flatten().for_each(|x| *x = *x * root * root);
     scaled
 }
 
-/// Signed measure of the simplex on these vertices, times the factorial of its dimension. The sign means something
-/// for cells alone: triangles if `space` is 2, tetrahedra if it is 3. Coordinates are (x, y, z), z unused in planes.
+/// Return the signed measure of the simplex on these vertices, times the factorial of its dimension. The sign is meaningful for
+/// cells alone: for triangles if `space` is 2, for tetrahedra if it is 3. Coordinates are (x, y, z); z is unused in the plane.
 pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
     let edge = |to: usize| Vector3::from(vertices[to]) - Vector3::from(vertices[0]);
     match vertices.len() {
@@ -136,7 +136,8 @@ pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
     }
 }
 
-/// Whether a simplex of this [`measure`] and of unit size has, to rounding, no extent: true for numbers that are none, too.
+/// Return whether a simplex of unit size with this [`measure`] has no extent, to rounding. A measure that is not finite counts
+/// as none.
 fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
     let mut longest = 0.0_f64;
     for (i, a) in vertices.iter().enumerate() {
@@ -179,13 +180,13 @@ mod tests {
         assert!(!turn(&mut [0, 1], &[a, [f64::INFINITY, 0.0, 0.0]], 1, 3));
     }
 
-    /// Mid-edges must stay between the same two vertices, whatever their order.
+    /// Each mid-edge stays between the same two vertices, whatever their order.
     #[test]
     fn mirrored_cells_keep_their_edges() {
         let edges: [(usize, &[[usize; 2]]); 2] =
             [(3, &[[0, 1], [1, 2], [0, 2]]), (4, &[[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])];
         for (vertices, edges) in edges {
-            // The number of a mid-edge point is the sum of the powers of ten of its vertices, so it names them.
+            // The number of a mid-edge point is the sum of the powers of ten of its vertices, so it identifies them.
             let mut cell: Vec<u32> = (0..vertices).map(|vertex| 10_u32.pow(vertex as u32)).collect();
             cell.extend(edges.iter().map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32)).collect::<Vec<_>>());
             let before = cell.clone();

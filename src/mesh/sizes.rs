@@ -1,15 +1,18 @@
-//! Meshes of wanted sizes: a script of the user's and a field of sizes, which Gmsh follows instead of the script's own.
+//! Meshes of prescribed sizes: Gmsh follows a field of sizes instead of those in the user's script.
 
 use super::script::Script;
 use super::tokens::{Token, tokens};
 use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
 
-/// Writes the script that meshes another one to a field of sizes into the folder `work`; gives its path. `field` is a view of
-/// Gmsh (`.pos`); where a point is in none of its cells, Gmsh would make cells as large as the part. Structured meshes cannot follow sizes: their commands are left out of a copy.
+/// Write a script into the folder `work` that meshes another script to a field of sizes, and return its path.
+///
+/// `field` is a view of Gmsh (`.pos`). Where a point is in none of the view's cells, Gmsh would make cells as large as the
+/// part, so the script limits sizes to the largest of the view. Structured meshes cannot follow sizes, so their commands are
+/// removed in a copy.
 ///
 /// # Errors
-/// A structured script that reads other files, which a copy would not find; a folder that cannot be written.
+/// A structured script reads other files, which a copy would not find. The folder cannot be written.
 pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: &Path) -> Result<PathBuf> {
     let write = |name: &str, text: &str| {
         let path = work.join(name);
@@ -37,7 +40,7 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
     write("sized.geo", &text)
 }
 
-/// The script without the commands that ask for structured meshes, from the word to the semicolon.
+/// Return the script without the commands that ask for structured meshes, from the word to the semicolon.
 pub fn unstructured(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
     let mut from = 0;
@@ -51,8 +54,8 @@ pub fn unstructured(text: &str) -> String {
     kept + &text[from..]
 }
 
-/// A field of sizes on simplices as a view of Gmsh: corners of all simplices, `stride` of them each, and the size at each
-/// corner.
+/// Return a field of sizes on simplices as a view of Gmsh. `corners` holds the corners of all simplices, `stride` of them each,
+/// and `sizes` the size at each corner.
 pub fn view(stride: usize, corners: &[[f64; 3]], sizes: &[f64]) -> String {
     use std::fmt::Write;
     let mut text = String::from("View \"sizes\" {\n");
@@ -60,7 +63,7 @@ pub fn view(stride: usize, corners: &[[f64; 3]], sizes: &[f64]) -> String {
     for (x, size) in corners.chunks_exact(stride).zip(sizes.chunks_exact(stride)) {
         let at = list(&mut x.iter().flatten().copied());
         let size = list(&mut size.iter().copied());
-        // writing to a String cannot fail
+        // Writing to a String cannot fail.
         let _ = writeln!(text, "S{}({at}){{{size}}};", if stride == 3 { "T" } else { "S" });
     }
     text + "};\n"

@@ -1,18 +1,18 @@
-//! Quadrangles, hexahedra, prisms and pyramids as triangles and tetrahedra.
+//! The division of quadrangles, hexahedra, prisms and pyramids into triangles and tetrahedra.
 //!
-//! Every cell is the cone from its vertex of the smallest number over the faces without that vertex, and a quadrangle the cone from its
-//! smallest vertex over the edges without it. Which diagonal a quadrangle gets depends on the numbers of its vertices alone, so that
-//! cells of any kind agree on the faces that they share.
+//! Every cell is the cone from its vertex with the smallest number over the faces without that vertex. A quadrangle is the cone
+//! from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the numbers of its
+//! vertices alone, so that cells of any kind agree on common faces.
 
-/// Vertices of a face, or of an edge of a quadrangle.
+/// The vertices of a face, or of an edge of a quadrangle.
 type Face = &'static [usize];
 
-/// A kind of cell that is made of simplices.
+/// A kind of cell that is divided into simplices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Split {
     /// Dimension, 2 or 3.
     pub dimension: usize,
-    /// Vertices.
+    /// Number of vertices.
     pub stride: usize,
     faces: &'static [Face],
 }
@@ -27,7 +27,7 @@ const PRISM: [Face; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], 
 const PYRAMID: [Face; 5] = [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
 
 impl Split {
-    /// The cells that an element type number of Gmsh stands for, if they are linear and no simplices.
+    /// Return the kind of cell that an element type number of Gmsh stands for, if it is linear and not a simplex.
     pub fn of_type(number: i32) -> Option<Split> {
         let (dimension, stride, faces): (_, _, &[Face]) = match number {
             3 => (2, 4, &EDGES),
@@ -39,14 +39,15 @@ impl Split {
         Some(Split { dimension, stride, faces })
     }
 
-    /// The simplices of a cell, `dimension + 1` vertices each, oriented anyhow. Those of vertices that were drawn into one are left out.
+    /// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. Simplices in which a vertex occurs
+    /// twice, since an edge was drawn into a point, are omitted.
     pub fn simplices(&self, cell: &[u32]) -> Vec<u32> {
         let corners: Vec<Vec<u32>> = self.faces.iter().map(|face| face.iter().map(|&at| cell[at]).collect()).collect();
         cone(cell, &corners).into_iter().filter(|simplex| all_differ(simplex)).flatten().collect()
     }
 }
 
-/// The cone from the smallest vertex of a cell over its faces without it.
+/// Return the cone from the smallest vertex of a cell over its faces without this vertex.
 fn cone(cell: &[u32], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let Some(&apex) = cell.iter().min() else { return Vec::new() };
     let mut simplices = Vec::new();
@@ -84,7 +85,7 @@ mod tests {
         [0.0, 1.0, 1.0],
     ];
 
-    /// Six times the volume of the pieces, and how often each triangle is a face of one.
+    /// Return six times the volume of the pieces of a cell, and the number of pieces that have each triangle as a face.
     fn pieces(kind: i32, cell: &[u32], points: &[[f64; 3]]) -> (f64, BTreeMap<Vec<u32>, usize>) {
         let (mut volume, mut faces) = (0.0, BTreeMap::new());
         for tetrahedron in Split::of_type(kind).unwrap().simplices(cell).chunks_exact(4) {
@@ -98,7 +99,8 @@ mod tests {
         (volume, faces)
     }
 
-    /// However the vertices are numbered, the pieces fill the cell, and those of two cells share the triangles of their common face.
+    /// Whatever the numbers of the vertices, the pieces fill the cell. The pieces of two cells have the same triangles on the
+    /// common face.
     #[test]
     fn pieces_fill_cells_and_fit_across_faces() {
         let mut seed = 7_u64;
@@ -108,7 +110,7 @@ mod tests {
                 seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
                 order.swap(at, (seed >> 33) as usize % (at + 1));
             }
-            // a cube, and beside its face x = 1 a prism of vertices 1 2 6 5 8 9
+            // The points are those of a cube and, beside its face x = 1, of a prism with the vertices 1 2 6 5 8 9.
             let mut points = vec![[0.0; 3]; 12];
             let named = [&CUBE[..], &[[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [3.0, 0.5, 0.5], [0.0; 3]]].concat();
             order.iter().zip(named).for_each(|(&at, x)| points[at as usize] = x);
@@ -125,10 +127,11 @@ mod tests {
             };
             assert_eq!((shared(&of_cube).len(), shared(&of_cube)), (2, shared(&of_prism)));
             assert_eq!(shared(&of_cube), shared(&of_pyramid));
-            // inside every triangle has two sides, on the boundary one: 12 triangles of a cube
+            // A triangle inside the cube is a face of two pieces, and one on the boundary of one. A cube has 12 triangles on
+            // its boundary.
             assert_eq!(of_cube.values().filter(|&&count| count == 1).count(), 12);
             assert!(of_cube.values().all(|&count| count <= 2));
-            // and a quadrangle of the surface has the same diagonal
+            // A quadrangle of the surface has the same diagonal.
             let triangles = Split::of_type(3).unwrap().simplices(&of(&[1, 2, 6, 5]));
             for triangle in triangles.chunks_exact(3) {
                 let mut triangle = triangle.to_vec();

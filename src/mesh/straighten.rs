@@ -1,7 +1,8 @@
-//! Quadratic cells that a curved boundary folds, made straight.
+//! Straight edges for quadratic cells that a curved boundary folds.
 //!
-//! A mesher puts mid-edge nodes on the curved boundary when the straight cells are done. Where a cell is flat or large beside the radius of the
-//! boundary, its map is no longer one to one. With its edges straight it is a good cell, and the boundary is there what linear elements make of it.
+//! A mesher moves mid-edge nodes to the curved boundary after it has made the straight cells. If a cell is flat, or large in
+//! comparison with the radius of the boundary, its map may no longer be one to one. With straight edges it is a good cell. The
+//! boundary there is then that of linear elements.
 
 use super::Mesh;
 use super::check::{EDGES, is_folded};
@@ -9,8 +10,8 @@ use crate::linalg::pad;
 use crate::problem::order::Order;
 
 impl<const D: usize> Mesh<D> {
-    /// Make the edges of all folded cells straight, until no cell is folded, and count the cells in [`Mesh::straightened`]. Neighbours share the edges: a
-    /// cell that is folded by that follows.
+    /// Make the edges of all folded cells straight until no cell is folded, and count the cells in [`Mesh::straightened`].
+    /// Neighbours share the edges, so a straight edge may fold another cell, which becomes straight in the next pass.
     pub fn straighten(&mut self) {
         if self.order == Order::P1 {
             return;
@@ -29,14 +30,14 @@ impl<const D: usize> Mesh<D> {
                 }
             }
             if !has_moved {
-                // upside down even when straight: the checks have words for it
+                // The cells are inverted even with straight edges. The checks report them.
                 return;
             }
             self.straightened += folded.len();
         }
     }
 
-    /// The nodes of the cells that are folded.
+    /// Return the nodes of the folded cells, one list per cell.
     fn folded_cells(&self) -> Vec<Vec<u32>> {
         let of_cells = self.groups.iter().filter(|group| group.dimension == D);
         let cells = of_cells.flat_map(|group| group.connectivity.chunks_exact(group.stride));
@@ -44,13 +45,13 @@ impl<const D: usize> Mesh<D> {
         let folded = |cell: &&[u32]| is_folded(&cell.iter().map(place).collect::<Vec<_>>(), D);
         let mut found: Vec<Vec<u32>> =
             cells.filter(|cell| self.is_curved(cell)).filter(folded).map(<[u32]>::to_vec).collect();
-        // a cell may be in several groups
+        // A cell may be in several groups.
         found.sort_unstable();
         found.dedup();
         found
     }
 
-    /// Whether a quadratic cell has an edge whose middle is off its chord by more than rounding. Most cells have none.
+    /// Return whether a quadratic cell has an edge whose middle is off its chord by more than rounding. Most cells have none.
     fn is_curved(&self, cell: &[u32]) -> bool {
         EDGES.iter().zip(&cell[D + 1..]).any(|(&[i, j], &middle)| {
             let [x, y, m] = [cell[i], cell[j], middle].map(|node| self.points[node as usize]);
@@ -64,8 +65,8 @@ mod tests {
     use super::*;
     use crate::mesh::Group;
 
-    /// Two quadratic triangles on the square of four corners; the mid-edge node of the bottom is at the height `bottom`, that of the diagonal is moved by
-    /// `bent` towards the lower corner.
+    /// Return two quadratic triangles on the square of four corners. The mid-edge node of the bottom is at the height `bottom`.
+    /// The one of the diagonal is moved by `bent` towards the lower corner.
     fn square(bottom: f64, bent: f64) -> Mesh<2> {
         let points = vec![
             [0.0, 0.0],
@@ -91,7 +92,7 @@ mod tests {
         let mut folded = square(0.6, 0.0);
         folded.straighten();
         assert_eq!((folded.straightened, folded.points[4]), (1, [0.5, 0.0]));
-        // the diagonal, which folds the lower cell, is an edge of the upper one, too
+        // The diagonal folds the lower cell, and it is an edge of the upper cell, too.
         let mut both = square(0.0, 0.4);
         both.straighten();
         assert_eq!((both.straightened, both.points[6]), (1, [0.5, 0.5]));

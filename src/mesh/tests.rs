@@ -48,13 +48,13 @@ fn located(path: PathBuf) -> Located<PathBuf> {
     Located::new(path, Place { source: source.into(), span: 0..4 })
 }
 
-/// The mesh of a script with these numbers, kept in a cache.
+/// Return the mesh of a script with these numbers, kept in a cache.
 fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &[PathBuf]) -> Result<Loaded<D>> {
     let limits = (&Guard::default(), &Interrupt::default());
     from_script(&located(geo.to_owned()), (set, &[]), None, order, limits, cache)
 }
 
-/// Bytes of the mesh of a script in another form than the program asks for.
+/// Return the bytes of the mesh of a script in the form that these arguments request.
 fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let (geo, out) = (folder.path().join("a.geo"), folder.path().join("a.msh"));
@@ -74,7 +74,7 @@ fn parse<const D: usize>(bytes: &[u8]) -> Result<Mesh<D>> {
     msh::parse(Path::new("a.msh"), bytes, msh::Maker::User)
 }
 
-/// Sum of the measures of a group, times the factorial of its dimension.
+/// Return the sum of the measures of a group, times the factorial of its dimension.
 fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
     group
         .simplices()
@@ -87,7 +87,7 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
         .sum()
 }
 
-/// Every mid-edge point of a straight mesh lies between its two vertices.
+/// Assert that every mid-edge point of a straight mesh lies between its two vertices.
 fn assert_mid_edges<const D: usize>(mesh: &Mesh<D>) {
     const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
     for group in mesh.groups.iter().filter(|group| group.dimension > 0) {
@@ -112,7 +112,7 @@ fn squares_of_both_forms_and_orders() {
             let mesh: Mesh<2> = parse(&gmsh(SQUARE, &[&["-2", "-order", order], form].concat())).unwrap();
             mesh
         });
-        // Text has 16 digits, so coordinates may differ in the last.
+        // Text has 16 digits, so coordinates may differ in the last one.
         assert_eq!(text.groups, binary.groups);
         for mesh in [&text, &binary] {
             let count = |name| mesh.group(name).unwrap().len();
@@ -126,7 +126,7 @@ fn squares_of_both_forms_and_orders() {
             for (name, expected) in [("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)] {
                 assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
             }
-            // All cells positive one by one, although one surface is drawn clockwise.
+            // Each cell is positive, although one surface is drawn clockwise.
             for group in mesh.groups.iter().filter(|group| group.dimension == 2) {
                 for cell in group.connectivity.chunks(group.stride) {
                     let one = Group { connectivity: cell.to_vec(), ..group.clone() };
@@ -170,7 +170,7 @@ fn inverted_cells_are_turned_and_order_two_with_them() {
         let script = format!("{SQUARE}\nMesh 2;\nReverseMesh Surface{{1}};");
         let mesh: Mesh<2> = parse(&gmsh(&script, &["-2", "-order", order])).unwrap();
         assert!((extent(&mesh, mesh.group("soft rock").unwrap()) - 0.5).abs() < 1e-9);
-        // A reflection through the origin.
+        // The negative scale is a reflection through the origin.
         let cube: Mesh<3> =
             parse(&gmsh(CUBE, &["-3", "-order", order, "-setnumber", "Mesh.ScalingFactor", "-1"])).unwrap();
         assert!(cube.points.iter().flatten().all(|coordinate| *coordinate <= 0.0));

@@ -1,4 +1,4 @@
-//! The words of a Gmsh script, as Gmsh itself splits it.
+//! The words of a Gmsh script, split as Gmsh itself splits them.
 
 use std::ops::Range;
 
@@ -13,7 +13,8 @@ pub enum Token<'a> {
     Sign(char),
 }
 
-/// The names, quoted texts and other signs of a script with the bytes where they stand; comments and numbers are left out.
+/// Return the names, quoted texts and other signs of a script, with the range of bytes where each stands. Comments and numbers
+/// are omitted.
 pub fn tokens(text: &str) -> Vec<(Range<usize>, Token<'_>)> {
     let mut tokens = Vec::new();
     let mut at = 0;
@@ -45,7 +46,8 @@ pub fn tokens(text: &str) -> Vec<(Range<usize>, Token<'_>)> {
     tokens
 }
 
-/// Length of the number that a text begins with. A word may follow at once: Gmsh takes it as one.
+/// Return the length of the number at the start of a text. A word may follow without a space, and Gmsh reads it as a separate
+/// word.
 fn number(text: &str) -> usize {
     let digits = |from: usize| text[from..].bytes().take_while(u8::is_ascii_digit).count();
     let mut end = digits(0);

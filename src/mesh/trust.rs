@@ -1,22 +1,22 @@
-//! What a Gmsh script may not do unless its user trusts it.
+//! Commands that a Gmsh script may not use unless its user trusts it.
 //!
-//! A `.geo` file is a program. Gmsh runs commands of the shell for it, writes the files that it names, and reads others that may do
-//! the same. None of that is needed to describe a body. This reads the words as Gmsh's own scanner does (`Gmsh.l`), and refuses
-//! what cannot be judged by reading: names of files that the script computes, and texts that the scanner would cut.
+//! A `.geo` file is a program. Gmsh runs shell commands for it, writes the files that it names, and reads others that may do
+//! the same. The description of a body needs none of that. This module reads the words as Gmsh's own scanner does (`Gmsh.l`).
+//! It refuses what reading cannot judge: names of files that the script computes, and texts that the scanner would cut.
 
 use super::tokens::{Token, tokens};
 use std::path::Path;
 
-/// What a script does that it may not, and the line.
+/// A forbidden action of a script, with its line.
 #[derive(Debug, PartialEq)]
 pub struct Breach {
-    /// Line, from 1 on.
+    /// Line, counted from 1.
     pub line: usize,
-    /// What it does, in words.
+    /// What the script does, in words.
     pub what: String,
 }
 
-/// Commands that run other programs or text that the script makes up.
+/// Commands that run other programs, or text that the script makes up.
 pub const RUN: [&str; 11] = [
     "SystemCall",
     "System",
@@ -27,7 +27,7 @@ pub const RUN: [&str; 11] = [
     "ExternalProcess",
     "Parse",
     "Plugin",
-    // a command whose name is a text
+    // These two turn a text into the name of a command.
     "StringToName",
     "S2N",
 ];
@@ -38,16 +38,16 @@ const WRITE: [&str; 5] = ["Save", "Print", "CreateDir", "RenameFile", "DeleteFil
 /// Commands that read a file as a script.
 pub const READ: [&str; 3] = ["Include", "Merge", "MergeWithBoundingBox"];
 
-/// Gmsh's scanner cuts texts of 1024 bytes, and reads the rest of one as commands.
+/// Largest length of a text in bytes. Gmsh's scanner cuts texts at 1024 bytes, and reads the rest as commands.
 const LONGEST: usize = 1000;
 
-/// Kinds of file that Gmsh hands to a reader of shapes or meshes, whatever is in them.
+/// Kinds of file that Gmsh hands to a reader of shapes or meshes, whatever their contents.
 const DATA: [&str; 12] = ["step", "stp", "iges", "igs", "brep", "stl", "vtk", "unv", "med", "mesh", "bdf", "nas"];
 
-/// Kinds of file that Gmsh reads as a script, or knows by how they begin. It starts others as programs.
+/// Kinds of file that Gmsh reads as a script, or recognizes by how they begin. It starts files of other kinds as programs.
 const SCRIPTS: [&str; 8] = ["geo", "pos", "msh", "opt", "inc", "dat", "txt", "par"];
 
-/// The first thing in a file that its user must trust it for. `home` is the folder that it may read from.
+/// Return the first action in a file for which its user must trust it. `home` is the folder that the file may read from.
 pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
     if !is_script(path, bytes) {
         return None;
@@ -68,7 +68,7 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
             Token::Name(name) if chooses_file(name, &all[..index]) => {
                 Some(format!("chooses files that Gmsh writes: `General.{name}`"))
             }
-            // a variable of this name is no command
+            // A variable of this name is not a command.
             Token::Name(_) if matches!(next, Some(Token::Sign('='))) => None,
             Token::Name(name) if RUN.contains(&name) => Some(format!("runs other programs or made-up text: `{name}`")),
             Token::Name(name) if WRITE.contains(&name) && next != Some(Token::Sign('.')) => {
@@ -77,7 +77,7 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
             Token::Name(name @ ("Printf" | "Error" | "Warning")) if redirects(&all[index + 1..]) => {
                 Some(format!("writes files: `{name}(...) > ...`"))
             }
-            // also as `Solver[0].Executable0`
+            // This includes the form `Solver[0].Executable0`.
             Token::Name("Solver") if matches!(next, Some(Token::Sign('.' | '['))) => {
                 Some("sets programs: `Solver`".to_owned())
             }
@@ -91,22 +91,22 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
     None
 }
 
-/// Return whether Gmsh reads a file as a script: not one that it hands to a reader of shapes or meshes.
+/// Return whether Gmsh reads a file as a script, and does not hand it to a reader of shapes or meshes.
 pub fn is_script(path: &Path, bytes: &[u8]) -> bool {
     !is_kind(path, &DATA) && !bytes.starts_with(b"$MeshFormat")
 }
 
 type Spot<'a> = (std::ops::Range<usize>, Token<'a>);
 
-/// Whether a name is an option of Gmsh that names a file to write. The name of its category may be computed or have an index. Fields and views
-/// have a `FileName` that is read.
+/// Return whether a name is an option of Gmsh that names a file to write. The name of its category may be computed or have an
+/// index. Fields and views have a `FileName`, too, which is only read.
 fn chooses_file(name: &str, before: &[Spot]) -> bool {
     let is_general = matches!(before, [.., (_, Token::Name("General")), (_, Token::Sign('.'))]);
     let is_option = matches!(before, [.., (_, Token::Sign('.'))]);
     name.ends_with("FileName") && is_option && (is_general || name != "FileName")
 }
 
-/// Whether an argument in parentheses or brackets comes first, and then `>`.
+/// Return whether an argument in parentheses or brackets comes first, and then `>`.
 fn redirects(after: &[Spot]) -> bool {
     let mut depth = 0;
     for (at, (_, token)) in after.iter().enumerate() {
@@ -122,7 +122,8 @@ fn redirects(after: &[Spot]) -> bool {
     false
 }
 
-/// What is wrong with the file that a command reads: it must be one that is written out, of a known kind, below `home`.
+/// Return what is wrong with the file that a command reads. The script must write out its name, its kind must be known, and it
+/// must lie below `home`.
 fn reads(command: &str, after: &[Spot], path: &Path, home: &Path) -> Option<String> {
     let [(_, Token::Text(name)), (_, Token::Sign(';')), ..] = after else {
         return Some(format!("reads a file whose name it makes up: `{command}`"));
@@ -133,12 +134,12 @@ fn reads(command: &str, after: &[Spot], path: &Path, home: &Path) -> Option<Stri
     if !known {
         return Some(format!("lets Gmsh open a file of unknown kind: `{command} \"{name}\"`"));
     }
-    // Gmsh says what is not there
+    // Gmsh itself reports a file that does not exist.
     let outside = file.canonicalize().is_ok_and(|file| !file.starts_with(home));
     outside.then(|| format!("reads a file outside its own folder: `{command} \"{name}\"`"))
 }
 
-/// Whether the name of a file ends in one of these, in small letters or in capitals: Gmsh knows no mixture.
+/// Return whether the name of a file ends in one of these, in lower or upper case. Gmsh does not recognize a mixture.
 pub fn is_kind(path: &Path, kinds: &[&str]) -> bool {
     let end = path.extension().unwrap_or_default();
     kinds.iter().any(|kind| end == *kind || end == kind.to_ascii_uppercase().as_str())

@@ -1,19 +1,19 @@
-//! Universal files (`.unv`) as Gmsh 4.8 can read them: it passes over groups of dataset 2467, which most programs write, and crashes on
-//! members of groups that are no elements of the file.
+//! Universal files (`.unv`) in a form that Gmsh 4.8 can read. This Gmsh ignores groups of dataset 2467, which most programs
+//! write. It crashes on members of groups that are not elements of the file.
 
 use std::collections::HashSet;
 use std::fmt::Write;
 
-/// Datasets of groups with four numbers a member; Gmsh reads the second.
+/// Datasets of groups with four numbers per member. Gmsh reads groups from the second one, 2477.
 const GROUPS: [&str; 5] = ["2467", "2477", "2452", "2435", "2432"];
 
-/// Kinds of elements with one more line: beams.
+/// Kinds of elements with an additional line: beams.
 const BEAMS: [&str; 5] = ["11", "21", "22", "23", "24"];
 
 /// Code of members that are elements.
 const ELEMENT: &str = "8";
 
-/// The file with groups of elements that are there, and no others.
+/// Return the file with groups that contain only elements of the file.
 pub fn readable(text: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
     let mut elements = HashSet::new();
@@ -44,12 +44,12 @@ pub fn readable(text: &str) -> String {
     made
 }
 
-/// Lines between each two of `-1`.
+/// Return the lines between each two lines of `-1`.
 fn datasets<'a>(lines: &'a [&'a str]) -> impl Iterator<Item = &'a [&'a str]> {
     lines.split(|line| line.trim() == "-1").filter(|dataset| dataset.iter().any(|line| !line.trim().is_empty()))
 }
 
-/// Groups with the members that are elements of the file.
+/// Write the groups without members that are not elements of the file. Groups that become empty are omitted.
 fn write_groups(mut lines: &[&str], elements: &HashSet<String>, made: &mut String) {
     while let [head, name, rest @ ..] = lines {
         let head: Vec<&str> = head.split_whitespace().collect();

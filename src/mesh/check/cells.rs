@@ -1,13 +1,13 @@
-//! The cells of one body, their nodes numbered within it.
+//! The cells of one body, with nodes numbered within the body.
 
 use crate::error::Error;
 use crate::linalg::pad;
 use crate::mesh::{Group, Mesh};
 
-/// Mid-edge nodes of a simplex stand behind its corners in the order of these edges.
+/// Edges of a simplex in the order of its mid-edge nodes, which follow the corners.
 pub const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
 
-/// No node of the body.
+/// The entry of a point that is not a node of the body.
 pub const NONE: u32 = u32::MAX;
 
 /// The cells of one body.
@@ -18,15 +18,15 @@ pub struct Cells<'a, const D: usize> {
     group: &'a Group,
     /// Nodes per cell: corners, then mid-edge nodes if its elements are quadratic.
     pub stride: usize,
-    /// The point of the mesh that each node is.
+    /// Point of the mesh of each node.
     pub points: Vec<u32>,
-    /// Nodes of all cells.
+    /// Nodes of all cells, `stride` per cell.
     nodes: Vec<u32>,
 }
 
 impl<'a, const D: usize> Cells<'a, D> {
-    /// Number the nodes of the body of this group, `stride` a cell, in the order in which cells meet them. `node` has the node of each point after, and
-    /// [`NONE`] everywhere before.
+    /// Number the nodes of the body of this group, `stride` per cell, in order of first appearance in the cells. `node` holds
+    /// [`NONE`] for every point before, and the nodes of the body's points afterwards.
     pub fn new(mesh: &'a Mesh<D>, group: &'a Group, stride: usize, node: &mut [u32]) -> Self {
         let (mut points, mut nodes) = (Vec::new(), Vec::with_capacity(group.len() * stride));
         for &point in group.simplices().flat_map(|cell| &cell[..stride]) {
@@ -40,38 +40,38 @@ impl<'a, const D: usize> Cells<'a, D> {
         Self { mesh, group, stride, points, nodes }
     }
 
-    /// Number of nodes.
+    /// Return the number of nodes.
     pub fn node_count(&self) -> usize {
         self.points.len()
     }
 
-    /// Number of cells.
+    /// Return the number of cells.
     pub fn count(&self) -> usize {
         self.nodes.len() / self.stride
     }
 
-    /// Whether edges have nodes between their ends.
+    /// Return whether edges have nodes between their ends.
     pub fn is_quadratic(&self) -> bool {
         self.stride > D + 1
     }
 
-    /// Nodes of a cell.
+    /// Return the nodes of a cell.
     pub fn cell(&self, cell: usize) -> &[u32] {
         &self.nodes[cell * self.stride..][..self.stride]
     }
 
-    /// Coordinates of a node, z = 0 in the plane.
+    /// Return the coordinates (x, y, z) of a node, z = 0 in the plane.
     pub fn at(&self, node: u32) -> [f64; 3] {
         pad(self.mesh.points[self.points[node as usize] as usize])
     }
 
-    /// The mid-edge node of a cell between two of its corners.
+    /// Return the mid-edge node of a cell between two of its corners.
     pub fn middle(&self, cell: usize, ends: [usize; 2]) -> u32 {
         let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
         self.cell(cell)[D + 1 + EDGES.iter().position(|edge| *edge == ends).unwrap_or(0)]
     }
 
-    /// The refusal of the body for what is the matter with some of its cells, at a point.
+    /// Return the refusal of the body because of `what` is wrong with some of its cells, at the point `at`.
     pub fn refuse(&self, what: &str, cells: &[usize], at: [f64; 3]) -> Error {
         let mesh = self.mesh;
         let at = mesh.in_scene(std::array::from_fn(|c| at[c]));

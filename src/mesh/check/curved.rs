@@ -3,17 +3,18 @@
 use super::cells::Cells;
 use crate::error::Result;
 
-/// Share of the largest coefficient of a Jacobian below which it is rounding: a cell that is flat at a corner, as at the end of
-/// two edges that touch each other, has zero there.
+/// Share of the largest coefficient of a Jacobian below which a value is rounding. The Jacobian is zero where a cell is flat at
+/// a corner, as at the end of two edges that touch each other.
 const ROUNDING: f64 = 1e-9;
 
-/// Halvings of a cell until a Jacobian that was not found negative counts as positive.
+/// Number of bisections of a cell after which a Jacobian counts as positive, if no negative value was found.
 const DEPTH: usize = 12;
 
-/// Checks the mid-edge nodes of a body and the Jacobians of its curved cells.
+/// Check the mid-edge nodes of a body and the Jacobians of its curved cells.
 ///
 /// # Errors
-/// A mid-edge node on two edges or at a corner; a cell whose Jacobian is negative somewhere; each with the cell and the place in it.
+/// A mid-edge node is on two edges or at a corner, or the Jacobian of a cell is negative somewhere. The error gives the cell
+/// and the place in it.
 pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
     if !cells.is_quadratic() {
         return Ok(());
@@ -40,12 +41,13 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
     Ok(())
 }
 
-/// Whether a quadratic cell with these nodes, corners first, is folded: its Jacobian is negative somewhere.
+/// Return whether a quadratic cell with these nodes, corners first, is folded: its Jacobian is negative somewhere.
 pub fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
     folded(&control_points(x, dimension), dimension, DEPTH)
 }
 
-/// Points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij`, from corners and mid-edge nodes.
+/// Return the control points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij` from corners and mid-edge nodes, where `l_i` are
+/// the barycentric coordinates.
 fn control_points(x: &[[f64; 3]], dimension: usize) -> [[[f64; 3]; 4]; 4] {
     let mut b = [[[0.0; 3]; 4]; 4];
     let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
@@ -57,9 +59,10 @@ fn control_points(x: &[[f64; 3]], dimension: usize) -> [[[f64; 3]; 4]; 4] {
     b
 }
 
-/// Whether the Jacobian of the map is negative somewhere. It is a polynomial of degree D, between the least and the largest of
-/// its coefficients in Bernstein's basis, of which those at the corners are values. Where these do not decide, halves of
-/// the cell do.
+/// Return whether the Jacobian of the map is negative somewhere.
+///
+/// The Jacobian is a polynomial of degree D. It lies between its least and its largest coefficient in Bernstein's basis, and
+/// the coefficients at the corners are values. If the coefficients do not decide, the two halves of the cell are examined.
 fn folded(b: &[[[f64; 3]; 4]; 4], dimension: usize, depth: usize) -> bool {
     let (corners, others) = coefficients(b, dimension);
     let largest = corners.iter().chain(&others).fold(0.0, |max: f64, c| max.max(c.abs()));
@@ -70,14 +73,15 @@ fn folded(b: &[[[f64; 3]; 4]; 4], dimension: usize, depth: usize) -> bool {
     if depth == 0 || !others.iter().any(negative) {
         return false;
     }
-    // the longest edge, by its chord
+    // This is the longest edge, measured by its chord.
     let chord = |i: usize, j: usize| (0..3).map(|c| (b[i][i][c] - b[j][j][c]).powi(2)).sum::<f64>();
     let edges = (0..=dimension).flat_map(|j| (0..j).map(move |i| (i, j)));
     let Some((i, j)) = edges.max_by(|e, f| chord(e.0, e.1).total_cmp(&chord(f.0, f.1))) else { return false };
     [(i, j), (j, i)].into_iter().any(|(kept, moved)| folded(&half(b, kept, moved, dimension), dimension, depth - 1))
 }
 
-/// The map on the half of the cell in which the middle of an edge takes the place of the corner `moved`: by de Casteljau.
+/// Return the map on the half of the cell in which the middle of an edge replaces the corner `moved`, by de Casteljau's
+/// algorithm.
 fn half(b: &[[[f64; 3]; 4]; 4], kept: usize, moved: usize, dimension: usize) -> [[[f64; 3]; 4]; 4] {
     let mean = |x: [f64; 3], y: [f64; 3]| std::array::from_fn(|c| 0.5 * (x[c] + y[c]));
     let mut h = *b;
@@ -89,8 +93,9 @@ fn half(b: &[[[f64; 3]; 4]; 4], kept: usize, moved: usize, dimension: usize) -> 
     h
 }
 
-/// Coefficients of the Jacobian in Bernstein's basis: those at the corners, and the others. The derivative along edge 0a is
-/// `2 sum_k l_k (b_ak - b_0k)`; a determinant of such sums has at `l_k l_m ...` the mean over all orders of k, m, ...
+/// Return the coefficients of the Jacobian in Bernstein's basis: those at the corners, and the others. The derivative along
+/// edge 0a is `2 sum_k l_k (b_ak - b_0k)`. The coefficient of a determinant of such sums at `l_k l_m ...` is the mean over all
+/// orders of k, m, ...
 fn coefficients(b: &[[[f64; 3]; 4]; 4], dimension: usize) -> (Vec<f64>, Vec<f64>) {
     let d = |a: usize, k: usize| -> [f64; 3] { std::array::from_fn(|c| b[a][k][c] - b[0][k][c]) };
     let (mut corners, mut others) = (Vec::new(), Vec::new());
@@ -130,14 +135,14 @@ mod tests {
         folded(&control_points(&x, 2), 2, DEPTH)
     }
 
-    /// With the middle of 12 at (a, a) the Jacobian at corner 0 is one, at 1 and 2 it is 4 a - 1, which is its least.
+    /// With the middle of 12 at (a, a) the Jacobian is 1 at corner 0. Its least value is 4 a - 1, at corners 1 and 2.
     #[test]
     fn a_triangle_folds_at_a_quarter() {
         assert!(!triangle([0.5, 0.5, 0.0]) && !triangle([0.25 + 1e-6, 0.25 + 1e-6, 0.0]));
         assert!(triangle([0.25 - 1e-6, 0.25 - 1e-6, 0.0]));
     }
 
-    /// The Jacobian of the map with these nodes, by differences, on a grid of the cell.
+    /// Return the least Jacobian of the map with these control points on a grid of the cell.
     fn least(b: &[[[f64; 3]; 4]; 4]) -> f64 {
         let n = 12;
         let mut least = f64::INFINITY;
@@ -157,7 +162,7 @@ mod tests {
         least
     }
 
-    /// Tetrahedra with mid-edge nodes at random.
+    /// The mid-edge nodes of the tetrahedra are random.
     #[test]
     fn tetrahedra_fold_where_their_jacobian_does() {
         let mut state = 1_u64;
@@ -175,7 +180,7 @@ mod tests {
             let middles = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]].map(middle);
             let b = control_points(&[&corners[..], &middles].concat(), 3);
             let (found, least) = (folded(&b, 3, DEPTH), least(&b));
-            // the grid may miss a small fold
+            // The grid may miss a small fold.
             assert!(found || least > 0.0, "{least}");
             assert!(!found || least < 0.02, "{least}");
             counts[usize::from(found)] += 1;

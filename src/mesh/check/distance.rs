@@ -1,8 +1,8 @@
-//! Whether segments and triangles in space come nearer to each other than a distance.
+//! Predicates that tell whether segments and triangles in space come nearer to each other than a distance.
 
 use robust::Coord3D;
 
-/// A point.
+/// A point (x, y, z).
 pub type Point = [f64; 3];
 
 fn minus(a: Point, b: Point) -> Point {
@@ -13,36 +13,36 @@ fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Cross product.
+/// Return the cross product.
 pub fn cross(a: Point, b: Point) -> Point {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Distance of two points.
+/// Return the distance of two points.
 pub fn apart(a: Point, b: Point) -> f64 {
     dot(minus(a, b), minus(a, b)).sqrt()
 }
 
-/// The point `a + t (b - a)`.
+/// Return the point `a + t (b - a)`.
 fn between(a: Point, b: Point, t: f64) -> Point {
     std::array::from_fn(|c| a[c] + t * (b[c] - a[c]))
 }
 
-/// Distance of a point from a segment.
+/// Return the distance of a point from a segment.
 pub fn from_segment(x: Point, [a, b]: [Point; 2]) -> f64 {
     let edge = minus(b, a);
     let t = (dot(minus(x, a), edge) / dot(edge, edge)).clamp(0.0, 1.0);
     apart(x, between(a, b, t))
 }
 
-/// Whether two segments come within a distance.
+/// Return whether the distance of two segments is at most `within`.
 pub fn segments([a, b]: [Point; 2], [c, d]: [Point; 2], within: f64) -> bool {
     let ends =
         from_segment(a, [c, d]).min(from_segment(b, [c, d])).min(from_segment(c, [a, b])).min(from_segment(d, [a, b]));
     if ends <= within {
         return true;
     }
-    // the least distance is that of an end, or that of the lines where both feet lie inside
+    // The least distance is that of an end, or that of the lines if both feet lie inside the segments.
     let (u, v, w) = (minus(b, a), minus(d, c), minus(a, c));
     let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
     let det = uu * vv - uv * uv;
@@ -51,7 +51,7 @@ pub fn segments([a, b]: [Point; 2], [c, d]: [Point; 2], within: f64) -> bool {
     inside(s) && inside(t) && apart(between(a, b, s), between(c, d, t)) <= within
 }
 
-/// Distance of a point from a triangle.
+/// Return the distance of a point from a triangle.
 pub fn from_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
     let normal = cross(minus(b, a), minus(c, a));
     let inner = |p: Point, q: Point| dot(cross(minus(q, p), minus(x, p)), normal) >= 0.0;
@@ -61,14 +61,15 @@ pub fn from_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
     from_segment(x, [a, b]).min(from_segment(x, [b, c])).min(from_segment(x, [c, a]))
 }
 
-/// Which side of the plane through three points a fourth lies on: a sign without error of rounding, zero in the plane.
+/// Return the side of the plane through three points on which a fourth one lies. The sign is free of rounding errors, and zero
+/// in the plane.
 fn side([a, b, c]: [Point; 3], x: Point) -> f64 {
     let [a, b, c, x] = [a, b, c, x].map(|[x, y, z]| Coord3D { x, y, z });
     robust::orient3d(a, b, c, x)
 }
 
-/// Whether a segment has a point of a triangle between its ends. In a flat boundary all determinants are zero but for rounding, and
-/// the sign of a rounded one tells nothing: hence exact signs.
+/// Return whether a segment has a point of a triangle between its ends. In a flat boundary all determinants vanish except for
+/// rounding. The sign of a rounded one tells nothing, so exact signs are needed.
 fn pierces([p, q]: [Point; 2], [a, b, c]: [Point; 3]) -> bool {
     let ends = [p, q].map(|x| side([a, b, c], x));
     if !(ends[0] < 0.0 && ends[1] > 0.0 || ends[0] > 0.0 && ends[1] < 0.0) {
@@ -78,7 +79,7 @@ fn pierces([p, q]: [Point; 2], [a, b, c]: [Point; 3]) -> bool {
     sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
 }
 
-/// Whether a segment and a triangle come within a distance.
+/// Return whether the distance of a segment and a triangle is at most `within`.
 pub fn segment_triangle([p, q]: [Point; 2], [a, b, c]: [Point; 3], within: f64) -> bool {
     let normal = cross(minus(b, a), minus(c, a));
     let size = dot(normal, normal).sqrt();
@@ -92,7 +93,7 @@ pub fn segment_triangle([p, q]: [Point; 2], [a, b, c]: [Point; 3], within: f64) 
         || [[a, b], [b, c], [c, a]].into_iter().any(|edge| segments([p, q], edge, within))
 }
 
-/// Whether the half-planes from the line ab through c and through d are the same, to a small angle.
+/// Return whether the half-planes from the line ab through c and through d coincide to within a small angle.
 pub fn same_side([a, b]: [Point; 2], c: Point, d: Point, angle: f64) -> bool {
     let edge = minus(b, a);
     let across = |x: Point| {
@@ -134,14 +135,14 @@ mod tests {
         assert!(!meets([-1.0, 1.5, 0.0], [2.0, 1.5, 0.0]));
     }
 
-    /// Triangles of a plane, turned so that no coordinate is exact, meet where their corners say so and nowhere else.
+    /// The plane is turned so that no coordinate is exact. Its triangles meet where their corners say so and nowhere else.
     #[test]
     fn triangles_of_a_turned_plane() {
         let (u, v) = ([0.6, 0.37, -0.709_295_425_052_062_4], [0.1, 0.83, 0.517_559_123_1]);
         let point = |s: f64, t: f64| -> Point { std::array::from_fn(|c| 0.123 + s * u[c] + t * v[c]) };
         let mut meeting = [0; 2];
         for k in 0..40_000 {
-            // a segment at s + t > 1, and in every second case one that enters the triangle
+            // The segment lies at s + t > 1; in every second case it enters the triangle.
             let [i, j, m] = [k % 37, k / 37 % 37, k / 1369].map(|i| f64::from(i) / 37.0);
             let enters = k % 2 == 0;
             let ends =

@@ -1,27 +1,28 @@
-//! The faces of all cells of a body, each found by its corners.
+//! The faces of all cells of a body, which can be found by their corners.
 
 use super::cells::Cells;
 use crate::error::Result;
 
-/// Corners of a cell on the face opposite each of its corners, in an order that turns the normal outwards.
+/// Corners of a cell on the face opposite each of its corners, in the order in which the normal points outwards.
 const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]];
 
-/// A face of a cell, in twelve bytes: there are two a cell and more, most of the memory of a check.
+/// A face of a cell in twelve bytes. The list has D + 1 faces per cell, which is most of the memory of a check.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Face<const D: usize> {
-    /// Corners but the least, sorted; in the plane there is one.
+    /// Corners except the least one, sorted; in the plane there is one.
     rest: [u32; 2],
-    /// Four times the cell, and which of its corners it lacks.
+    /// Four times the index of the cell, plus the local number of the corner that is not on the face.
     place: u32,
 }
 
 impl<const D: usize> Face<D> {
-    /// The cell.
+    /// Return the cell.
     pub fn cell(&self) -> usize {
         (self.place / 4) as usize
     }
 
-    /// Its corners, sorted, and whether it takes an odd permutation from these to the order that turns the normal out of the cell.
+    /// Return the corners, sorted. Return also whether the permutation to the order in which the normal points out of the cell
+    /// is odd.
     fn sorted(&self, cells: &Cells<D>) -> ([u32; D], bool) {
         let (mut key, mut odd) = (self.corners().map(|i| cells.cell(self.cell())[i]), false);
         for end in (1..D).rev() {
@@ -35,12 +36,13 @@ impl<const D: usize> Face<D> {
         (key, odd)
     }
 
-    /// Places of its corners in the cell, the normal outwards.
+    /// Return the local numbers of the corners in the cell, in the order in which the normal points outwards.
     pub fn corners(&self) -> [usize; D] {
         std::array::from_fn(|i| OUTWARD[D - 2][self.place as usize % 4][i])
     }
 
-    /// Its nodes, the normal outwards: corners, then between 01, 12, 02 the mid-edge nodes of quadratic ones.
+    /// Return the nodes, in the order in which the normal points outwards. The corners come first, then in a quadratic cell the
+    /// mid-edge nodes between 01, 12, 02.
     pub fn nodes(&self, cells: &Cells<D>) -> impl Iterator<Item = u32> {
         let (cell, corners) = (self.cell(), self.corners());
         let ends = [[0, 1], [1, 2], [0, 2]].map(|[i, j]: [usize; 2]| [corners[i % D], corners[j % D]]);
@@ -49,25 +51,25 @@ impl<const D: usize> Face<D> {
         corners.into_iter().map(move |i| cells.cell(cell)[i]).chain(ends.map(move |ends| cells.middle(cell, ends)))
     }
 
-    /// Mean of its corners.
+    /// Return the mean of the corners.
     fn centre(&self, cells: &Cells<D>) -> [f64; 3] {
         let corners = self.sorted(cells).0.map(|node| cells.at(node));
         std::array::from_fn(|c| corners.iter().map(|x| x[c]).sum::<f64>() / D as f64)
     }
 }
 
-/// All faces of the cells of a body, those with the same corners one after the other.
+/// All faces of the cells of a body. Faces with the same corners follow each other.
 pub struct Faces<const D: usize> {
-    /// Sorted within those of one least corner.
+    /// The faces, ordered by their least corners. Those with the same least corner are sorted.
     list: Vec<Face<D>>,
-    /// Where the faces of each least corner begin; the end comes last.
+    /// Index of the first face of each least corner; the last entry is the number of faces.
     first: Vec<u32>,
 }
 
 impl<const D: usize> Faces<D> {
-    /// Sorts the faces of a body by their corners, in linear time: few have the same least one.
+    /// Sort the faces of a body by their corners. The time is linear, since few faces have the same least corner.
     pub fn new(cells: &Cells<D>) -> Self {
-        // the least corner, and the face
+        // This returns the least corner of a face, and the face.
         let face = |cell: usize, opposite: usize| {
             let mut face = Face { rest: [0; 2], place: (4 * cell + opposite) as u32 };
             let (key, _) = face.sorted(cells);
@@ -89,23 +91,23 @@ impl<const D: usize> Faces<D> {
         Self { list, first }
     }
 
-    /// Faces with the same corners.
+    /// Return the faces in groups with the same corners.
     fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
         let of_least = self.first.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
         of_least.flat_map(|ends| self.list[ends].chunk_by(|a, b| a.rest == b.rest))
     }
 
-    /// Faces between two cells, with both.
+    /// Return the faces between two cells, one for each cell.
     pub fn inner(&self) -> impl Iterator<Item = [&Face<D>; 2]> {
         self.alike().filter_map(|alike| if let [a, b] = alike { Some([a, b]) } else { None })
     }
 
-    /// Faces of one cell alone.
+    /// Return the faces of one cell alone.
     pub fn outer(&self) -> impl Iterator<Item = Face<D>> {
         self.alike().filter_map(|alike| if let [one] = alike { Some(*one) } else { None })
     }
 
-    /// How many cells have a facet with these nodes: corners, then mid-edge nodes if there are any.
+    /// Return the number of cells that have a facet with these nodes: corners, then mid-edge nodes if there are any.
     pub fn cells_at(&self, cells: &Cells<D>, facet: &[u32]) -> usize {
         let mut key: [u32; D] = std::array::from_fn(|i| facet[i]);
         key.sort_unstable();
@@ -116,10 +118,11 @@ impl<const D: usize> Faces<D> {
         self.list[from..to].iter().filter(same).count()
     }
 
-    /// Two cells at most share a face, they lie on its two sides, and the nodes between its corners are the same for both.
+    /// Check that at most two cells share a face, that they lie on its two sides, and that they have the same nodes between its
+    /// corners.
     ///
     /// # Errors
-    /// A face where it is not so, with its corners.
+    /// A face violates this. The error gives the place and the cells.
     pub fn check(&self, cells: &Cells<D>) -> Result<()> {
         for alike in self.alike() {
             let refuse = |what: &str| {
@@ -150,5 +153,5 @@ impl<const D: usize> Faces<D> {
     }
 }
 
-/// What to do about cells that are wrong in themselves.
+/// The advice about cells that are wrong in themselves.
 const AGAIN: &str = "such a file is damaged or was put together from several: mesh the geometry again";

@@ -1,4 +1,4 @@
-//! Groups that serve bodies: whether they lie on them.
+//! The check that groups in use lie on the bodies that they serve.
 
 use super::cells::{Cells, NONE};
 use super::faces::Faces;
@@ -6,12 +6,12 @@ use crate::error::{Error, Result};
 use crate::mesh::{Group, Mesh};
 use std::collections::HashSet;
 
-/// What a group does for a body.
+/// The purpose of a group for a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Duty {
-    /// Load, spring, contact: acts on the boundary of the bodies that it serves.
+    /// A load, spring or contact, which acts on the boundary of the bodies that it serves.
     Acts,
-    /// Support: holds nodes of bodies, inside them, too.
+    /// A support, which constrains nodes of bodies, also inside them.
     Holds,
 }
 
@@ -19,27 +19,28 @@ pub enum Duty {
 pub struct InUse<'a> {
     group: &'a Group,
     duty: Duty,
-    /// For each simplex, what it is to the bodies.
+    /// The relation of each simplex to the bodies.
     found: Vec<Found>,
 }
 
-/// What a simplex is to the bodies looked at.
+/// The relation of a simplex to the bodies that were compared so far.
 #[derive(Clone, Copy, Default)]
 struct Found {
-    /// It is where the duty asks for it.
+    /// Whether it lies where the duty requires it.
     serves: bool,
-    /// Its nodes are nodes of a body that it serves.
+    /// Whether its nodes are nodes of a body that it serves.
     touches: bool,
 }
 
 impl<'a> InUse<'a> {
-    /// A group that serves.
+    /// Start with a group and its duty.
     pub fn new(group: &'a Group, duty: Duty) -> Self {
         Self { group, duty, found: vec![Found::default(); group.len()] }
     }
 
-    /// Compares the group with a body that it serves, or, for `other`, with another one of the scene: supports may hold a
-    /// group in part. `node` has the nodes of the body.
+    /// Compare the group with a body. `other` tells that the group does not serve this body. Only supports are compared with
+    /// such a body: a support may constrain a part of its group, and the rest may lie on other bodies. `node` holds the body's
+    /// node of each point.
     pub fn compare<const D: usize>(&mut self, cells: &Cells<D>, faces: &Faces<D>, node: &[u32], other: bool) {
         let dimension = self.group.dimension;
         if other && self.duty == Duty::Acts {
@@ -65,7 +66,7 @@ impl<'a> InUse<'a> {
         }
     }
 
-    /// Those edges of the body between nodes of the group, for groups of edges in space.
+    /// Return the edges of the body between nodes of the group, for groups of edges in space.
     fn edges<const D: usize>(&self, cells: &Cells<D>, node: &[u32]) -> HashSet<[u32; 2]> {
         let mut on_group = vec![false; cells.node_count()];
         let nodes = self.group.connectivity.iter().map(|&point| node[point as usize]);
@@ -81,8 +82,8 @@ impl<'a> InUse<'a> {
         edges
     }
 
-    /// Refuses a group that has a simplex twice, serves in part only, or whose simplices lie across its bodies. One that touches none is left to
-    /// the line of the scene that names it.
+    /// Refuse a group that has a simplex twice, serves in part only, or has simplices that lie across its bodies. A group that
+    /// touches no body is left to the caller, which reports the line of the scene that names it.
     pub fn judge<const D: usize>(&self, mesh: &Mesh<D>) -> Result<()> {
         if let Some(twice) = self.twice() {
             return Err(self.refuse(mesh, twice, "stands twice in it", "mesh the geometry again"));
@@ -107,7 +108,7 @@ impl<'a> InUse<'a> {
         })
     }
 
-    /// A simplex that has the corners of an earlier one.
+    /// Return the index of a simplex that has the corners of an earlier one.
     fn twice(&self) -> Option<usize> {
         let corners = |index: usize| {
             let mut corners = [NONE; 3];
@@ -120,7 +121,7 @@ impl<'a> InUse<'a> {
         (0..self.group.len()).find(|&index| !seen.insert(corners(index)))
     }
 
-    /// The refusal of a simplex of the group.
+    /// Return the refusal of a simplex of the group.
     fn refuse<const D: usize>(&self, mesh: &Mesh<D>, index: usize, what: &str, help: &str) -> Error {
         let points = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
         let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;

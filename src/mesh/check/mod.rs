@@ -1,26 +1,29 @@
-//! Whether the cells of a body are a mesh of it.
+//! The check that the cells of a body are a mesh of it.
 //!
-//! What a body must be, and what is looked at:
+//! A body must satisfy six conditions. The module in parentheses checks each of them.
 //!
-//! 1. Cells have positive volume: straight ones since they were read, curved ones by [`curved`].
-//! 2. Two cells at most share a facet, from its two sides ([`faces`]).
-//! 3. Facets of the boundary, those of one cell alone, meet in common corners and edges only ([`surface`]).
+//! 1. Cells have positive volume. Straight cells have it since they were read; curved ones are checked ([`curved`]).
+//! 2. At most two cells share a facet, from its two sides ([`faces`]).
+//! 3. Facets of the boundary, which are those of one cell alone, meet in common corners and edges only ([`surface`]).
 //! 4. Behind each closed surface of the boundary there is one cell ([`nesting`]).
 //! 5. Cells join through facets, not by an edge or a corner alone ([`parts`]).
 //! 6. Bodies have nodes of their own, and the facets of groups in use bound the bodies that they serve ([`groups`]).
 //!
-//! Then every point is covered once. By 1 and 2 the cells are a chain, whose boundary is that of 3 with its outer
-//! normals. The number of cells at a point off the boundary is therefore how often the boundary goes around it (the degree
-//! of the map from cells to space): it changes by one across each facet, and nowhere else. By 3 the boundary divides space
-//! into regions with a closed surface between any two neighbours, and by 4 the number is one inside and zero outside of
-//! each. No angle inside need be looked at: folded cells show at the boundary. By 3, too, there is no crack: a hanging node and
-//! a facet with two sets of nodes are places where the boundary touches itself.
+//! Then every point of the body is covered once. By 1 and 2 the cells are a chain. The boundary of this chain is that of 3 with
+//! its outer normals. The number of cells at a point off the boundary is therefore the number of times that the boundary goes
+//! around the point. It is the degree of the map from cells to space. This number changes by one across each facet of the
+//! boundary, and nowhere else. By 3 the boundary divides space into regions with a closed surface between any two neighbours.
+//! By 4 the number is one inside and zero outside of each closed surface. Angles inside the body need no check, because folded
+//! cells show at the boundary. Condition 3 also excludes cracks: a hanging node and a facet with two sets of nodes are places
+//! where the boundary touches itself.
 //!
-//! Not proven: for quadratic elements 3 and 4 see the boundary with flat pieces between its nodes, eight to an edge where
-//! facets without common nodes seem to meet. 3 takes for touching what is nearer than 1e-9 of a facet. Whether a point of the
-//! boundary is where the user wants it nobody can tell: a mesh with a node moved a little is another mesh. A body may be pinched at a
-//! point, if its cells join through facets elsewhere. All costs are linear in the number of cells, but for the search tree of the
-//! boundary.
+//! The checks have these limits. For quadratic elements, 3 and 4 replace the boundary by flat pieces between its nodes. Where
+//! facets without common nodes seem to meet, 3 uses eight pieces per edge. Condition 3 counts facets as touching if they are
+//! nearer than 1e-9 of the size of a facet. No check can tell whether a point of the boundary is where the user wants it: a
+//! mesh with a node moved a little is another mesh. A body may be pinched at a point, if its cells join through facets
+//! elsewhere.
+//!
+//! All costs are linear in the number of cells, except for that of the search tree of the boundary.
 
 mod cells;
 mod curved;
@@ -49,48 +52,49 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use surface::Surface;
 
-/// A body and the groups that serve it.
+/// A body to check, and the groups that serve it.
 #[derive(Debug, Clone)]
 pub struct Asked<'a> {
-    /// Name of the body: a group of cells.
+    /// Name of the body, which is that of a group of cells.
     pub name: &'a str,
-    /// Order of its elements, not above that of the mesh.
+    /// Order of its elements, at most that of the mesh.
     pub order: Order,
-    /// Names of groups, with what they do.
+    /// Names of groups, with their duties.
     pub groups: Vec<(&'a str, Duty)>,
 }
 
-/// What was found of a body.
+/// Results of the check of a body.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Checked {
-    /// Facets between two cells.
+    /// Number of facets between two cells.
     pub inner: usize,
-    /// Facets of the boundary.
+    /// Number of facets of the boundary.
     pub outer: usize,
-    /// What hangs together.
+    /// Parts of the body that are connected by facets.
     pub parts: Parts,
-    /// The point of the mesh that each of its nodes is.
+    /// Point of the mesh of each node of the body.
     #[serde(skip)]
     pub points: Vec<u32>,
 }
 
 impl<const D: usize> Mesh<D> {
-    /// Check the bodies that are asked for, with the groups that serve them; `contacts` serve any body, and with `shared` bodies may have nodes in
-    /// common. Names that are no groups of the mesh are left to others, which know where they stand.
+    /// Check these bodies with the groups that serve them. `contacts` names groups that serve any body. With `shared`, bodies
+    /// may have nodes in common. Names that are not groups of the mesh are skipped, because the caller knows where they stand
+    /// in the scene.
     ///
     /// # Errors
-    /// What is no mesh of a body, with body, place and elements.
+    /// A group of cells is not a mesh of a body. The error gives the body, the place and the elements.
     pub fn check(&self, bodies: &[Asked], contacts: &[&str], shared: bool) -> Result<Vec<Checked>> {
         let mut in_use: BTreeMap<(&str, Duty), InUse> = BTreeMap::new();
         let contacts = || contacts.iter().map(|&name| (name, Duty::Acts));
         for (name, duty) in bodies.iter().flat_map(|body| body.groups.iter().copied()).chain(contacts()) {
-            // every cell of a group is one of a body, or of none
+            // Groups of cells need no comparison: every cell of a group belongs to one body, or to none.
             if let Some(group) = self.group(name).filter(|group| group.dimension < D) {
                 in_use.entry((name, duty)).or_insert_with(|| InUse::new(group, duty));
             }
         }
         let mut node = vec![NONE; self.points.len()];
-        // the last body of each point
+        // This is the last body found at each point.
         let mut owner = vec![NONE; if shared { 0 } else { self.points.len() }];
         let mut checked = Vec::new();
         for (index, body) in bodies.iter().enumerate() {
@@ -124,7 +128,7 @@ impl<const D: usize> Mesh<D> {
     }
 }
 
-/// The refusal of a body that shares a node with another one.
+/// Return the refusal of a body that shares a node with another one.
 fn two<const D: usize>(cells: &Cells<D>, node: u32, other: &str) -> Error {
     let what = format!("it shares a node with body `{other}`");
     let cell = (0..cells.count()).find(|&cell| cells.cell(cell).contains(&node));

@@ -1,4 +1,4 @@
-//! How often cells cover a point, told by the boundary alone.
+//! The number of cells that cover a point, from the boundary alone.
 
 use super::cells::Cells;
 use super::distance::{Point, cross};
@@ -6,7 +6,7 @@ use super::parts::Joined;
 use super::surface::Surface;
 use crate::error::Result;
 
-/// Weights of the corners of a cell for points inside it that lie on no line or plane through other nodes.
+/// Weights of the corners of a cell for points inside it. These points lie on no line or plane through other nodes.
 const INSIDE: [[f64; 4]; 5] = [
     [0.2718, 0.2357, 0.2583, 0.2342],
     [0.2236, 0.2646, 0.2449, 0.2669],
@@ -15,8 +15,11 @@ const INSIDE: [[f64; 4]; 5] = [
     [0.2887, 0.2079, 0.1619, 0.3415],
 ];
 
-/// Every closed surface of the boundary has the body on one side and nothing on the other: behind one facet of each there is
-/// one cell, not two, as there would be were a part meshed again inside another one.
+/// Check that every closed surface of the boundary has the body on one side and nothing on the other. Behind one facet of each
+/// surface there must be one cell. There would be two if a part was meshed again inside another one.
+///
+/// # Errors
+/// The number of cells behind a facet is not one.
 pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<()> {
     let mut joined = Joined::new(cells.node_count());
     for i in 0..surface.faces.len() {
@@ -37,7 +40,8 @@ pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<(
             corners
                 .fold([0.0; 3], |x, (&node, weight)| std::array::from_fn(|c| x[c] + weight / sum * cells.at(node)[c]))
         };
-        // a line that meets an edge tells nothing; so does, in a thin curved cell, a point beside its chords
+        // A line that meets an edge decides nothing. The same holds in a thin curved cell for a point that its chords leave
+        // outside.
         let counts: Vec<i32> = INSIDE.iter().filter_map(|weights| covers(surface, inside(weights))).collect();
         if counts.iter().all(|&count| count != 1) && !counts.is_empty() {
             let what = format!("{} cells lie over each other", counts[0].max(2));
@@ -48,8 +52,9 @@ pub fn check<const D: usize>(cells: &Cells<D>, surface: &Surface<D>) -> Result<(
     Ok(())
 }
 
-/// How many times the boundary goes around a point: what cells of positive volume cover it. Counted along the line from the
-/// point to larger x, outwards minus inwards; none if the line meets an edge of a facet.
+/// Return how many times the boundary goes around a point, which is the number of cells of positive volume that cover it. The
+/// crossings of the line from the point to larger x are counted, outwards minus inwards. Return `None` if the line meets an
+/// edge of a facet.
 fn covers<const D: usize>(surface: &Surface<D>, from: Point) -> Option<i32> {
     let mut far = from;
     far[0] = f64::MAX;
@@ -61,8 +66,8 @@ fn covers<const D: usize>(surface: &Surface<D>, from: Point) -> Option<i32> {
     Some(count)
 }
 
-/// The crossing of a segment with the body on its left; its upper end does not belong to it, so that of two segments with
-/// a common end one is crossed.
+/// Return the crossing of a segment that has the body on its left. The upper end does not belong to the segment, so that two
+/// segments with a common end do not both count it.
 fn line(from: Point, a: Point, b: Point) -> i32 {
     if (a[1] > from[1]) == (b[1] > from[1]) {
         return 0;
@@ -71,10 +76,10 @@ fn line(from: Point, a: Point, b: Point) -> i32 {
     if x > from[0] { (b[1] - a[1]).signum() as i32 } else { 0 }
 }
 
-/// The crossing of a triangle whose normal points out of the body; none at its edges.
+/// Return the crossing of a triangle whose normal points out of the body. At its edges return `None`.
 fn triangle(from: Point, x: [Point; 3]) -> Option<i32> {
     let x = x.map(|x| -> Point { std::array::from_fn(|c| x[c] - from[c]) });
-    // twice the areas in the plane across the line
+    // These are twice the areas in the plane across the line.
     let areas = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| x[i][1] * x[j][2] - x[i][2] * x[j][1]);
     let size = x.iter().flat_map(|x| &x[1..]).fold(0.0, |max: f64, x| max.max(x.abs()));
     let side = |area: &f64| if area.abs() <= 1e-12 * size * size { 0 } else { area.signum() as i32 };
@@ -87,7 +92,7 @@ fn triangle(from: Point, x: [Point; 3]) -> Option<i32> {
     }
     let across: [Point; 2] = [1, 2].map(|i| std::array::from_fn(|c| x[i][c] - x[0][c]));
     let normal = cross(across[0], across[1]);
-    // the line meets the plane of the triangle at this x
+    // The line meets the plane of the triangle ahead of the point if this x is positive.
     let ahead = (0..3).map(|c| normal[c] * x[0][c]).sum::<f64>() / normal[0] > 0.0;
     Some(if ahead { sides[0] } else { 0 })
 }

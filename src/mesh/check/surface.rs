@@ -1,4 +1,4 @@
-//! The boundary of a body: it does not meet itself.
+//! The boundary of a body, which must not meet itself.
 
 use super::cells::{Cells, NONE};
 use super::distance::{self, Point};
@@ -8,34 +8,34 @@ use crate::linalg;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
-/// Share of a facet's size below which two facets touch: ten times what Gmsh misses the places of nodes by.
+/// Share of a facet's size below which two facets touch. It is ten times the error with which Gmsh places nodes.
 const TOUCH: f64 = 1e-9;
 
-/// Pieces of the edge of a curved facet when it is looked at closely.
+/// Number of pieces of the edge of a curved facet in a close comparison.
 const FINE: usize = 8;
 
-/// Facets of the boundary of a body, found by their boxes.
+/// The facets of the boundary of a body, with a search tree of their boxes.
 pub struct Surface<'a, const D: usize> {
     cells: &'a Cells<'a, D>,
-    /// Its facets.
+    /// The facets as faces of cells.
     pub faces: Vec<Face<D>>,
-    /// Nodes of all facets.
+    /// Nodes of all facets, `stride` per facet.
     nodes: Vec<u32>,
     stride: usize,
     tree: RTree<GeomWithData<Rectangle<Point>, u32>>,
 }
 
-/// A part of a facet between corners: a segment in the plane, a triangle in space.
+/// A flat part of a facet between corners: a segment in the plane, a triangle in space.
 #[derive(Clone, Copy)]
 struct Piece {
-    /// Corners, the last one twice in a segment.
+    /// Corners; a segment has the last one twice.
     x: [Point; 3],
-    /// Their nodes; [`NONE`] where it is none.
+    /// Nodes of the corners, or [`NONE`] where a corner is not a node.
     node: [u32; 3],
 }
 
 impl<'a, const D: usize> Surface<'a, D> {
-    /// Of the facets that bound one cell, in the order of [`Faces::outer`](super::faces::Faces::outer).
+    /// Make the surface of the facets that bound one cell, in the order of [`Faces::outer`](super::faces::Faces::outer).
     pub fn new(cells: &'a Cells<'a, D>, faces: Vec<Face<D>>) -> Self {
         let nodes: Vec<u32> = faces.iter().flat_map(|face| face.nodes(cells)).collect();
         let stride = if cells.is_quadratic() { D * (D + 1) / 2 } else { D };
@@ -47,18 +47,19 @@ impl<'a, const D: usize> Surface<'a, D> {
         Self { cells, faces, nodes, stride, tree }
     }
 
-    /// Nodes of a facet.
+    /// Return the nodes of a facet.
     pub fn facet(&self, i: usize) -> &[u32] {
         &self.nodes[i * self.stride..][..self.stride]
     }
 
-    /// Facets whose boxes meet one.
+    /// Return the indices of the facets whose boxes meet the box from `low` to `high`.
     pub fn near(&self, low: Point, high: Point) -> impl Iterator<Item = usize> + '_ {
         let found = self.tree.locate_in_envelope_intersecting(AABB::from_corners(low, high));
         found.map(|found| found.data as usize)
     }
 
-    /// Corners of the flat pieces of a facet, at its nodes: itself, or with mid-edge nodes two segments or four triangles.
+    /// Return the corners of the flat pieces of a facet between its nodes. A linear facet is one piece. With mid-edge nodes
+    /// there are two segments or four triangles.
     pub fn flat(&self, i: usize) -> impl Iterator<Item = [Point; D]> + '_ {
         self.pieces(i).map(|piece| std::array::from_fn(|k| piece.x[k]))
     }
@@ -74,7 +75,7 @@ impl<'a, const D: usize> Surface<'a, D> {
         })
     }
 
-    /// Pieces of a curved facet that has no node in common with what it is compared with.
+    /// Return the pieces of a curved facet that has no node in common with the facet to which it is compared.
     fn fine_pieces(&self, i: usize) -> Vec<Piece> {
         let x: Vec<Point> = self.facet(i).iter().map(|&node| self.cells.at(node)).collect();
         let point = |l: [f64; 3]| -> Point {
@@ -98,7 +99,10 @@ impl<'a, const D: usize> Surface<'a, D> {
         lower.chain(upper).map(piece).collect()
     }
 
-    /// No two facets meet but in the corners and edges that they share.
+    /// Check that no two facets meet except in the corners and edges that they share.
+    ///
+    /// # Errors
+    /// Two facets meet elsewhere.
     pub fn check(&self) -> Result<()> {
         for i in 0..self.faces.len() {
             let [low, high] = bounds(self.facet(i), self.cells);
@@ -112,7 +116,7 @@ impl<'a, const D: usize> Surface<'a, D> {
         Ok(())
     }
 
-    /// Whether two facets meet where they should not.
+    /// Return whether two facets meet where they should not.
     fn meet(&self, i: usize, j: usize) -> bool {
         let other: Vec<Piece> = self.pieces(j).collect();
         if !self.pieces(i).any(|piece| other.iter().any(|other| meet::<D>(&piece, other))) {
@@ -122,12 +126,12 @@ impl<'a, const D: usize> Surface<'a, D> {
         if !(apart && self.cells.is_quadratic()) {
             return true;
         }
-        // chords may meet where arcs do not
+        // Chords may meet where arcs do not.
         let other = self.fine_pieces(j);
         self.fine_pieces(i).iter().any(|piece| other.iter().any(|other| meet::<D>(piece, other)))
     }
 
-    /// What is wrong with two facets that meet.
+    /// Return the error of two facets that meet.
     fn refuse(&self, i: usize, j: usize) -> crate::error::Error {
         let cells = [i, j].map(|i| self.faces[i].cell());
         let pair = || [(i, j), (j, i)].into_iter();
@@ -163,12 +167,12 @@ impl<'a, const D: usize> Surface<'a, D> {
     }
 }
 
-/// The box around nodes.
+/// Return the box around nodes.
 fn bounds<const D: usize>(nodes: &[u32], cells: &Cells<D>) -> [Point; 2] {
     linalg::bounds(nodes.iter().map(|&node| cells.at(node)))
 }
 
-/// Whether two pieces meet but in the corners that they share.
+/// Return whether two pieces meet except in the corners that they share.
 fn meet<const D: usize>(a: &Piece, b: &Piece) -> bool {
     let largest = |piece: &Piece| {
         let [p, q, r] = piece.x;
@@ -180,7 +184,7 @@ fn meet<const D: usize>(a: &Piece, b: &Piece) -> bool {
     if (0..3).any(|c| low(a, c) > high(b, c) + within || low(b, c) > high(a, c) + within) {
         return false;
     }
-    // corners of a that b has as well come first, in the same order
+    // The corners that both pieces have come first, in the same order.
     let (mut p, mut q) = (*a, *b);
     let mut common = 0;
     for k in 0..D {

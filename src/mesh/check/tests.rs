@@ -1,10 +1,10 @@
-//! Meshes with one mistake each, and meshes without.
+//! Tests on meshes with one mistake each, and on meshes without mistakes.
 
 use super::{Asked, Checked, Duty};
 use crate::mesh::{Group, Mesh};
 use crate::problem::order::Order;
 
-/// A body of simplices on points.
+/// Return a mesh with one body of simplices on points.
 fn mesh<const D: usize>(points: Vec<[f64; D]>, cells: &[u32]) -> Mesh<D> {
     let stride = D + 1;
     let tags = (1..=(cells.len() / stride) as u64).collect();
@@ -45,7 +45,7 @@ fn squares() -> (Vec<[f64; 2]>, Vec<u32>) {
     (points, vec![0, 1, 3, 1, 4, 3, 1, 2, 4, 2, 5, 4])
 }
 
-/// A unit cube in six tetrahedra around a diagonal, with a corner at `from`; corners are numbered from `first`.
+/// Return a unit cube with a corner at `from` as six tetrahedra around a diagonal. Corners are numbered from `first`.
 fn cube(from: [f64; 3], first: u32) -> (Vec<[f64; 3]>, Vec<u32>) {
     let points = (0..8).map(|k| [0, 1, 2].map(|c| from[c] + f64::from(k >> c & 1))).collect();
     let around = [1, 3, 2, 6, 4, 5];
@@ -53,7 +53,7 @@ fn cube(from: [f64; 3], first: u32) -> (Vec<[f64; 3]>, Vec<u32>) {
     (points, cells)
 }
 
-/// The same simplices with a node in the middle of each edge.
+/// Return the same simplices with a node in the middle of each edge.
 fn quadratic<const D: usize>(mesh: &Mesh<D>) -> Mesh<D> {
     let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
     let (mut points, mut middles) = (mesh.points.clone(), std::collections::HashMap::new());
@@ -94,7 +94,7 @@ fn good_meshes_are_counted() {
     }
 }
 
-/// A bar of many cubes with a group at its end is whole, until another cube lies across it.
+/// A bar of many cubes with a group at its end is valid, until another cube lies across it.
 #[test]
 fn a_bar_is_looked_at_as_a_whole() {
     let count = 20;
@@ -114,7 +114,7 @@ fn a_bar_is_looked_at_as_a_whole() {
         let found = check(&bar, &[("end", Duty::Acts)]).unwrap();
         assert_eq!([found.inner, found.outer, found.parts.count, found.points.len()], [158, 164, 1, bar.points.len()]);
     }
-    // a cube of its own through a side in the middle
+    // The added cube has its own nodes and crosses a side of the bar in its middle.
     let (more, others) = cube([10.3, 0.4, 0.5], points.len() as u32);
     points.extend(more);
     cells.extend(others);
@@ -133,20 +133,20 @@ fn parts_that_lie_apart_are_found() {
 #[test]
 fn cells_that_overlap() {
     let (points, cells) = squares();
-    // given twice, as an inner one and alone
+    // The first mesh repeats an inner cell, the second one repeats its only cell.
     refused(&mesh(points.clone(), &[&cells[..], &[1, 4, 3]].concat()), &["3 cells share the facet", "elements"]);
     refused(&mesh(points.clone(), &[0, 1, 3, 0, 1, 3]), &["same side", "elements 1 and 2"]);
-    // a node pulled out of the cells around it: the cell there was turned when it was read
+    // Node 1 is pulled out of the cells around it. The reader would have turned the cell that is inverted by that.
     let mut folded = points.clone();
     folded[1] = [1.2, 1.4];
     let turned = [0, 1, 3, 1, 3, 4, 1, 4, 2, 2, 5, 4];
     refused(&mesh(folded, &turned), &["same side of the facet that they share"]);
-    // a spiral of triangles that goes around twice and a bit less: each fits to the next
+    // The triangles form a spiral that goes around twice and a bit less. Each fits the next one.
     let angle = |k: u32| f64::from(k) * 0.9;
     let around: Vec<[f64; 2]> = (0..9).map(|k| [angle(k).cos(), angle(k).sin()]).collect();
     let spiral: Vec<u32> = (0..8).flat_map(|k| [9, k, k + 1]).collect();
     refused(&mesh([&around[..], &[[0.0; 2]]].concat(), &spiral), &["crosses itself"]);
-    // a part within another one
+    // One part lies within another one.
     let inner = [[0.6, 0.6], [0.7, 0.6], [0.6, 0.7]];
     let twice = mesh([&points[..], &inner].concat(), &[&cells[..], &[6, 7, 8]].concat());
     refused(&twice, &["2 cells lie over each other", "(0.6"]);
@@ -155,13 +155,13 @@ fn cells_that_overlap() {
     points.extend([[0.5, 0.3, 0.2], [0.6, 0.3, 0.2], [0.5, 0.4, 0.2], [0.5, 0.3, 0.3]]);
     cells.extend([8, 9, 10, 11]);
     refused(&mesh(points.clone(), &cells), &["2 cells lie over each other"]);
-    // one that comes out of it
+    // The inner part now reaches out of the outer one.
     points[9] = [3.0, 0.35, 0.22];
     refused(&mesh(points.clone(), &cells), &["crosses itself"]);
     refused(&quadratic(&mesh(points, &cells)), &["crosses itself"]);
 }
 
-/// A hole is no mistake, nor is a part in a hole.
+/// A hole is not a mistake, and neither is a part in a hole.
 #[test]
 fn holes_and_what_is_in_them() {
     let ring: Vec<[f64; 2]> = (0..16)
@@ -180,21 +180,21 @@ fn holes_and_what_is_in_them() {
 
 #[test]
 fn cracks() {
-    // a node between 1 and 4 that the left square does not have
+    // The node between 1 and 4 belongs to the right square only.
     let (points, _) = squares();
     let hanging = mesh([&points[..], &[[1.0, 0.5]]].concat(), &[0, 1, 3, 1, 4, 3, 1, 2, 6, 6, 5, 4, 2, 5, 6]);
     refused(&hanging, &["a node hangs on a facet", "at (1, 0.5)"]);
-    // the left square has the corner 4 of another body
+    // The left square has a node of its own at corner 4.
     let own = mesh([&points[..], &[[1.0, 1.0]]].concat(), &[0, 1, 3, 1, 6, 3, 1, 2, 4, 2, 5, 4]);
     refused(&own, &["nodes of their own", "at (1, 1)"]);
     refused(&quadratic(&own), &["nodes of their own"]);
-    // both ends
+    // Both cubes have their own nodes on the common face.
     let (mut points, mut cells) = cube([0.0; 3], 0);
     let (more, others) = cube([1.0, 0.0, 0.0], 8);
     points.extend(more);
     cells.extend(others);
     refused(&mesh(points.clone(), &cells), &["nodes of their own"]);
-    // and a mesh that does not match: half a cube along y
+    // The faces of these cubes do not match: the second cube is smaller along y and z.
     for x in &mut points[8..] {
         (x[1], x[2]) = (0.3 + 0.4 * x[1], 0.2 + 0.5 * x[2]);
     }
@@ -208,7 +208,7 @@ fn cells_that_hang_by_less_than_a_facet() {
     refused(&by_corner, &["an edge or a corner alone", "(2, 1)", "elements 4 and 5"]);
     let (points, cells) = cube([0.0; 3], 0);
     let more = [[2.0, 0.5, 2.0], [2.0, 0.6, 1.5]];
-    // by the edge between the corners 5 and 7
+    // The cells share the edge between the corners 5 and 7.
     let by_edge = mesh([&points[..], &more].concat(), &[&cells[..], &[5, 7, 9, 8]].concat());
     refused(&by_edge, &["an edge or a corner alone"]);
 }
@@ -218,7 +218,7 @@ fn mid_edge_nodes() {
     let (points, cells) = squares();
     let good = quadratic(&mesh(points, &cells));
     let mut other = good.clone();
-    // the middle of 1-4 once more, for the right square alone
+    // The right square alone gets a second node in the middle of 1-4.
     let middle = good.groups[0].connectivity[6 + 3];
     other.points.push(other.points[middle as usize]);
     let new = other.points.len() as u32 - 1;
@@ -235,10 +235,10 @@ fn mid_edge_nodes() {
     refused(&folded, &["a curved cell is folded"]);
 }
 
-/// Arcs with a gap between them that is smaller than the distance of their chords.
+/// The gap between the arcs is smaller than the distance of their chords.
 #[test]
 fn chords_that_meet_are_looked_at_closely() {
-    // two quarters of thin rings, one body in two parts, with nodes at different angles
+    // Two quarters of thin rings are one body in two parts, with nodes at different angles.
     let ring = |radius: [f64; 2], turn: f64, first: u32, n: u32| {
         let at = |i: u32| {
             let angle = turn + f64::from(i / 2) * 0.4;
@@ -267,7 +267,7 @@ fn chords_that_meet_are_looked_at_closely() {
                     (straight.points[cell[i] as usize], straight.points[cell[j] as usize], cell[3 + k]);
                 let r = 0.5 * (a[0].hypot(a[1]) + b[0].hypot(b[1]));
                 let scale = r / radius(middle);
-                // places are read from the straight mesh, written to the curved one
+                // Places are read from the straight mesh and written to the curved one.
                 let x = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
                 let scale = if (radius(middle) - x[0].hypot(x[1])).abs() < 1e-12 { scale } else { 1.0 };
                 curved.points[middle as usize] =
@@ -286,7 +286,7 @@ fn groups_lie_on_their_bodies() {
     for mesh in [bottom.clone(), quadratic(&bottom)] {
         assert!(check(&mesh, &[("bottom", Duty::Acts), ("bottom", Duty::Holds)]).is_ok());
     }
-    // a facet inside, which a support may hold; and one that is none
+    // One facet is inside, where a support may constrain it. Others are not facets of the body.
     let inside = with_group(plane(), "bottom", 1, vec![0, 1, 1, 4]);
     assert!(check(&inside, &[("bottom", Duty::Holds)]).is_ok());
     for (mesh, duty, words) in [
@@ -299,14 +299,14 @@ fn groups_lie_on_their_bodies() {
     }
     let message = check(&with_group(plane(), "bottom", 1, vec![0, 1, 1, 0]), &[("bottom", Duty::Acts)]).unwrap_err();
     assert!(message.contains("stands twice in it") && message.contains("element 91"), "{message}");
-    // the wrong mid-edge node
+    // The mid-edge nodes are exchanged.
     let mut wrong = quadratic(&bottom);
     wrong.groups[1].connectivity.swap(2, 5);
     assert!(check(&wrong, &[("bottom", Duty::Acts)]).is_err());
-    // one that lies elsewhere is refused with the line of the scene
+    // A group that lies elsewhere is left to the caller, which reports the line of the scene.
     let far = Mesh { points: [&points[..], &[[5.0, 5.0], [6.0, 5.0]]].concat(), ..plane() };
     assert!(check(&with_group(far, "far", 1, vec![6, 7]), &[("far", Duty::Acts)]).is_ok());
-    // edges and points in space
+    // These groups are edges in space.
     let (points, cells) = cube([0.0; 3], 0);
     let space = |edge: [u32; 2]| with_group(mesh(points.clone(), &cells), "edge", 1, edge.to_vec());
     assert!(check(&space([0, 1]), &[("edge", Duty::Holds)]).is_ok());

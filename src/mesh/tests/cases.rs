@@ -1,4 +1,4 @@
-//! The geometries in `meshes/`.
+//! Tests on the geometries in `meshes/`.
 
 use super::*;
 
@@ -9,10 +9,11 @@ fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
     meshed(&file, &set, Order::P1, &[folder.path().to_owned()]).unwrap().mesh
 }
 
-/// Gmsh places the nodes of a transfinite line to about this.
+/// Accuracy with which Gmsh places the nodes of a transfinite line.
 const PLACES: f64 = 1e-10;
 
-/// Vertices of the triangles of a group on a fine grid, reflected about y = `middle` if asked; sorted.
+/// Return the vertices of the triangles of a group on a fine grid, sorted. They are reflected about y = `reflect`, if it is
+/// given.
 fn triangles(mesh: &Mesh<2>, group: &str, reflect: Option<f64>) -> Vec<[[i64; 2]; 3]> {
     let place = |point: &u32| {
         let [x, y] = mesh.points[*point as usize];
@@ -33,7 +34,7 @@ fn triangles(mesh: &Mesh<2>, group: &str, reflect: Option<f64>) -> Vec<[[i64; 2]
     all
 }
 
-/// The upper body mirrors the lower one, and they share no point.
+/// Assert that the upper body mirrors the lower one, and that they share no point.
 fn assert_mirrored(mesh: &Mesh<2>, middle: f64) {
     let lower = mesh.group("lower").unwrap();
     let upper = mesh.group("upper").unwrap();
@@ -98,7 +99,7 @@ fn half_planes_are_fine_at_the_groove_and_coarse_far_away() {
     let mesh = case("half-planes/half-planes.geo", &[("n", 16.0)]);
     assert!((area(&mesh, "lower") - 256.0).abs() < 1e-8);
     assert_mirrored(&mesh, 16.0);
-    // Distance from the axis and length of the edges of the contact surface.
+    // These are the distance from the axis and the length of each edge of the contact surface.
     let edges: Vec<(f64, f64)> = mesh
         .group("lower_top")
         .unwrap()

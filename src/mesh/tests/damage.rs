@@ -1,4 +1,4 @@
-//! Files that are no good meshes.
+//! Tests on files that are not valid meshes.
 
 use super::*;
 
@@ -6,14 +6,14 @@ fn message(bytes: &[u8]) -> String {
     parse::<2>(bytes).map(|_| ()).expect_err("this mesh is bad").to_string()
 }
 
-/// No byte anywhere makes the reader panic or allocate without end; whatever it accepts keeps the promises of a mesh.
+/// No byte makes the reader panic or allocate without end. Whatever it accepts satisfies the invariants of a mesh.
 #[test]
 fn damaged_files_are_meshes_or_errors() {
     for form in [&[][..], &["-bin"], &["-order", "2", "-bin"]] {
         let good = gmsh(SQUARE, &[&["-2", "-setnumber", "n", "1"], form].concat());
         for end in 0..good.len() {
             let read = parse::<2>(&good[..end]);
-            // All that may be missing is the end of line after the last section.
+            // Only the end of line after the last section may be missing.
             assert!(read.is_err() || end + 1 == good.len(), "{end} of {}", good.len());
         }
         for position in 0..good.len() {

@@ -1,4 +1,4 @@
-//! From scripts and files to meshes, with the cache.
+//! Tests of the way from scripts and files to meshes, with the cache.
 
 use super::*;
 use crate::mesh::{Origin, load, view};
@@ -25,7 +25,7 @@ fn scripts_are_meshed_once_for_each_key() {
     let quadratic = run(4.0, Order::P2);
     assert_eq!((quadratic.origin, quadratic.mesh.order), (Origin::Gmsh, Order::P2));
 
-    // A damaged file is made again.
+    // A damaged file is made anew.
     let whole = std::fs::read(&first.file).unwrap();
     std::fs::write(&first.file, &whole[..whole.len() / 2]).unwrap();
     assert_eq!(run(4.0, Order::P1).origin, Origin::Gmsh);
@@ -37,11 +37,11 @@ fn scripts_are_meshed_once_for_each_key() {
     assert!((extent(&moved.mesh, moved.mesh.group("steel").unwrap()) - 1.0).abs() < 1e-9);
     std::fs::write(&part, SQUARE).unwrap();
     assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
-    // Nothing but meshes is left: n = 4, n = 3, order 2, and the moved one.
+    // Only meshes are left: n = 4, n = 3, order 2, and the one of the changed file.
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
 }
 
-/// Gmsh leaves out the last command of a script whose last line is not ended.
+/// Gmsh omits the last command of a script whose last line is not ended.
 #[test]
 fn the_last_line_of_a_script_need_not_end() {
     let folder = tempfile::tempdir().unwrap();
@@ -76,7 +76,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     assert!(message.contains("did you mean `n`?") && message.contains("scene.toml"), "{message}");
     let message = refuse(&format!("{SQUARE}Mesh.ElementOrder = 1;"), &[], Order::P2);
     assert!(message.contains("remove `Mesh.ElementOrder`"), "{message}");
-    // Its lines and bytes mean nothing to someone who wrote a script.
+    // Lines and bytes of the mesh mean nothing to someone who wrote a script.
     let message = refuse(&format!("{SQUARE}Recombine Surface{{1}};"), &[], Order::P2);
     assert!(
         message.contains("a.geo: group `soft rock` has quadrangle elements") && !message.contains("byte"),
@@ -119,7 +119,8 @@ fn loads_at_the_same_time_do_not_meet() {
     assert_eq!(load().origin, Origin::Cache);
 }
 
-/// Gmsh's parallel algorithm makes another mesh of the same cube, with a file of its own in the cache, whatever the number of threads.
+/// Gmsh's parallel algorithm makes another mesh of the same cube. This mesh has its own file in the cache, and it does not
+/// depend on the number of threads.
 #[test]
 fn free_meshes_in_space_by_threads() {
     let folder = tempfile::tempdir().unwrap();
@@ -136,7 +137,7 @@ fn free_meshes_in_space_by_threads() {
     };
     let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
     assert_eq!(origin, Origin::Gmsh);
-    // as many points, perhaps, but others
+    // The numbers of points may be equal, but the points differ.
     let counts = [&usual, &parallel].map(Vec::len);
     assert!(usual != parallel && counts[0].abs_diff(counts[1]) < counts[0] / 4, "{counts:?}");
     assert_eq!((run(Some(2)), run(None)), ((Origin::Cache, parallel), (Origin::Cache, usual)));
