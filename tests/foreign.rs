@@ -144,6 +144,7 @@ fn files_of_abaqus_and_calculix() {
     refused("Upper, LOWER", "Upper, LOWR", &["there is no set `LOWR`"]);
     refused("2, 11, 12, 13, 15, 16, 17", "2, 11, 12, 13, 15, 16", &["an element has 6 nodes here, not 5"]);
     refused("2, 11, 12, 13, 15, 16, 17", "2, 11, 12, 13, 15, 16, 99", &["the node 99, which is not there"]);
+    refused("15, 18, 1", "1, 18446744073709551615", &["more members, from 1 to 18446744073709551615", "a.inp:"]);
     refused("LOWER, S1", "LOWER, T1", &["is no face of elements"]);
     refused("LOWER, S1", "UPPER, S6", &["has no face S6"]);
     refused("1, S2", "7, S2", &["a face of element 7, which is not there"]);
@@ -221,4 +222,6 @@ fn what_is_no_mesh_and_no_shape_is_refused() {
     let quadratic = format!("{} 17 2 {} {}{nodes}", words[0], words[3], words[4]);
     refused("a.msh", &text.replace(line, &quadratic), "\"a.msh\"", 4, &["hexahedron elements of 20 nodes", "order 1"]);
     refused("a.msh", &text.replace("\"lower\"", "\"lowr\""), "\"a.msh\"", 3, &["`lower`"]);
+    // names that differ by what becomes the same
+    refused("a.msh", &text.replace("\"upper\"", "\"LOWER\""), "\"a.msh\"", 4, &["two groups", "`lower`", "rename"]);
 }

@@ -73,6 +73,8 @@ type Numbered = (u8, Vec<u64>);
 /// The contents of a file.
 #[derive(Default)]
 struct Model {
+    /// Bytes of the file: no set has more members.
+    bytes: usize,
     nodes: BTreeMap<u64, [f64; 3]>,
     elements: BTreeMap<u64, Element>,
     kinds: Vec<Kind>,
@@ -97,7 +99,7 @@ enum Data {
 /// A line is not one of Abaqus. The file has parts or assemblies, or elements of other kinds. A set has members that do not
 /// exist. Errors in a line name it.
 pub fn convert(path: &Path, text: &str) -> Result<String> {
-    let mut model = Model::default();
+    let mut model = Model { bytes: text.len(), ..Model::default() };
     let mut data = Data::Other;
     for (number, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -209,8 +211,13 @@ impl Model {
                 if generate {
                     let [first, last] = [count::<u64>(words[0])?, count(words.get(1).copied().unwrap_or_default())?];
                     let step =
-                        words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?;
-                    members.extend((first..=last).step_by(step.max(1)));
+                        words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?.max(1);
+                    if last.saturating_sub(first) / step as u64 >= self.bytes as u64 {
+                        return Err(format!(
+                            "the set `{set}` has more members, from {first} to {last}, than the file has bytes"
+                        ));
+                    }
+                    members.extend((first..=last).step_by(step));
                 } else {
                     for word in words.iter().filter(|word| !word.is_empty()) {
                         match word.parse() {

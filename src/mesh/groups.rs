@@ -1,7 +1,7 @@
 //! The groups of a mesh by name, and a compact numbering that drops the points of no group.
 
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::{Deref, DerefMut};
 
 /// A named group of simplices of one dimension.
@@ -53,11 +53,6 @@ impl Groups {
     pub fn place(&self, name: &str) -> Option<usize> {
         self.place.get(name).copied()
     }
-
-    /// Return the groups without the index.
-    pub fn into_list(self) -> Vec<Group> {
-        self.list
-    }
 }
 
 impl From<Vec<Group>> for Groups {
@@ -79,6 +74,12 @@ impl DerefMut for Groups {
     fn deref_mut(&mut self) -> &mut [Group] {
         &mut self.list
     }
+}
+
+/// Return a name that two groups have.
+pub fn twice(groups: &[Group]) -> Option<&str> {
+    let mut names = HashSet::new();
+    groups.iter().map(|group| group.name.as_str()).find(|name| !names.insert(*name))
 }
 
 /// Return for each of `count` points whether a group uses it. Every point number in the groups is below `count`.

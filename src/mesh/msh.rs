@@ -172,6 +172,10 @@ fn finish<const D: usize>(
         let message = format!("the physical {} `{name}` has no elements", thing.to_lowercase());
         return Err(fail(message).help(format!("check what its `Physical {thing}` names, or remove it")));
     }
+    if let Some(name) = groups::twice(&groups) {
+        let help = "names of bodies have small letters, digits and _, and other characters become these: rename one of the groups";
+        return Err(fail(format!("two groups of the mesh have the name `{name}` here")).help(help));
+    }
     let (Some(order), true) = (order, groups.iter().any(|group| group.dimension == D)) else {
         return Err(fail(format!("no physical group holds {cells}s, and dimension = {D}")).help(example));
     };
