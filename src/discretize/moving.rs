@@ -42,7 +42,9 @@ impl<const D: usize> Moving<D> {
 /// Each nodal force f changes along the motions in proportion to its magnitude, by -|f| sum_j b_j m_j at its node. The amounts
 /// b_j solve
 ///
-/// ```text sum_k G_jk b_k = w_j,      G_jk = sum_nodes |f| m_j . m_k, ```
+/// ```text
+/// sum_k G_jk b_k = w_j,      G_jk = sum_nodes |f| m_j . m_k,
+/// ```
 ///
 /// so that nodes with equal loads get equal corrections.
 pub fn balance<const D: usize>(

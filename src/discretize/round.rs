@@ -5,7 +5,9 @@
 //! A normal of a meshed surface is the mean of the facets around it, so it is uncertain by the angle between them. Therefore the
 //! mesh cannot show that a motion m is resisted if
 //!
-//! ```text |n_q . m(x_q)| <= 2 s_q |m(x_q)|       at every contact point q of the body, ```
+//! ```text
+//! |n_q . m(x_q)| <= 2 s_q |m(x_q)|       at every contact point q of the body,
+//! ```
 //!
 //! where n_q is the normal at the point x_q, and s_q is the largest difference between unit normals of facets and nodes near q
 //! ([`Side::spread`](crate::contact::Side::spread)). The true normal lies between the facets. So the motion of a round body along
