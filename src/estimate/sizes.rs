@@ -77,7 +77,7 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim)
     gather(meshes, &counts, size).within(most)
 }
 
-/// Sizes `factor` times those of the meshes.
+/// Return sizes that are `factor` times those of the meshes.
 pub fn scaled(meshes: &dyn Meshes, bodies: usize, factor: f64) -> Sizes {
     gather(meshes, &counts(meshes, bodies), |_, size| factor * size)
 }
