@@ -198,8 +198,8 @@ impl Discrete {
     }
 }
 
-/// Return the trace (2n) with which the scene starts, divided by the load factor `factor`. The result is `None` if the program is
-/// to find the start.
+/// Return the trace (2n) with which the scene starts at the share `factor` of the loads. It is relative to the rigid motions that
+/// supports impose. The result is `None` if the program is to find the start.
 ///
 /// # Errors
 /// The start is not finite at a contact point.

@@ -34,13 +34,13 @@ pub trait Factory {
     /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
     ///
     /// # Errors
-    /// PETSc's options cannot be read.
+    /// PETSc refuses an option.
     fn plan(&mut self, outlines: &[Outline]) -> Result<Self::Plan>;
 
     /// Follow the plan of the first rank on another rank.
     ///
     /// # Errors
-    /// PETSc's options cannot be read.
+    /// PETSc refuses an option.
     fn adopt(&mut self, plan: Self::Plan) -> Result<()>;
 
     /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices

@@ -1,6 +1,6 @@
-//! Rigid motions along the own surface of a body, which contact cannot resist: the spin of a roller, of a ball, of a ring in a
-//! press fit, a block that slides on rollers. Such a motion is resisted only by the facets of the mesh. If points lie on the
-//! other surface, the normals of that surface may resist it, too.
+//! Rigid motions along the own surface of a body, which contact cannot resist. Examples are the spin of a roller, of a ball, or
+//! of a ring in a press fit, and a block that slides on rollers. Such a motion is resisted only by the facets of the mesh. If
+//! points lie on the other surface, the normals of that surface may resist it, too.
 //!
 //! A normal of a meshed surface is the mean of the facets around it, so it is uncertain by the angle between them. Therefore the
 //! mesh cannot show that a motion m is resisted if

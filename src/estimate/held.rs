@@ -11,10 +11,10 @@ use crate::model::rigid::Motions;
 use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// Largest work of the loads on a motion, as a share of the work that the contact forces could do, at which springs only keep the
-/// body in place. What a coarse mesh leaves of the balance of loads is below this share. The benchmark is two rings in a press
-/// fit on springs of stiffness 1e-9 to 1. The estimated errors are 1.4e-2 in displacements and 0.106 in energy for every
-/// stiffness. With the motions on springs included, the estimates are 3.8e5 and 7.4.
+/// Share of the work that the contact forces could do, up to which loads may work on a motion that springs only keep in place.
+/// What a coarse mesh leaves of the balance of loads is below this share. The benchmark is two rings in a press fit on springs of
+/// stiffness 1e-9 to 1. The estimated errors are 1.4e-2 in displacements and 0.106 in energy for every stiffness. With the
+/// motions on springs included, the estimates are 3.8e5 and 7.4.
 const CARRIED: f64 = 1e-2;
 
 /// The motions n_k of all bodies that springs only keep in place, as amounts of the motions of each body.

@@ -35,8 +35,8 @@ pub struct Aim {
 
 /// Return the sizes of the mesh with the fewest cells that meets an aim. Collective.
 ///
-/// With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2, where p is the degree of its elements, and s^-D cells
-/// take its place in D dimensions. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the
+/// Let p be the degree of the elements and D the dimension. With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2,
+/// and s^-D cells take its place. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the
 /// new mesh then has nearly the same error.
 pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;

@@ -19,12 +19,13 @@ use crate::problem::order::Order;
 use patch::{Monomials, Patch};
 use rings::Rings;
 
-/// A function that returns the stress (xx yy zz xy yz xz) in a cell at a point for a strain (xx yy zz, and 2 eps of xy yz xz).
+/// A function that returns the stress (xx yy zz xy yz xz) in a cell at a point. Its last argument is the strain there (xx yy zz,
+/// and 2 eps of xy yz xz).
 pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
 
-/// Number of fits of a patch before its degree is reduced. It gets another ring of cells after each, where its nodes do not
-/// determine the polynomial. Cells at a corner of a body have few nodes, and with two more rings as many as others. No larger
-/// patch determines what is then still undetermined, such as the second derivative through a plate one cell thick.
+/// Largest number of additional rings of cells that a patch gets while its nodes do not determine the polynomial. Cells at a
+/// corner of a body have few nodes, and with two more rings as many as others. No larger patch determines what is then still
+/// undetermined, such as the second derivative through a plate one cell thick.
 const MORE_RINGS: usize = 3;
 
 /// A displacement with the polynomials recovered from it.
