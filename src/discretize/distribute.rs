@@ -108,8 +108,8 @@ impl Partition {
         (0..self.ranks).filter(|&rank| self.nodes.counts[rank][number] > 0).collect()
     }
 
-    /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and the cells that
-    /// touch one of the former. So the rank has all cells at every node of the former. Tied nodes are assembled on the rank of
+    /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
+    /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
     /// their master.
     pub fn cells<const D: usize>(&self, number: usize, part: &Part<D>, rank: usize) -> Vec<usize> {
         let Part { space, held, .. } = part;

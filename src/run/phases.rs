@@ -93,7 +93,7 @@ where
 /// The facts of the file of a mesh, on the rank that has read it.
 struct FileRead {
     digest: String,
-    /// Reason in words why the mesh was not taken from the cache, if it never is.
+    /// Warning that the mesh is made anew in each run, with the reason, if it is.
     unkept: Option<String>,
 }
 
