@@ -131,7 +131,7 @@ fn meeting<const D: usize>(
 /// Check that every rule found a pair.
 ///
 /// # Errors
-/// The first rule that found nothing.
+/// A rule found no pair; the first such rule is reported.
 fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> Result<()> {
     let is_fruitless = |rule: &usize| found.iter().all(|(number, _)| number != rule);
     let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };

@@ -86,7 +86,7 @@ impl<'a> Values<'a> {
     /// Return the first error, if any.
     ///
     /// # Errors
-    /// The first value that does not exist, with its expression and the point.
+    /// A value does not exist. The first one is reported, with its expression and the point.
     pub fn refused(self) -> Result<()> {
         self.refused.into_inner().map_or(Ok(()), Err)
     }

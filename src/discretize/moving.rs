@@ -14,7 +14,7 @@ pub struct Moving<const D: usize> {
     pub motions: Vec<RigidMotion<D>>,
     /// Name of the motion.
     pub name: String,
-    /// Root mean square of the gap change, per unit of the motion.
+    /// Gap change per unit of the motion: the root of the sum over pairs of its mean square.
     pub error: f64,
 }
 

@@ -43,8 +43,8 @@ pub trait Post {
     /// See `Forces::trace`.
     fn trace(&self, field: &[f64]) -> Vec<f64>;
 
-    /// Return the contribution of the owned nodes to the mean displacement of the outer part of the body along a direction. The
-    /// outer part is where the body is loaded along the direction, else where it is constrained along it, else the whole body.
+    /// Return the contribution of the owned nodes to the mean displacement (x, y, z) of the outer part of the body. The outer
+    /// part is where the body is loaded along `direction`, else where it is constrained along it, else the whole body.
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
 
     /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are

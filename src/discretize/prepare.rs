@@ -198,7 +198,7 @@ fn interfaces_of<const D: usize>(
 }
 
 /// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not distributed
-/// stays whole; such bodies are assigned so that every rank gets about as many of their dofs.
+/// stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
 fn owners<const D: usize>(parts: &[Part<D>], partitions: &[Partition], ranks: usize) -> Vec<(usize, Vec<usize>)> {
     let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { parts[body].space.dofs() };
     let owners = crate::parallel::owners(&(0..parts.len()).map(dofs).collect::<Vec<_>>(), ranks);
