@@ -1,4 +1,4 @@
-//! Scene and mesh -> [`Model`]: the one place where geometry ends. Nothing below it knows the dimension.
+//! The step from a scene and its mesh to a [`Model`]. Geometry ends here: nothing below knows the space dimension.
 
 mod approach;
 mod assembler;
@@ -56,37 +56,41 @@ use unassembled::LocalBody;
 pub use unbalanced::Unbalanced;
 pub use verify::{Verified, verify};
 
-/// The discrete problem and what reports need to know of its origin.
+/// The discrete problem, with the facts of its origin that reports need.
 pub struct Discrete {
-    /// What the method works on.
+    /// The model on which the method works.
     pub model: Model,
     /// Bodies in the order of the scene.
     pub bodies: Vec<BodyInfo>,
-    /// Origin of each pair.
+    /// Origin of each pair in the scene.
     pub contacts: Vec<ContactInfo>,
     /// Free motions of several bodies together.
     pub mechanisms: Vec<Mechanism>,
     /// Loads that were balanced.
     pub balanced: Vec<Balanced>,
-    /// Trace of the rigid motions that supports give bodies: states, and so the traces of iterates, are relative to them.
+    /// Trace (2n) of the rigid motions that supports impose on bodies. Layer states, and so the traces of iterates, are relative
+    /// to them.
     pub carried: Vec<f64>,
-    /// The meshes, kept only when an estimate of the error was asked for.
+    /// The meshes, kept only if an estimate of the error was requested.
     pub meshes: Option<Rc<dyn Meshes>>,
-    /// Stiffness matrices assembled on this rank.
+    /// Number of stiffness matrices assembled on this rank.
     pub assemblies: usize,
-    /// Those that an earlier scene has left.
+    /// Number of stiffness matrices reused from an earlier scene.
     pub assemblies_avoided: usize,
 }
 
-/// Turn a scene and its mesh into a model.
+/// Turn a scene and its mesh into a model. Collective.
 ///
-/// The first rank prepares all but matrices, as if it were alone; then every rank gets what it needs of each body, and assembles it. `bodies` are those
-/// of `verified` under the loads of a step; `cut` finds the common pieces of surfaces in this dimension. `factory` turns each body of this rank into one
-/// that solves. `keep` tells to keep the meshes, for an estimate of the error. Collective.
+/// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
+/// assembles it.
+///
+/// `bodies` are those of `verified` under the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
+/// `factory` turns each body of this rank into one with a solver. `keep` requests that the meshes are kept for an estimate of the
+/// error.
 ///
 /// # Errors
-/// Refusals of the scene against its mesh: missing groups, surfaces of the wrong body, supports that contradict each
-/// other, surfaces that do not face each other; and failures of `factory`.
+/// The scene may contradict its mesh: missing groups, surfaces of the wrong body, supports that contradict each other, surfaces
+/// that do not face each other. Failures of `factory` are returned, too.
 pub fn discretize<const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
@@ -141,7 +145,7 @@ where
     })
 }
 
-/// Give every rank what it needs of each body, from the first rank, which has `prepared` all. Collective.
+/// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
 fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Locals<D>>
 where
     [f64; D]: Plain,
@@ -159,7 +163,8 @@ where
     Ok(locals.into_iter().map(|local| (local, None)).collect())
 }
 
-/// Gives the bodies of a model the rigid motions of their supports, with these traces on the contact rows of each; all of them, 2n.
+/// Impose on the bodies of a model the rigid motions of their supports. `each` holds the traces of these motions on the contact
+/// rows of each body. Return the trace of all of them, 2n.
 fn carry(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
     let mut carried = vec![0.0; 2 * model.points()];
     each.iter().enumerate().for_each(|(body, trace)| model.put(body, trace, &mut carried));
@@ -168,13 +173,13 @@ fn carry(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
 }
 
 impl Discrete {
-    /// Sides of pair `i` in the order of the scene.
+    /// Return the sides of pair `i` in the order of the scene.
     pub fn sides(&self, i: usize) -> [usize; 2] {
         if self.contacts[i].swapped { [1, 0] } else { [0, 1] }
     }
 
-    /// Tells every rank what only the owner of a body knows of it: largest stiffness, and stiffness at the contact rows. Collective,
-    /// after all ranks have made their problem.
+    /// Send every rank what only the owner rank of a body has: its largest stiffness and the stiffness at its contact rows.
+    /// Collective, after all ranks have made their problem.
     pub fn share(&mut self) {
         let count = self.model.bodies.len();
         let mut message = vec![0.0; count + 2 * self.model.points()];
@@ -193,10 +198,11 @@ impl Discrete {
     }
 }
 
-/// The trace (2n) with which the scene begins, at a share `factor` of the loads; none if it is for the program to find.
+/// Return the trace (2n) with which the scene starts at the share `factor` of the loads. It is relative to the rigid motions that
+/// supports impose. The result is `None` if the program is to find the start.
 ///
 /// # Errors
-/// A start that is not finite at a contact point.
+/// The start is not finite at a contact point.
 pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<Vec<f64>>> {
     let model = &discrete.model;
     let points = model.points();

@@ -1,4 +1,4 @@
-//! How a body moves as seen from its contact: the mean displacement of where it is loaded or held.
+//! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
 
 use super::find::find_group;
 use crate::contact::{add, pad};
@@ -9,45 +9,45 @@ use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
 use serde::{Deserialize, Serialize};
 
-/// Cosine of the largest angle between a force or a held direction and the contact's normal at which the place counts: the 60 degrees up to
-/// which facets are pairs without the key `angle`.
+/// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is included.
+/// It belongs to 60 degrees, up to which facets are pairs without the key `angle`.
 const ALONG: f64 = 0.5;
 
-/// What nodes count in a mean.
+/// Weights of nodes in a mean.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct Weights {
-    /// Those of some nodes.
+    /// Weights of the nodes of this rank.
     of_nodes: Vec<(u32, f64)>,
-    /// The sum of those of all.
+    /// Sum of the weights of all nodes.
     total: f64,
 }
 
 impl Weights {
-    /// Of nodes that all are known.
+    /// Make the weights from those of all nodes.
     fn new(of_nodes: Vec<(u32, f64)>) -> Self {
         Self { total: of_nodes.iter().map(|entry| entry.1).sum(), of_nodes }
     }
 
-    /// The same of some nodes, sorted, by their places among these.
+    /// Restrict the weights to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     fn on(&self, nodes: &[u32]) -> Self {
         let here = |(node, weight): &(u32, f64)| Some((place(nodes, *node)?, *weight));
         Self { of_nodes: self.of_nodes.iter().filter_map(here).collect(), total: self.total }
     }
 }
 
-/// A surface or a set of nodes on which the body is loaded or held.
+/// A surface or a set of nodes on which the body is loaded or constrained.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Place {
-    /// Unit vectors: the force, or the directions that are held.
+    /// Unit vectors: the direction of the force, or the constrained directions.
     directions: Vec<[f64; 3]>,
-    /// Integrals of the shape functions of nodes over the surface; 1 each where there is no surface.
+    /// Integrals of the shape functions of nodes over the surface; 1 for each node if there is no surface.
     weights: Weights,
-    /// Whether it is a surface.
+    /// Whether this is a surface.
     has_area: bool,
 }
 
 impl Place {
-    /// The nodes of a group.
+    /// Collect the nodes of a group.
     fn new<const D: usize>(space: &Space<D>, group: &crate::mesh::Group, directions: Vec<[f64; 3]>) -> Self {
         let facets = if group.dimension + 1 == D { Some(space.facets(group)) } else { None };
         let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
@@ -65,22 +65,23 @@ impl Place {
     }
 }
 
-/// Where a body is loaded, and where it is held.
+/// The places where a body is loaded, and where it is constrained.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outer {
     loaded: Vec<Place>,
     held: Vec<Place>,
-    /// Integrals of the shape functions over a body that nothing loads or holds.
+    /// Integrals of the shape functions over the body, if it has no loads, supports or springs.
     whole: Weights,
     /// Number of nodes of the body.
     nodes: usize,
 }
 
 impl Outer {
-    /// Look where a body is loaded and held; `resultant` sums a load. The body counts as a whole where nothing loads or holds it.
+    /// Find the places where a body is loaded and constrained. `resultant` returns the sum of a load. The whole body is used if
+    /// it has no loads, supports or springs.
     ///
     /// # Errors
-    /// Groups that are not there.
+    /// A group is missing.
     pub fn new<const D: usize>(
         spec: &BodySpec,
         space: &Space<D>,
@@ -117,14 +118,15 @@ impl Outer {
         Ok(outer)
     }
 
-    /// The same of some nodes, sorted, by their places among these.
+    /// Restrict the places to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     pub fn on(&self, nodes: &[u32]) -> Self {
         let on = |places: &[Place]| places.iter().map(|place| place.on(nodes)).collect();
         Self { loaded: on(&self.loaded), held: on(&self.held), whole: self.whole.on(nodes), nodes: self.nodes }
     }
 
-    /// What own nodes add to the mean displacement, from those of the nodes here: over all surfaces with loads that push along a direction; without
-    /// them over supports and springs that hold it; without these over the whole body.
+    /// Return the contribution of owned nodes to the mean displacement, from the displacements `u` of the nodes of this rank. The
+    /// mean is over all surfaces with loads along `direction`. Without them it is over supports and springs that constrain this
+    /// direction, and without these over the whole body.
     pub fn mean<const D: usize>(&self, u: &[f64], own: &[bool], direction: [f64; 3]) -> [f64; 3] {
         let chosen = |places: &[Place]| {
             let along = || places.iter().filter(|place| place.acts_along(direction));
@@ -144,7 +146,7 @@ impl Outer {
     }
 }
 
-/// What own nodes add to a mean of nodal displacements; none without nodes.
+/// Return the contribution of owned nodes to a mean of nodal displacements, or `None` without nodes.
 fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &'a Weights>) -> Option<[f64; 3]> {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
     for Weights { of_nodes, total: of_all } in all {
@@ -156,12 +158,12 @@ fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &
     (total > 0.0).then(|| sum.map(|sum| sum / total))
 }
 
-/// Integrals of the shape functions over a surface.
+/// Return the integrals of the shape functions over a surface.
 fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
     first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| along_first()))
 }
 
-/// Integrals of the shape functions over the body.
+/// Return the integrals of the shape functions over the body.
 fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
     first_components(&assemble::body_force(space, Parts::Whole, &|_| along_first()))
 }
@@ -174,7 +176,7 @@ fn first_components<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {
     all.iter().map(|(node, weight)| (node, weight[0])).collect()
 }
 
-/// Mean normal of a surface.
+/// Return the mean unit normal of a surface, if it has one.
 fn normal<const D: usize>(space: &Space<D>, group: &crate::mesh::Group) -> Option<[f64; 3]> {
     if group.dimension + 1 != D {
         return None;

@@ -1,4 +1,4 @@
-//! From what one rank has of a body to its matrix and the solver of it.
+//! The step from what one rank has of a body to its matrix and its solver.
 
 use super::balance::Forces;
 use super::carried::Supported;
@@ -21,30 +21,30 @@ use crate::model::{Body, BodySlot, Loads};
 use crate::problem::{BodySpec, Plane};
 use std::rc::Rc;
 
-/// A body before its matrix is assembled, as one rank sees it.
+/// A body on one rank before its matrix is assembled.
 pub struct Assembler<'a, const D: usize> {
-    /// What the scene says.
+    /// Description in the scene.
     pub spec: &'a BodySpec,
     /// Kind of a plane problem.
     pub plane: Plane,
-    /// What all ranks know of it.
+    /// What all ranks have of the body.
     pub shared: SharedBody<D>,
-    /// What this rank has of it, if anything.
+    /// What this rank has of the body, if anything.
     pub local: Option<LocalBody<D>>,
-    /// Which nodes K couples, if that is known here.
+    /// Coupling of nodes by K, if it was computed on this rank.
     pub graph: Option<NodeGraph>,
 }
 
-/// How many matrices were assembled on a rank, and how many of an earlier scene served again.
+/// Counters of matrices that were assembled on a rank, and of those reused from an earlier scene.
 #[derive(Default)]
 pub struct Counts {
-    /// Those assembled.
+    /// Number of assembled matrices.
     pub assemblies: usize,
-    /// Those that served again.
+    /// Number of reused matrices.
     pub avoided: usize,
 }
 
-/// What only the ranks that have a part of a body know of it, until all ranks share it.
+/// What only the ranks with a part of a body have of it, until [`Discrete::share`](super::Discrete::share).
 #[derive(Default)]
 struct Made {
     local: Option<Box<dyn Body>>,
@@ -53,10 +53,11 @@ struct Made {
 }
 
 impl<const D: usize> Assembler<'_, D> {
-    /// Assemble the body and make it one that solves, with its mesh if this rank has it; its report learns how to evaluate displacements.
+    /// Assemble the body and give it a solver, with its mesh if this rank has it. Its report receives the evaluation of
+    /// displacements.
     ///
     /// # Errors
-    /// Refusals of the scene against its mesh that show when K is assembled, and failures of `factory`.
+    /// The scene contradicts its mesh in a way that shows when K is assembled, or `factory` fails.
     pub fn make(
         self,
         mesh: &Mesh<D>,
@@ -104,17 +105,18 @@ impl<const D: usize> Assembler<'_, D> {
     }
 }
 
-/// A body that solves.
+/// A body with its solver.
 pub struct Finished<const D: usize> {
-    /// What the method sees of it.
+    /// The body as the method uses it.
     pub slot: BodySlot,
-    /// What reports say of it.
+    /// Facts for reports.
     pub info: BodyInfo,
-    /// Its mesh, if this rank has it.
+    /// Mesh of the body, if this rank has it.
     pub shape: Option<Shape<D>>,
 }
 
-/// Return the loads of a body on the dofs that are here, and the motions that supports leave; `works` of all loads on these where only some loads are here.
+/// Return the loads of a body on the dofs of this rank, and the motions that supports leave. If this rank has only some of the
+/// loads, `works` holds the work of all loads on these motions.
 fn loads<const D: usize>(
     part: &Part<D>,
     load: &NodalForces<D>,
@@ -133,8 +135,8 @@ fn loads<const D: usize>(
     (Loads { work, force, prescribed, carried }, free)
 }
 
-/// Give `info` the means to evaluate displacements and forces of a body at the nodes that this rank knows. `own` marks the nodes that belong to this
-/// rank. Return the space and the supports of the body.
+/// Give `info` the evaluation of displacements and forces of a body at the nodes that this rank has. `own` marks the nodes that
+/// belong to this rank. Return the space and the supports of the body.
 fn tell_displacements<const D: usize>(
     info: &mut BodyInfo,
     part: Part<D>,
@@ -166,13 +168,13 @@ fn tell_displacements<const D: usize>(
     Ok((space, held))
 }
 
-/// Which of the nodes that a rank knows of a body are its own.
+/// Return, for each node of a body on this rank, whether the rank owns it.
 fn own_nodes<const D: usize>(part: &Part<D>, share: Option<&Share>) -> Vec<bool> {
     let is_own = |node| share.is_none_or(|share| share.is_own::<D>(part.held.frame.node(node) as usize));
     (0..part.space.nodes.len() as u32).map(is_own).collect()
 }
 
-/// The body of an earlier scene under other loads; none if it cannot serve again.
+/// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
 fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
     let Some(mut before) = kept else { return Ok(None) };
     let serves = match &mut before.local {
@@ -215,8 +217,8 @@ impl<const D: usize> Assembly<'_, '_, D> {
             Some(share) => share.interpolation::<D>(|coarse| part.interpolation(coarse)),
             None => part.interpolation(&part.coarse_nodes()),
         });
-        // multigrid must know motions with hardly any strain: far from the axis a ring is nearly as soft against radial displacements and turns of its
-        // section as a plane body
+        // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
+        // displacements and rotations of its section as a plane body.
         let smooth = || rigid::modes(&part.facts.extent).iter().map(|motion| part.dofs_of(motion)).collect();
         let local = factory.make(Assembled {
             name: name.to_owned(),

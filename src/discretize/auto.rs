@@ -11,17 +11,17 @@ use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
 use std::collections::HashSet;
 
-/// A pair that was found: the number of its rule, and its two surfaces, named after the bodies.
+/// A found pair: the index of its rule and its two surfaces, which are named after the bodies.
 pub type Found<'a, const D: usize> = (usize, [Surface<'a, D>; 2]);
 
-/// The pairs of bodies that come near each other, but for those in `named` (numbers of bodies, the smaller first). The narrowest
-/// rule for two bodies decides alone whether they are a pair.
+/// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
+/// one first. The narrowest rule for two bodies decides alone whether they are a pair.
 ///
-/// First all facets that could have a partner are gathered, so that the nodal normals are those of smooth surfaces;
-/// of these the ones stay that share a piece.
+/// All facets that could have a partner are collected first, so that the nodal normals are those of smooth surfaces. Then only
+/// the facets with a common piece are kept.
 ///
 /// # Errors
-/// A rule that finds nothing, patterns that match no body, and two rules equally near to a pair.
+/// A rule finds nothing, a pattern matches no body, or two rules match a pair equally well.
 pub fn find<'a, const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
@@ -62,15 +62,15 @@ pub fn find<'a, const D: usize>(
     Ok(found)
 }
 
-/// Two bodies that a rule is for, with facets that could have a partner.
+/// Two bodies to which a rule applies, with the facets that could have a partner.
 struct Possible<const D: usize> {
-    /// Their numbers, the smaller first.
+    /// Indices of the bodies, the smaller one first.
     bodies: [usize; 2],
-    /// These facets of either.
+    /// Facets of each body that could have a partner.
     near: [Facets<D>; 2],
-    /// Number of the narrowest rule for them.
+    /// Index of the narrowest rule for the bodies.
     rule: usize,
-    /// Number of another rule that is as narrow.
+    /// Index of another rule that is as narrow.
     other: Option<usize>,
 }
 
@@ -101,10 +101,10 @@ fn possible<const D: usize>(
     Ok(all)
 }
 
-/// The facets of both sides, counted among the near ones, that share a piece.
+/// Pairs of facets with a common piece, each as indices into the near facets of both sides.
 type Meeting = Vec<[u32; 2]>;
 
-/// Return the facets of each two bodies that meet.
+/// Return the pairs of facets with a common piece, for each two possible bodies.
 fn meeting<const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
@@ -128,7 +128,10 @@ fn meeting<const D: usize>(
     all
 }
 
-/// Refuses a rule that found nothing.
+/// Check that every rule found a pair.
+///
+/// # Errors
+/// A rule found no pair; the first such rule is reported.
 fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> Result<()> {
     let is_fruitless = |rule: &usize| found.iter().all(|(number, _)| number != rule);
     let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };
@@ -141,7 +144,7 @@ fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> R
     Err(Error::scene(place, message).help(help))
 }
 
-/// Which bodies a rule is for, as the first and as the second of a pair, and how narrow it is.
+/// The bodies to which a rule applies, as the first and as the second of a pair, with the rank that says how narrow the rule is.
 struct Matches {
     of: Option<[Vec<bool>; 2]>,
     rank: Rank,
@@ -166,7 +169,7 @@ impl Matches {
     }
 }
 
-/// The narrowest of the rules for two bodies, and another one that is as narrow.
+/// Return the narrowest rule for two bodies, and another one that is as narrow, if any.
 fn narrowest(rules: &[Matches], a: usize, b: usize) -> Option<(usize, Option<usize>)> {
     let own = || (0..rules.len()).filter(|&rule| rules[rule].are_for(a, b));
     let rank = own().map(|rule| rules[rule].rank).max()?;
@@ -174,7 +177,7 @@ fn narrowest(rules: &[Matches], a: usize, b: usize) -> Option<(usize, Option<usi
     Some((best.next()?, best.next()))
 }
 
-/// A rule in a refusal, and its place.
+/// Return the name of a rule in an error, and its place in the scene.
 fn title(rule: &AutoContact) -> (String, &Place) {
     match &rule.of {
         None => ("different bodies".to_owned(), &rule.contact.between[0].place),
@@ -182,13 +185,13 @@ fn title(rule: &AutoContact) -> (String, &Place) {
     }
 }
 
-/// How far the surfaces of a found pair may be apart, and how inclined in degrees.
+/// Return how far the surfaces of a found pair may be apart, and how inclined, with `angle` in degrees.
 pub fn within<const D: usize>(a: &Side<D>, b: &Side<D>, distance: f64, angle: f64) -> Reach {
     let reach = Reach::between(a, b, angle);
     Reach { gap: distance, overlap: distance.min(reach.overlap), ..reach }
 }
 
-/// Facets of two bodies with opposed normals and boxes within the distance.
+/// Return the facets of two bodies with opposed normals and with boxes within the distance.
 fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &Search<D>, reach: &Reach) -> [Facets<D>; 2] {
     let mut keep = [vec![false; a.facets.count()], vec![false; b.facets.count()]];
     for i in 0..a.facets.count() {

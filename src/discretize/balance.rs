@@ -1,4 +1,5 @@
-//! Forces and moments on a body at the end: loads, contacts, supports, springs, rigid surfaces, and what their sum lacks.
+//! Forces and moments on a body in the solution: loads, contacts, supports, springs, rigid surfaces, and the imbalance of their
+//! sum.
 
 use super::owned::OwnedPart;
 use super::supports::Constraints;
@@ -10,58 +11,59 @@ use std::rc::Rc;
 /// A force and its moment about the datum (x, y, z).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Resultant {
-    /// The force.
+    /// Force.
     pub force: [f64; 3],
-    /// The moment.
+    /// Moment.
     pub moment: [f64; 3],
 }
 
 impl Resultant {
-    /// Adds a force at a node.
+    /// Add a force at a node.
     fn add<const D: usize>(&mut self, space: &Space<D>, node: u32, force: [f64; D]) {
         add(&mut self.force, space.net_force(force));
         add(&mut self.moment, space.net_moment(node, force));
     }
 }
 
-/// All that acts on a body from outside. In equilibrium everything together is zero.
+/// All external forces on a body. In equilibrium their sum is zero.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Balance {
-    /// Loads, but for those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
+    /// Loads without those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
     pub parts: Vec<Resultant>,
-    /// Sum of the sizes of all nodal forces, and of these times their distances from the datum: what the sum of all parts is
-    /// small against. About an origin far away moments are that of the sum of forces and little else.
+    /// Sum of the magnitudes of all nodal forces, and of these times their distances from the datum. They are the scale of the
+    /// sum of all parts. About a distant origin, moments would be little else than that of the sum of forces.
     pub size: [f64; 2],
 }
 
-/// What it takes to find the forces on the own nodes of a part of a body.
+/// The data from which the forces on the owned nodes of a part of a body are computed.
 pub struct Forces<const D: usize> {
-    /// The part.
+    /// Part of the body.
     pub part: OwnedPart<D>,
-    /// Its elasticity.
+    /// Elasticity of its cells.
     pub elasticity: Rc<Elasticity>,
-    /// Its supports and rigid surfaces.
+    /// Supports and rigid surfaces.
     pub held: Rc<Constraints<D>>,
-    /// Its springs.
+    /// Springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Number of supports in the scene.
     pub supports: usize,
-    /// Nodal forces of its loads.
+    /// Nodal forces of the loads.
     pub load: Vec<f64>,
-    /// Forces on its rigid surfaces: a node of each, and the force.
+    /// Forces on rigid surfaces: a node of each, and the force.
     pub rigid: Vec<(u32, [f64; D])>,
-    /// Its contact rows for displacements of its nodes.
+    /// Contact rows with displacements of nodes as columns.
     pub rows: Csr,
-    /// Where the whole body is.
+    /// Extent of the whole body.
     pub extent: Extent,
-    /// Nodes of the whole body.
+    /// Number of nodes of the whole body.
     pub nodes: usize,
 }
 
 impl<const D: usize> Forces<D> {
-    /// The share of own nodes in the balance, at displacements of the nodes of the part, under the forces omega p of the contact rows.
+    /// Return the contribution of owned nodes to the balance, for displacements `u` of the nodes of the part and the forces omega
+    /// p of the contact rows.
     ///
-    /// Reactions are the internal forces of the cells around the held nodes less all that is known to act there.
+    /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
     pub fn balance(&self, u: &[f64], force: &[f64]) -> Balance {
         let mut contact = vec![0.0; u.len()];
         self.rows.add_transpose(-1.0, force, &mut contact);
@@ -97,7 +99,7 @@ impl<const D: usize> Forces<D> {
         Balance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
     }
 
-    /// What holds the own nodes of supports and rigid surfaces, in their order.
+    /// Return the reactions at the owned nodes of supports and rigid surfaces, in increasing order of the nodes.
     fn reactions(&self, u: &[f64], known: &[f64]) -> Vec<(u32, [f64; D])> {
         let OwnedPart { space, own, .. } = &self.part;
         let mut held = vec![false; own.len()];
@@ -117,7 +119,7 @@ impl<const D: usize> Forces<D> {
     }
 }
 
-/// Sums forces at own nodes.
+/// A sum of forces at owned nodes.
 struct Sum<'a, const D: usize> {
     size: [f64; 2],
     part: &'a OwnedPart<D>,

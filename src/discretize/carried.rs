@@ -1,4 +1,4 @@
-//! Supports that move a body as one: that motion is taken out before anything is rounded.
+//! Supports that move a body as one. That motion is subtracted before anything is rounded.
 
 use super::part::Part;
 use crate::exchange::Plain;
@@ -6,17 +6,17 @@ use crate::fem::rigid::{self, RigidMotion};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-/// What supports prescribe.
+/// The displacements that supports prescribe.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct Supported<const D: usize> {
-    /// The rigid motion by which they move the body as one.
+    /// Rigid motion by which the supports move the body as one.
     pub carried: Option<RigidMotion<D>>,
-    /// (dof, value) besides it, sorted by dof.
+    /// Prescribed (dof, value) relative to this motion, sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
 }
 
-/// What the supports of a body prescribe; `free` are the rigid motions of the free body.
+/// Return the displacements that the supports of a body prescribe. `free` are the rigid motions of the free body.
 pub fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion<D>]) -> Supported<D> {
     let prescribed = part.prescribed_sorted();
     let value = |k: usize, dof: usize| part.dof_of(&free[k], dof);
@@ -26,14 +26,15 @@ pub fn supported<const D: usize>(part: &Part<D>, free: &[RigidMotion<D>]) -> Sup
     }
 }
 
-/// Supports agree with a rigid motion to this share of the largest prescribed displacement.
+/// Share of the largest prescribed displacement up to which supports agree with a rigid motion.
 const AGREES: f64 = 1e-9;
 
 /// Prescribed (dof, value).
 type Prescribed = Vec<(usize, f64)>;
 
-/// Weights of the `count` motions whose sum the prescribed (dof, value) are, and what they prescribe besides it; `None` if they prescribe zero
-/// or deform the body. `value` is what a motion does at a dof.
+/// Return the weights of the `count` motions whose sum the supports prescribe, and the prescribed values relative to this sum.
+/// `value(k, dof)` is the displacement of motion k at a dof. The result is `None` if the supports prescribe zero or deform the
+/// body.
 fn carried(
     count: usize,
     value: &dyn Fn(usize, usize) -> f64,
@@ -47,7 +48,7 @@ fn carried(
     let values = DVector::from_fn(prescribed.len(), |i, _| prescribed[i].1);
     let factors = at.clone().svd(true, true);
     let mut weights = factors.solve(&values, 1e-7).ok()?;
-    // refined, as every digit lost is a digit of the strains
+    // The weights are refined, since every lost digit is a digit of the strains.
     weights += factors.solve(&(&values - &at * &weights), 1e-7).ok()?;
     let noise = 1e-14 * weights.amax();
     weights.iter_mut().filter(|weight| weight.abs() < noise).for_each(|weight| *weight = 0.0);
@@ -67,7 +68,7 @@ mod tests {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
         let all = modes(&Extent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
-        // the upper edge down by 0.3, x held at one node
+        // The upper edge moves down by 0.3, and one node is constrained along x.
         let (weights, rest) = carried(3, &value, &[(0, 0.0), (5, -0.3), (7, -0.3)]).expect("a translation");
         assert!(weights[0].abs() < 1e-15 && (weights[1] + 0.3).abs() < 1e-15 && weights[2].abs() < 1e-15);
         assert!(rest.iter().all(|(_, u)| u.abs() < 1e-15));

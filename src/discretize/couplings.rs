@@ -1,4 +1,4 @@
-//! Which nodes of bodies are coupled with which in their matrix: the work and the memory that each takes.
+//! The coupling of the nodes of bodies in their matrix, which determines the work and the memory of each node.
 
 use super::interface::Interface;
 use super::part::Part;
@@ -7,7 +7,7 @@ use crate::fem::NodeGraph;
 use std::cell::OnceCell;
 use std::collections::HashMap;
 
-/// Couplings of the nodes of all bodies, found when they are first requested.
+/// The couplings of the nodes of all bodies, computed when they are first requested.
 pub struct Coupled<'a, const D: usize> {
     parts: &'a [Part<'a, D>],
     interfaces: &'a [Interface<D>],
@@ -15,19 +15,19 @@ pub struct Coupled<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Coupled<'a, D> {
-    /// Prepare to look at these bodies.
+    /// Prepare the couplings of these bodies without computing them.
     pub fn new(parts: &'a [Part<'a, D>], interfaces: &'a [Interface<D>]) -> Self {
         Self { parts, interfaces, graphs: vec![OnceCell::new(); parts.len()] }
     }
 
-    /// Return which nodes of a body K couples.
+    /// Return the coupling of the nodes of a body by K.
     pub fn graph(&self, body: usize) -> &NodeGraph {
         let (part, rows) = (&self.parts[body], &self.interfaces[body].rows);
         self.graphs[body].get_or_init(|| NodeGraph::with_rows(&part.space, rows, &part.held.frame))
     }
 
-    /// Return how many nodes each node of these `bodies`, one body after the other, is coupled with in a matrix of all of them, itself included: in
-    /// cells around it, and in contact rows.
+    /// Return, for each node of these `bodies`, the number of nodes with which it is coupled in a matrix of all of them, itself
+    /// included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body after the other.
     pub fn of_nodes(&self, bodies: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
         let (mut first, mut all) = (HashMap::new(), Vec::new());
         for &body in bodies {

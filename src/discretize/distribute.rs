@@ -1,4 +1,5 @@
-//! The nodes of bodies over the ranks: each node of bodies in one matrix has one owner, and a number in that matrix.
+//! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a number in that
+//! matrix.
 
 use super::interface::Interface;
 use super::part::Part;
@@ -11,32 +12,33 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. BodyFacts on the first rank.
+/// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. It exists on the first rank.
 pub struct Partition {
-    /// Their numbers in the scene, in increasing order.
+    /// Indices of the bodies in the scene, in increasing order.
     pub bodies: Vec<usize>,
     ranks: usize,
-    /// The rank that owns each node of each body.
+    /// Rank that owns each node of each body.
     owner: Vec<Vec<u32>>,
-    /// All nodes of each body.
+    /// Numbers of all nodes of each body.
     nodes: Numbers,
-    /// The nodes of each body from which displacements are interpolated, where that is wanted.
+    /// Numbers of the nodes of each body from which displacements are interpolated, if an interpolation is requested.
     coarse: Numbers,
 }
 
-/// Numbers of nodes of the bodies in one matrix: rank by rank, there body by body, there in the order of the nodes.
+/// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body in the
+/// order of the nodes.
 struct Numbers {
-    /// The number of each node of each body; [`NONE`] for nodes that are not counted.
+    /// Number of each node of each body; [`NONE`] for nodes without a number.
     of_node: Vec<Vec<u32>>,
-    /// How many nodes of each body each rank owns: `counts[rank][body]`.
+    /// Count of the nodes of each body on each rank: `counts[rank][body]`.
     counts: Vec<Vec<usize>>,
 }
 
-/// A node that is not counted.
+/// The mark of a node without a number.
 const NONE: u32 = u32::MAX;
 
 impl Numbers {
-    /// Number the nodes for which `is_counted(body, node)` holds.
+    /// Number the nodes for which `is_counted(body, node)` is true.
     fn new(owner: &[Vec<u32>], ranks: usize, is_counted: impl Fn(usize, u32) -> bool) -> Self {
         let is_counted = &is_counted;
         let counted = |body: usize| {
@@ -70,8 +72,9 @@ impl Numbers {
 }
 
 impl Partition {
-    /// Distribute the nodes of `bodies` by recursive bisection. Each node, one body after the other, weighs as much as the number of nodes with which
-    /// it is coupled in the matrix. `wants_coarse(body)` tells whether a body is interpolated from its coarse nodes.
+    /// Distribute the nodes of `bodies` by recursive bisection. `couplings` has, for one body after the other, the number of
+    /// nodes with which each node is coupled in the matrix; this is the weight of the node. `wants_coarse(body)` returns whether
+    /// a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
         bodies: Vec<usize>,
         parts: &[Part<D>],
@@ -90,7 +93,7 @@ impl Partition {
         Self { bodies, ranks, owner, nodes, coarse }
     }
 
-    /// Return the rank that owns a node of the body with this number among those of the matrix.
+    /// Return the rank that owns a node. `number` is the index of the body among those of the matrix.
     pub fn owner(&self, number: usize, node: u32) -> usize {
         self.owner[number][node as usize] as usize
     }
@@ -105,8 +108,9 @@ impl Partition {
         (0..self.ranks).filter(|&rank| self.nodes.counts[rank][number] > 0).collect()
     }
 
-    /// Return the numbers of the cells of a body that a rank needs: those at its own nodes, and those that touch one of these, so that the rank knows all
-    /// that meets at the nodes of the former. Tied nodes are assembled where their master is.
+    /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
+    /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
+    /// their master.
     pub fn cells<const D: usize>(&self, number: usize, part: &Part<D>, rank: usize) -> Vec<usize> {
         let Part { space, held, .. } = part;
         let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
@@ -119,8 +123,8 @@ impl Partition {
         cells().enumerate().filter(|(_, cell)| is_wanted(cell)).map(|(cell, _)| cell).collect()
     }
 
-    /// Return the nodes of a body that a rank with these cells must know, sorted: its own ones, those of its cells and of contact rows, and masters of
-    /// tied nodes.
+    /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its cells and of
+    /// contact rows, and masters of tied nodes.
     pub fn nodes<const D: usize>(
         &self,
         number: usize,
@@ -138,7 +142,7 @@ impl Partition {
         Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(masters))
     }
 
-    /// Return how the dofs of a body are distributed, as a rank sees it that knows these `nodes`; `rows` are the contact rows of the body.
+    /// Return the distribution of the dofs of a body for a rank that has these `nodes`. `rows` are the contact rows of the body.
     pub fn share<const D: usize>(
         &self,
         number: usize,
@@ -194,34 +198,35 @@ impl Partition {
     }
 }
 
-/// What one rank has of the dofs of a body that is distributed.
+/// What one rank has of the dofs of a distributed body.
 #[derive(Serialize, Deserialize)]
 pub struct Share {
-    /// The dofs of this rank.
+    /// Dofs of this rank.
     pub distribution: Distribution,
-    /// The nodes that this rank knows, sorted; numbers are those of the body.
+    /// Nodes that this rank has, sorted, as numbered in the body.
     pub nodes: Vec<u32>,
-    /// Number of each of these in the matrix that has its rows.
+    /// Number of each of these nodes in the matrix with the rows of the body.
     number: Vec<u32>,
-    /// Its coarse nodes; none where no interpolation is wanted.
+    /// Coarse nodes; empty if no interpolation is requested.
     coarse: Coarse,
 }
 
 /// The coarse nodes of a body on one rank.
 #[derive(Serialize, Deserialize)]
 struct Coarse {
-    /// Which of the nodes that are known here these are: their places.
+    /// Local indices of the coarse nodes among the nodes of this rank.
     nodes: Vec<u32>,
-    /// Their numbers among the coarse nodes of the bodies in one matrix.
+    /// Numbers of these nodes among the coarse nodes of the bodies in one matrix.
     number: Vec<u32>,
-    /// How many coarse nodes these bodies have on all ranks.
+    /// Number of coarse nodes of these bodies on all ranks.
     all: usize,
-    /// How many coarse nodes of this body this rank owns.
+    /// Number of coarse nodes of this body that this rank owns.
     own: usize,
 }
 
 impl Share {
-    /// Return the rows of own dofs of the interpolation that `whole` makes from coarse nodes; columns are counted through the bodies in one matrix.
+    /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
+    /// bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Interpolation) -> Interpolation {
         let Coarse { nodes, number, all, own } = &self.coarse;
         let whole = whole(nodes);
@@ -233,13 +238,14 @@ impl Share {
         Interpolation { rows, own: D * own }
     }
 
-    /// Whether this rank owns a node, by its place among those that it knows.
+    /// Return whether this rank owns a node, given by its local index.
     pub fn is_own<const D: usize>(&self, node: usize) -> bool {
         let Distribution { first, own, .. } = &self.distribution;
         (*first..first + own.len()).contains(&(D * self.number[node] as usize))
     }
 
-    /// Return a body that was assembled for own nodes alone in its own dofs; columns of K are those of the matrix that has its rows.
+    /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
+    /// rows.
     pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
         let own = &self.distribution.places;
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;

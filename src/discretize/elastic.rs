@@ -1,4 +1,4 @@
-//! Elasticity of the bodies of a scene: constants, regions, and refusals that name body and place.
+//! Elasticity of the bodies of a scene: constants, regions, and errors that name body and place.
 
 use super::find::{find_group, not_on_body, of_body, point};
 use crate::error::{Error, Result, shown};
@@ -7,10 +7,10 @@ use crate::fem::elasticity::{Elasticity, Flaw};
 use crate::mesh::Mesh;
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 
-/// The elasticity of the cells of a body.
+/// Return the elasticity of the cells of a body.
 ///
 /// # Errors
-/// Regions that are not there, lie elsewhere or overlap, and constants that make no material.
+/// A region is missing, lies on another body or overlaps another one, or constants make no material.
 pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
     let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
     for (number, region) in spec.regions.iter().enumerate() {
@@ -31,10 +31,11 @@ pub fn of<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, pla
     of_regions(spec, of_cell, D, plane)
 }
 
-/// The elasticity of some cells of a body by the numbers of their constants; empty if the body has no regions.
+/// Return the elasticity of some cells of a body. `of_cell` is the index of the constants of each cell; it is empty if the body
+/// has no regions.
 ///
 /// # Errors
-/// Constants that make no material.
+/// Constants make no material.
 pub fn of_regions(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
     let specs: Vec<&ElasticitySpec> = specs(spec).collect();
     Elasticity::new(&specs, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
@@ -44,12 +45,13 @@ fn specs(spec: &BodySpec) -> impl Iterator<Item = &ElasticitySpec> {
     std::iter::once(&spec.elasticity).chain(spec.regions.iter().map(|region| &region.elasticity))
 }
 
-/// The refusal of the constants of a body (`number` 0) or its regions, at a point if they depend on it.
+/// Return the error of the constants of a body (`number` 0) or of one of its regions. The point is given if the constants depend
+/// on it.
 pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
     let elasticity = specs(spec).nth(number).unwrap_or(&spec.elasticity);
     let place = &elasticity.place;
     let fields = elasticity.fields();
-    // a value that does not exist makes every other complaint
+    // A value that does not exist causes every other flaw, so it is reported first.
     if let Some(error) = x.and_then(|x| fields.iter().find_map(|(name, field)| field.eval_finite(name, x).err())) {
         return error.because(of_body(&spec.name.value));
     }
@@ -78,8 +80,8 @@ pub fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw)
     }
 }
 
-/// Moduli against pressure along x, y, z, integrated over some cells. Cells whose constants make no material at their middle count as nothing:
-/// assembly refuses them.
+/// Return the moduli against pressure along x, y, z, integrated over some cells. A cell whose constants make no material at its
+/// middle contributes zero; assembly refuses it.
 pub fn moduli<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
@@ -93,7 +95,8 @@ pub fn moduli<const D: usize>(
     sum
 }
 
-/// The largest Poisson's ratio at these places in the scene of a body with linear elements; zero where these do not lock, or no element is linear.
+/// Return the largest Poisson's ratio of a body with linear elements at these points of the scene. It is zero for elements that
+/// do not lock, which are those in plane stress and those of second order.
 pub fn poisson(spec: &BodySpec, dimension: usize, own: impl Iterator<Item = [f64; 3]> + Clone, plane: Plane) -> f64 {
     if spec.order == Order::P2 || (dimension == 2 && plane == Plane::Stress) {
         return 0.0;
@@ -105,7 +108,8 @@ pub fn poisson(spec: &BodySpec, dimension: usize, own: impl Iterator<Item = [f64
     specs(spec).map(largest).fold(0.0, f64::max)
 }
 
-/// What the user should know: linear elements are too stiff where the volume can hardly change; by the largest Poisson's ratio.
+/// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff. There the volume can hardly
+/// change.
 pub fn warning(spec: &BodySpec, poisson: f64) -> Option<String> {
     (poisson > LOCKING).then(|| {
         let name = &spec.name.value;

@@ -1,4 +1,4 @@
-//! What bodies need to become solvers, and who makes them.
+//! The data of bodies that inner solvers need, and the trait that makes these solvers.
 
 use crate::error::Result;
 use crate::exchange::Plain;
@@ -8,25 +8,25 @@ use crate::linalg::Csr;
 use crate::model::{Body, BodySlot, Distribution};
 use crate::problem::order::Order;
 
-/// What the first rank knows of a body before it is assembled.
+/// What the first rank has of a body before it is assembled.
 pub struct Outline<'a> {
     /// Name in the scene.
     pub name: &'a str,
-    /// Space dimension: dofs of a node.
+    /// Space dimension, which is the number of dofs of a node.
     pub dimension: usize,
-    /// Order of its elements.
+    /// Order of the elements.
     pub order: Order,
-    /// All contact rows of the body, pair by pair; columns: its dofs.
+    /// All contact rows of the body, pair by pair, with its dofs as columns.
     pub rows: &'a Csr,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: &'a [(usize, f64)],
     /// Rigid motions of the free body.
     pub motions: AtDofs<'a>,
-    /// Which of its nodes K couples, made when it is first requested.
+    /// Coupling of nodes by K. It is computed when it is first requested.
     pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
-/// Gives bodies their inner solvers.
+/// A maker of the inner solvers of bodies.
 pub trait Factory {
     /// The choice of solvers of all bodies.
     type Plan: Plain;
@@ -34,50 +34,51 @@ pub trait Factory {
     /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
     ///
     /// # Errors
-    /// Failures of PETSc's options.
+    /// PETSc refuses an option.
     fn plan(&mut self, outlines: &[Outline]) -> Result<Self::Plan>;
 
-    /// Follow the plan of the first rank on another one.
+    /// Follow the plan of the first rank on another rank.
     ///
     /// # Errors
-    /// Failures of PETSc's options.
+    /// PETSc refuses an option.
     fn adopt(&mut self, plan: Self::Plan) -> Result<()>;
 
-    /// Return the numbers, in increasing order, of bodies whose nodes are to be distributed over the ranks, after the plan: those that share a matrix
-    /// together; none for bodies that stay whole.
+    /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
+    /// are in increasing order. Bodies that stay whole are in no set.
     fn distributed(&self) -> Vec<Vec<usize>>;
 
-    /// Whether the interpolation of a body from linear displacements is wanted, after the plan.
+    /// Return whether the plan needs the interpolation of a body from linear displacements.
     fn wants_interpolation(&self, name: &str) -> bool;
 
-    /// Makes a body, on the rank that owns it or a part of it, after its plan.
+    /// Make the solver of a body by its plan, on each rank that owns the body or a part of it.
     ///
     /// # Errors
-    /// PETSc's refusal of a matrix or an option value.
+    /// PETSc refuses a matrix or the value of an option.
     fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
 
-    /// A body of this name with the same K and contact rows, left by an earlier scene or leg on the rank that owns it.
+    /// Return a body of this name with the same K and contact rows that an earlier scene or leg has left. It is on the rank that
+    /// owns the body.
     fn kept(&mut self, name: &str) -> Option<BodySlot>;
 }
 
-/// A body ready for its inner solver.
+/// A body that is ready for its inner solver.
 pub struct Assembled<'a> {
     /// Name in the scene.
     pub name: String,
-    /// Space dimension: block size of the matrix.
+    /// Space dimension, which is the block size of the matrix.
     pub dimension: usize,
-    /// K, f and supports: of all dofs, or of those of this rank.
+    /// K, f and supports on all dofs, or on those of this rank.
     pub body: ElasticBody,
-    /// How the dofs are distributed, if they are.
+    /// Distribution of the dofs, if the body is distributed.
     pub distribution: Option<Distribution>,
-    /// All contact rows of the body, pair by pair. Columns: its dofs, or those of the nodes that this rank knows.
+    /// All contact rows of the body, pair by pair. The columns are its dofs, or those of the nodes that this rank has.
     pub rows: Csr,
-    /// Motions with hardly any strain in a few cells, for multigrid's near-null space: the rigid ones of the free body, in one of
-    /// revolution those of its meridian. One vector of these dofs each.
+    /// Motions with hardly any strain in a few cells, for the near-null space of multigrid. They are the rigid motions of the
+    /// free body, in a body of revolution those of its meridian. Each is one vector over these dofs.
     pub motions: &'a dyn Fn() -> Vec<Vec<f64>>,
-    /// Those that its supports leave, of these dofs.
+    /// Rigid motions that the supports leave, on these dofs.
     pub left: Vec<FreeMotion>,
-    /// Interpolation of its displacements from linear ones, if it was wanted. Rows: the dofs of `body`; columns: of this body alone, or of
-    /// all where dofs are distributed.
+    /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The columns belong
+    /// to this body alone, or to all bodies of the matrix if the dofs are distributed.
     pub interpolation: Option<Interpolation>,
 }

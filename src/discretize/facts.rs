@@ -4,25 +4,25 @@ use super::approach::Outer;
 use crate::fem::Extent;
 use serde::{Deserialize, Serialize};
 
-/// Facts of a whole body, and where its nodes come from.
+/// Facts of a whole body, and the points of the mesh that its nodes come from.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct BodyFacts {
-    /// The number of each node among the points of the mesh.
+    /// Point of the mesh of each node.
     pub points: Vec<u32>,
-    /// How many nodes the body has, and where.
+    /// Number of nodes of the body and their extent.
     pub extent: Extent,
     /// Number of cells.
     pub cells: usize,
-    /// Area (volume) of the body; of one of revolution that of the rings.
+    /// Area (volume) of the body; in a body of revolution the volume of the rings.
     pub volume: f64,
-    /// Means of the moduli along x, y, z over it ([`moduli`](super::elastic::moduli)).
+    /// Means over the body of the moduli along x, y, z ([`moduli`](super::elastic::moduli)).
     pub moduli: [f64; 3],
-    /// Where it is loaded and held.
+    /// Nodes at which the body is loaded or constrained.
     pub outer: Outer,
 }
 
 impl BodyFacts {
-    /// Restrict to some nodes, sorted, which get the numbers of their places.
+    /// Restrict the facts to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     pub fn on(&self, nodes: &[u32]) -> Self {
         Self {
             points: nodes.iter().map(|&node| self.points[node as usize]).collect(),

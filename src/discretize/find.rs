@@ -1,4 +1,4 @@
-//! Mesh groups by name, and refusals that point into the scene.
+//! Mesh groups by name, and errors that point into the scene.
 
 use crate::error::{Error, Located, Result, few};
 use crate::expression::Field;
@@ -6,7 +6,10 @@ use crate::mesh::{Group, Mesh};
 use crate::problem::body::BodySpec;
 use std::cell::RefCell;
 
-/// A mesh group by name, of one of these dimensions.
+/// Return the mesh group of this name if its dimension is one of `dimensions`. `what` says in an error what the group is for.
+///
+/// # Errors
+/// The mesh has no such group.
 pub fn find_group<'m, const D: usize>(
     mesh: &'m Mesh<D>,
     name: &Located<String>,
@@ -41,25 +44,25 @@ pub fn find_group<'m, const D: usize>(
     })
 }
 
-/// The refusal of a support or load on another body's group.
+/// Return the error of a support or load on a group of another body.
 pub fn not_on_body(on: &Located<String>, body: &str) -> Error {
     Error::scene(&on.place, format!("`{}` does not touch body `{body}`", on.value))
         .help("a support or load acts on a physical group of its own body")
 }
 
-/// The refusal of a load or spring on the axis of a body of revolution.
+/// Return the error of a load or spring on the axis of a body of revolution.
 pub fn without_area(on: &Located<String>, spec: &BodySpec) -> Error {
     Error::scene(&on.place, format!("body `{}`: `{}` lies on the axis and has no area", spec.name.value, on.value))
         .help("remove this line: per area nothing acts there")
 }
 
-/// Where an earlier support or load stands that a refused one meets.
+/// Return a sentence with the place of the earlier support or load that conflicts with a refused one.
 pub fn earlier(on: &Located<String>) -> String {
     let text = &on.place.source.text[..on.place.span.start];
     format!("the earlier one is on `{}`, line {} of {}", on.value, 1 + text.matches('\n').count(), on.place.source.name)
 }
 
-/// Values of fields at many points, of which the first that does not exist is refused afterwards.
+/// The values of fields at many points, with the first error. It is returned after all points are evaluated.
 pub struct Values<'a> {
     what: &'static str,
     body: &'a str,
@@ -67,12 +70,12 @@ pub struct Values<'a> {
 }
 
 impl<'a> Values<'a> {
-    /// Of the quantity `what` of a body, in words.
+    /// Make an evaluator of the quantity `what` of a body, both in words for the error.
     pub fn of(what: &'static str, body: &'a str) -> Self {
         Self { what, body, refused: RefCell::new(None) }
     }
 
-    /// The value at a point of the scene; zero where there is none.
+    /// Return the value of a field at a point of the scene, or zero where the field has none.
     pub fn at(&self, field: &Field, x: [f64; 3]) -> f64 {
         field.eval_finite(self.what, x).unwrap_or_else(|error| {
             self.refused.borrow_mut().get_or_insert_with(|| error.because(of_body(self.body)));
@@ -80,19 +83,21 @@ impl<'a> Values<'a> {
         })
     }
 
+    /// Return the first error, if any.
+    ///
     /// # Errors
-    /// The first value that did not exist, with its expression and the point.
+    /// A value does not exist. The first one is reported, with its expression and the point.
     pub fn refused(self) -> Result<()> {
         self.refused.into_inner().map_or(Ok(()), Err)
     }
 }
 
-/// Whose expression has no value somewhere, for a refusal that points at the expression: tables of bodies may be for many.
+/// Return the reason that names the body in an error at an expression. The table of the expression may be for many bodies.
 pub fn of_body(name: &str) -> String {
     format!("it is for body `{name}`")
 }
 
-/// A point as text.
+/// Return the text of a point.
 pub fn point(x: [f64; 3]) -> String {
     format!("({}, {}, {})", x[0], x[1], x[2])
 }

@@ -1,13 +1,14 @@
-//! Rigid motions that neither supports nor contact can hold: sliding on a plane, spin of a roller.
+//! Rigid motions that neither supports nor contact can resist: sliding on a plane, spin of a roller.
 //!
-//! If the loads do no work on such a motion, the solution is free up to it: one node is fixed against it, without reaction. If
-//! they do, there is no solution, and the run says so.
+//! If the loads do no work on such a motion, the solution is unique only up to it. One node is then fixed against the motion,
+//! without reaction. If the loads do work on it, there is no solution, and the run reports this.
 
 use super::interface::{Interface, Unconstrained};
 use super::part::Part;
 use crate::fem::rigid;
 
-/// Fixes the motions of a body that nothing feels and no load works on, and names them; `unconstrained` becomes what is left.
+/// Fix the motions of a body that nothing resists and on which no load works, and return their names. `unconstrained` becomes the
+/// set of the remaining motions.
 pub fn fix<const D: usize>(
     part: &mut Part<D>,
     interface: &Interface<D>,

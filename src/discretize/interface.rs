@@ -1,4 +1,4 @@
-//! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave it.
+//! A body before it is assembled: its contact rows, its loads, and the rigid motions that supports leave.
 
 use super::part::{Candidate, Part};
 use crate::contact::ContactPair;
@@ -18,17 +18,17 @@ pub const NO_WORK: f64 = 1e-9;
 /// A body before it is assembled.
 #[derive(Clone)]
 pub struct Interface<const D: usize> {
-    /// Its contact rows, pair by pair.
+    /// Contact rows of the body, pair by pair.
     pub segments: Vec<Segment>,
-    /// These rows; columns: its dofs.
+    /// These rows with dofs as columns.
     pub rows: Csr,
-    /// The same for displacements of its nodes.
+    /// The same rows with displacements of nodes as columns.
     pub nodal_rows: Csr,
     /// Rigid motions of the free body.
     pub free: Vec<RigidMotion<D>>,
-    /// Loads at own nodes.
+    /// Nodal forces of the loads, without those on rigid surfaces.
     pub nodal_load: NodalForces<D>,
-    /// What they add to forces at dofs.
+    /// Forces of all loads at dofs.
     pub load: NodalForces<D>,
 }
 
@@ -36,19 +36,19 @@ pub struct Interface<const D: usize> {
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct Unconstrained<const D: usize> {
-    /// Combinations of those of the free body.
+    /// Combinations of the motions of the free body.
     pub left: Vec<RigidMotion<D>>,
-    /// As contact and loads see them.
+    /// The same motions as traces on the contact rows and works of the loads.
     pub motions: Vec<Motion>,
-    /// Those that supports alone leave, if springs resist some of them.
+    /// Motions that supports alone leave, if springs resist some of them.
     pub sprung: Option<Sprung>,
-    /// Combinations of those of the free body that supports alone leave.
+    /// Combinations of the motions of the free body that supports alone leave.
     pub unsupported: Vec<RigidMotion<D>>,
-    /// Combinations of the motions that no contact row feels: name and weights.
+    /// Combinations of `left` that no contact row resists: name and weights.
     pub unresisted: Vec<(String, DVector<f64>)>,
 }
 
-/// Which contact rows each body has, pair by pair.
+/// Return the contact rows of each body, pair by pair.
 pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
     let mut segments = vec![Vec::new(); bodies];
     for (pair, sides) in pairs.iter().enumerate() {
@@ -58,10 +58,10 @@ pub fn segments(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<Segment>> {
 }
 
 impl<const D: usize> Interface<D> {
-    /// A body with its contact rows and loads.
+    /// Collect the contact rows and loads of a body.
     ///
     /// # Errors
-    /// Those of [`Part::load`].
+    /// See [`Part::load`].
     pub fn new(part: &Part<D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
         let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
             let mut all = Csr::new(part.space.dofs());
@@ -76,7 +76,7 @@ impl<const D: usize> Interface<D> {
         Ok(Self { segments, rows, nodal_rows, free: part.free(), nodal_load, load })
     }
 
-    /// Motions as contact and loads see them: at the dofs of contact rows and at loaded ones.
+    /// Return the traces of motions on the contact rows, with the work of the loads on each.
     pub fn motions(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<Motion> {
         let of = |(motion, work): (&RigidMotion<D>, f64)| {
             let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * part.dof_of(motion, dof)).sum();
@@ -85,14 +85,14 @@ impl<const D: usize> Interface<D> {
         all.iter().zip(self.works(part, all)).map(of).collect()
     }
 
-    /// The work of the loads on motions; exactly zero if it is rounding.
+    /// Return the work of the loads on motions. It is exactly zero where it is rounding.
     pub fn works(&self, part: &Part<D>, all: &[RigidMotion<D>]) -> Vec<f64> {
         let of = |motion: &RigidMotion<D>| self.load.works(|node| part.at_dofs(motion, node));
         let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
         all.iter().map(of).map(work).collect()
     }
 
-    /// Change each nodal force f by -|f| u, with the vector u of its place.
+    /// Change each nodal force f by -|f| u, where u is the vector at the position of its node.
     pub fn change_loads(&mut self, part: &Part<D>, u: impl Fn(&[f64; D]) -> [f64; D]) {
         let change = |(node, force): (u32, [f64; D])| {
             let (size, u) = (dot(&force, &force).sqrt(), u(&part.space.nodes[node as usize]));
@@ -102,7 +102,7 @@ impl<const D: usize> Interface<D> {
         self.load = part.load_on_dofs(&self.nodal_load);
     }
 
-    /// What supports and springs leave to the body now.
+    /// Return the motions that supports and springs leave to the body at present.
     pub fn unconstrained(&self, part: &Part<D>) -> Unconstrained<D> {
         let at = |k: usize, node: u32| self.free[k].at(&part.space.nodes[node as usize]);
         let left = part.left(self.free.len(), &at);
@@ -115,7 +115,8 @@ impl<const D: usize> Interface<D> {
         Unconstrained { left, motions, sprung, unsupported, unresisted }
     }
 
-    /// The dof outside the contact rows, so that these stay as they are, that a motion moves most, unless that is little.
+    /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, outside the contact rows so that
+    /// these do not change. The result is `None` if that displacement is small.
     pub fn candidate(&self, part: &Part<D>, motion: &RigidMotion<D>) -> Option<Candidate> {
         let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
         let size = |dof: usize| {
@@ -126,7 +127,7 @@ impl<const D: usize> Interface<D> {
     }
 }
 
-/// Combinations of motions that no contact row feels: name and weights.
+/// Return the combinations of motions that no contact row resists: name and weights.
 fn unresisted(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
     let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
     let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));

@@ -1,7 +1,8 @@
-//! Rigid motions of several bodies together that change no gap: a group that nothing holds, blocks that slide or turn as one.
+//! Rigid motions of several bodies together that change no gap: an unsupported group, or blocks that slide or turn as one.
 //!
-//! Each body is held by its neighbours then, and all of them are not. As with the motions of one body ([`gauge`]) there is a
-//! solution if the loads do no work on such a motion: one node of one body is fixed against it, without reaction.
+//! Each body is then constrained by its neighbours, but all of them together are not. As with the motions of one body
+//! ([`gauge`]), there is a solution if the loads do no work on such a motion. One node of one body is then fixed against it,
+//! without reaction.
 
 use super::gauge;
 use super::info::{Balanced, Gauged};
@@ -19,24 +20,25 @@ use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
-/// A rigid motion of a whole group that closes more than this share of its displacement is out of reach of the mesh. Not a matter
-/// of rounding: chords of the arc between neighbouring nodes leave it by 1/8 of their angle squared, and two meshes turn against
-/// each other by that much: 0.03 are chords of 28 degrees.
+/// Largest share of its displacement that a rigid motion of a whole group may close, for the mesh to treat it as free. The bound
+/// is not one of rounding. Chords of the arc between neighbouring nodes deviate from it by 1/8 of their angle squared, and two
+/// meshes turn against each other by as much. The value 0.03 belongs to chords of 28 degrees.
 const FLAWED: f64 = 0.03;
 
-/// What was fixed, and what cannot be.
+/// The motions that were fixed, and those that cannot be.
 pub struct Fixed<const D: usize> {
-    /// Motions of each body alone.
+    /// Fixed and spinning motions of each body alone.
     pub gauged: Vec<Gauged>,
     /// Motions of several bodies.
     pub mechanisms: Vec<Mechanism>,
-    /// The motions left to each body.
+    /// Motions left to each body.
     pub unconstrained: Vec<Unconstrained<D>>,
     /// Loads that were balanced.
     pub balanced: Vec<Balanced>,
 }
 
-/// Fixes the motions that nothing feels and no load works on: of whole groups of bodies, of each body alone, then what is left.
+/// Fix the motions that nothing resists and on which no load works. First come whole groups of bodies, then each body alone, then
+/// the motions that remain.
 pub fn fix<const D: usize>(
     parts: &mut [Part<D>],
     interfaces: &mut [Interface<D>],
@@ -66,7 +68,7 @@ pub fn fix<const D: usize>(
     Fixed { gauged, mechanisms: search.found, unconstrained: search.unconstrained, balanced: search.balanced }
 }
 
-/// Bodies that pairs connect, two at least, in the order of the first of them.
+/// Return the groups of at least two bodies that pairs connect, in the order of their first bodies.
 fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
     let mut joined = Joined::new(bodies);
     pairs.iter().map(|pair| pair.bodies.map(|body| body as u32)).for_each(|[a, b]| joined.join(a, b));
@@ -77,17 +79,17 @@ fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
     members
 }
 
-/// The contact rows of some bodies, pairs numbered among those that these touch.
+/// The contact rows of some bodies. Pairs are numbered among those that touch these bodies.
 struct Rows {
     segments: Vec<Vec<Segment>>,
-    /// Points of each pair.
+    /// Number of points of each pair.
     points: Vec<usize>,
-    /// Share of each point in its pair, so that motions count alike wherever they are resisted.
+    /// Share of each point in the area of its pair, so that motions have equal weight wherever they are resisted.
     weight: Vec<f64>,
 }
 
 impl Rows {
-    /// Of bodies in the order of `interfaces`.
+    /// Collect the rows of bodies in the order of `interfaces`.
     fn new<'d, const D: usize>(interfaces: impl Iterator<Item = &'d Interface<D>>, pairs: &[ContactPair]) -> Self {
         let mut rows = Self { segments: Vec::new(), points: Vec::new(), weight: Vec::new() };
         let mut number = HashMap::new();
@@ -107,7 +109,7 @@ impl Rows {
         rows
     }
 
-    /// What these rows feel of motions of each body.
+    /// Return how contact resists the motions of each body through these rows.
     fn feel<'a>(&'a self, motions: impl Iterator<Item = &'a [Motion]>) -> Motions<'a> {
         Motions::new(self.segments.iter().map(Vec::as_slice).zip(motions), &self.points)
     }
@@ -118,27 +120,27 @@ struct Search<'p, 's, const D: usize> {
     interfaces: &'p mut [Interface<D>],
     pairs: &'p [ContactPair],
     mesh: &'p Mesh<D>,
-    /// The motions that supports and springs leave to each body now.
+    /// Motions that supports and springs leave to each body at present.
     unconstrained: Vec<Unconstrained<D>>,
     found: Vec<Mechanism>,
     balanced: Vec<Balanced>,
 }
 
 impl<const D: usize> Search<'_, '_, D> {
-    /// Contact rows of some bodies.
+    /// Return the contact rows of some bodies.
     fn rows(&self, bodies: &[usize]) -> Rows {
         Rows::new(bodies.iter().map(|&body| &self.interfaces[body]), self.pairs)
     }
 
-    /// The rigid motions of some bodies as one.
+    /// Return the rigid motions of some bodies as one.
     fn as_one(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
         let parts = || bodies.iter().map(|&body| &self.parts[body]);
         let extent = parts().fold(Extent::default(), |all, part| all.join(&part.facts.extent));
         rigid::of(&extent, parts().any(|part| part.space.axisymmetric))
     }
 
-    /// The rigid motions of a group as one body that supports do not feel. Contact does not either, but for the error of meshed
-    /// surfaces that are curved and apart.
+    /// Return the rigid motions of a group as one body that its supports do not resist. Contact does not resist them either,
+    /// apart from the error of meshed surfaces that are curved and apart.
     fn of_group(&self, group: &[usize]) -> Vec<Moving<D>> {
         let all = self.as_one(group);
         let count = all.len();
@@ -154,7 +156,7 @@ impl<const D: usize> Search<'_, '_, D> {
         let rows = self.rows(group);
         let resisted = rows.feel(traces.iter().map(Vec::as_slice));
         let moving = |weights: DVector<f64>| {
-            // all bodies move by the same motion
+            // All bodies have the same motion.
             let amounts = DVector::from_fn(resisted.count(), |i, _| weights[i % count]);
             let square: f64 =
                 resisted.closing(&amounts).iter().zip(&rows.weight).map(|(c, weight)| weight * c * c).sum();
@@ -163,14 +165,14 @@ impl<const D: usize> Search<'_, '_, D> {
             Moving { bodies: group.to_vec(), name: motion.name.clone(), motions: vec![motion; group.len()], error }
         };
         let mut free = Blocks::free(&held, 1.0, TOLERANCE);
-        // translations come first
+        // Translations come first.
         let first = |weights: &DVector<f64>| weights.iter().position(|weight| weight.abs() > PART);
         free.sort_by_key(first);
         free.into_iter().map(moving).filter(|moving| moving.error <= FLAWED).collect()
     }
 
-    /// Motions of some of these bodies that contact does not feel, all others at rest; none if contact does not feel a motion of
-    /// one of them alone.
+    /// Return the motions of some of these bodies that contact does not resist while all others are at rest. The result is empty
+    /// if contact does not resist a motion of one of them alone.
     fn of_some(&self, bodies: &[usize]) -> Vec<Moving<D>> {
         if bodies.iter().any(|&body| !self.unconstrained[body].unresisted.is_empty()) {
             return Vec::new();
@@ -198,7 +200,7 @@ impl<const D: usize> Search<'_, '_, D> {
         factor.kernel_entries().iter().map(moving).collect()
     }
 
-    /// The name of a motion that moves its bodies like one.
+    /// Return the name of a motion if it moves its bodies as one.
     fn name_as_one(&self, moving: &Moving<D>) -> Option<String> {
         let corners = |body: usize| self.parts[body].facts.extent.corners();
         let each = moving.bodies.iter().zip(&moving.motions);
@@ -213,7 +215,7 @@ impl<const D: usize> Search<'_, '_, D> {
         is_one.then(|| rigid::combine(&whole, &DVector::from_vec(fit(&slices(&vectors), &each))).name)
     }
 
-    /// Fixes what motions of some bodies are left, until there are none, loads work on one, or one cannot be fixed.
+    /// Fix the remaining motions of some bodies, until there are none, loads work on one, or one cannot be fixed.
     fn fix_some(&mut self) {
         let every: Vec<usize> = (0..self.interfaces.len()).collect();
         loop {
@@ -223,7 +225,7 @@ impl<const D: usize> Search<'_, '_, D> {
             if !goes_on {
                 return;
             }
-            // motions of other bodies stay what they are when some are fixed
+            // Motions of other bodies do not change when some are fixed.
             let mut touched = vec![false; every.len()];
             while let Some(first) = all.first() {
                 let bodies = first.bodies.clone();
@@ -240,7 +242,8 @@ impl<const D: usize> Search<'_, '_, D> {
         }
     }
 
-    /// Fixes the motions of a body along its own surface on which no load works, besides those that are `fixed` already.
+    /// Fix the motions of a body along its own surface on which no load works. `fixed` holds the names of the motions that are
+    /// fixed already.
     fn fix_round(&mut self, body: usize, mut fixed: Vec<String>) -> Gauged {
         if self.unconstrained[body].left.is_empty() || !self.unconstrained[body].unresisted.is_empty() {
             return Gauged { fixed, spinning: Vec::new() };
@@ -248,7 +251,7 @@ impl<const D: usize> Search<'_, '_, D> {
         let points = Points::of(&self.interfaces[body], self.pairs);
         loop {
             let round = points.along_surface(&self.unconstrained[body].left);
-            // the centre of a load is known no better than that of the meshed body
+            // The centre of a load is no more accurate than that of the meshed body.
             let moving = |motion: RigidMotion<D>| Moving {
                 bodies: vec![body],
                 name: motion.name.clone(),
@@ -264,7 +267,7 @@ impl<const D: usize> Search<'_, '_, D> {
         }
     }
 
-    /// Notes the motion that loads work on most. Whether there is one.
+    /// Record the motion on which loads work most. Return whether there is one.
     fn works_on(&mut self, all: &[Moving<D>]) -> bool {
         let works: Vec<f64> = all.iter().map(|moving| self.work(moving).abs()).collect();
         let most = (0..works.len()).max_by(|&i, &j| works[i].total_cmp(&works[j])).filter(|&i| works[i] > 0.0);
@@ -277,14 +280,14 @@ impl<const D: usize> Search<'_, '_, D> {
         most.is_some()
     }
 
-    /// Fixes motions of the same bodies; `again` finds those that are left. Whether the first was fixed.
+    /// Fix motions of the same bodies. `again` finds those that remain. Return whether the first was fixed.
     fn fix(&mut self, all: Vec<Moving<D>>, again: impl Fn(&Self) -> Vec<Moving<D>>) -> bool {
         let Some(bodies) = all.first().map(|moving| moving.bodies.clone()) else { return false };
         let names: Vec<&str> = all.iter().map(|moving| moving.name.as_str()).collect();
         let mut mechanism = Mechanism { motion: names.join("; "), bodies, work: 0.0, fixed: None };
         let count = all.len();
         let mut left = all;
-        // a motion that is left when others are fixed is another one: it turns about their nodes
+        // A motion that remains when others are fixed is a different one, since it turns about their nodes.
         for number in 0..count {
             if number > 0 {
                 left = again(self);
@@ -301,15 +304,16 @@ impl<const D: usize> Search<'_, '_, D> {
         goes_on
     }
 
-    /// Work of the loads on a motion, as a share of the largest possible; zero if it is rounding or an error of the mesh.
+    /// Return the work of the loads on a motion, as a share of the largest possible work. It is zero if it is rounding or an
+    /// error of the mesh.
     fn work(&self, moving: &Moving<D>) -> f64 {
         let [work, largest] = moving.works(self.parts, self.interfaces);
         if work.abs() <= largest * moving.error.max(NO_WORK) { 0.0 } else { work / largest }
     }
 
-    /// Balance the loads on motions that nothing holds, if what they lack on each is no more than what the mesh may miss of them.
+    /// Balance the loads on unresisted motions, if the work on each is no more than the mesh may miss of it.
     fn balance(&mut self, all: &[Moving<D>]) {
-        // bodies without loads have nothing to balance
+        // Bodies without loads have nothing to balance.
         let works_on = |moving: &Moving<D>| moving.works(self.parts, self.interfaces);
         let (all, works): (Vec<&Moving<D>>, Vec<[f64; 2]>) =
             all.iter().map(|moving| (moving, works_on(moving))).filter(|(_, [_, largest])| *largest > 0.0).unzip();
@@ -331,7 +335,7 @@ impl<const D: usize> Search<'_, '_, D> {
         }
     }
 
-    /// Note that loads were balanced on a motion, beside others of the same bodies.
+    /// Record that loads were balanced on a motion, together with others of the same bodies.
     fn note_balanced(&mut self, moving: &Moving<D>, share: f64) {
         match self.balanced.iter_mut().find(|balanced| balanced.bodies == moving.bodies) {
             Some(balanced) => {
@@ -345,7 +349,7 @@ impl<const D: usize> Search<'_, '_, D> {
         }
     }
 
-    /// The work of the loads on a motion that the mesh may miss, where they could do the `largest`.
+    /// Return the work of the loads on a motion that the mesh may miss. `largest` is the largest work that the loads could do.
     fn missed(&self, moving: &Moving<D>, largest: f64) -> f64 {
         let (mut share, mut quadrature) = (moving.error, 0.0);
         for (&body, motion) in moving.bodies.iter().zip(&moving.motions) {
@@ -356,7 +360,7 @@ impl<const D: usize> Search<'_, '_, D> {
         share * largest + quadrature
     }
 
-    /// The motions of a body that no contact feels.
+    /// Return the motions of a body that contact does not resist.
     fn of_one(&self, body: usize) -> Vec<Moving<D>> {
         let Unconstrained { left, unresisted, .. } = &self.unconstrained[body];
         let moving = |(name, weights): &(String, DVector<f64>)| {
@@ -366,7 +370,8 @@ impl<const D: usize> Search<'_, '_, D> {
         unresisted.iter().map(moving).collect()
     }
 
-    /// Fixes a motion at one node of the largest body that has one where the motion is not small; returns the body.
+    /// Fix a motion at one node and return the body of the node. It is the largest body with a suitable node where the motion is
+    /// not small.
     fn pin(&mut self, moving: &Moving<D>) -> Option<usize> {
         let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| {
             Some((body, self.interfaces[body].candidate(&self.parts[body], motion)?))
@@ -383,10 +388,10 @@ impl<const D: usize> Search<'_, '_, D> {
     }
 }
 
-/// A node whose displacement is this share of the largest one can fix a motion.
+/// Share of the largest displacement from which a node can fix a motion.
 const NEAR: f64 = 1e-2;
 
-/// What a displacement is besides some motions.
+/// Return the part of a displacement that is not a combination of some motions.
 fn rest(displacement: &[f64], motions: &[Vec<f64>]) -> Vec<f64> {
     let mut rest = displacement.to_vec();
     let amounts = fit(&slices(motions), displacement);

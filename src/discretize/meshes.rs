@@ -1,4 +1,4 @@
-//! What an estimate of the error asks of meshes, without their dimension.
+//! The meshes without their space dimension, as an estimate of the error uses them.
 
 use super::supports::Constraints;
 use crate::contact::Fine;
@@ -8,31 +8,31 @@ use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
 pub trait Meshes {
-    /// Displacements of all nodes of a body for a state of all its dofs.
+    /// Return the displacements of all nodes of a body for a state of all its dofs.
     fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64>;
 
-    /// Turns forces at the nodes of a body into those at its dofs.
+    /// Turn forces at the nodes of a body into forces at its dofs.
     fn forces(&self, body: usize, load: &mut [f64]);
 
-    /// Recovers from displacements of all nodes of a body.
+    /// Recover smoother fields from the displacements `u` of all nodes of a body.
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a>;
 
-    /// Forces at the nodes of a body that the quadrature of its loads misses; empty for none.
+    /// Return the nodal forces of a body that the quadrature of its loads misses. The slice is empty if there are none.
     fn unloaded(&self, body: usize) -> &[f64];
 
-    /// Displacements of all nodes of a body in the rigid motions that its supports leave, by their amounts.
+    /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these amounts.
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
 
-    /// The size of the force at the node of each entry of forces at all nodes of a body.
+    /// Return the magnitude of the nodal force at each entry of `load`, which holds forces at all nodes of a body.
     fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
 
-    /// The integration points of a pair.
+    /// Return the integration points of a pair.
     fn points(&self, pair: usize) -> FinePoints<'_>;
 
-    /// The cells of a body.
+    /// Return the cells of a body.
     fn cells(&self, body: usize) -> Cells;
 
-    /// Order of convergence of the energy error of a body: the degree of its elements.
+    /// Return the order of convergence of the energy error of a body, which is the degree of its elements.
     fn degree(&self, body: usize) -> usize;
 }
 
@@ -40,72 +40,73 @@ pub trait Meshes {
 pub struct Cells {
     /// Coordinates of the nodes in the scene.
     pub nodes: Vec<[f64; 3]>,
-    /// Corners of a cell.
+    /// Number of corners of a cell.
     pub stride: usize,
     /// Node numbers of the corners, `stride` per cell.
     pub corners: Vec<u32>,
-    /// Node numbers of the corners of the facets of the boundary, `stride - 1` per facet, oriented outwards; none on an axis of revolution.
+    /// Node numbers of the corners of the boundary facets, `stride - 1` per facet, oriented outwards. Facets on an axis of
+    /// revolution are excluded.
     pub facets: Vec<u32>,
-    /// Size of each cell: edge of the regular simplex of its measure.
+    /// Size of each cell: the edge of the regular simplex with the measure of the cell.
     pub sizes: Vec<f64>,
 }
 
 /// The integration points of a pair; see [`Fine`].
 pub struct FinePoints<'a> {
-    /// Length (area) of each.
+    /// Length (area) of each point.
     pub weight: &'a [f64],
-    /// Gap of each.
+    /// Gap at each point.
     pub gap: &'a [f64],
-    /// What the two bodies give way, per pressure, to one that changes its sign within a facet: between the springs of two
-    /// half-spaces in a row, for a wave as long as the facet.
+    /// Deflection of the two bodies per pressure, for a pressure that changes its sign within a facet. It is the compliance of
+    /// the springs of two half-spaces in series, for a wave as long as the facet.
     pub compliance: Vec<f64>,
-    /// Contact point nearest to each.
+    /// Contact point nearest to each integration point.
     pub nearest: &'a [usize],
-    /// Whether the contact points around each are at mid-edges.
+    /// Whether the contact points around each integration point are at mid-edges.
     pub at_edges: &'a [bool],
-    /// Values at the contact points -> values at these.
+    /// Matrix from values at the contact points to values at the integration points.
     pub interpolation: &'a Csr,
-    /// Pressures at the contact points -> those that the discrete problem has at these.
+    /// Matrix from pressures at the contact points to the pressures of the discrete problem at the integration points.
     pub pressing: &'a Csr,
 }
 
-/// A displacement of a body with what was recovered from it.
+/// A displacement of a body with the fields recovered from it.
 pub trait Recovered {
-    /// Squared energy norm of recovered minus discrete stress, for each cell.
+    /// Return the squared energy norm of the recovered minus the discrete stress, for each cell.
     fn energy_errors(&self) -> Vec<f64>;
 
-    /// Residual at all nodes of the interpolation error, see [`Recovery::interpolation_residual`], and of what straight facets miss of a
-    /// curved boundary, see [`Recovery::add_strip`].
+    /// Return the residual of the interpolation error at all nodes, see [`Recovery::interpolation_residual`]. It includes the
+    /// strip between straight facets and a curved boundary, see [`Recovery::add_strip`].
     fn interpolation_residual(&self) -> Vec<f64>;
 
-    /// Outer normal displacement at the integration points of a side of a pair, the interpolation error added.
+    /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
-    /// At the contact points of a pair, of whose side b this is, with rows B_b of its nodal displacements: what the compression lacks where
-    /// the mean around a point is taken for the value at the point itself.
+    /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is replaced by the
+    /// value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its nodal displacements.
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64>;
 
-    /// Adds `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.
+    /// Add `sum force_g n.v` over the integration points of a side of a pair to `r`, for every shape function v.
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]);
 }
 
 /// A body's space, elasticity and supports.
 pub struct Shape<const D: usize> {
-    /// Its space.
+    /// Space of the body.
     pub space: Rc<Space<D>>,
-    /// Its elasticity.
+    /// Elasticity of the body.
     pub elasticity: Rc<Elasticity>,
-    /// Its modulus against pressure on its contact surfaces, E/(1 - nu^2) if isotropic.
+    /// Modulus against pressure on the contact surfaces of the body, E/(1 - nu^2) if isotropic.
     pub modulus: f64,
-    /// Its supports, which choose the dofs.
+    /// Supports of the body, which define its dofs.
     pub held: Rc<Constraints<D>>,
     /// See [`Meshes::unloaded`].
     pub unloaded: Vec<f64>,
-    /// The rigid motions that its supports leave, in the order of [`Motions::with_springs`](crate::model::Motions::with_springs).
+    /// Rigid motions that the supports leave, in the order of [`Motions::with_springs`](crate::model::Motions::with_springs).
     pub motions: Vec<RigidMotion<D>>,
 }
 
-/// [`Meshes`] in `D` dimensions.
+/// The implementation of [`Meshes`] in `D` dimensions.
 pub struct Kept<const D: usize> {
     /// Bodies in the order of the scene.
     pub shapes: Vec<Shape<D>>,
@@ -153,7 +154,7 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn cells(&self, body: usize) -> Cells {
         let space = &self.shapes[body].space;
-        // measure of the regular simplex with edges of length one
+        // This is the measure of the regular simplex with edges of length one.
         let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
         let size = |index| (space.cell_measure(index) / regular).powf(1.0 / D as f64);
         let boundary = space.boundary();
@@ -181,7 +182,7 @@ struct OnBody<'a, const D: usize> {
 }
 
 impl<const D: usize> OnBody<'_, D> {
-    /// Stress of a strain at an integration point of a cell; assembly was there, so the law has a value.
+    /// Return the stress of a strain at an integration point of a cell. Assembly evaluated the law there, so it has a value.
     fn stress(&self, cell: usize, x: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
         self.shape
             .elasticity
@@ -190,11 +191,11 @@ impl<const D: usize> OnBody<'_, D> {
     }
 }
 
-/// The outer normal of side b is minus that of side a.
+/// Factors of the normal for side a and side b. The outer normal of side b is minus that of side a.
 const SIGN: [f64; 2] = [1.0, -1.0];
 
 impl<const D: usize> OnBody<'_, D> {
-    /// Displacement at barycentric coordinates of a facet, the interpolation error added.
+    /// Return the displacement at barycentric coordinates of a facet, including the interpolation error.
     fn displacement(&self, nodes: &[u32], l: &[f64; D]) -> [f64; D] {
         let mut u = self.recovery.missed(nodes, l);
         for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
@@ -203,7 +204,8 @@ impl<const D: usize> OnBody<'_, D> {
         u
     }
 
-    /// Visits the integration points of a side: number, normal, nodes and barycentric coordinates of each.
+    /// Call `visitor` for each integration point of a side, with its index, its normal, and the nodes and barycentric coordinates
+    /// in its facet.
     fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], &[u32], &[f64; D])) {
         let fine = &self.kept.fine[pair];
         let on = &fine.sides[side];

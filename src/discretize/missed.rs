@@ -1,4 +1,4 @@
-//! What a mesh may miss of the loads of a body, so that loads which balance on the true surfaces do not on the facets.
+//! Bounds of the loads of a body that its mesh may miss. Loads that balance on the true surfaces may lack balance on the facets.
 
 use super::find::find_group;
 use super::interface::Interface;
@@ -7,12 +7,13 @@ use crate::contact::ContactPair;
 use crate::fem::{RigidMotion, turn};
 use crate::mesh::Mesh;
 
-/// Ratio of the error of a quadrature to the difference between it and the same rule on halves of the elements. Where a load jumps within an element, the error on
-/// halves is half as large, so that the difference is half of the error. Where the load is smooth, the ratio is nearly one.
+/// Ratio of the error of a quadrature to the difference between it and the same rule on halves of the elements. Where a load
+/// jumps within an element, the error on halves is half as large, so the difference is half of the error. Where the load is
+/// smooth, the ratio is nearly one.
 const HALVES: f64 = 2.0;
 
-/// The share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all surfaces: those in contact
-/// stand for it.
+/// Return the share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all
+/// surfaces, and the surfaces in contact represent them.
 pub fn by_facets<const D: usize>(
     part: &Part<D>,
     interface: &Interface<D>,
@@ -25,11 +26,11 @@ pub fn by_facets<const D: usize>(
         return on_groups;
     }
     let points = interface.segments.iter().flat_map(|segment| &pairs[segment.pair].surface[segment.side]);
-    // facets differ from their mean by half of the angle between them
+    // Facets differ from their mean by half of the angle between them.
     points.map(|point| turn::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
 }
 
-/// The largest work on a motion that the nodal forces of loads on surfaces can do by which their quadrature misses them.
+/// Return a bound of the work on a motion of the nodal forces that the quadrature of surface loads misses.
 pub fn by_quadrature<const D: usize>(part: &Part<D>, motion: &RigidMotion<D>, mesh: &Mesh<D>) -> f64 {
     let missed = part.missed_load(mesh).unwrap_or_default();
     let [_, largest] = missed.works(|node| motion.at(&part.space.nodes[node as usize]));

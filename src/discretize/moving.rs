@@ -1,4 +1,4 @@
-//! Rigid motions of some bodies together, and loads that are to do no work on them.
+//! Rigid motions of some bodies together, and the change of loads so that they do no work on these motions.
 
 use super::interface::Interface;
 use super::part::Part;
@@ -8,18 +8,18 @@ use nalgebra::{DMatrix, DVector};
 
 /// A motion of some bodies, each of which is rigid.
 pub struct Moving<const D: usize> {
-    /// The bodies that it moves.
+    /// Indices of the bodies that it moves.
     pub bodies: Vec<usize>,
-    /// What it does to each of them.
+    /// Rigid motion of each of these bodies.
     pub motions: Vec<RigidMotion<D>>,
-    /// Its name.
+    /// Name of the motion.
     pub name: String,
-    /// Root of the mean square of what it closes.
+    /// Gap change per unit of the motion: the root of the sum over pairs of its mean square.
     pub error: f64,
 }
 
 impl<const D: usize> Moving<D> {
-    /// Return the work of the loads on the motion, and the largest that forces of their sizes could do.
+    /// Return the work of the loads on the motion, and the largest work that forces of their magnitudes could do.
     pub fn works(&self, parts: &[Part<D>], interfaces: &[Interface<D>]) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (&body, motion) in self.bodies.iter().zip(&self.motions) {
@@ -29,23 +29,24 @@ impl<const D: usize> Moving<D> {
         sums
     }
 
-    /// What the motion does to a body, if it moves it.
+    /// Return the rigid motion of a body, if the motion moves it.
     fn of(&self, body: usize) -> Option<&RigidMotion<D>> {
         let place = self.bodies.iter().position(|&moved| moved == body)?;
         Some(&self.motions[place])
     }
 }
 
-/// Change the loads so that they do no work on any of these motions m_j, on which they do the `works` w_j. Return whether that was possible: rigid
-/// surfaces keep their forces.
+/// Change the loads so that they do no work on any of these motions m_j. `works` holds the works w_j that the loads do on them.
+/// Return whether this was possible, since rigid surfaces keep their forces.
 ///
-/// Each nodal force f changes along the motions in proportion to its size, by -|f| sum_j b_j m_j at its node, with
+/// Each nodal force f changes along the motions in proportion to its magnitude, by -|f| sum_j b_j m_j at its node. The amounts
+/// b_j solve
 ///
 /// ```text
 /// sum_k G_jk b_k = w_j,      G_jk = sum_nodes |f| m_j . m_k,
 /// ```
 ///
-/// so that no node takes more of what is lacking than others that are loaded alike.
+/// so that nodes with equal loads get equal corrections.
 pub fn balance<const D: usize>(
     all: &[&Moving<D>],
     works: &[f64],

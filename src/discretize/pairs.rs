@@ -1,4 +1,4 @@
-//! Contacts of the scene on the mesh: which body each surface bounds, which side carries the points.
+//! Contacts of the scene on the mesh: the body that each surface bounds, and the side that carries the points.
 
 use super::auto;
 use super::find::{find_group, point};
@@ -17,29 +17,29 @@ use std::collections::{BTreeSet, HashSet};
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
-    /// Where the scene speaks of it.
+    /// Place of the pair in the scene.
     pub origin: Origin,
-    /// The arrays of the method.
+    /// Arrays on which the method works.
     pub pair: ContactPair,
-    /// Its integration points, if they were requested.
+    /// Integration points, if they were requested.
     pub fine: Option<Fine<D>>,
-    /// Whether side a (which carries the points) is the second of the two that the scene names.
+    /// Whether side a, which carries the points, is the second of the two surfaces that the scene names.
     pub swapped: bool,
-    /// Its mesh, for output.
+    /// Mesh of side a, for output.
     pub surface: ContactSurface,
 }
 
-/// Where a scene speaks of a pair.
+/// The entry of the scene that a pair comes from.
 #[derive(Clone, Serialize, Deserialize)]
 pub enum Origin {
-    /// The contact of this number, with the names of its surfaces.
+    /// Index of a contact that names its surfaces.
     Named(usize),
-    /// The rule of this number, by which the pair was found between two bodies.
+    /// Index of the rule by which the pair was found, and the names of the two bodies.
     Found(usize, [String; 2]),
 }
 
 impl Origin {
-    /// Return what the scene says of the pair; `between` names the bodies if it was found.
+    /// Return the scene's description of the pair. `between` names the bodies if the pair was found.
     pub fn spec(&self, scene: &Scene) -> ContactSpec {
         match self {
             Self::Named(number) => scene.contacts[*number].clone(),
@@ -52,10 +52,11 @@ impl Origin {
     }
 }
 
-/// Return all pairs of the scene: those with names in the order of the file, then those that are found. `fine` asks for integration points.
+/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests
+/// integration points.
 ///
 /// # Errors
-/// Surfaces that are not there, bound no body or several, or do not face each other; laws and gaps that are none somewhere.
+/// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
 pub fn all<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
@@ -106,7 +107,7 @@ struct Opposite<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Opposite<'a, D> {
-    /// Of two surfaces; with a `distance` they may be no farther apart.
+    /// Make the sides of a pair from two surfaces. They may be no farther apart than `distance`, if it is given.
     fn new(
         origin: Origin,
         spec: ContactSpec,
@@ -118,7 +119,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
             let held = &parts[body].held;
             (body, Side::new(name, &parts[body].space, facets, &held.prescribed, &held.frame))
         });
-        // the finer side carries the points, whatever the order in the scene
+        // The finer side carries the points, whatever the order in the scene.
         let (fine_a, fine_b) = (first.1.mean_measure(), second.1.mean_measure());
         let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
         let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
@@ -128,7 +129,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, reach }
     }
 
-    /// Make the pair; also its integration points, if they are requested (`fine`).
+    /// Assemble the pair, and its integration points if `fine` requests them.
     fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.spec.touching {
@@ -155,7 +156,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
     }
 }
 
-/// Whose expression has no value somewhere: tables of contacts may be for many pairs.
+/// Return the reason that names the pair in an error at an expression. The table of the expression may be for many pairs.
 fn of_pair(spec: &ContactSpec) -> String {
     let [a, b] = spec.between.each_ref().map(|name| &name.value);
     format!("it is for the contact of `{a}` and `{b}`")
@@ -195,7 +196,7 @@ impl Owners {
         Self(all)
     }
 
-    /// Bodies with points of a group.
+    /// Return the bodies with points of a group.
     fn touching(&self, group: &Group) -> BTreeSet<usize> {
         let at = |&point: &u32| {
             let first = self.0.partition_point(|entry| entry.0 < point);
@@ -204,7 +205,10 @@ impl Owners {
         group.connectivity.iter().flat_map(at).collect()
     }
 
-    /// The body that a contact surface bounds, with the facets.
+    /// Return the body that a contact surface bounds, with its facets there.
+    ///
+    /// # Errors
+    /// The surface bounds no body or several, or only some of its facets bound the body.
     fn of<const D: usize>(
         &self,
         name: &Located<String>,

@@ -21,15 +21,15 @@ use std::rc::Rc;
 /// A body of the scene with its space, supports and springs.
 #[derive(Clone)]
 pub struct Part<'a, const D: usize> {
-    /// What the scene says.
+    /// Description in the scene.
     pub spec: &'a BodySpec,
-    /// Its finite element space.
+    /// Finite element space.
     pub space: Space<D>,
-    /// What supports and rigid surfaces hold.
+    /// Constraints from supports and rigid surfaces.
     pub held: Constraints<D>,
-    /// Springs to the ground: for each of the scene, its stiffnesses between nodes.
+    /// Springs to the ground: the stiffness blocks between nodes for each spring of the scene.
     pub springs: Vec<Vec<NodalBlock<D>>>,
-    /// Elasticity of its cells.
+    /// Elasticity of the cells.
     pub elasticity: Rc<Elasticity>,
     /// Facts of the whole body.
     pub facts: BodyFacts,
@@ -37,17 +37,17 @@ pub struct Part<'a, const D: usize> {
 
 /// A dof that can be fixed against a motion.
 pub struct Candidate {
-    /// Which one.
+    /// Index of the dof.
     pub dof: usize,
-    /// The size of the motion there.
+    /// Magnitude of the motion there.
     pub size: f64,
 }
 
 impl<'a, const D: usize> Part<'a, D> {
-    /// Applies the supports and springs of a body.
+    /// Apply the supports and springs of a body.
     ///
     /// # Errors
-    /// Refusals of the scene against its mesh.
+    /// The scene contradicts its mesh.
     pub fn new(
         spec: &'a BodySpec,
         mesh: &Mesh<D>,
@@ -61,27 +61,28 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(Self { spec, space, held, springs, elasticity, facts })
     }
 
-    /// Displacements of all dofs in a rigid motion.
+    /// Return the displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
         self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
     }
 
-    /// The rigid motions of the free body.
+    /// Return the rigid motions of the free body.
     pub fn free(&self) -> Vec<RigidMotion<D>> {
         rigid::of(&self.facts.extent, self.space.axisymmetric)
     }
 
-    /// What a rigid motion does at the dofs of a node.
+    /// Return the displacements of the dofs of a node in a rigid motion.
     pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
         self.held.frame.at(node, |node| self.at(motion, node))
     }
 
-    /// What a rigid motion does at a dof.
+    /// Return the displacement of a dof in a rigid motion.
     pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
         self.held.frame.dof(dof, |node| self.at(motion, node))
     }
 
-    /// Return the products of rigid motions over all dofs but the `prescribed` ones, and the work that the load vector does on each.
+    /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
+    /// motion.
     pub fn products(
         &self,
         motions: &[RigidMotion<D>],
@@ -103,17 +104,17 @@ impl<'a, const D: usize> Part<'a, D> {
         (products, work)
     }
 
-    /// What a rigid motion does at a node.
+    /// Return the displacement of a node in a rigid motion.
     fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
         motion.at(&self.space.nodes[node as usize])
     }
 
-    /// Return the places of all nodes in the scene.
+    /// Return the coordinates of all nodes in the scene.
     pub fn places(&self) -> impl Iterator<Item = [f64; 3]> + Clone {
         self.space.nodes.iter().map(|&x| self.space.in_scene(x))
     }
 
-    /// Return the dof at which a value is largest, of equal ones the last; `size` has none for dofs that do not count.
+    /// Return the dof with the largest value, the last one of equal values. `size` is `None` for dofs that are excluded.
     pub fn largest(&self, size: impl Fn(usize) -> Option<f64>) -> Option<Candidate> {
         let all = (0..self.space.dofs()).filter_map(|dof| Some(Candidate { dof, size: size(dof)? }));
         all.max_by(|a, b| a.size.total_cmp(&b.size))
@@ -124,14 +125,15 @@ impl<'a, const D: usize> Part<'a, D> {
         self.held.prescribed.insert(found.dof, 0.0);
     }
 
-    /// Prescribed (dof, value), sorted by dof.
+    /// Return the prescribed (dof, value), sorted by dof.
     pub fn prescribed_sorted(&self) -> Vec<(usize, f64)> {
         let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
         all.sort_unstable_by_key(|entry| entry.0);
         all
     }
 
-    /// Weights of those of `count` motions that neither supports nor springs hold; `u` is what a motion does at a node.
+    /// Return the weights of those combinations of `count` motions that neither supports nor springs resist. `u(k, node)` is the
+    /// displacement of motion k at a node.
     pub fn left(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
         let left = self.left_by_supports(count, u);
         let springs = self.springs.concat();
@@ -143,7 +145,8 @@ impl<'a, const D: usize> Part<'a, D> {
         rigid::left_by_supports(count, value, &self.prescribed_sorted())
     }
 
-    /// The rigid motions that supports leave, with the stiffness of the springs in terms of them; none without springs.
+    /// Return the rigid motions that supports leave, with the stiffness of the springs in terms of them. The result is `None`
+    /// without springs.
     pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
         let springs = self.springs.concat();
         if springs.is_empty() {
@@ -156,19 +159,19 @@ impl<'a, const D: usize> Part<'a, D> {
         Some((left, stiffness))
     }
 
-    /// Return the nodal forces of the loads, but for those on rigid surfaces. Supports are not regarded.
+    /// Return the nodal forces of the loads without those on rigid surfaces. Supports are not taken into account.
     ///
     /// # Errors
-    /// Loads that are not finite somewhere, and surfaces that are not of the body or have no area.
+    /// A load is not finite somewhere, or a surface is not on the body or has no area.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let load = body_force(self.spec, &self.space, Parts::Whole)?.and(self.on_surfaces(mesh, Parts::Whole)?);
         if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) }
     }
 
-    /// Return what the quadrature of the nodal forces of all loads misses; empty where all loads are constant.
+    /// Return the nodal forces of all loads that the quadrature misses. The result is empty if all loads are constant.
     ///
     /// # Errors
-    /// Those of [`Part::load`].
+    /// See [`Part::load`].
     pub fn unloaded(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
@@ -188,17 +191,17 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(missed)
     }
 
-    /// Return what the quadrature of the nodal forces of loads on surfaces misses.
+    /// Return the nodal forces of loads on surfaces that the quadrature misses.
     ///
     /// # Errors
-    /// Those of [`Part::load`].
+    /// See [`Part::load`].
     pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let whole: NodalForces<D> =
             self.on_surfaces(mesh, Parts::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
         Ok(self.on_surfaces(mesh, Parts::Halves)?.and(whole))
     }
 
-    /// Nodal forces of all loads on surfaces that are not rigid.
+    /// Return the nodal forces of all loads on surfaces that are not rigid.
     fn on_surfaces(&self, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
         let mut load = NodalForces::default();
         for spec in &self.spec.load {
@@ -207,7 +210,7 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(load)
     }
 
-    /// Nodal forces of `factor` times a load of the scene, unless its surface is rigid.
+    /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
     fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
         let group = find_group(mesh, &spec.on, &[D - 1], "load")?;
@@ -240,10 +243,10 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(load)
     }
 
-    /// Sum of the nodal forces of a load of the scene at its full value, unless its surface is rigid.
+    /// Return the sum of the nodal forces of a load of the scene at its full value. It is zero if the surface is rigid.
     ///
     /// # Errors
-    /// Those of [`Part::load`].
+    /// See [`Part::load`].
     pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
         let mut sum = [0.0; 3];
         for (_, force) in self.on_surface(spec, 1.0, mesh, Parts::Whole)?.iter() {
@@ -252,7 +255,7 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(sum)
     }
 
-    /// Forces on rigid surfaces: a node of each, and the force (x, y, z).
+    /// Return the forces on rigid surfaces: a node of each, and the force (x, y, z).
     pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; 3])> + '_ {
         self.held.rigid.iter().filter_map(|(index, nodes)| {
             let load = &self.spec.load[*index];
@@ -269,7 +272,7 @@ impl<'a, const D: usize> Part<'a, D> {
         load.iter().chain(rigid).map(|(node, force)| self.held.frame.force(node, force)).collect()
     }
 
-    /// The load vector f at all dofs, from the nodal forces at all nodes.
+    /// Return the load vector f at all dofs, from the nodal forces at all nodes.
     pub fn load_vector(&self, load: &NodalForces<D>) -> Vec<f64> {
         let mut load = load.all(self.space.nodes.len());
         for (node, total) in self.rigid_forces() {
@@ -279,18 +282,18 @@ impl<'a, const D: usize> Part<'a, D> {
         load
     }
 
-    /// The nodes that linear displacements have, sorted.
+    /// Return the nodes of linear displacements, sorted.
     pub fn coarse_nodes(&self) -> Vec<u32> {
         coarse_nodes(&self.space, &self.held.frame)
     }
 
-    /// Interpolation of the dofs from those at these nodes.
+    /// Return the interpolation of the dofs from those at these nodes.
     pub fn interpolation(&self, coarse: &[u32]) -> Interpolation {
         from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
-    /// K on its graph, f and supports; `carried` is the rigid motion that was taken out of `prescribed`, if any. The graph may have the
-    /// rows of some nodes only, and then so have K and f.
+    /// Assemble K on its graph, with f and the supports. `carried` is the rigid motion that was subtracted from `prescribed`, if
+    /// any. If the graph has the rows of some nodes only, so have K and f.
     pub fn assemble(
         &self,
         mesh: &Mesh<D>,
@@ -316,7 +319,7 @@ impl<'a, const D: usize> Part<'a, D> {
         }
         self.springs.iter().for_each(|springs| assemble::add_blocks(graph, springs, &mut stiffness));
         self.held.frame.turn_matrix(&mut stiffness);
-        // rows that other ranks have
+        // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
         Ok(support(stiffness, load, prescribed, carried))
     }
@@ -325,7 +328,7 @@ impl<'a, const D: usize> Part<'a, D> {
 /// Return the nodal forces of the body force.
 ///
 /// # Errors
-/// A force that is not finite somewhere, or beyond the range of numbers.
+/// The force is not finite somewhere, or beyond the range of numbers.
 fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = Values::of("this body force", &name.value);
@@ -342,7 +345,7 @@ fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -
     Ok(load)
 }
 
-/// The refusal of loads that only together are beyond the range of numbers.
+/// Return the error of loads whose sum is beyond the range of numbers.
 fn too_large(spec: &BodySpec) -> Error {
     Error::scene(&spec.name.place, format!("body `{}`: its loads together are too large", spec.name.value))
         .label("their forces are beyond the range of numbers")

@@ -17,7 +17,7 @@ use std::rc::Rc;
 /// Return the bodies with their spaces, elasticity, supports and springs.
 ///
 /// # Errors
-/// Refusals of the scene against its mesh.
+/// The scene contradicts its mesh.
 pub fn parts<'a, const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
@@ -42,7 +42,7 @@ pub fn parts<'a, const D: usize>(
 /// Return the space of a body.
 ///
 /// # Errors
-/// A mesh without its cells, and bodies of revolution with points of negative radius.
+/// The mesh lacks the cells of the body, or a body of revolution has points of negative radius.
 fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Result<Space<D>> {
     let space = Space::new(mesh, find_group(mesh, &spec.name, &[D], "body")?, spec.order);
     if plane != Plane::Axisymmetric {
@@ -56,7 +56,7 @@ fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Resul
     Err(Error::mesh(&mesh.path, None, message).help(help))
 }
 
-/// Return facts of a body whose nodes are these `points` of the mesh.
+/// Return the facts of a body whose nodes are these `points` of the mesh.
 fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> BodyFacts {
     let cells = space.cell_count();
     let volume = (0..cells).map(|cell| space.share(cell)).collect::<Total>().value();

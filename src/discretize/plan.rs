@@ -1,4 +1,5 @@
-//! The factory's plan of all bodies. It asks for facts about each body, decides on solvers, and says which bodies share a matrix.
+//! The factory's plan of all bodies. The factory requests facts about each body, chooses solvers, and decides which bodies share
+//! a matrix.
 
 use super::carried::Supported;
 use super::couplings::Coupled;
@@ -10,10 +11,10 @@ use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::fem::rigid::AtDofs;
 
-/// Let the factory plan the solvers of all bodies.
+/// Return the factory's plan of the solvers of all bodies.
 ///
 /// # Errors
-/// Those of [`Factory::plan`].
+/// See [`Factory::plan`].
 pub fn plan<const D: usize, F: Factory>(
     parts: &[Part<D>],
     interfaces: &[Interface<D>],
@@ -21,7 +22,7 @@ pub fn plan<const D: usize, F: Factory>(
     coupled: &Coupled<D>,
     factory: &mut F,
 ) -> Result<F::Plan> {
-    // facts of a body are found when they are requested
+    // Facts of a body are computed when they are requested.
     let graphs: Vec<_> = (0..parts.len()).map(|body| move || coupled.graph(body)).collect();
     let at = |body: usize| move |k: usize, dof: usize| parts[body].dof_of(&interfaces[body].free[k], dof);
     let at: Vec<_> = (0..parts.len()).map(at).collect();

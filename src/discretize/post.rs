@@ -1,4 +1,4 @@
-//! What a body says of its displacements once they are found: fields for output, forces, errors against a known answer; each rank of its
+//! Evaluation of the displacements of a body: fields for output, forces, errors against a known solution. Each rank evaluates its
 //! part.
 
 use super::approach::Outer;
@@ -12,20 +12,20 @@ use crate::fem::{norms, strain, strain::Strained, stress};
 use crate::output::{BodyField, CellKind};
 use crate::problem::BodySpec;
 
-/// A part of a body, evaluated for states of the dofs of its nodes, whatever the dimension.
+/// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
 pub trait Post {
-    /// Displacements and stresses of the cells that this rank shows. `bent` is the same state without the rigid
-    /// motion that supports leave: beside a large one the digits of the deformation are few.
+    /// Return displacements and stresses of the cells that this rank writes. `bent` is the state without the rigid motion that
+    /// supports leave. Stresses come from `bent`, since a large rigid motion leaves few digits to the deformation.
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
 
-    /// The largest strain in the cells that this rank shows; `bent` as in [`Post::field`].
+    /// Return the largest strain in the cells that this rank writes. `bent` is as in [`Post::field`].
     fn strain(&self, bent: &[f64]) -> Strained;
 
-    /// Forces on the own nodes, under the forces omega p of the contact rows of the body.
+    /// Return the forces on the owned nodes under the forces omega p of the contact rows of the body.
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
 
-    /// Forces that lack balance on the own nodes, under the forces omega p of the contact rows; `bent` as in [`Post::field`], `springs` are the
-    /// stiffnesses omega kappa of these rows.
+    /// Return the unbalanced forces on the owned nodes under the forces omega p of the contact rows. `bent` is as in
+    /// [`Post::field`]. `springs` are the stiffnesses omega kappa of these rows.
     fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced;
 
     /// See `Forces::rough`.
@@ -43,29 +43,30 @@ pub trait Post {
     /// See `Forces::trace`.
     fn trace(&self, field: &[f64]) -> Vec<f64>;
 
-    /// What own nodes add to the mean displacement of where the body is loaded along a direction, else of where it is held along it, else of all
-    /// of it.
+    /// Return the contribution of the owned nodes to the mean displacement (x, y, z) of the outer part of the body. The outer
+    /// part is where the body is loaded along `direction`, else where it is constrained along it, else the whole body.
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
 
-    /// Norms of the error against the scene's known displacements, and of these, on the cells that this rank shows, if the scene has them: L2
-    /// norm, H1 seminorm, energy norm ([`norms::error`]).
+    /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are
+    /// the L2 norm, the H1 seminorm and the energy norm ([`norms::error`]) on the cells that this rank writes. The result is
+    /// `None` if the scene has no known displacements.
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
 
-/// [`Post`] in `D` dimensions.
+/// The implementation of [`Post`] in `D` dimensions.
 pub struct OnPart<const D: usize> {
     name: String,
-    /// BodyFacts displacements, if the scene has them.
+    /// Known displacements, if the scene has them.
     exact: Option<Vec<Expression>>,
     outer: Outer,
     forces: Forces<D>,
 }
 
 impl<const D: usize> OnPart<D> {
-    /// Of a part of a body.
+    /// Make the evaluation of a part of a body.
     ///
     /// # Errors
-    /// A known displacement that is not finite at a node.
+    /// A known displacement is not finite at a node.
     pub fn new(spec: &BodySpec, outer: Outer, forces: Forces<D>) -> Result<Self> {
         let space = &forces.part.space;
         let places = || space.nodes.iter().map(|&x| space.in_scene(x));
@@ -80,7 +81,7 @@ impl<const D: usize> OnPart<D> {
         Ok(Self { name: spec.name.value.clone(), exact: spec.exact.clone(), outer, forces })
     }
 
-    /// Displacements of the nodes of the part.
+    /// Return the displacements of the nodes of the part.
     fn nodal(&self, v: &[f64]) -> Vec<f64> {
         self.forces.held.frame.displacements(v)
     }

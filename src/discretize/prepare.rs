@@ -1,4 +1,4 @@
-//! What the first rank does alone: all of a problem but its matrices, and what each rank gets of it.
+//! The work of the first rank alone: a problem without its matrices, and what each rank receives of it.
 
 use super::carried::{Supported, supported};
 use super::couplings::Coupled;
@@ -26,13 +26,13 @@ use crate::problem::{BodySpec, Plane};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
-/// What all ranks know of a prepared problem.
+/// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, P: Plain")]
 pub struct Shared<const D: usize, P> {
     /// Bodies in the order of the scene.
     pub bodies: Vec<SharedBody<D>>,
-    /// The arrays of the method.
+    /// Arrays on which the method works.
     pub pairs: Vec<ContactPair>,
     /// Origin of each pair.
     pub contacts: Vec<SharedContact>,
@@ -42,11 +42,11 @@ pub struct Shared<const D: usize, P> {
     pub balanced: Vec<Balanced>,
     /// Integration points of each pair, if meshes are kept.
     pub fine: Vec<contact::Fine<D>>,
-    /// The choice of solvers.
+    /// Choice of solvers.
     pub plan: P,
 }
 
-/// What all ranks know of the origin of a pair.
+/// What all ranks have of the origin of a pair.
 #[derive(Serialize, Deserialize)]
 pub struct SharedContact {
     origin: Origin,
@@ -55,13 +55,13 @@ pub struct SharedContact {
 }
 
 impl SharedContact {
-    /// Return it with what the scene says.
+    /// Return the facts of the pair, including its description in the scene.
     pub fn info(self, scene: &Scene) -> ContactInfo {
         ContactInfo { spec: self.origin.spec(scene), swapped: self.swapped, surface: self.surface }
     }
 }
 
-/// All bodies as a whole, before their matrices are assembled, and which ranks own their nodes.
+/// All bodies before their matrices are assembled, with the ranks that own their nodes.
 pub struct Whole<'a, const D: usize> {
     bodies: Vec<Unassembled<'a, D>>,
     partitions: Vec<Partition>,
@@ -69,11 +69,11 @@ pub struct Whole<'a, const D: usize> {
     keep: bool,
 }
 
-/// What a rank has of each body, and which nodes K couples in it, where that is known.
+/// What a rank has of each body, and the coupling of its nodes by K, if it was computed.
 pub type Locals<const D: usize> = Vec<(Option<LocalBody<D>>, Option<NodeGraph>)>;
 
 impl<const D: usize> Whole<'_, D> {
-    /// Give all to the only rank.
+    /// Return everything, for the only rank.
     pub fn into_locals(self) -> Locals<D> {
         let local = |mut body: Unassembled<D>| {
             let graph = body.graph.take();
@@ -82,7 +82,7 @@ impl<const D: usize> Whole<'_, D> {
         self.bodies.into_iter().map(local).collect()
     }
 
-    /// Return what a rank gets of each body.
+    /// Return what a rank receives of each body.
     pub fn on(&self, rank: usize) -> Vec<Option<LocalBody<D>>> {
         let of_body = |(index, body): (usize, &Unassembled<D>)| {
             let is_owned = body.owner == rank;
@@ -95,15 +95,15 @@ impl<const D: usize> Whole<'_, D> {
     }
 }
 
-/// Return the partition that a body is in, and its number there; none if it stays whole.
+/// Return the partition that contains a body, and the index of the body there. The result is `None` if the body stays whole.
 fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)> {
     partitions.iter().find_map(|partition| Some((partition, partition.bodies.binary_search(&body).ok()?)))
 }
 
-/// Prepare a scene on its mesh for so many `ranks`; see [`discretize`](super::discretize).
+/// Prepare a scene on its mesh for this number of `ranks`; see [`discretize`](super::discretize).
 ///
 /// # Errors
-/// Refusals of the scene against its mesh, and failures of `factory`.
+/// The scene contradicts its mesh, or `factory` fails.
 pub fn prepare<'a, const D: usize, F: Factory>(
     scene: &Scene,
     verified: &Verified<D>,
@@ -158,16 +158,16 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     Ok((shared, Whole { bodies: whole, partitions, keep }))
 }
 
-/// The next of a list that has one entry for each body.
+/// Return the next entry of a list that has one entry for each body.
 fn next<T>(each: &mut std::vec::IntoIter<T>) -> T {
     each.next().unwrap_or_else(|| unreachable!("there is one for each body"))
 }
 
-/// What pairs of surfaces come to.
+/// The pairs of surfaces.
 struct Paired<const D: usize> {
     pairs: Vec<ContactPair>,
     contacts: Vec<SharedContact>,
-    /// Integration points of each, if meshes are kept.
+    /// Integration points of each pair, if meshes are kept.
     fine: Vec<contact::Fine<D>>,
 }
 
@@ -197,8 +197,8 @@ fn interfaces_of<const D: usize>(
     interfaces.map(|(part, segments)| Interface::new(part, segments, pairs, mesh)).collect()
 }
 
-/// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. Bodies that are not distributed stay whole, and each
-/// rank gets about as many of their dofs as the others.
+/// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not distributed
+/// stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
 fn owners<const D: usize>(parts: &[Part<D>], partitions: &[Partition], ranks: usize) -> Vec<(usize, Vec<usize>)> {
     let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { parts[body].space.dofs() };
     let owners = crate::parallel::owners(&(0..parts.len()).map(dofs).collect::<Vec<_>>(), ranks);
@@ -209,7 +209,7 @@ fn owners<const D: usize>(parts: &[Part<D>], partitions: &[Partition], ranks: us
     owners.into_iter().enumerate().map(of_body).collect()
 }
 
-/// What the user should know of the elasticity of a body.
+/// Return a warning for the user about the elasticity of a body, if there is reason for one.
 fn warning<const D: usize>(part: &Part<D>, plane: Plane) -> Option<String> {
     elastic::warning(part.spec, elastic::poisson(part.spec, D, part.places(), plane))
 }

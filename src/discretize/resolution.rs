@@ -1,4 +1,4 @@
-//! What the mesh of a contact surface leaves out of a gap that varies faster than its nodes can follow.
+//! The part of a gap that the mesh of a contact surface misses because the gap varies faster than its nodes can follow.
 
 use super::surface::ContactSurface;
 use crate::contact::Carriers;
@@ -7,29 +7,29 @@ use crate::fem::element;
 use crate::output::vtu::CellKind;
 use crate::problem::order::Order;
 
-/// How a mesh follows a gap g: compared with I g, which has the values of g at the contact points of each facet and goes
-/// between them as pressures do.
+/// How well a mesh follows a gap g. It is compared with its interpolation I g, which has the values of g at the contact points of
+/// each facet and varies between them as pressures do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resolution {
-    /// Root mean square of g from its mean over the surface.
+    /// Root mean square of g minus its mean over the surface.
     pub height: f64,
-    /// Share of the variance that is left out: the integral of (g - I g)^2 over that of (g - mean g)^2.
+    /// Share of the variance that the mesh misses: the integral of (g - I g)^2 over that of (g - mean g)^2.
     pub variance: f64,
     /// Share of the surface whose facets have a root mean square of g - I g above a tenth of the height.
     pub area: f64,
-    /// Mean length of the facets' sides.
+    /// Mean length of the sides of the facets.
     pub side: f64,
 }
 
-/// Places to look at in all: a second of one core (two faces with 1024 x 1024 heights took 0.5 to 0.8 s). Facets are looked at less closely
-/// beyond.
+/// Largest number of sample points in all. They take about a second of one core: two faces with 1024 x 1024 heights took 0.5 to
+/// 0.8 s. Surfaces that need more are sampled less densely.
 const MOST: usize = 4_000_000;
-/// Sub-intervals of a side at least: a wave of the length of a facet shows in each of four.
+/// Smallest number of sub-intervals of a side. A wave of the length of a facet shows in each of four.
 const LEAST: usize = 4;
-/// Share of the height above which a facet misses the gap. An error that is as large as this everywhere is a hundredth of the variance.
+/// Share of the height above which a facet misses the gap. An error of this size everywhere is a hundredth of the variance.
 const MISSED: f64 = 0.1;
 
-/// How a surface follows a gap that has no detail below a length.
+/// Return how well a surface follows a gap that has no detail below the length `detail`.
 pub fn resolution(surface: &ContactSurface, gap: &Field, detail: f64) -> Resolution {
     let (cell, facets) = surface.facets();
     let facets: Vec<Facet> = facets.map(|(nodes, carriers)| Facet { nodes, carriers, gap }).collect();
@@ -66,7 +66,7 @@ struct Facet<'a> {
     gap: &'a Field,
 }
 
-/// Means over a facet: of g, of g^2, of (g - I g)^2.
+/// Means over a facet: of g, of g^2, and of (g - I g)^2.
 #[derive(Default)]
 struct Misses {
     value: f64,
@@ -75,17 +75,17 @@ struct Misses {
 }
 
 impl Facet<'_> {
-    /// Of the plane, in equal pieces.
+    /// Return the means over a facet in the plane, cut into equal intervals.
     fn along(&self, order: Order, cuts: usize) -> Misses {
         let places = (0..cuts).map(|k| (k as f64 + 0.5) / cuts as f64);
         self.misses(order, places.map(|t| [1.0 - t, t]))
     }
 
-    /// A triangle, in equal ones.
+    /// Return the means over a triangle, cut into equal triangles.
     fn across(&self, order: Order, cuts: usize) -> Misses {
         let rows = (0..cuts).flat_map(|j| (0..2 * (cuts - j) - 1).map(move |i| (i, j)));
         let centre = |(i, j): (usize, usize)| {
-            // every second one stands on its tip
+            // Every second triangle of a row stands on its tip.
             let shift = if i % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 };
             let [u, v] = [(i / 2) as f64 + shift, j as f64 + shift].map(|steps| steps / cuts as f64);
             [1.0 - u - v, u, v]
@@ -99,7 +99,7 @@ impl Facet<'_> {
         for place in places {
             let (shape, held) = (element::values(order, &place), self.carriers.interpolation(order, &place));
             let x = std::array::from_fn(|c| self.nodes.iter().zip(shape).map(|(node, shape)| shape * node[c]).sum());
-            // nodes that are no contact points count nothing, also where they have no value
+            // Nodes that are not contact points contribute nothing, even where the gap has no value.
             let held = values.iter().zip(held).filter(|(_, share)| *share != 0.0).map(|(value, share)| share * value);
             let (found, held) = (self.gap.eval(x), held.sum::<f64>());
             if found.is_finite() && held.is_finite() {
@@ -113,16 +113,16 @@ impl Facet<'_> {
         Misses { value: sums.value / count, square: sums.square / count, miss: sums.miss / count }
     }
 
-    /// Mean length of the sides; of a facet in the plane its own.
+    /// Return the mean length of the sides. In the plane it is the length of the facet.
     fn side(&self, corners: usize) -> f64 {
         (0..corners).map(|k| distance(self.nodes[k], self.nodes[(k + 1) % corners])).sum::<f64>() / corners as f64
     }
 
-    /// Length or area with straight sides.
+    /// Return the length or area of the facet with straight sides.
     fn measure(&self, corners: usize) -> f64 {
         let [a, b, c] = [0, 1, 2].map(|k| distance(self.nodes[k % corners], self.nodes[(k + 1) % corners]));
         let half = 0.5 * (a + b + c);
-        // Heron's formula
+        // This is Heron's formula.
         if corners == 2 { a } else { (half * (half - a) * (half - b) * (half - c)).max(0.0).sqrt() }
     }
 }

@@ -1,4 +1,4 @@
-//! The single bodies of a scene in which tables, and lines in them, stand for many by patterns of names.
+//! The single bodies of a scene. Its tables, and the lines in them, may stand for many bodies by patterns of names.
 
 use super::find::find_group;
 use crate::error::{Error, Located, Place, Result, few};
@@ -8,13 +8,13 @@ use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
 use crate::scene::Scene;
 use std::collections::{BTreeSet, HashMap};
 
-/// The bodies of a scene: table by table, those of a pattern in the order of the mesh.
+/// Return the bodies of a scene, table by table. The bodies of a pattern are in the order of the mesh.
 ///
-/// A body that several tables match is that of the narrowest. What acts on groups named by a pattern acts on all that match and lie
-/// on the body; in a table of a pattern every line acts on those bodies on which its group lies.
+/// A body that several tables match belongs to the narrowest one. A line on groups named by a pattern acts on all groups that
+/// match and lie on the body. In a table of a pattern, every line acts on those bodies on which its group lies.
 ///
 /// # Errors
-/// Patterns that match nothing, two tables equally near to a body, groups that cannot name bodies, a total force on several
+/// A pattern matches nothing, two tables match a body equally well, a group cannot name a body, or a total force acts on several
 /// surfaces.
 pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> Result<Vec<BodySpec>> {
     if !scene.bodies.iter().any(is_plural) {
@@ -58,24 +58,24 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
     Ok(bodies)
 }
 
-/// Whether a table stands for several bodies, or has lines for several groups.
+/// Return whether a table stands for several bodies, or has lines for several groups.
 fn is_plural(table: &BodySpec) -> bool {
     let lines = table.fix.iter().map(|line| &line.on).chain(table.load.iter().map(|line| &line.on));
     let lines = lines.chain(table.spring.iter().map(|line| &line.on)).chain(table.regions.iter().map(|line| &line.on));
     is_pattern(&table.name.value) || lines.into_iter().any(|on| is_open(&on.value))
 }
 
-/// Whether the name of a group is a pattern, or made from that of the body.
+/// Return whether the name of a group is a pattern, or contains the placeholder for the name of the body.
 fn is_open(on: &str) -> bool {
     is_pattern(on) || on.contains(BODY)
 }
 
-/// A name or pattern of the scene, whose spelling was checked with it.
+/// Return the pattern of a name of the scene. Its spelling was checked with the scene.
 pub fn pattern(name: &Located<String>) -> Result<Pattern<'_>> {
     Pattern::new(&name.value).map_err(|flaw| Error::scene(&name.place, flaw))
 }
 
-/// The names of the bodies of each table.
+/// Return the names of the bodies of each table.
 fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
     let patterns = scene.bodies.iter().map(|table| pattern(&table.name)).collect::<Result<Vec<_>>>()?;
     let single = (0..patterns.len()).filter(|&table| !patterns[table].is_plural());
@@ -114,20 +114,21 @@ fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Ve
     }
 }
 
-/// The refusal of two patterns of which none is nearer to a body, or to a pair of bodies.
+/// Return the error of two patterns that match a body, or a pair of bodies, equally well.
 pub fn tie(what: &str, [first, second]: [&str; 2], place: &Place) -> Error {
     Error::scene(place, format!("`{first}` and `{second}` match `{what}` equally well"))
         .label("this one and an earlier one")
         .help("the name itself wins, then the pattern with more characters of its own: give one of them more")
 }
 
-/// Numbers of the groups that lie on each body, body by body of each table; none where no table or line stands for many.
+/// Indices of the groups that lie on each body, for the bodies of each table in turn. The list is empty if no table or line
+/// stands for many.
 pub type Lying = Vec<Vec<u32>>;
 
-/// Return the groups that lie on each body: its own cells, and those of which it has all corners of an element.
+/// Return the groups that lie on each body: its own cells, and each group with an element whose corners all belong to the body.
 ///
 /// # Errors
-/// Patterns of bodies that match nothing or too much.
+/// A pattern of bodies matches nothing or too much.
 pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(Vec::new());
@@ -166,7 +167,7 @@ pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
     Ok(lying)
 }
 
-/// What a table says of groups, and the groups on each of its bodies.
+/// A table with its bodies, and the groups on each of them.
 struct Lines<'a, const D: usize> {
     table: &'a BodySpec,
     mesh: &'a Mesh<D>,
@@ -175,8 +176,8 @@ struct Lines<'a, const D: usize> {
 }
 
 impl<const D: usize> Lines<'_, D> {
-    /// The lines of one key for each body, every one with the name of a single group. `kinds` are the dimensions of the groups that a
-    /// line can act on.
+    /// Return the lines of one key for each body, each with the name of a single group. `kinds` are the dimensions of the groups
+    /// on which a line can act.
     fn deal<'k, T: Clone>(
         &self,
         lines: &[T],
@@ -212,7 +213,7 @@ impl<const D: usize> Lines<'_, D> {
         Ok(given)
     }
 
-    /// The refusal of a line that acts on no body.
+    /// Return the error of a line that acts on no body.
     fn acts_nowhere(&self, on: &Located<String>, what: &str, kinds: &[usize]) -> Error {
         if let (false, Err(error)) = (is_open(&on.value), find_group(self.mesh, on, kinds, what)) {
             return error;

@@ -1,15 +1,18 @@
-//! Rigid motions along the own surface of a body, which contact cannot resist: the spin of a roller, of a ball, of a ring in a press fit, a block that slides
-//! on rollers. Only the facets of a mesh do, or the normals of the other surface, if points lie there.
+//! Rigid motions along the own surface of a body, which contact cannot resist. Examples are the spin of a roller, of a ball, or
+//! of a ring in a press fit, and a block that slides on rollers. Such a motion is resisted only by the facets of the mesh. If
+//! points lie on the other surface, the normals of that surface may resist it, too.
 //!
-//! A normal of a meshed surface is the mean of the facets around it, and known up to the angle between them. So a motion m is free as far as the mesh can tell if
+//! A normal of a meshed surface is the mean of the facets around it, so it is uncertain by the angle between them. Therefore the
+//! mesh cannot show that a motion m is resisted if
 //!
 //! ```text
 //! |n_q . m(x_q)| <= 2 s_q |m(x_q)|       at every contact point q of the body,
 //! ```
 //!
-//! where s_q is the largest difference between unit normals of facets and nodes near q ([`Side::spread`](crate::contact::Side::spread)). The true normal lies
-//! between the facets, so the motion of a round body along itself has at most s_q on every mesh. That motion is found from the normals, weighted by 1/s_q, and is
-//! off by as much again. On flat facets s_q is rounding, and no motion passes that contact feels.
+//! where n_q is the normal at the point x_q, and s_q is the largest difference between unit normals of facets and nodes near q
+//! ([`Side::spread`](crate::contact::Side::spread)). The true normal lies between the facets. So the motion of a round body along
+//! itself has a quotient |n_q . m| / |m| of at most s_q on every mesh. That motion is found from the normals, weighted by 1/s_q,
+//! and its own error is as large again. On flat facets s_q is rounding, and no motion passes that contact resists.
 
 use super::interface::Interface;
 use crate::contact::ContactPair;
@@ -18,17 +21,18 @@ use crate::linalg::{Blocks, TOLERANCE, dot};
 use crate::model::Segment;
 use nalgebra::{DMatrix, DVector};
 
-/// How many times the difference between facets and their mean a motion may close: once for the normal, once for the motion itself.
+/// Multiple of the difference between facets and their mean by which a motion may close a point: once for the normal, and once
+/// for the motion itself.
 const UNSURE: f64 = 2.0;
 
 /// A contact point on the own surface of a body.
 struct Point<const D: usize> {
-    /// Where it is, measured from the datum.
+    /// Position, measured from the datum.
     at: [f64; D],
     normal: [f64; D],
-    /// How well the normal is known: s_q.
+    /// Uncertainty s_q of the normal.
     spread: f64,
-    /// Root of its share in the weight of all points.
+    /// Square root of the share of its area in the area of all points.
     root: f64,
 }
 
@@ -54,7 +58,7 @@ impl<const D: usize> Points<D> {
         Self(points)
     }
 
-    /// Return those combinations of motions that only facets resist, pure motions as such.
+    /// Return the combinations of motions that only facets resist. Pure motions are returned as such.
     pub fn along_surface(&self, motions: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
         let rows = D * self.0.len();
         let moved = DMatrix::from_fn(rows, motions.len(), |row, j| {
@@ -70,7 +74,7 @@ impl<const D: usize> Points<D> {
         pure(&round).iter().map(|weights| rigid::combine(motions, weights)).collect()
     }
 
-    /// Whether a motion closes no point by more than that.
+    /// Return whether the motion closes no point by more than its uncertainty allows.
     fn passes(&self, motion: &RigidMotion<D>) -> bool {
         self.0.iter().all(|point| {
             let moved = motion.at(&point.at);
@@ -79,9 +83,10 @@ impl<const D: usize> Points<D> {
     }
 }
 
-/// Right singular vectors x of A with |A x|^2 <= most^2 x'B x, B positive semidefinite; what B does not see is left out.
+/// Return the right singular vectors x of A with |A x|^2 <= most^2 x'B x, where B is positive semidefinite. The kernel of B is
+/// excluded.
 fn lowest(a: &DMatrix<f64>, b: &DMatrix<f64>, most: f64) -> Vec<DVector<f64>> {
-    // decompositions of what is no number do not end
+    // Decompositions of matrices with NaN or infinite entries do not terminate.
     if b.is_empty() || a.iter().chain(b).any(|value| !value.is_finite()) {
         return Vec::new();
     }
@@ -92,7 +97,7 @@ fn lowest(a: &DMatrix<f64>, b: &DMatrix<f64>, most: f64) -> Vec<DVector<f64>> {
         return Vec::new();
     }
     let basis = DMatrix::from_columns(&basis);
-    // products of A with itself would lose half of the digits, and weights differ by ten orders of magnitude
+    // The product of A with itself would lose half of the digits, and weights differ by ten orders of magnitude.
     let triangle = (a * &basis).qr().r();
     let of_a = triangle.svd(false, true);
     let Some(right) = of_a.v_t else { return Vec::new() };
@@ -100,7 +105,7 @@ fn lowest(a: &DMatrix<f64>, b: &DMatrix<f64>, most: f64) -> Vec<DVector<f64>> {
     low.map(|k| &basis * right.row(k).transpose()).collect()
 }
 
-/// A basis of the span of some vectors in which pure motions come out pure.
+/// Return a basis of the span of some vectors in which pure motions are separate.
 fn pure(vectors: &[DVector<f64>]) -> Vec<DVector<f64>> {
     if vectors.is_empty() {
         return Vec::new();

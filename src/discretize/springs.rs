@@ -1,4 +1,4 @@
-//! Springs of a body to the ground: per area on surfaces, each at the points of point groups.
+//! Springs of a body to the ground. On surfaces their stiffness is per area; on groups of points each point has its own spring.
 
 use super::find::{find_group, not_on_body, of_body, without_area};
 use crate::error::{Error, Result, shown};
@@ -8,10 +8,10 @@ use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, SpringKind, SpringSpec};
 use std::cell::RefCell;
 
-/// The stiffnesses between nodes that a spring of the scene adds to K.
+/// Return the stiffness blocks between nodes that a spring of the scene adds to K.
 ///
 /// # Errors
-/// Groups that are missing or not on the body, stiffnesses that are negative or not finite somewhere.
+/// The group is missing or not on the body, or the stiffness is negative or not finite somewhere.
 pub fn blocks<const D: usize>(
     spring: &SpringSpec,
     spec: &BodySpec,
@@ -59,7 +59,10 @@ pub fn blocks<const D: usize>(
     }
 }
 
-/// A stiffness at a point, which must be finite and not negative.
+/// Return the stiffness at a point.
+///
+/// # Errors
+/// The stiffness is negative or not finite.
 fn stiffness(field: &Field, spring: &SpringSpec, x: [f64; 3]) -> Result<f64> {
     match field.eval_finite("the stiffness of this spring", x)? {
         k if k >= 0.0 => Ok(k),

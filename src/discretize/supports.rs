@@ -12,19 +12,19 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
-/// One condition n.u = value at a node.
+/// One condition n.u = value at a node, with the direction n.
 #[derive(Debug, Clone, Copy)]
 struct Condition<const D: usize> {
     direction: [f64; D],
     value: f64,
-    /// Number of the support in the scene; none for the symmetry of a body of revolution.
+    /// Index of the support in the scene; `None` for the symmetry of a body of revolution.
     support: Option<usize>,
 }
 
-/// A held direction, with the number of its support if it is one.
+/// A constrained direction, with the index of its support if it comes from one.
 type Direction<const D: usize> = ([f64; D], Option<usize>);
 
-/// What the supports and rigid surfaces of a body come to.
+/// The constraints from the supports and rigid surfaces of a body.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
 pub struct Constraints<const D: usize> {
@@ -32,21 +32,21 @@ pub struct Constraints<const D: usize> {
     pub frame: Frame<D>,
     /// Prescribed dofs and their values.
     pub prescribed: HashMap<usize, f64>,
-    /// Independent directions held at each node (at the master of tied ones).
+    /// Independent constrained directions at each node. Those of tied nodes are at their master.
     directions: BTreeMap<u32, Vec<Direction<D>>>,
-    /// Tied nodes of each rigid load, with its number.
+    /// Tied nodes of each rigid load, with the index of the load.
     pub rigid: Vec<(usize, Vec<u32>)>,
 }
 
-/// Directions whose sine is below this are the same.
+/// Sine below which two directions are the same.
 const PARALLEL: f64 = 1e-8;
 
 impl<const D: usize> Constraints<D> {
-    /// Collects the conditions of a body's supports on its nodes.
+    /// Collect the conditions of a body's supports on its nodes.
     ///
     /// # Errors
-    /// Groups that are missing or not on the body, values that are not finite, surfaces that are no planes, and supports or
-    /// rigid loads that contradict each other.
+    /// A group is missing or not on the body, a value is not finite, a surface is not plane, or supports or rigid loads
+    /// contradict each other.
     pub fn new(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<Self> {
         let mut held = Constraints::default();
         held.tie(spec, space, mesh)?;
@@ -81,7 +81,7 @@ impl<const D: usize> Constraints<D> {
         Ok(held)
     }
 
-    /// The same of some nodes, sorted, by their places among these.
+    /// Restrict the constraints to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     pub fn on(&self, nodes: &[u32]) -> Self {
         let here = |node: u32| place(nodes, node);
         let prescribed = |(dof, value): (&usize, &f64)| Some((D * here((dof / D) as u32)? as usize + dof % D, *value));
@@ -95,7 +95,8 @@ impl<const D: usize> Constraints<D> {
         }
     }
 
-    /// In a body of revolution nodes on the axis and rigid surfaces have no radial displacement.
+    /// Return the conditions of symmetry. In a body of revolution, nodes on the axis and rigid surfaces have no radial
+    /// displacement.
     fn symmetry(&self, space: &Space<D>) -> BTreeMap<u32, Vec<Condition<D>>> {
         let radial = Condition { direction: unit(0), value: 0.0, support: None };
         let on_axis = (0..space.nodes.len() as u32).filter(|&node| space.on_axis(node));
@@ -104,7 +105,7 @@ impl<const D: usize> Constraints<D> {
         held.map(|node| (self.frame.node(node), vec![radial])).collect()
     }
 
-    /// Ties the nodes of rigid surfaces.
+    /// Tie the nodes of each rigid surface to its first node.
     fn tie(&mut self, spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<()> {
         let mut taken: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, load) in spec.load.iter().enumerate() {
@@ -137,7 +138,7 @@ impl<const D: usize> Constraints<D> {
         Ok(())
     }
 
-    /// Turns the conditions at a node into prescribed dofs, in axes of their own where they are inclined.
+    /// Turn the conditions at a node into prescribed dofs. If the conditions are inclined, the node gets axes of its own.
     fn hold(&mut self, node: u32, conditions: &[Condition<D>], spec: &BodySpec, space: &Space<D>) -> Result<()> {
         let mut basis: Vec<([f64; D], f64)> = Vec::new();
         let kept = self.directions.entry(node).or_default();
@@ -151,7 +152,7 @@ impl<const D: usize> Constraints<D> {
             let size = dot(&rest, &rest).sqrt();
             if size > PARALLEL {
                 let axis = rest.map(|r| r / size);
-                // an axis of space stays one to the last digit
+                // A coordinate axis stays exact to the last digit.
                 let along = (0..D).find(|&c| axis[c].abs() > 1.0 - 1e-14);
                 basis.push(along.map_or((axis, value / size), |c| (unit(c), value / size * axis[c].signum())));
                 kept.push((condition.direction, condition.support));
@@ -172,7 +173,7 @@ impl<const D: usize> Constraints<D> {
                     std::array::from_fn(|i| rest[i] - share * axis[i])
                 });
                 let size = dot(&rest, &rest).sqrt();
-                // some axis of space is always this far from a smaller subspace
+                // Some coordinate axis is always this far from a smaller subspace.
                 if axes.len() < D && size > 0.5 {
                     axes.push(rest.map(|r| r / size));
                 }
@@ -186,7 +187,10 @@ impl<const D: usize> Constraints<D> {
         Ok(())
     }
 
-    /// A rigid force must not push along a direction that a support holds.
+    /// Check that no rigid force pushes along a direction that a support constrains.
+    ///
+    /// # Errors
+    /// A rigid force pushes against a support.
     fn refuse_pushed_supports(&self, spec: &BodySpec) -> Result<()> {
         for (index, nodes) in &self.rigid {
             let load = &spec.load[*index];
@@ -209,7 +213,7 @@ impl<const D: usize> Constraints<D> {
         Ok(())
     }
 
-    /// A reaction at a node, split among the supports that hold it there: (support, force).
+    /// Split a reaction at a node among the supports that constrain it: (support, force).
     pub fn split(&self, node: u32, reaction: [f64; D]) -> Vec<(usize, [f64; D])> {
         let Some(directions) = self.directions.get(&node).filter(|directions| !directions.is_empty()) else {
             return Vec::new();
@@ -222,13 +226,13 @@ impl<const D: usize> Constraints<D> {
         directions.iter().enumerate().filter_map(part).collect()
     }
 
-    /// Nodes at which supports act, and tied ones.
+    /// Return the nodes at which supports act, and the tied nodes.
     pub fn nodes(&self) -> impl Iterator<Item = u32> + '_ {
         let tied = self.rigid.iter().flat_map(|(_, nodes)| nodes.iter().copied());
         self.directions.keys().copied().chain(tied)
     }
 
-    /// Number of prescribed dofs that are not those of tied nodes.
+    /// Return the number of prescribed dofs without those of tied nodes.
     pub fn supported(&self) -> usize {
         self.prescribed.len() - D * self.frame.master.len()
     }
@@ -238,7 +242,10 @@ fn unit<const D: usize>(component: usize) -> [f64; D] {
     std::array::from_fn(|c| if c == component { 1.0 } else { 0.0 })
 }
 
-/// The outer unit normal of a plane surface.
+/// Return the outer unit normal of a plane surface.
+///
+/// # Errors
+/// The surface is not plane.
 fn plane<const D: usize>(space: &Space<D>, group: &Group, name: &str, place: &Place) -> Result<[f64; D]> {
     let facets: Facets<D> = space.facets(group);
     let normals = facets.normals(space);
@@ -259,7 +266,7 @@ fn contradiction<const D: usize>(
     other: Option<&Condition<D>>,
     x: [f64; 3],
 ) -> Error {
-    // symmetry comes first: what contradicts it is a support
+    // Conditions of symmetry come first, so a condition that contradicts one is a support.
     let on = condition.support.map_or(&spec.name, |support| &spec.fix[support].on);
     let what = match (0..D).find(|&c| condition.direction[c] == 1.0) {
         Some(c) => format!("the {} displacement", ["x", "y", "z"][c]),

@@ -1,4 +1,5 @@
-//! A contact surface of a pair; its mesh for output: the facets of side a, and where their values come from.
+//! A contact surface of a pair. Its mesh for output holds the facets of side a, and the contact points from which their values
+//! come.
 
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::fem::{Facets, element};
@@ -7,9 +8,9 @@ use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
-/// One surface of a pair: facets of a body.
+/// One surface of a pair, which is a set of facets of a body.
 pub struct Surface<'a, const D: usize> {
-    /// Number of the body.
+    /// Index of the body.
     pub body: usize,
     /// Name of the physical group, or of the body if the pair was found.
     pub name: &'a str,
@@ -17,25 +18,25 @@ pub struct Surface<'a, const D: usize> {
     pub facets: Facets<D>,
 }
 
-/// The facets of the side that carries the points.
+/// The facets of the side that carries the contact points.
 #[derive(Serialize, Deserialize)]
 pub struct ContactSurface {
     points: Vec<[f64; 3]>,
     cell: CellKind,
     connectivity: Vec<u32>,
-    /// For each point of the mesh the contact points that its values come from, with their shares; none where nothing is
-    /// known.
+    /// For each point of the mesh, the contact points from which its values come, with their shares. The list is empty where no
+    /// contact point contributes.
     sources: Vec<Vec<(usize, f64)>>,
-    /// Which nodes of each facet are contact points; none where it is not paired.
+    /// The nodes of each facet that are contact points; `None` if the facet is not paired.
     carriers: Vec<Option<Carriers>>,
     /// Share of each facet that is paired.
     cover: Vec<f64>,
-    /// Why it is not paired as a whole: the number of the reason.
+    /// Number of the reason why a facet is not paired as a whole.
     left: Vec<f64>,
 }
 
 impl ContactSurface {
-    /// The facets of side a; those without a partner have no values.
+    /// Collect the facets of side a. Facets without a partner have no values.
     pub fn new<const D: usize>(a: &Side<D>, pair: &ContactPair) -> Self {
         let of_node: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
         let order = a.facets.order;
@@ -76,7 +77,7 @@ impl ContactSurface {
                 }
             }
         }
-        // a node without a point of its own has the mean of what the facets around it make of theirs
+        // A node that is not a contact point takes the mean of the values that the facets around it interpolate there.
         surface.sources = sums
             .into_iter()
             .map(|(facets, sum)| sum.into_iter().map(|(q, share)| (q, share / facets)).collect())
@@ -89,16 +90,17 @@ impl ContactSurface {
         surface
     }
 
-    /// Kind of the facets; of each that is paired the nodes, and which of them are contact points.
+    /// Return the kind of the facets. For each paired facet, return the coordinates of its nodes and which of them are contact
+    /// points.
     pub fn facets(&self) -> (CellKind, impl Iterator<Item = (Vec<[f64; 3]>, Carriers)> + '_) {
         let nodes = self.connectivity.chunks_exact(self.cell.stride()).zip(&self.carriers);
         let points = |nodes: &[u32]| nodes.iter().map(|&node| self.points[node as usize]).collect();
         (self.cell, nodes.filter_map(move |(nodes, carriers)| Some((points(nodes), (*carriers)?))))
     }
 
-    /// The mesh with arrays of values at the contact points: name, components per point, values. Points of the mesh that no
-    /// contact point serves get NaN; where values are extrapolated, they stay between those that they come from, so that
-    /// a pressure is never negative nor above its peak.
+    /// Return the mesh with arrays of values at the contact points; each array has a name, a number of components per point, and
+    /// its values. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
+    /// come, so that a pressure is never negative nor above its peak.
     pub fn grid(&self, name: String, arrays: &[(&str, usize, Vec<f64>)]) -> Grid {
         let spread = |components: usize, values: &[f64]| {
             let at = |sources: &Vec<(usize, f64)>, c: usize| {
@@ -106,7 +108,7 @@ impl ContactSurface {
                 let extreme =
                     |pick: fn(f64, f64) -> f64| sources.iter().fold(f64::NAN, |all, &(q, _)| pick(all, of(q)));
                 let value: f64 = sources.iter().map(|&(q, share)| share * of(q)).sum();
-                // without sources the bounds are NaN, which `max` would leave out
+                // Without sources the bounds are NaN, which `max` would ignore.
                 if sources.is_empty() { f64::NAN } else { value.max(extreme(f64::min)).min(extreme(f64::max)) }
             };
             self.sources

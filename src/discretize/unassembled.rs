@@ -1,4 +1,4 @@
-//! A body of which all is known but its matrix: as a whole on the first rank, what all ranks know of it, and what one rank has of it.
+//! A body that is ready for assembly: the whole body on the first rank, what all ranks have of it, and what one rank has.
 
 use super::carried::Supported;
 use super::distribute::{Partition, Share};
@@ -19,43 +19,43 @@ use serde::{Deserialize, Serialize};
 /// A whole body before its matrix is assembled, on the first rank.
 #[derive(Clone)]
 pub struct Unassembled<'a, const D: usize> {
-    /// Its space, supports and springs.
+    /// Space, supports and springs.
     pub part: Part<'a, D>,
-    /// Its contact rows and loads.
+    /// Contact rows and loads.
     pub interface: Interface<D>,
-    /// What its supports prescribe.
+    /// Displacements that the supports prescribe.
     pub supported: Supported<D>,
-    /// Which nodes K couples, if the choice of solvers has requested it.
+    /// Coupling of nodes by K, if the choice of solvers has requested it.
     pub graph: Option<NodeGraph>,
-    /// Rank that owns the body, or most of it.
+    /// Rank that owns the body or, if it is distributed, most of it.
     pub owner: usize,
-    /// Ranks that own nodes of it.
+    /// Ranks that own nodes of the body.
     pub ranks: Vec<usize>,
-    /// Sum of its loads, but for those on rigid surfaces.
+    /// Sum of the loads without those on rigid surfaces.
     pub load: [f64; 3],
-    /// What the user should know of its elasticity.
+    /// Warning for the user about the elasticity.
     pub warning: Option<String>,
-    /// Rigid motions that nothing but its mesh resists.
+    /// Rigid motions that only the mesh resists.
     pub gauged: Gauged,
-    /// The rigid motions that supports and springs leave it.
+    /// Rigid motions that supports and springs leave.
     pub unconstrained: Unconstrained<D>,
-    /// Nodal forces that the quadrature of its loads misses, if estimates ask for them.
+    /// Nodal forces that the quadrature of the loads misses, if an estimate of the error needs them.
     pub unloaded: Vec<f64>,
-    /// The same motions on all dofs, if these are distributed.
+    /// The same rigid motions on all dofs, if the dofs are distributed.
     pub on_dofs: Option<OnDofs>,
 }
 
-/// Rigid motions that supports and springs leave a body, on all of its dofs.
+/// The rigid motions that supports and springs leave a body, on all of its dofs.
 #[derive(Clone)]
 pub struct OnDofs {
-    /// Their products over all dofs but prescribed ones.
+    /// Products of the motions over all dofs without the prescribed ones.
     pub products: DMatrix<f64>,
-    /// Work of all loads on each.
+    /// Work of all loads on each motion.
     pub works: Vec<f64>,
 }
 
 impl OnDofs {
-    /// Look at a body under its loads; `unconstrained` has the motions.
+    /// Compute the products and works of the motions in `unconstrained` for a body under its loads.
     pub fn new<const D: usize>(
         part: &Part<D>,
         interface: &Interface<D>,
@@ -68,58 +68,58 @@ impl OnDofs {
     }
 }
 
-/// What all ranks know of a body.
+/// What all ranks have of a body.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct SharedBody<const D: usize> {
-    /// What reports say of it.
+    /// Facts for reports.
     pub info: BodyInfo,
-    /// Its contact rows, pair by pair.
+    /// Contact rows, pair by pair.
     pub segments: Vec<Segment>,
-    /// The rigid motions that supports and springs leave it.
+    /// Rigid motions that supports and springs leave.
     pub unconstrained: Unconstrained<D>,
-    /// Its modulus along the normals of its contact surfaces.
+    /// Modulus along the normals of the contact surfaces.
     pub modulus: f64,
-    /// Its depth behind them.
+    /// Depth of the body behind its contact surfaces.
     pub depth: f64,
-    /// Traces on its contact rows of the rigid motion that supports give it.
+    /// Trace on the contact rows of the rigid motion that supports impose.
     pub carried: Vec<f64>,
 }
 
-/// What one rank has of a body: all of it, or a part on the nodes that this rank needs, with its own numbers.
+/// What one rank has of a body: all of it, or the part on the nodes that this rank needs, with local numbers.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
 pub struct LocalBody<const D: usize> {
-    /// Its nodes and cells.
+    /// Nodes and cells.
     pub space: Space<D>,
-    /// Number of the constants of each cell; empty if the body has no regions.
+    /// Index of the elastic constants of each cell; empty if the body has no regions.
     pub regions: Vec<usize>,
-    /// Its supports and rigid surfaces.
+    /// Supports and rigid surfaces.
     pub held: Constraints<D>,
-    /// Its springs.
+    /// Springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
-    /// Facts of the whole body, and where these nodes come from.
+    /// Facts of the whole body, and the points of the mesh that these nodes come from.
     pub facts: BodyFacts,
-    /// Its contact rows for dofs.
+    /// Contact rows with dofs as columns.
     pub rows: Csr,
-    /// The same for displacements of nodes.
+    /// Contact rows with displacements of nodes as columns.
     pub nodal_rows: Csr,
-    /// Nodal forces of its loads at own nodes, and at nodes tied to these.
+    /// Nodal forces of the loads at owned nodes, and at nodes tied to these.
     pub load: NodalForces<D>,
-    /// What its supports prescribe.
+    /// Displacements that the supports prescribe.
     pub supported: Supported<D>,
-    /// Work of all loads on each rigid motion that supports and springs leave; none where all loads are here.
+    /// Work of all loads on each rigid motion that supports and springs leave; `None` if this rank has all loads.
     pub works: Option<Vec<f64>>,
-    /// Its dofs of this rank, if those of the body are distributed.
+    /// Dofs of this rank, if the body is distributed.
     pub share: Option<Share>,
-    /// Whether this rank owns the body or nodes of it; others have it for estimates of the error.
+    /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
     pub is_owned: bool,
     /// See [`Unassembled::unloaded`].
     pub unloaded: Vec<f64>,
 }
 
 impl<const D: usize> LocalBody<D> {
-    /// Take all of a body.
+    /// Take the whole body.
     pub fn whole(body: Unassembled<D>, is_owned: bool) -> Self {
         let Unassembled { part, interface, supported, unloaded, .. } = body;
         let cells = if part.spec.regions.is_empty() { 0 } else { part.space.cell_count() };
@@ -140,7 +140,8 @@ impl<const D: usize> LocalBody<D> {
         }
     }
 
-    /// Restrict a body, the one with this number in its matrix, to the nodes that a rank needs; all of them if `wants_all`.
+    /// Restrict a body to the nodes that a rank needs, or keep all nodes if `wants_all`. `number` is the index of the body in its
+    /// matrix.
     pub fn restrict(body: &Unassembled<D>, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
         let Unassembled { part, interface, supported, .. } = body;
         let cells = match wants_all {
@@ -181,11 +182,11 @@ impl<const D: usize> LocalBody<D> {
     }
 }
 
-/// What a body is like behind its contact surfaces.
+/// Modulus and depth of a body behind its contact surfaces.
 struct Scales {
-    /// Modulus along their normals.
+    /// Modulus along the normals of the surfaces.
     modulus: f64,
-    /// Area or volume over their length or area; infinite without contact.
+    /// Area (volume) of the body over the length (area) of the surfaces; infinite without contact.
     depth: f64,
 }
 
@@ -199,7 +200,7 @@ impl<const D: usize> Unassembled<'_, D> {
         }
     }
 
-    /// Return what all ranks know of it; its mesh was `checked`.
+    /// Return what all ranks have of the body. `checked` is the result of the check of its mesh.
     pub fn shared(&self, pairs: &[ContactPair], checked: &Checked) -> SharedBody<D> {
         let Scales { modulus, depth } = self.scales(pairs);
         SharedBody {
@@ -212,7 +213,7 @@ impl<const D: usize> Unassembled<'_, D> {
         }
     }
 
-    /// Return the traces on its contact rows of the rigid motion that supports give it.
+    /// Return the trace on the contact rows of the rigid motion that supports impose.
     fn carried(&self) -> Vec<f64> {
         let rows = &self.interface.rows;
         let Some(motion) = &self.supported.carried else { return vec![0.0; rows.rows()] };
@@ -251,7 +252,7 @@ impl<const D: usize> Unassembled<'_, D> {
     }
 }
 
-/// Mean squared components of the normals on the contact surfaces of a body.
+/// Return the mean squared components of the normals on the contact surfaces of a body.
 fn along_axes<'p>(pairs: impl Iterator<Item = &'p ContactPair>) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for pair in pairs {

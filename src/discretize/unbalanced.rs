@@ -1,17 +1,18 @@
-//! Forces that displacements leave without balance in a body, and displacements that show how much energy is in them.
+//! Unbalanced forces of a body at given displacements, and displacements that show how much energy is in these forces.
 
 use super::balance::Forces;
 use crate::fem::{Extent, internal, internal::Internal};
 use crate::linalg::dot;
 
-/// What the forces on the nodes of a part of a body lack in balance.
+/// The unbalanced forces on the nodes of a part of a body.
 #[derive(Debug, Clone, Default)]
 pub struct Unbalanced {
-    /// r = f - K u - B' omega p beyond its rounding, one entry a dof of the nodes of the part; zero where supports hold it, and at nodes of other ranks.
+    /// r = f - K u - B' omega p without its rounding, one entry per dof of the nodes of the part. Entries are zero at dofs that
+    /// supports prescribe, and at nodes of other ranks.
     pub force: Vec<f64>,
-    /// u'Ku of own nodes, with springs to the ground.
+    /// Energy product u'Ku of owned nodes, with springs to the ground.
     pub strain: f64,
-    /// Stiffness of each node: bounds of the diagonal of K, and of what contact springs add to it.
+    /// Stiffness of each node: a bound of the diagonal of K here, and of what contact springs add to it in `springs`.
     diagonal: Vec<f64>,
     springs: Vec<f64>,
     /// See [`Internal::bulk`].
@@ -19,19 +20,19 @@ pub struct Unbalanced {
 }
 
 impl Unbalanced {
-    /// Return what stands for a body whose displacements are not known.
+    /// Return what stands for a body whose displacements are unknown.
     pub fn unknown() -> Self {
         Self { strain: f64::NAN, ..Self::default() }
     }
 }
 
-/// Most hats of a grid: their sums are a message between ranks, short beside one of all contact points.
+/// Largest number of hats of a grid. Their sums are a message between ranks, which stays short beside one of all contact points.
 const HATS: usize = 5000;
 
-/// Nodes of a body for each hat: finer hats would be those of its elements, which the diagonal of K knows.
+/// Nodes of a body per hat. Finer hats would resemble those of the elements, which the diagonal of K covers.
 const NODES: usize = 4;
 
-/// Grids over a body, each twice as fine as the one before.
+/// Return grids over a body, each twice as fine as the one before.
 fn grids<const D: usize>(extent: &Extent, nodes: usize) -> Vec<Grid<D>> {
     let corners: Vec<[f64; D]> = extent.corners().collect();
     let (low, high) = (corners[0], corners[corners.len() - 1]);
@@ -56,7 +57,7 @@ impl<const D: usize> Grid<D> {
         self.count.iter().product()
     }
 
-    /// The hats at a place with their values.
+    /// Return the hats at a point with their values.
     fn hats(&self, x: &[f64; D]) -> impl Iterator<Item = (usize, f64)> {
         let (mut first, mut share) = ([0; D], [0.0; D]);
         for c in 0..D {
@@ -78,8 +79,8 @@ impl<const D: usize> Grid<D> {
 }
 
 impl<const D: usize> Forces<D> {
-    /// What displacements of the nodes of the part, without rigid motion, and the forces omega p of the contact rows leave without balance; `springs` are
-    /// the stiffnesses omega kappa of these rows.
+    /// Return the unbalanced forces for displacements `u` of the nodes of the part without rigid motion, and for the forces omega
+    /// p of the contact rows. `springs` are the stiffnesses omega kappa of these rows.
     pub fn unbalanced(&self, u: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
         let space = &*self.part.space;
         let Internal { force: inner, rounding, mut diagonal, bulk } =
@@ -128,12 +129,12 @@ impl<const D: usize> Forces<D> {
         (0..self.load.len()).filter(|dof| self.part.own[dof / D])
     }
 
-    /// Zero at the dofs that supports prescribe.
+    /// Set the entries at dofs that supports prescribe to zero.
     fn clear(&self, field: &mut [f64]) {
         self.held.prescribed.keys().for_each(|&dof| field[dof] = 0.0);
     }
 
-    /// The displacement of each node that its unbalanced force alone would make, one entry a dof; right at own nodes.
+    /// Return the displacement of each node under its unbalanced force alone, one entry per dof. It is valid at owned nodes.
     pub fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64> {
         let Unbalanced { force, diagonal, springs, .. } = unbalanced;
         let divided = |(dof, force): (usize, &f64)| match force {
@@ -143,7 +144,8 @@ impl<const D: usize> Forces<D> {
         force.iter().enumerate().map(divided).collect()
     }
 
-    /// What own nodes add to the forces on hats of all grids over the body, and to the stiffnesses of these, D + 2 numbers a hat.
+    /// Return the contribution of owned nodes to the forces on the hats of all grids over the body, and to the stiffnesses of the
+    /// hats. There are D + 2 numbers per hat.
     pub fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64> {
         let mut sums = Vec::new();
         let force = self.held.frame.displacements(&unbalanced.force);
@@ -165,8 +167,8 @@ impl<const D: usize> Forces<D> {
         sums
     }
 
-    /// The displacement that the forces on all hats would make if each hat were alone, one entry a dof, from what all ranks found for
-    /// [`Forces::on_hats`]; with contact springs or without.
+    /// Return the displacement under the forces on all hats as if each hat were alone, one entry per dof. `sums` is the sum over
+    /// ranks of [`Forces::on_hats`]; contact springs are included if `with_springs`.
     pub fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64> {
         let space = &*self.part.space;
         let mut field = vec![0.0; self.load.len()];
@@ -190,7 +192,8 @@ impl<const D: usize> Forces<D> {
         field
     }
 
-    /// Products v_i'K v_j over the cells that this rank shows, with springs to the ground at own nodes, of fields with one entry a dof.
+    /// Return the products v_i'K v_j over the cells that this rank writes, with springs to the ground at owned nodes. Each field
+    /// has one entry per dof.
     pub fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
         let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.held.frame.displacements(field)).collect();
         let n = fields.len();
@@ -206,7 +209,7 @@ impl<const D: usize> Forces<D> {
         products
     }
 
-    /// What own nodes add to B v, one entry a contact row, for a field with one entry a dof.
+    /// Return the contribution of owned nodes to B v, one entry per contact row, for a field v with one entry per dof.
     pub fn trace(&self, field: &[f64]) -> Vec<f64> {
         let nodal = self.held.frame.displacements(field);
         let own = |row: usize| self.rows.row(row).filter(|(dof, _)| self.part.own[dof / D]);
@@ -221,7 +224,7 @@ struct Sum {
 }
 
 impl Sum {
-    /// Adds a force, a product of two numbers: two roundings.
+    /// Add a force that is a product of two numbers. Product and sum contribute one rounding each.
     fn add(&mut self, dof: usize, force: f64, dimension: usize) {
         self.force[dof] += force;
         self.size[dof / dimension] += 2.0 * f64::EPSILON * (force.abs() + self.force[dof].abs());

@@ -1,4 +1,4 @@
-//! The mesh against what the scene makes of it: what must hold before anything is assembled.
+//! Checks of the mesh against the scene before anything is assembled.
 
 use super::find::point;
 use super::part::Part;
@@ -14,19 +14,19 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-/// A mesh that is what the bodies of a scene must be, and these bodies.
+/// A checked mesh, and the bodies of a scene on it.
 pub struct Verified<const D: usize> {
-    /// The mesh; on other ranks than the first its groups have no elements, and there are no points.
+    /// The mesh. On ranks other than the first, its groups have no elements and there are no points.
     pub mesh: Mesh<D>,
     /// Number of points of the mesh.
     pub points: usize,
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
-    /// What was found of each body, in the same order, on the first rank; bodies that the mesh does not have are missing.
+    /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
     pub checked: Rc<[Checked]>,
 }
 
-/// What all ranks know of a mesh.
+/// What all ranks have of a mesh.
 #[derive(Serialize, Deserialize)]
 struct Head {
     path: PathBuf,
@@ -39,11 +39,12 @@ struct Head {
     lying: Lying,
 }
 
-/// Find the bodies of a scene and check its mesh once: see [`roster::bodies`] and [`Mesh::check`]. The first rank reads the mesh, and looks at it.
-/// Collective.
+/// Find the bodies of a scene and check its mesh once, see [`roster::bodies`] and [`Mesh::check`]. The first rank reads and
+/// checks the mesh. Collective.
 ///
 /// # Errors
-/// That of `read`; patterns that do not fit the mesh; what is no mesh of a body, with body, place and elements.
+/// `read` fails, a pattern does not fit the mesh, or the mesh cannot be that of a body. The last error names the body, the place
+/// and the elements.
 pub fn verify<const D: usize>(
     scene: &Scene,
     exchange: &dyn Exchange,
@@ -62,11 +63,11 @@ pub fn verify<const D: usize>(
     }
 }
 
-/// Check the mesh of a scene; return also which groups lie on which bodies.
+/// Check the mesh of a scene. Return also which groups lie on which bodies.
 fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D>, Lying)> {
     size(&mesh)?;
     mesh.sort_cells();
-    // the radius of a body of revolution is measured from its axis
+    // The radius of a body of revolution is measured from its axis.
     mesh.measure_nearby(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
     let lying = roster::lying(scene, &mesh)?;
     let bodies = roster::bodies(scene, &mesh, &lying)?;
@@ -91,7 +92,7 @@ impl Head {
         }
     }
 
-    /// Return what a rank that has not read the mesh knows of it.
+    /// Return the facts of the mesh on a rank that has not read it.
     fn into_verified<const D: usize>(self, scene: &Scene) -> Result<Verified<D>> {
         let Self { path, order, groups, split, straightened, points, lying } = self;
         let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups.into()) };
@@ -100,7 +101,10 @@ impl Head {
     }
 }
 
-/// Refuses a mesh whose size no run computes with.
+/// Check that the size of the mesh is within the range of lengths of the program.
+///
+/// # Errors
+/// The mesh is too small or too large.
 fn size<const D: usize>(mesh: &Mesh<D>) -> Result<()> {
     let mut extent = Extent::default();
     mesh.points.iter().for_each(|x| extent.add(*x));
@@ -113,7 +117,7 @@ fn size<const D: usize>(mesh: &Mesh<D>) -> Result<()> {
     Err(Error::mesh(&mesh.path, None, message).help("choose another unit of length"))
 }
 
-/// A body with the groups that serve it.
+/// Return a body with the groups on which its loads, springs and supports act.
 fn asked(body: &BodySpec) -> Asked<'_> {
     let loads = body.load.iter().map(|load| (load.on.value.as_str(), Duty::Acts));
     let springs = body.spring.iter().map(|spring| (spring.on.value.as_str(), Duty::Acts));
@@ -121,10 +125,11 @@ fn asked(body: &BodySpec) -> Asked<'_> {
     Asked { name: &body.name.value, order: body.order, groups: loads.chain(springs).chain(supports).collect() }
 }
 
-/// Refuse a body in parts to which supports and springs leave more than to a body in one: contact and loads see its rigid motions as those of one body.
+/// Check a body in several unconnected parts. Supports and springs must leave it no more rigid motions than a connected body
+/// would have. The reason is that contact and loads treat its rigid motions as those of one body.
 ///
 /// # Errors
-/// Such a body, with the place of a part that is free.
+/// Supports and springs leave more. The error names the place of a free part.
 pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Result<()> {
     if parts.count == 1 {
         return Ok(());
@@ -139,7 +144,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
     }
     let motions: Vec<Vec<RigidMotion<D>>> =
         extents.iter().map(|extent| rigid::of(extent, space.axisymmetric)).collect();
-    // a part moves, the others stay at rest
+    // In each of these motions one part moves and the others stay at rest.
     let each: Vec<(usize, &RigidMotion<D>)> =
         motions.iter().enumerate().flat_map(|(number, own)| own.iter().map(move |motion| (number, motion))).collect();
     let left = |moving: &[(usize, &RigidMotion<D>)]| {
@@ -154,7 +159,7 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
     if left(&each) <= whole {
         return Ok(());
     }
-    // contact may hold a part that supports leave free in part: the one most free is the one that is meant
+    // Contact may resist a part to which supports leave some motions. The part with the most free motions is reported.
     let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
     let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
     let at = first[most].map_or([0.0; 3], |x| space.in_scene(x));

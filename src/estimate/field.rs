@@ -1,4 +1,4 @@
-//! From the sizes wanted at the nodes of a mesh to a field of sizes that a mesher can follow.
+//! The step from the sizes requested at the nodes of a mesh to a field of sizes that a mesher can follow.
 //!
 //! ```text
 //! limit    on curved boundaries a size is at most TURN times the radius of curvature
@@ -6,8 +6,8 @@
 //! cover    the boundary gets a layer of cells outside, as thick as facets may lie below a curved boundary
 //! ```
 //!
-//! The field stands on the straight cells of the old mesh. The mesher looks for sizes at points of the true boundary, which bulges out of these cells;
-//! where a field has no cell, it gives no size.
+//! The field is defined on the straight cells of the old mesh. The mesher evaluates it at points of the true boundary, which lies
+//! partly outside these cells. A field gives no size where it has no cell.
 
 use crate::discretize::meshes::Cells;
 use crate::fem::cross;
@@ -15,16 +15,17 @@ use crate::linalg::dot;
 use std::cmp::Ordering;
 use std::collections::{BinaryHeap, HashMap};
 
-/// Most angle that a facet may turn from the next, where the boundary is smooth: 12 facets on a circle, whose chords miss 1 % of its area. Gmsh's manual
-/// uses as many for `Mesh.MeshSizeFromCurvature`.
+/// Largest angle in radians between neighbouring facets of a smooth boundary. It belongs to 12 facets on a circle, whose chords
+/// miss 1 % of its area. Gmsh's manual uses as many for `Mesh.MeshSizeFromCurvature`.
 const TURN: f64 = std::f64::consts::PI / 6.0;
 
-/// Facets that turn by more than 60 degrees meet at an edge of the part. A circle of six chords turns by that; Gmsh makes seven or more of a circle by default
-/// (`Mesh.MinimumCirclePoints`).
+/// Angle in radians, 60 degrees, above which neighbouring facets meet at an edge of the part. The facets of a circle of six
+/// chords differ by this angle. Gmsh divides a circle into seven or more by default (`Mesh.MinimumCirclePoints`).
 const EDGE: f64 = std::f64::consts::FRAC_PI_3;
 
-/// Most growth of the size along a length. Cells beside each other then differ by a factor of about 1 + GROWTH; the worst cells of the meshes of both flanges are as good as those of
-/// the scripts' own meshes (docs/theory.md). With 1 and 2 for 0.5 `groove-held` and `hertz-sphere` took the same number of meshes, of the same size within 5 %.
+/// Largest growth of the size along a length. Neighbouring cells then differ by a factor of about 1 + GROWTH. The worst cells of
+/// the meshes of both flanges are as good as those of the scripts' own meshes (docs/theory.md). With 1 and 2 instead of 0.5,
+/// `groove-held` and `hertz-sphere` took the same number of meshes, of the same size within 5 %.
 const GROWTH: f64 = 0.5;
 
 /// Limit the sizes at the nodes of a body, one for each node, and grade them.
@@ -35,24 +36,24 @@ pub(super) fn smooth(cells: &Cells, sizes: &mut [f64]) {
     grade(cells, sizes);
 }
 
-/// Corners and sizes of the simplices of the field: the cells and the layer outside.
+/// Return the corners and sizes of the simplices of the field, which are the cells and the layer outside.
 pub(super) fn simplices(cells: &Cells, sizes: &[f64]) -> (Vec<[f64; 3]>, Vec<f64>) {
     let own = cells.corners.iter().map(|&node| (cells.nodes[node as usize], sizes[node as usize]));
     own.chain(layer(cells, sizes)).unzip()
 }
 
-/// Two facets of the boundary that meet in a common edge, in the plane in a common node.
+/// Two facets of the boundary with a common edge, in the plane with a common node.
 struct Pair {
     facets: [usize; 2],
-    /// Angle between their normals.
+    /// Angle between the normals, in radians.
     turn: f64,
-    /// Curvature across the edge: the angle over the mean of the facets' heights over it.
+    /// Curvature across the edge: the angle over the mean height of the facets above it.
     curvature: f64,
-    /// Area (length) on which this is the curvature.
+    /// Area (length) to which this curvature applies.
     weight: f64,
 }
 
-/// All pairs of facets that meet, with the outer unit normals of the facets.
+/// Return all pairs of neighbouring facets, and the outer unit normals of all facets.
 fn pairs(cells: &Cells) -> (Vec<Pair>, Vec<[f64; 3]>) {
     let dimension = cells.stride - 1;
     let normals: Vec<[f64; 3]> = cells.facets.chunks_exact(dimension).map(|facet| normal(cells, facet)).collect();
@@ -77,10 +78,10 @@ fn pairs(cells: &Cells) -> (Vec<Pair>, Vec<[f64; 3]>) {
     (pairs, normals)
 }
 
-/// Limits of the sizes at nodes of curved boundaries.
+/// Return the limits of the sizes at nodes of curved boundaries.
 ///
-/// The mean square of the curvatures across the edges of a facet of a cylinder is 3/8 of the square of its curvature, that of a sphere all of it; with twice the
-/// mean both are met within a fifth.
+/// The mean square of the curvatures across the edges of a facet is 3/8 of the squared curvature of a cylinder, and all of that
+/// of a sphere. With twice the mean square, both curvatures are met within a fifth.
 fn limits(cells: &Cells) -> Vec<(u32, f64)> {
     let dimension = cells.stride - 1;
     let mut sums = vec![[0.0; 2]; cells.facets.len() / dimension];
@@ -102,7 +103,7 @@ fn limits(cells: &Cells) -> Vec<(u32, f64)> {
     limits
 }
 
-/// A node that hands its size on; the smallest comes first.
+/// A node that passes its size on. The smallest size comes first.
 #[derive(PartialEq)]
 struct Front {
     size: f64,
@@ -123,7 +124,8 @@ impl Ord for Front {
     }
 }
 
-/// The largest sizes below those given whose differences along edges are at most [`GROWTH`] times the length: Dijkstra's algorithm from the smallest size.
+/// Reduce the sizes to the largest ones whose differences along edges are at most [`GROWTH`] times the length. This is Dijkstra's
+/// algorithm from the smallest size.
 fn grade(cells: &Cells, sizes: &mut [f64]) {
     let mut beside: Vec<Vec<u32>> = vec![Vec::new(); cells.nodes.len()];
     for cell in cells.corners.chunks_exact(cells.stride) {
@@ -147,10 +149,11 @@ fn grade(cells: &Cells, sizes: &mut [f64]) {
     }
 }
 
-/// Corners of the simplices outside of facets that stand on a curved boundary, with their sizes.
+/// Return the corners of the simplices outside of facets on a curved boundary, with their sizes.
 ///
-/// A chord h of a boundary that turns by t lies h t/8 below it; the centre of a triangle of edges h on a sphere, whose facets turn by t = h/(sqrt(3) R), lies h^2/(6 R) = 0.29 h t
-/// below it. The layer is h t/2 thick, as nodes beside an edge of the part move out at 45 degrees.
+/// Let h be the length of a chord, t the angle by which neighbouring facets turn, and R the radius of a sphere. A chord lies h
+/// t/8 below the boundary. The centre of a triangle with edges h on the sphere lies h^2/(6 R) = 0.29 h t below it, where t =
+/// h/(sqrt(3) R). The layer is h t/2 thick, since nodes beside an edge of the part move out at 45 degrees.
 fn layer(cells: &Cells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
     let dimension = cells.stride - 1;
     let (pairs, normals) = pairs(cells);
@@ -158,7 +161,7 @@ fn layer(cells: &Cells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
     for pair in pairs.iter().filter(|pair| pair.turn < EDGE) {
         pair.facets.iter().for_each(|&facet| turn[facet] = turn[facet].max(pair.turn));
     }
-    // outwards, and the thickness, at each node
+    // These are the outward direction and the thickness at each node.
     let mut out = vec![([0.0; 3], 0.0f64); cells.nodes.len()];
     for ((facet, normal), turn) in cells.facets.chunks_exact(dimension).zip(&normals).zip(&turn) {
         let longest = facet.iter().map(|&node| distance(cells, facet[0], node)).fold(0.0, f64::max);
@@ -180,7 +183,8 @@ fn layer(cells: &Cells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
         nodes.sort_unstable();
         let prism: Vec<_> = nodes.iter().map(|&node| (cells.nodes[node as usize], sizes[node as usize])).collect();
         let roof: Vec<_> = nodes.iter().map(|&node| (lifted(node), sizes[node as usize])).collect();
-        // the prism between both in simplices: from the floor up to each node, from there on the roof
+        // The prism between floor and roof is divided into simplices. Each has the floor up to one node and the roof from this
+        // node on.
         for at in 0..dimension {
             simplices.extend_from_slice(&prism[..=at]);
             simplices.extend_from_slice(&roof[at..]);
@@ -189,10 +193,11 @@ fn layer(cells: &Cells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
     simplices
 }
 
-/// Facets that turn by less are parts of planes: rounding of coordinates turns those by 1e-12 at most, a circle of 10^6 facets by 6e-6.
+/// Angle in radians up to which neighbouring facets belong to a plane. Rounding of coordinates turns facets of a plane by 1e-12
+/// at most. A circle of 10^6 facets turns by 6e-6.
 const FLAT: f64 = 1e-6;
 
-/// Outer unit normal of a facet by its corners, which are in the order of their orientation.
+/// Return the outer unit normal of a facet from its corners, whose order gives the orientation.
 fn normal(cells: &Cells, facet: &[u32]) -> [f64; 3] {
     let arm = |k: usize| -> [f64; 3] { difference(cells, facet[k], facet[0]) };
     let across = match facet.len() {
@@ -206,7 +211,7 @@ fn normal(cells: &Cells, facet: &[u32]) -> [f64; 3] {
     across.map(|x| x / size)
 }
 
-/// Height of a node over the line of an edge, in the plane its distance from the node.
+/// Return the height of a node above the line of an edge, in the plane its distance from the node.
 fn height(cells: &Cells, edge: &[u32], node: u32) -> f64 {
     let from = difference(cells, node, edge[0]);
     if edge.len() == 1 {
@@ -230,7 +235,7 @@ fn distance(cells: &Cells, a: u32, b: u32) -> f64 {
 mod tests {
     use super::*;
 
-    /// Triangles from the centre to the chords of a circle of radius 2, of size one.
+    /// Return triangles of size one from the centre to the chords of a circle of radius 2.
     fn disc(chords: u32) -> Cells {
         let angle = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(chords);
         let mut nodes = vec![[0.0; 3]];
@@ -241,7 +246,7 @@ mod tests {
         Cells { nodes, stride: 3, corners, facets, sizes: vec![1.0; chords as usize] }
     }
 
-    /// The faces of an octahedron, each in 16 parts, moved onto the sphere of radius 2, with cells to the centre.
+    /// Return the faces of an octahedron, each in 16 parts, moved onto the sphere of radius 2, with cells to the centre.
     fn ball() -> Cells {
         let (mut nodes, mut facets) = (vec![[0.0; 3]], Vec::new());
         let mut number = HashMap::new();
@@ -283,11 +288,11 @@ mod tests {
             smooth(&cells, &mut sizes);
             let most = TURN * 2.0;
             assert!(sizes[1..].iter().all(|size| (0.66..=1.1).contains(&(size / most))), "{sizes:?} {most}");
-            // from there on the size grows to the centre
+            // From there on the size grows towards the centre.
             let least = sizes[1..].iter().copied().fold(f64::INFINITY, f64::min);
             assert!(sizes[0] <= least + GROWTH * 2.0 + 1e-12 && sizes[0] > most);
         }
-        // four chords are a square, not a circle
+        // Four chords are a square and not a circle.
         let square = disc(4);
         let mut sizes = vec![100.0; square.nodes.len()];
         smooth(&square, &mut sizes);
@@ -304,7 +309,7 @@ mod tests {
         assert!(sizes.iter().zip(expected).all(|(size, expected)| (size - expected).abs() < 1e-12), "{sizes:?}");
     }
 
-    /// Whether a simplex of the field has the point.
+    /// Return whether a simplex of the field contains the point.
     fn covers(corners: &[[f64; 3]], stride: usize, at: [f64; 3]) -> bool {
         let inside = |x: &[[f64; 3]]| {
             let arm = |k: usize| -> [f64; 3] { std::array::from_fn(|c| x[k][c] - x[0][c]) };
@@ -316,7 +321,7 @@ mod tests {
         corners.chunks_exact(stride).any(inside)
     }
 
-    /// Points of the circle and the sphere, which the chords miss, have a size.
+    /// Points of the circle and the sphere that the chords miss have a size.
     #[test]
     fn the_layer_covers_the_curved_boundary() {
         for cells in [disc(12), ball()] {

@@ -1,8 +1,9 @@
-//! Rigid motions that springs to the ground alone hold, where they carry next to nothing: they keep a body in place whose loads balance.
+//! Rigid motions that only springs to the ground resist, where these springs carry next to nothing. They keep a body in place
+//! whose loads balance.
 //!
-//! There a spring of stiffness k carries what the mesh leaves of the balance of the loads, however soft it is. That force F moves the bodies by F/k and stores
-//! the energy F^2/k, which grow without end as k becomes soft, and so do those of the errors. They say nothing of deformations and
-//! pressures, so that neither the error nor the solution counts them.
+//! A spring of stiffness k carries what the mesh leaves of the balance of the loads, however soft the spring is. This force F
+//! moves the bodies by F/k and stores the energy F^2/k. Both grow without bound as k decreases, and so do their errors. They do
+//! not concern deformations and pressures, so neither the error nor the solution includes them.
 
 use crate::discretize::meshes::Meshes;
 use crate::linalg::dot;
@@ -10,22 +11,24 @@ use crate::model::rigid::Motions;
 use crate::model::{Layer, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// Springs only hold a motion if loads do no more work on it than this share of what the contact forces could do. What a coarse mesh leaves of the balance of loads is below
-/// it. Benchmark: two rings in a press fit on springs of stiffness 1e-9 to 1. The estimated errors are 1.4e-2 in displacements and 0.106 in energy for every
-/// stiffness. When the springs count, the estimates are 3.8e5 and 7.4.
+/// Share of the work that the contact forces could do, up to which loads may work on a motion that springs only keep in place.
+/// What a coarse mesh leaves of the balance of loads is below this share. The benchmark is two rings in a press fit on springs of
+/// stiffness 1e-9 to 1. The estimated errors are 1.4e-2 in displacements and 0.106 in energy for every stiffness. With the
+/// motions on springs included, the estimates are 3.8e5 and 7.4.
 const CARRIED: f64 = 1e-2;
 
-/// The motions n_k of all bodies that springs only hold, as amounts of the motions of each body.
+/// The motions n_k of all bodies that springs only keep in place, as amounts of the motions of each body.
 pub struct HoldingSprings {
     motions: Vec<DVector<f64>>,
-    /// How far the solution goes along each.
+    /// Amount of each motion in the solution.
     amounts: DVector<f64>,
     /// Energy of the springs in the solution, u'Ku of these motions.
     pub energy: f64,
 }
 
 impl HoldingSprings {
-    /// Find the motions that neither the closed contacts of `layer` nor supports resist, and on which springs carry next to nothing.
+    /// Find the motions that neither the closed contacts of `layer` nor supports resist, and on which springs carry next to
+    /// nothing.
     pub fn of(model: &Model, layer: &Layer) -> Self {
         let none = || Self { motions: Vec::new(), amounts: DVector::zeros(0), energy: 0.0 };
         if model.bodies.iter().all(|slot| slot.sprung.is_none()) {
@@ -45,14 +48,14 @@ impl HoldingSprings {
         let pulls: Vec<DVector<f64>> = motions.iter().map(|motion| ground.multiply(motion)).collect();
         let stiffness = DMatrix::from_fn(motions.len(), motions.len(), |i, j| motions[i].dot(&pulls[j]));
         let work = DVector::from_fn(motions.len(), |k, _| motions[k].dot(&loads));
-        // springs that do not resist all of them
+        // The factor does not exist if springs do not resist all of the motions.
         let Some(factor) = stiffness.cholesky() else { return none() };
         let amounts = factor.solve(&work);
         let energy = amounts.dot(&work);
         Self { motions, amounts, energy }
     }
 
-    /// The trace of these motions in the solution, added to `trace` with a sign.
+    /// Add `sign` times the trace of these motions in the solution to `trace`.
     pub fn add_trace(&self, model: &Model, sign: f64, trace: &mut [f64]) {
         let all = Motions::with_springs(model);
         for (motion, amount) in self.motions.iter().zip(self.amounts.iter()) {
@@ -60,9 +63,10 @@ impl HoldingSprings {
         }
     }
 
-    /// Balance loads at all nodes of the bodies, empty for those of other ranks, on these motions: each nodal force f changes by a share of its size. Collective.
+    /// Balance the loads at all nodes of the bodies on these motions. `loads` is empty for bodies of other ranks. Each nodal
+    /// force changes in proportion to its magnitude. Collective.
     ///
-    /// What the springs would carry of them then acts on the bodies themselves, as in a solution without springs.
+    /// The forces that the springs would carry then act on the bodies themselves, as in a solution without springs.
     pub fn balance(&self, meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
         let count = self.motions.len();
         if count == 0 {

@@ -5,20 +5,21 @@ use crate::discretize::meshes::FinePoints;
 use crate::model::Layer;
 use std::ops::Range;
 
-/// What a pair lacks between its contact points.
+/// The error of the layer of a pair between its contact points.
 pub(super) struct LayerError {
-    /// Squared energy error of the layer there.
+    /// Squared energy error of the layer.
     pub energy: f64,
-    /// Estimated pressure at each integration point; where it is no better than that of the discrete problem, that.
+    /// Estimated pressure at each integration point. It is the pressure of the discrete problem where the estimate is no better.
     pub pressure: Vec<f64>,
 }
 
 impl LayerError {
-    /// That of a pair with contact points `range`; `giving` is what the recovered displacements of both bodies close at each
-    /// integration point, `beyond` what the compression of each contact point lacks as a mean.
+    /// Compute the error of a pair with contact points `range`. `giving` is the closing of the recovered displacements of both
+    /// bodies at each integration point. `beyond` is what the compression of each contact point lacks as a mean.
     ///
-    /// The recovered displacements belong to the pressures of the contact points, interpolated. With s the compliance of the bodies to a
-    /// pressure that changes within a facet, a pressure p there leaves the compression c* - s (p - p_i), and the law meets this line.
+    /// The recovered displacements belong to the interpolated pressure p_i of the contact points, and close the gap to the
+    /// compression c*. Let s be the compliance of the bodies to a pressure that varies within a facet. A pressure p then leaves
+    /// the compression c* - s (p - p_i), and the intersection of this line with the law is the estimate.
     pub fn new(
         pair: &ContactPair,
         points: &FinePoints,
@@ -34,8 +35,8 @@ impl LayerError {
             let (compliance, nearest) = (points.compliance[g], points.nearest[g]);
             let carriers = || points.interpolation.row(g);
             let is_whole = carriers().all(|(q, _)| compression[q] >= 0.0);
-            // a curve through points of which some are open may rise above all of them, more so the faster the gap grows: no
-            // pressure is made of that
+            // A curve through points of which some are open may rise above all of them, the more the faster the gap grows. No
+            // pressure follows from such a rise.
             let between = |value: &dyn Fn(usize) -> f64| {
                 let curve: f64 = carriers().map(|(q, share)| share * value(q)).sum();
                 let largest = || carriers().map(|(q, _)| value(q)).fold(f64::NEG_INFINITY, f64::max);
@@ -58,7 +59,7 @@ impl LayerError {
             let stiffness = carriers().map(|(q, _)| tangent[q]).fold(0.0, f64::max) * compliance;
             let of_law = match () {
                 () if is_whole => weight_of_law(stiffness, 1.0),
-                // with the weight below quadratic facets in space had 0.57 of the error under a layer of 1e8
+                // With the weight below, quadratic facets in space had 0.57 of the error under a layer of 1e8.
                 () if points.at_edges[g] => 1.0,
                 () => weight_of_law(stiffness / (1.0 + stiffness), amplified),
             };
@@ -68,11 +69,14 @@ impl LayerError {
     }
 }
 
-/// Weight of the law's pressure beside that of the discrete problem: where displacements miss e, the law misses a share of e/s, `stiffness`, and
-/// the discrete pressure, made of such that miss e/s each, the root of `amplified` times e/s. The mean of the two with the least variance has weights
-/// as one over their squares.
+/// Return the weight of the law's pressure relative to that of the discrete problem.
 ///
-/// In a facet whose points are all closed the law misses kappa e, as c* and p_i do together; else e/(s + 1/kappa).
+/// Let e be the error of displacements and s the compliance. The pressure of the law has the error `stiffness` times e/s. The
+/// discrete pressure is a sum of values with errors of e/s each, so its error is the root of `amplified` times e/s. The mean of
+/// both with the least variance has weights in proportion to one over their squares.
+///
+/// In a facet whose points are all closed, the error of the law is kappa e, since p_i is wrong together with c*. Elsewhere it is
+/// e/(s + 1/kappa). Here kappa is the tangent stiffness of the law.
 fn weight_of_law(stiffness: f64, amplified: f64) -> f64 {
     amplified / (amplified + stiffness * stiffness)
 }

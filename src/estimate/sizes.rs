@@ -1,4 +1,4 @@
-//! From the error of each cell to the sizes of the next mesh.
+//! The step from the error of each cell to the sizes of the next mesh.
 
 use super::Estimate;
 use super::field;
@@ -7,40 +7,42 @@ use crate::model::Model;
 
 /// Sizes of elements at the corners of the cells of all bodies.
 pub struct Sizes {
-    /// Corners of a cell.
+    /// Number of corners of a cell.
     pub stride: usize,
-    /// Corners of all cells.
+    /// Coordinates of the corners of all cells.
     pub corners: Vec<[f64; 3]>,
-    /// Size wanted at each.
+    /// Requested size at each corner.
     pub sizes: Vec<f64>,
-    /// Cells that a mesh of these sizes has, roughly.
+    /// Approximate number of cells of a mesh with these sizes.
     pub cells: f64,
 }
 
-/// Least and largest ratio of a new size to the old one. Errors of a mesh foretell those of cells a few times smaller, not of cells an order smaller. With 0.08 for 0.25
-/// `groove-held` to 1e-3 and `hertz-sphere` to 2e-2 took the same number of meshes, the last ones of the same size within 7 %.
+/// Smallest and largest ratio of a new size to the old one. Errors of a mesh predict those of cells a few times smaller, but not
+/// of cells an order of magnitude smaller. With 0.08 instead of 0.25, `groove-held` to 1e-3 and `hertz-sphere` to 2e-2 took the
+/// same number of meshes, the last ones of the same size within 7 %.
 const RANGE: (f64, f64) = (0.25, 2.0);
 
-/// What the next mesh is to be.
+/// The requirements on the next mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Aim {
-    /// Share of the squared energy error that may be left.
+    /// Share of the squared energy error that may remain.
     pub share: f64,
-    /// Fewest cells, as a multiple of those of the present mesh.
+    /// Smallest number of cells, as a multiple of that of the present mesh.
     pub more: f64,
-    /// Most cells; they count more than the other two.
+    /// Largest number of cells. It has priority over the other two.
     pub most: f64,
 }
 
 /// Return the sizes of the mesh with the fewest cells that meets an aim. Collective.
 ///
-/// With h -> s h the squared error of a cell becomes s^(2p) eta^2, and s^-D cells take its place. The number of cells is least
-/// where s^(2p + D) eta^2 is the same everywhere: every cell of the new mesh then has nearly the same error.
+/// Let p be the degree of the elements and D the dimension. With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2,
+/// and s^-D cells take its place. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the
+/// new mesh then has nearly the same error.
 pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
     let bodies = model.bodies.len();
     let counts = counts(meshes, bodies);
-    // every rank knows the meshes, the owner of a body its errors
+    // Every rank has the meshes, and only the owner rank of a body has its errors.
     let mut errors = vec![0.0; counts.iter().sum()];
     let mut first = 0;
     for (of_body, count) in estimate.cells.iter().zip(&counts) {
@@ -58,7 +60,7 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim)
     };
     let left = |level: f64| -> f64 { all.iter().map(|&cell| cell.0 * ratio(level, cell).powf(2.0 * cell.1)).sum() };
     let cells = |level: f64| -> f64 { all.iter().map(|&cell| ratio(level, cell).powf(-dimension)).sum() };
-    // both grow or fall with the level: bisect its logarithm
+    // Remaining error and cell sizes increase with the level, so its logarithm is bisected.
     let largest = errors.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let (mut low, mut high) = (largest.ln() - 100.0, largest.ln() + 10.0);
     for _ in 0..60 {
@@ -75,12 +77,13 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim)
     gather(meshes, &counts, size).within(most)
 }
 
-/// Sizes `factor` times those of the meshes.
+/// Return sizes that are `factor` times those of the meshes.
 pub fn scaled(meshes: &dyn Meshes, bodies: usize, factor: f64) -> Sizes {
     gather(meshes, &counts(meshes, bodies), |_, size| factor * size)
 }
 
-/// The sizes of the meshes, but none below the one with which the bodies together would have about so many `cells`.
+/// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would have about
+/// this number of `cells`.
 pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
     let power = meshes.cells(0).stride as f64 - 1.0;
     let volume: f64 = (0..bodies).flat_map(|body| meshes.cells(body).sizes).map(|size| size.powf(power)).sum::<f64>();
@@ -88,19 +91,20 @@ pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
     gather(meshes, &counts(meshes, bodies), |_, size| size.max(least))
 }
 
-/// Cells of each body.
+/// Return the number of cells of each body.
 fn counts(meshes: &dyn Meshes, bodies: usize) -> Vec<usize> {
     (0..bodies).map(|body| meshes.cells(body).sizes.len()).collect()
 }
 
-/// Return the field of the sizes that `wanted` returns for each cell. Its arguments are the number of the cell, counted over all bodies, and the size that the cell has.
+/// Return the field of the sizes that `wanted` returns for each cell. Its arguments are the index of the cell, counted over all
+/// bodies, and the present size of the cell.
 fn gather(meshes: &dyn Meshes, counts: &[usize], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
     let mut field = Sizes { stride: 0, corners: Vec::new(), sizes: Vec::new(), cells: 0.0 };
     let mut first = 0;
     for (body, &count) in counts.iter().enumerate() {
         let of_body = meshes.cells(body);
         field.stride = of_body.stride;
-        // geometric mean over the cells around each corner
+        // This is the geometric mean over the cells around each corner.
         let mut logs = vec![(0.0, 0.0); of_body.nodes.len()];
         for (index, corners) in of_body.corners.chunks_exact(of_body.stride).enumerate() {
             for &node in corners {
@@ -125,14 +129,14 @@ fn gather(meshes: &dyn Meshes, counts: &[usize], wanted: impl Fn(usize, f64) -> 
 }
 
 impl Sizes {
-    /// Make all sizes smaller, so that a mesh has `more` times the cells.
+    /// Reduce all sizes, so that a mesh has `more` times as many cells.
     pub fn refine(&mut self, more: f64) {
         let factor = more.powf(-1.0 / (self.stride as f64 - 1.0));
         self.sizes.iter_mut().for_each(|size| *size *= factor);
         self.cells *= more;
     }
 
-    /// Return the same field, or larger sizes where a mesh would have more than `most` cells.
+    /// Return the same field, or one with larger sizes if a mesh would have more than `most` cells.
     fn within(mut self, most: f64) -> Self {
         if self.cells > most {
             self.refine(most / self.cells);

@@ -1,9 +1,9 @@
-//! Displacements recovered by patches, and what they tell of the error: polynomial preserving recovery (Zhang and Naga 2005).
+//! Displacements recovered by patches, and the error estimated from them: polynomial preserving recovery (Zhang and Naga 2005).
 //!
-//! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its gradient
-//! is of higher order than the discrete one on any mesh, at boundaries too; between vertices the polynomials are blended by
-//! the linear hats. Patches end with their body, so nothing is smoothed across a contact. A vertex on the boundary takes two
-//! rings of cells, since one is one-sided.
+//! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its gradient is of
+//! higher order than the discrete one on any mesh, at boundaries too. Between vertices the polynomials are blended by the linear
+//! hats. Patches end at the boundary of their body, so nothing is smoothed across a contact. A vertex on the boundary uses two
+//! rings of cells, since a single ring is one-sided.
 
 mod blend;
 mod patch;
@@ -19,11 +19,13 @@ use crate::problem::order::Order;
 use patch::{Monomials, Patch};
 use rings::Rings;
 
-/// Stress (xx yy zz xy yz xz) in a cell at a point of a strain (xx yy zz, and 2 eps of xy yz xz).
+/// A function that returns the stress (xx yy zz xy yz xz) in a cell at a point. Its last argument is the strain there (xx yy zz,
+/// and 2 eps of xy yz xz).
 pub type Law<'a, const D: usize> = &'a dyn Fn(usize, [f64; D], &[f64; 6]) -> [f64; 6];
 
-/// How often a patch gets another ring of cells where its nodes do not determine the polynomial. Cells at a corner of a body have few nodes, and with two more rings as many as
-/// others; what is not determined then, as the second derivative through a plate one cell thick, no larger patch determines.
+/// Largest number of additional rings of cells that a patch gets while its nodes do not determine the polynomial. Cells at a
+/// corner of a body have few nodes, and with two more rings as many as others. No larger patch determines what is then still
+/// undetermined, such as the second derivative through a plate one cell thick.
 const MORE_RINGS: usize = 3;
 
 /// A displacement with the polynomials recovered from it.
@@ -32,14 +34,14 @@ pub struct Recovery<'a, const D: usize> {
     displacement: &'a [f64],
     /// Polynomial of each vertex; `None` at mid-edge nodes.
     patches: Vec<Option<Patch<D>>>,
-    /// Nodal values of the blend of the polynomials, one entry a dof.
+    /// Nodal values of the blend of the polynomials, one entry per dof.
     blended: Vec<f64>,
-    /// Those of the polynomials: of one degree more than the elements, and of each lower one.
+    /// Monomials of the polynomials: of one degree more than the elements, and of each lower degree.
     monomials: Vec<Monomials>,
 }
 
 impl<'a, const D: usize> Recovery<'a, D> {
-    /// Recovers the gradient of the displacement `u`, one entry a dof.
+    /// Recover the polynomials of the displacement `u`, one entry per dof.
     pub fn new(space: &'a Space<D>, u: &'a [f64]) -> Self {
         let degree = if space.order == Order::P1 { 2 } else { 3 };
         let monomials = (0..=degree).rev().map(|degree| Monomials::new(D, degree)).collect();
@@ -51,7 +53,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         recovery
     }
 
-    /// Whether each node is a vertex of the boundary. The axis of a body of revolution is none: beyond it the body goes on.
+    /// Return whether each node is a vertex of the boundary. The axis of a body of revolution is not part of the boundary, since
+    /// the body continues beyond it.
     fn outer_vertices(&self) -> Vec<bool> {
         let mut outer = vec![false; self.space.nodes.len()];
         for (index, opposite) in self.space.lone_facets() {
@@ -63,7 +66,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
         outer
     }
 
-    /// The polynomial of a vertex; of a lower degree in a body, or a plate, of so few cells that its nodes determine no more.
+    /// Return the polynomial of a vertex. It has a lower degree in a body or plate of so few cells that its nodes determine no
+    /// more.
     fn fit(&self, node: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
         let (space, u) = (self.space, self.displacement);
         let fit = |nodes: &[u32], monomials| Patch::fit(space, u, space.nodes[node], nodes, monomials);
@@ -93,8 +97,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
     }
 
-    /// Strain of the recovered displacement less the discrete one in a cell, as products l_k l_m have it, k <= m: the gradient of a parabola is linear,
-    /// coordinates are so in linear elements, and all products sum to one.
+    /// Return the strain of the recovered minus the discrete displacement in a linear cell, as coefficients of the products l_k
+    /// l_m with k <= m. The gradient of a parabola is linear, the blending weights are linear in linear elements, and all
+    /// products sum to one.
     fn strain_errors(&self, cell: &[u32], gradient: &[[f64; D]]) -> Vec<[f64; 6]> {
         let discrete = self.space.slope(cell, &[0.0; D], &[], gradient, self.displacement);
         let recovered = |node: usize, at: usize| {
@@ -116,13 +121,13 @@ impl<'a, const D: usize> Recovery<'a, D> {
         errors
     }
 
-    /// Gradient of the polynomial of a vertex.
+    /// Return the gradient of the polynomial of a vertex.
     fn recovered(&self, node: u32, at: &[f64; D]) -> Slope<D> {
         let (value, h) = self.patch(node).jet(&self.monomials[0], at);
         Slope { h, hoop: if self.space.axisymmetric { self.space.hoop(at, value[0]) } else { 0.0 } }
     }
 
-    /// Squared energy norm of the difference of recovered and discrete stress on each cell.
+    /// Return the squared energy norm of the recovered minus the discrete stress on each cell.
     pub fn energy_errors(&self, law: Law<D>) -> Vec<f64> {
         let rule = quadrature::simplex(D + 1, 5);
         let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;

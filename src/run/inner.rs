@@ -1,7 +1,5 @@
-//! The inner solvers: what was asked for, or the program's choice and its reason.
-//!
-//! Newton's method joins the bodies in one matrix where all of them are condensed, factored, or solved by multigrid; the
-//! bodies then need no solver of their own. Else every body has one, and sweeps solve the linear steps.
+//! The inner solvers: those requested, or the program's choice with its reason. Newton's method joins the bodies in one matrix if all are condensed,
+//! factored, or solved by multigrid; they then need no solver of their own. Otherwise every body has one, and sweeps solve the linear steps.
 
 use super::deal::dealt_out;
 use super::plan::{DENSE, Plan, agree};
@@ -27,38 +25,37 @@ use std::collections::{BTreeMap, HashMap};
 /// Prefix of the PETSc options of the matrix of all bodies.
 pub const WHOLE: &str = "newton";
 
-/// Chooses and makes the inner solvers of a scene's bodies.
+/// A factory that chooses and makes the inner solvers of a scene's bodies.
 pub struct Inner<'a> {
     session: &'a Session,
-    /// What the scene names.
+    /// Preset that the scene names.
     asked: Option<Preset>,
-    /// Bytes that the solvers so far leave, on the rank that has least.
+    /// Bytes that the solvers planned so far leave free, on the rank that has least.
     memory: usize,
     method: MethodName,
-    /// How the scene wants linear steps to be solved.
+    /// Solver of linear steps that the scene requests.
     wanted: Option<Linear>,
-    /// How linear steps are solved, from the plan on.
+    /// Solver of linear steps, from the plan on.
     pub linear: Linear,
-    /// What the user wrote for the solvers.
+    /// Options that the user wrote for the solvers.
     typed: Typed,
     /// Options of the matrix of all bodies.
     pub whole: Chosen,
-    /// Its interpolation from linear displacements, where bodies have quadratic ones and multigrid.
+    /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and multigrid.
     pub interpolation: Option<Interpolation>,
-    /// Seconds of set-up and iteration by the estimates that chose the solvers of bodies in space; none where there was nothing to estimate.
+    /// Estimated seconds of set-up and iteration, from the choice of solvers of bodies in space; `None` if nothing was estimated.
     pub seconds: Option<f64>,
     plans: Vec<Plan>,
-    /// Whether each body is dealt out over the ranks, where sweeps solve linear steps.
+    /// Whether each body is distributed over the ranks, if sweeps solve linear steps.
     dealt: Vec<bool>,
-    /// Place of each body in `plans`.
+    /// Index of each body in `plans`.
     places: HashMap<String, usize>,
-    /// Condensed bodies that an earlier scene has left; `local` is there on the rank that owns it.
+    /// Condensed bodies that an earlier scene has left. `local` exists on the rank that owns the body.
     kept: HashMap<String, BodySlot>,
 }
 
 impl<'a> Inner<'a> {
-    /// Starts from the memory that is free now and the options that the user wrote for these `bodies`; collective. `kept` are bodies of an
-    /// earlier scene that serve this one, too.
+    /// Start from the free memory and the options that the user wrote for `bodies`. This scene can reuse the bodies `kept` of an earlier one. Collective.
     pub fn new(session: &'a Session, scene: &Scene, bodies: &[&str], kept: Vec<BodySlot>) -> Result<Self> {
         let mine = memory::available() as u64;
         let mut least = mine;
@@ -84,7 +81,7 @@ impl<'a> Inner<'a> {
         })
     }
 
-    /// Why the solvers are what they are, in words: for each kind of solver once, by the largest body that has it.
+    /// Return the reason for the solvers in words. Each kind of solver is named once, with the reason of its largest body.
     pub fn reason(&self) -> String {
         let mut kinds: Vec<Vec<&Plan>> = Vec::new();
         for plan in &self.plans {
@@ -105,7 +102,7 @@ impl<'a> Inner<'a> {
         kinds.into_iter().filter_map(of_kind).collect::<Vec<_>>().join("; ")
     }
 
-    /// The options of all solvers of PETSc that a run has: of each body that sweeps solve by one, or of the matrix of all bodies.
+    /// Return the options of all PETSc solvers of a run: of bodies that sweeps solve by one, or of the matrix of all bodies.
     pub fn into_options(self) -> Vec<Chosen> {
         match self.linear {
             Linear::Dense => Vec::new(),
@@ -117,12 +114,12 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Whether a body has quadratic elements.
+    /// Return whether a body has quadratic elements.
     fn is_quadratic(&self) -> bool {
         self.plans.iter().any(|plan| plan.order == Order::P2)
     }
 
-    /// The solvers that apply a preconditioner once instead of solving, as a warning each kind.
+    /// Return the warnings of solvers that apply a preconditioner once instead of solving, one for each kind.
     pub fn applied_once(&self) -> Vec<String> {
         let chosen: Vec<&Chosen> = match self.linear {
             Linear::Sweeps => self.plans.iter().map(|plan| &plan.chosen).collect(),
@@ -143,20 +140,19 @@ impl<'a> Inner<'a> {
         kinds.into_iter().map(warning).collect()
     }
 
-    /// Names of the condensed bodies.
+    /// Return the names of the condensed bodies.
     pub fn condensed(&self) -> Vec<String> {
         let condensed = self.plans.iter().filter(|plan| plan.preset == Preset::Condensed);
         condensed.map(|plan| plan.name.clone()).collect()
     }
 
-    /// Whether a matrix is factored on the way, by the program's choice.
+    /// Return whether the program's choice of solvers factors a matrix.
     pub fn factors(&self) -> bool {
         let direct = |plan: &Plan| matches!(plan.preset, Preset::Condensed | Preset::Mumps);
         self.linear != Linear::Multigrid && self.plans.iter().any(direct)
     }
 
-    /// What scene and options say of a body, with the reason; none where the program is to choose. `condensable` tells whether it
-    /// could be condensed.
+    /// Return the requested solver of a body with the reason, or `None` for the program's choice. `condensable` is whether it can be condensed.
     fn asked_for(&self, typed: bool, condensable: bool) -> Option<(Preset, &'static str)> {
         match (self.asked, self.wanted) {
             (Some(Preset::Condensed), _) if !condensable => {
@@ -172,15 +168,15 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Whether Newton's method may have one matrix of all bodies.
+    /// Return whether Newton's method may use one matrix of all bodies.
     fn may_join(&self) -> bool {
         let newton = matches!(self.method, MethodName::Auto | MethodName::Newton);
         newton && self.wanted != Some(Linear::Sweeps)
     }
 
-    /// Chooses for a body in the plane.
+    /// Choose the solver of a body in the plane.
     fn choose_in_plane(&mut self, plan: &mut Plan) {
-        // a body that is kept has its memory already
+        // The memory of a reused body is allocated already.
         let is_kept = self.kept.contains_key(&plan.name);
         let memory = if is_kept { usize::MAX } else { self.memory };
         let size = Size { dofs: plan.dofs, retained: plan.on_contact(), memory };
@@ -193,7 +189,7 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Chooses for bodies in space: for all together where Newton's method may join them.
+    /// Choose the solvers of bodies in space, for all together if Newton's method may join them.
     fn choose_in_space(&mut self, plans: &mut [&mut Plan], outlines: &[&Outline]) {
         let joined = self.may_join();
         let size = if joined { plans.len().max(1) } else { 1 };
@@ -209,7 +205,7 @@ impl<'a> Inner<'a> {
                 Candidate { dofs: plan.dofs, order: plan.order, retained, couplings: graph.col.len() }
             });
             let candidates: Vec<_> = candidates.collect();
-            // bodies that are kept have their memory already
+            // The memory of reused bodies is allocated already.
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let memory = if are_kept { usize::MAX } else { self.memory };
             let mut comparison = Comparison::of_cubes(&candidates, step, speed::REFERENCE);
@@ -243,7 +239,7 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// How linear steps are solved, once bodies have their presets.
+    /// Return the solver of linear steps, once bodies have their presets.
     fn join(&mut self) -> Result<Linear> {
         if !self.may_join() {
             return Ok(Linear::Sweeps);
@@ -251,7 +247,7 @@ impl<'a> Inner<'a> {
         let mut typed = false;
         for Plan { chosen, .. } in &self.plans {
             typed |= chosen.asks_for_ksp();
-            // what is typed for one body reaches that body
+            // Options typed for one body apply to that body alone, so the bodies are not joined.
             if self.method == MethodName::Auto && chosen.has_own() && chosen.asks_for_ksp() {
                 return Ok(Linear::Sweeps);
             }
@@ -283,7 +279,7 @@ impl<'a> Inner<'a> {
         })
     }
 
-    /// Return what the other ranks must know of the plan.
+    /// Return the decisions of the plan that the other ranks need.
     fn decisions(&self) -> Decisions {
         let of_body = |plan: &Plan| Decision {
             name: plan.name.clone(),
@@ -317,11 +313,11 @@ impl<'a> Inner<'a> {
     }
 }
 
-/// The choice of solvers of all bodies, by the first rank.
+/// The choice of solvers of all bodies, made by the first rank.
 #[derive(Serialize, Deserialize)]
 pub struct Decisions {
     linear: Linear,
-    /// Whether each body is distributed over the ranks, where sweeps solve linear steps.
+    /// Whether each body is distributed over the ranks, if sweeps solve linear steps.
     dealt: Vec<bool>,
     bodies: Vec<Decision>,
 }
@@ -342,12 +338,12 @@ impl Factory for Inner<'_> {
 
     fn plan(&mut self, outlines: &[Outline]) -> Result<Decisions> {
         let mut plans = Vec::new();
-        // bodies for which the program is to choose
+        // This marks the bodies for which the program is to choose.
         let mut open = Vec::new();
         for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
             let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
-            // a KSP of all bodies together wants them whole
+            // A KSP for all bodies together needs them uncondensed.
             let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());
             let condensable = (1..dofs).contains(&retained.dofs.len()) && !typed;
             let asked = self.asked_for(typed, condensable);
@@ -393,7 +389,7 @@ impl Factory for Inner<'_> {
 
     fn distributed(&self) -> Vec<Vec<usize>> {
         let bodies = 0..self.plans.len();
-        // a condensed body lives on one rank, and all of them can have what is left of it
+        // A condensed body stays on one rank, and all ranks can have its Schur complement.
         let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);
         match self.linear {
             Linear::Sweeps => bodies.filter(|&body| self.dealt[body]).map(|body| vec![body]).collect(),
@@ -433,7 +429,7 @@ impl Factory for Inner<'_> {
         {
             let empty = || Interpolation { rows: Csr::new(0), own: 0 };
             let whole = self.interpolation.get_or_insert_with(empty);
-            // columns are those of all bodies where dofs are dealt out
+            // If dofs are distributed, the columns are those of all bodies.
             let first = if distribution.is_some() { 0 } else { whole.rows.columns };
             whole.append(&next, first);
         }

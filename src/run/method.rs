@@ -1,4 +1,4 @@
-//! The scene's method -> the method that runs.
+//! The step from the method that a scene names to the method that runs.
 
 use super::stages::Built;
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
@@ -14,8 +14,8 @@ use crate::scene::Scene;
 use crate::solver::options::Chosen;
 use crate::solver::{Dense, Krylov, Monolithic, Union};
 
-/// Makes the method of a scene and the solvers it needs, set up; refusals come before the first sweep. An automatic start that the set-up
-/// finds is left in `start`.
+/// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
+/// automatic start, it is stored in `start`.
 pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
     let Built { scene, discrete, linear, whole, interpolation, .. } = built;
     let model = &mut discrete.model;
@@ -39,7 +39,8 @@ pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<M
     Ok(Method::Sweeps { acceleration, coefficient: coefficient(), linear: Box::new(Sweeps::carried()) })
 }
 
-/// What solves the linear steps of Newton's method: how, with the options of the matrix of all bodies and its interpolation.
+/// Return the solver of the linear steps of Newton's method. The tuple has its kind, the options of the matrix of all bodies, and
+/// the interpolation of this matrix.
 fn linear_step(
     session: &Session,
     scene: &Scene,
@@ -53,7 +54,7 @@ fn linear_step(
         return Ok(Box::new(Sweeps::new(coefficient)));
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
-    // multigrid wants nodes, without numbers for rigid motions among them; so do rows that are dealt out
+    // Multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows.
     let nodes = linear == Linear::Multigrid || model.is_distributed();
     let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };
     let Some(union) = union else {

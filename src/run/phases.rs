@@ -1,4 +1,5 @@
-//! From a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, iteration.
+//! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options,
+//! iteration.
 
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
@@ -29,10 +30,10 @@ use std::rc::Rc;
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;
 
-/// Builds the discrete problem of a scene; bodies get their inner solvers but nothing is factored.
+/// Build the discrete problem of a scene. Bodies get their inner solvers, but nothing is factored.
 ///
 /// # Errors
-/// Refusals of scene and mesh, printed on one rank; failures of PETSc.
+/// Scene or mesh are refused, with a message on one rank, or PETSc fails.
 pub fn build(
     session: &Session,
     scene: impl Into<Rc<Scene>>,
@@ -42,7 +43,7 @@ pub fn build(
     build_with(session, scene.into(), Vec::new(), interrupt, clock)
 }
 
-/// The same, with the bodies `kept` from an earlier scene.
+/// Build the discrete problem as [`build`] does, with the bodies `kept` from an earlier scene.
 pub fn build_with(
     session: &Session,
     scene: Rc<Scene>,
@@ -57,7 +58,7 @@ pub fn build_with(
     }
 }
 
-/// What [`build`] does where the dimension matters.
+/// Do the work of [`build`] in `D` dimensions.
 fn build_in<const D: usize>(
     session: &Session,
     scene: Rc<Scene>,
@@ -89,19 +90,19 @@ where
     Ok(built)
 }
 
-/// What is known of the file of a mesh on the rank that has read it.
+/// The facts of the file of a mesh, on the rank that has read it.
 struct FileRead {
     digest: String,
-    /// Why it was not taken from the cache, in words, if it never is.
+    /// Warning that the mesh is made anew in each run, with the reason, if it is.
     unkept: Option<String>,
 }
 
-/// A scene with its mesh: what discrete problems are made of.
+/// A scene with its mesh, from which discrete problems are built.
 struct Source<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
-    /// On the rank that has read the mesh.
+    /// Facts of the file, on the rank that has read the mesh.
     read: Option<FileRead>,
     cut: Cut<D>,
 }
@@ -111,7 +112,7 @@ where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
 {
-    /// The problem under the loads of a step of the scene's history, or the full ones. Collective.
+    /// Build the problem under the loads of a step of the scene's history, or under the full loads. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
         let Self { session, scene, verified, read, cut } = self;
         let stage = session.stage("discretize");
@@ -126,7 +127,8 @@ where
         let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
-        // small fronts and several ranks lose by BLAS threads, and the short vectors of a Krylov method do; large factorisations gain
+        // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
+        // from them.
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
         let gains = D == 3 && verified.points * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
@@ -148,7 +150,7 @@ where
     }
 }
 
-/// PETSc options of the scene, weaker than typed ones.
+/// Set the PETSc options of the scene. Typed options take precedence over them.
 fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()> {
     for (name, value) in options::pairs(&scene.solver.options)? {
         options::set_of_scene(session, bodies, name, value)?;
@@ -156,7 +158,7 @@ fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()
     Ok(())
 }
 
-/// Return the bodies of a scene and their mesh, which the first rank lets Gmsh make, reads and checks. Collective.
+/// Return the bodies of a scene and their mesh. The first rank runs Gmsh, reads the mesh and checks it. Collective.
 fn verified<const D: usize>(
     session: &Session,
     scene: &Scene,
@@ -234,19 +236,19 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
     warnings
 }
 
-/// Elements that were split, as a warning.
+/// Return the warning of elements that were split, if any.
 pub fn in_parts(split: usize) -> Option<String> {
     let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";
     (split > 0).then(|| format!("{split} {what}"))
 }
 
-/// Quadratic cells that were made straight, in words.
+/// Return the warning of quadratic cells that were made straight, if any.
 pub fn made_straight(cells: usize) -> Option<String> {
     let why = "were folded by the curved boundary and have straight edges now, so that gaps there are those of chords: a finer mesh follows the boundary";
     (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
 }
 
-/// Facets that a pair leaves out as a warning.
+/// Return the warning of facets that a pair excludes, if any.
 fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     let without: Vec<Left> =
         pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
@@ -266,7 +268,7 @@ fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     Some(text)
 }
 
-/// Pieces of a pair that the search for common points has lost, as a warning.
+/// Return the warning of pieces of a pair that the search for common points has lost, if any.
 fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     let names = contact.spec.between.each_ref().map(|name| &name.value);
     pair.lost.map(|LostPieces { pieces, share, at: [x, y, z] }| {
@@ -278,7 +280,7 @@ fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     })
 }
 
-/// Loads that were balanced as a warning.
+/// Return the warning of loads that were balanced.
 fn balanced_in_words(discrete: &Discrete, Balanced { bodies, motion, share }: &Balanced) -> String {
     let names = in_words(bodies.iter().map(|&body| &discrete.bodies[body].name));
     format!(
@@ -290,7 +292,7 @@ fn balanced_in_words(discrete: &Discrete, Balanced { bodies, motion, share }: &B
     )
 }
 
-/// A free motion of several bodies as a warning.
+/// Return the warning of a free motion of several bodies.
 fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     let name = |&body: &usize| &discrete.bodies[body].name;
     let bodies = in_words(mechanism.bodies.iter().map(name));
@@ -302,10 +304,10 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
 }
 
-/// Makes the method, factors every body for the start, then refuses options that nobody read.
+/// Make the method and factor every body for the start. Then refuse options that no solver has read.
 ///
 /// # Errors
-/// Unknown PETSc options, a start that is not finite, failures of PETSc.
+/// PETSc does not know an option, the start is not finite, or PETSc fails.
 pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Prepared> {
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
@@ -318,7 +320,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     let mut full = start.clone();
     let method = collectively(session, method::make(session, &mut built, &mut full))?;
     if scene.method.steps.is_empty() {
-        // what the set-up found is the start of the run; load steps have other loads
+        // The start that the set-up found is that of the run. Load steps have other loads.
         start = full;
     }
     let mut names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
@@ -341,10 +343,10 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     Ok(Prepared { built, method, start, steps, earlier, warnings })
 }
 
-/// Warnings of options that no solver with one of these `names` has read, but for those that are `known`.
+/// Return the warnings of options that no solver with one of these `names` has read. Options in `known` are excluded.
 ///
 /// # Errors
-/// Options that PETSc does not know.
+/// PETSc does not know an option.
 fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Result<Vec<String>> {
     let any = |flags: &mut [u8]| {
         if session.size() > 1 && !flags.is_empty() {
@@ -372,10 +374,10 @@ fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Resul
     Ok(warnings)
 }
 
-/// Iterates. From here on a signal ends the run after its step, and lets its results be written.
+/// Iterate. From here on a signal ends the run after the current step, so that its results are written.
 ///
 /// # Errors
-/// Failures of PETSc; not converging is a status of the outcome.
+/// PETSc fails. A run that does not converge is not an error but a status of the outcome.
 pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
     keep_at_hand();
@@ -389,7 +391,7 @@ pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, 
     Ok(done)
 }
 
-/// Estimates the error of what a run found, if the scene asks for it.
+/// Estimate the error of the solution, if the scene requests it.
 pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> {
     let Outcome { status, iterate, layer, .. } = &done.outcome;
     let good = status.is_solved() || *status == Status::IterationLimit;
@@ -407,7 +409,7 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     Ok(Some(estimate))
 }
 
-/// The stopping rules in words.
+/// Return the stopping rules in words.
 pub fn targets(scene: &Scene) -> String {
     let stop = &scene.method.stop;
     let rules = [("residual", stop.residual), ("increment", stop.increment)];

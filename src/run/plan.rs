@@ -1,43 +1,43 @@
-//! The choice of an inner solver for each body, and what bodies have to agree on.
+//! The choice of an inner solver for each body, and the choices that bodies have to share.
 
 use crate::problem::{Order, Preset};
 use crate::solver::Retained;
 use crate::solver::options::Chosen;
 
-/// Dofs of all condensed bodies up to which their dense matrix is factored: 0.2 s and 250 MB.
+/// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and 250 MB.
 pub const DENSE: usize = 3000;
 
-/// The choice for a body.
+/// The choice of a solver for a body.
 pub struct Plan {
-    /// Its name.
+    /// Name of the body.
     pub name: String,
-    /// Its PETSc options.
+    /// PETSc options of the body.
     pub chosen: Chosen,
-    /// How it is solved.
+    /// Preset of its solver.
     pub preset: Preset,
-    /// Why, in words.
+    /// Reason for the preset, in words.
     pub reason: String,
-    /// Dofs of a node.
+    /// Number of dofs of a node.
     pub dimension: usize,
-    /// Order of its elements.
+    /// Order of the elements.
     pub order: Order,
-    /// Its dofs.
+    /// Number of dofs of the body.
     pub dofs: usize,
-    /// Whether it could be condensed.
+    /// Whether the body could be condensed.
     pub condensable: bool,
-    /// For a condensed body, until it is made.
+    /// Interface dofs of a condensed body, until it is made.
     pub retained: Option<Retained>,
 }
 
 impl Plan {
-    /// Dofs that a condensed body would keep.
+    /// Return the number of dofs that a condensed body would keep.
     pub fn on_contact(&self) -> usize {
         self.retained.as_ref().map_or(0, |retained| retained.dofs.len())
     }
 }
 
-/// Gives all bodies what Newton's method can join: multigrid if one of them needs it; in the plane one factorisation if together
-/// they have too much contact for one dense matrix.
+/// Give all bodies presets that Newton's method can join. They get multigrid if one of them needs it. In the plane they get one
+/// factorisation if together they have too many dofs on the contact for one dense matrix.
 pub fn agree(plans: &mut [Plan]) {
     let dense: usize = plans.iter().filter(|plan| plan.preset == Preset::Condensed).map(Plan::on_contact).sum();
     let needs = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone());
@@ -61,7 +61,7 @@ mod tests {
     use crate::linalg::Csr;
     use crate::solver::options::Typed;
 
-    /// A body in space whose contact rows are `contact` dofs.
+    /// Return the plan of a body in space whose contact rows have `contact` dofs.
     fn plan(name: &str, preset: Preset, contact: usize) -> Plan {
         let mut rows = Csr::new(30_000);
         (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
@@ -97,7 +97,8 @@ mod tests {
         assert!(mixed[2].reason.contains("30000 dofs; `b` has it"), "{}", mixed[2].reason);
     }
 
-    /// In the plane two contacts of 1500 dofs are joined by dense algebra, with one dof more by one factorisation.
+    /// In the plane, two contacts of 1500 dofs are joined by dense algebra. With one dof more they are joined by one
+    /// factorisation.
     #[test]
     fn wide_contacts_in_the_plane_are_joined_by_a_factorisation() {
         let pair = |more: usize| {

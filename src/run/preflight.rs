@@ -1,29 +1,32 @@
-//! What can be said before the first sweep: how strongly the bodies of a pair are coupled, and what that costs each method.
+//! Estimates before the first sweep: how strongly the bodies of a pair are coupled, and how many sweeps each method needs.
 //!
-//! A mode of the interface with body stiffness k and layer tangent kappa has theta = kappa/(k + kappa); the pair has
-//! theta = sqrt(theta_a theta_b). The plain iteration has the error factors 1 - gamma (1 +- theta), conjugate gradients over
-//! the same sweep the condition (1 + theta)/(1 - theta). The estimate takes the stiffest single mode that is known without a
-//! solve, uniform pressure, at the pressure that the loads would give if they were spread evenly: an order of magnitude.
+//! A mode of the interface with body stiffness k and layer tangent kappa has theta = kappa/(k + kappa). With theta_a and theta_b
+//! of its two sides, the pair has theta = sqrt(theta_a theta_b). The plain iteration has the error factors 1 - gamma (1 +-
+//! theta). Conjugate gradients over the same sweep have the condition (1 + theta)/(1 - theta).
+//!
+//! The estimate uses uniform pressure, the stiffest single mode that is known without a solve. The pressure is the one that
+//! evenly spread loads would give. The result is an order of magnitude.
 
 use super::stages::Built;
 use crate::contact::ContactPair;
 use crate::problem::method::Gamma;
 
-/// Estimates for a pair.
+/// The estimates for a pair.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coupling {
     /// Mean pressure that the loads give.
     pub pressure: f64,
     /// theta of side a and side b.
     pub theta: [f64; 2],
-    /// Expected sweeps to a relative residual of 1e-8: method and number; infinite where the estimate sees no convergence.
+    /// Expected sweeps to a relative residual of 1e-8, by method. The number is infinite where the estimate predicts no
+    /// convergence.
     pub sweeps: Vec<(&'static str, f64)>,
 }
 
-/// Digits that the estimates are for: ln(1e8).
+/// Logarithm ln(1e8) of the reduction of the residual in the estimates.
 const DIGITS: f64 = 18.42;
 
-/// The coupling of pair `i`.
+/// Return the coupling of pair `i`.
 pub fn coupling(built: &Built, i: usize) -> Coupling {
     let Built { scene, discrete, .. } = built;
     let pair = &discrete.model.pairs[i];
@@ -34,7 +37,7 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
             std::array::from_fn(|c| (0..pair.len()).map(|q| pair.weight[q] * pair.normal[q][c]).sum());
         let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
         let along = (0..3).map(|c| load[c] * normal[c]).sum::<f64>().abs() / size.max(f64::MIN_POSITIVE);
-        // what rounding leaves of a load across the normal is none
+        // A load across the normal leaves rounding along it, which is treated as zero.
         if along > f64::EPSILON.sqrt() * load.iter().map(|f| f.abs()).sum::<f64>() { along } else { 0.0 }
     };
     let pressure = pair.bodies.map(pushed).into_iter().fold(0.0, f64::max) / length;
@@ -56,7 +59,8 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
     Coupling { pressure, theta, sweeps }
 }
 
-/// p' of the layer (at the pair's first point) where it carries `pressure`; 0 for one that it cannot reach.
+/// Return the tangent p' of the layer at the pair's first point where it carries `pressure`. The result is zero for a pressure
+/// that the layer cannot reach.
 fn tangent_at(pair: &ContactPair, pressure: f64) -> f64 {
     let compression = pair.law.compression(0, pressure);
     if compression > 0.0 && compression.is_finite() { pair.law.response(0, compression).tangent } else { 0.0 }

@@ -1,4 +1,4 @@
-//! Runs that pause: who watches them and keeps what they have, and how they go on.
+//! Runs that pause: the observer that saves their state, and the loop that continues them.
 
 use super::ended::All;
 use super::requests;
@@ -7,23 +7,22 @@ use super::{look, results};
 use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
 use crate::error::Result;
 
-/// An observer that keeps what a run has. All calls are collective; what cannot be written is no reason to end the run.
+/// An observer that saves the state and results of a run. All calls are collective. A failure to write does not end the run.
 pub trait Recorder: Observer {
-    /// Keeps the state of a run, or of its load step, from which it can go on.
+    /// Save the state of a run, or of its load step, from which it can continue.
     fn state(&mut self, _done: &Done) {}
 
-    /// Keeps the results of a load step that has ended, the last of [`Done::steps`], in the units of the scene, with
-    /// its bodies.
+    /// Save the results of a finished load step, the last of [`Done::steps`], in the units of the scene, with its bodies.
     fn step(&mut self, _done: &Done, _recovered: &All) {}
 
-    /// Keeps the results so far, and leaves the run as it is.
+    /// Save the results so far without changing the run.
     fn results(&mut self, _done: &mut Done) {}
 }
 
 impl Recorder for Silent {}
 
-/// Solves through all pauses until a rule or a signal ends the run. At the full load it may end at the error of the discretisation,
-/// and the interval of gamma is found if the scene asks for it.
+/// Solve through all pauses until a rule or a signal ends the run. `full` is whether this is the full load. There the run may end
+/// at the error of the discretisation, and the interval of gamma is computed if the scene requests it.
 pub fn solve(mut ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
     if let Start::Continue(state) = &ready.start {
         state.rows.iter().for_each(|row| keep.row(row));

@@ -1,31 +1,31 @@
-//! What is asked of a run while it iterates: to end, to write what it has, to keep its state.
+//! Requests to a run while it iterates: to end, to write its results, or to save its state.
 
 use crate::exchange::ASKS;
 use crate::interrupt::{self, ENDING, Interrupt};
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-/// Bits of [`Observer::asked`](crate::ddm::Observer::asked) behind those of [`ENDING`].
+/// Bits of [`Observer::asked`](crate::ddm::Observer::asked) that follow those of [`ENDING`].
 const SNAPSHOT: u8 = 1 << ENDING.len();
 const CHECKPOINT: u8 = SNAPSHOT << 1;
 const _: () = assert!(CHECKPOINT == 1 << (ASKS - 1), "a message has as many kinds");
 
-/// Signals, and the time for the next checkpoint.
+/// The requests by signals, and the time of the next checkpoint.
 pub struct Requests {
     interrupt: Interrupt,
-    /// Time between checkpoints, on the rank that keeps it.
+    /// Time between checkpoints, on the rank that keeps the time.
     every: Option<Duration>,
     last: Cell<Instant>,
 }
 
 impl Requests {
-    /// Asks for a checkpoint after every `minutes`, if there are any.
+    /// Request a checkpoint after every `minutes`, if they are given.
     pub fn new(interrupt: &Interrupt, minutes: Option<f64>) -> Self {
         let every = minutes.and_then(|minutes| Duration::try_from_secs_f64(60.0 * minutes).ok());
         Self { interrupt: interrupt.clone(), every, last: Cell::new(Instant::now()) }
     }
 
-    /// What is asked now.
+    /// Return the bits of the current requests.
     pub fn bits(&self) -> u8 {
         let ending = ENDING.iter().position(|&signal| self.interrupt.asked() == Some(signal));
         let snapshot = if self.interrupt.wants_snapshot() { SNAPSHOT } else { 0 };
@@ -37,17 +37,17 @@ impl Requests {
     }
 }
 
-/// The signal by which a run is asked to end.
+/// Return the signal that requests the end of a run, if any.
 pub fn signal(asked: u8) -> Option<i32> {
     ENDING.iter().enumerate().find(|(bit, _)| asked >> bit & 1 == 1).map(|(_, &signal)| signal)
 }
 
-/// Its name; empty without one.
+/// Return the name of this signal, which is empty without one.
 pub fn signal_name(asked: u8) -> &'static str {
     signal(asked).map_or("", interrupt::name)
 }
 
-/// Whether a snapshot is asked for.
+/// Return whether a snapshot is requested.
 pub fn is_snapshot(asked: u8) -> bool {
     asked & SNAPSHOT != 0
 }

@@ -1,20 +1,21 @@
-//! The polynomials of the vertices as one displacement, and what its nodal interpolant misses.
+//! The polynomials of the vertices blended to one displacement, and the error of its nodal interpolant.
 //!
 //! With P_i the polynomial of vertex i and l_i its barycentric coordinate (the hat function of the vertex)
 //!
 //! ```text
 //! u* = sum l_i P_i          the blend: continuous, since on a facet only the hats of its vertices are not zero
-//! b  = u* - I u*            what the interpolant at the nodes misses
+//! b  = u* - I u*            the error of the interpolant I u* at the nodes
 //! ```
 //!
-//! b vanishes at all nodes and is continuous. A displacement of one degree more than the elements has this b exactly.
+//! b vanishes at all nodes and is continuous. For a displacement of one degree more than the elements, b is exact.
 
 use super::{Law, Recovery};
 use crate::fem::{EDGES, Slope, assemble::interpolate, element, quadrature};
 use crate::problem::order::Order;
 
 impl<const D: usize> Recovery<'_, D> {
-    /// Values of the blend at all nodes, one entry a dof: those of the polynomials at vertices, their mean at the middle of an edge.
+    /// Return the values of the blend at all nodes, one entry per dof. At a vertex it is the value of the polynomial, at the
+    /// middle of an edge the mean of those of both ends.
     pub(super) fn blend_nodes(&self) -> Vec<f64> {
         let space = self.space;
         let value = |vertex: u32, node: u32| {
@@ -37,7 +38,8 @@ impl<const D: usize> Recovery<'_, D> {
         blended
     }
 
-    /// The error b of the nodal interpolant at barycentric point `l` of a simplex, a cell or a facet, with these nodes.
+    /// Return the error b of the nodal interpolant at barycentric point `l` of a simplex with these nodes, which is a cell or a
+    /// facet.
     pub fn missed(&self, nodes: &[u32], l: &[f64]) -> [f64; D] {
         let phi = element::values(self.space.order, l);
         let mut at = [0.0; D];
@@ -54,12 +56,12 @@ impl<const D: usize> Recovery<'_, D> {
         sum
     }
 
-    /// Residual of the interpolation error: `-int sigma(b) : grad v` for every shape function v.
+    /// Return the residual of the interpolation error: `-int sigma(b) : grad v` for every shape function v.
     ///
-    /// With b the error of the nodal interpolant, a displacement w with this residual is what the nodal values lack.
+    /// With b the error of the nodal interpolant, a displacement w with this residual is the error of the nodal values.
     pub fn interpolation_residual(&self, law: Law<D>) -> Vec<f64> {
         let space = self.space;
-        // the gradient of b has one degree more than the elements, that of v one less
+        // The gradient of b has one degree more than the elements, and that of v has one less.
         let rule = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
         let mut residual = vec![0.0; space.dofs()];
         for index in 0..space.cell_count() {
@@ -73,7 +75,7 @@ impl<const D: usize> Recovery<'_, D> {
         residual
     }
 
-    /// Gradient of b at a point of a cell.
+    /// Return the gradient of b at a point of a cell.
     pub(super) fn missed_slope(&self, at: &At<D>) -> Slope<D> {
         let hats = at.hats();
         let mut slope = Slope::ZERO;
@@ -106,7 +108,7 @@ impl<const D: usize> Recovery<'_, D> {
 pub(super) struct At<'a, const D: usize> {
     /// Nodes of the cell.
     cell: &'a [u32],
-    /// Barycentric coordinates.
+    /// Barycentric coordinates of the point.
     l: &'a [f64],
     x: [f64; D],
     phi: [f64; element::MOST],
@@ -114,14 +116,16 @@ pub(super) struct At<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> At<'a, D> {
-    /// The point with these barycentric coordinates in a cell whose nodes lie at `x`, and the measure there; `None` where the cell is folded.
+    /// Return the point with these barycentric coordinates in a cell with nodes at `x`, and the measure there. The result is
+    /// `None` if the cell is folded.
     pub fn new(order: Order, cell: &'a [u32], x: &[[f64; D]], l: &'a [f64]) -> Option<(Self, f64)> {
         let (gradient, measure) = element::gradients(order, x, l)?;
         let phi = element::values(order, l);
         Some((Self { cell, l, x: interpolate(x, &phi), phi, gradient }, measure))
     }
 
-    /// Gradients of the barycentric coordinates, also in curved cells: l_k is one at vertex k and a half in the middle of each edge there.
+    /// Return the gradients of the barycentric coordinates, also in curved cells. The coordinate l_k is one at vertex k, and a
+    /// half in the middle of each edge at this vertex.
     fn hats(&self) -> [[f64; D]; 4] {
         let mut hats = [[0.0; D]; 4];
         hats[..=D].copy_from_slice(&self.gradient[..=D]);

@@ -3,21 +3,21 @@
 use crate::fem::Space;
 use nalgebra::DMatrix;
 
-/// Most monomials: those of degree 3 in space.
+/// Largest number of monomials, which is that of degree 3 in space.
 const MOST: usize = 20;
 
 /// The monomials up to a degree, lower ones first. Each but the first is an earlier one times a coordinate.
 pub(super) struct Monomials {
     degree: usize,
-    /// Number of the earlier one, and the coordinate.
+    /// Index of the earlier monomial, and index of the coordinate.
     made: Vec<(usize, usize)>,
 }
 
 impl Monomials {
-    /// Those up to a degree.
+    /// Make the monomials up to a degree.
     pub fn new(dimension: usize, degree: usize) -> Self {
         let mut made = vec![(0, 0)];
-        // the last coordinate of each
+        // These are the last coordinates of all monomials.
         let mut last = vec![0];
         let mut first = 0;
         for _ in 0..degree {
@@ -33,7 +33,7 @@ impl Monomials {
         Self { degree, made }
     }
 
-    /// Their values.
+    /// Return the values of the monomials at a point.
     fn at<const D: usize>(&self, x: &[f64; D]) -> [f64; MOST] {
         let mut values = [0.0; MOST];
         values[0] = 1.0;
@@ -52,16 +52,16 @@ pub(super) struct Patch<const D: usize> {
     terms: Vec<[f64; D]>,
 }
 
-/// Least pivot of a fit whose monomials have norm one: the part of a monomial that the others do not make. Its square is what rounding of
-/// sums is amplified by: a fit has six digits of sixteen at least.
+/// Smallest pivot of a fit whose monomials have norm one. A pivot is the part of a monomial that the others do not represent. One
+/// over its square amplifies the rounding of sums, so that a fit has at least six digits of sixteen.
 const DETERMINED: f64 = 1e-5;
 
 impl<const D: usize> Patch<D> {
-    /// The least-squares fit to the values `u` at nodes; `None` where they do not determine it.
+    /// Return the least-squares fit to the values `u` at nodes, or `None` if they do not determine it.
     ///
-    /// What the polynomial misses is the next term of Taylor's series, which grows as the distance to the power of the degree and one.
-    /// Squares of differences are weighed by one over the square of that, so that all nodes count by what they determine, and far ones do not
-    /// spoil the derivatives at the centre. A node in the centre counts as the next one.
+    /// The error of the polynomial is the next term of Taylor's series. It grows with the distance to the power of the degree
+    /// plus one, and squared differences are divided by its square. So all nodes are weighted by what they determine, and distant
+    /// ones do not spoil the derivatives at the centre. A node in the centre is weighted like the nearest other one.
     pub fn fit(space: &Space<D>, u: &[f64], centre: [f64; D], nodes: &[u32], monomials: &Monomials) -> Option<Self> {
         let n = monomials.made.len();
         if nodes.len() < n {
@@ -85,13 +85,13 @@ impl<const D: usize> Patch<D> {
             let squared = near * near + distance(node).powi(2);
             let weight = (near * near / squared).powi(monomials.degree as i32 + 1);
             add(x, u, weight);
-            // around the axis of a body of revolution u_r is odd in r, u_y even: no one-sided fit
+            // Around the axis of a body of revolution u_r is odd in r and u_y is even, so the fit is not one-sided.
             if space.axisymmetric && centre[0] == 0.0 {
                 (x[0], u[0]) = (-x[0], -u[0]);
                 add(x, u, weight);
             }
         }
-        // scaled to a diagonal of ones
+        // The matrix is scaled to a diagonal of ones.
         let scale: Vec<f64> = (0..n).map(|i| gram[i][i].sqrt().recip()).collect();
         let factor = DMatrix::from_fn(n, n, |i, j| scale[i] * scale[j] * gram[i.max(j)][i.min(j)]).cholesky()?;
         let pivots = factor.l_dirty().diagonal();
@@ -103,7 +103,7 @@ impl<const D: usize> Patch<D> {
         Some(Self { centre, size, terms })
     }
 
-    /// Value and gradient u_c,j at a point.
+    /// Return the value and the gradient u_c,j at a point.
     pub fn jet(&self, monomials: &Monomials, x: &[f64; D]) -> ([f64; D], [[f64; D]; D]) {
         let local: [f64; D] = std::array::from_fn(|i| (x[i] - self.centre[i]) / self.size);
         let (mut values, mut slopes) = ([0.0; MOST], [[0.0; D]; MOST]);

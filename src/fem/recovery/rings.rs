@@ -2,17 +2,17 @@
 
 use crate::fem::Space;
 
-/// Rings of cells around the vertices of a mesh, and those around one of them.
+/// Rings of cells around the vertices of a mesh, with the current selection around one of them.
 pub(super) struct Rings<'a, const D: usize> {
     space: &'a Space<D>,
-    /// Cells at each vertex; none at other nodes.
+    /// Cells at each vertex; empty at other nodes.
     around: Vec<Vec<u32>>,
     cells: Marked,
     nodes: Marked,
 }
 
 impl<'a, const D: usize> Rings<'a, D> {
-    /// Those of a mesh.
+    /// Collect the cells at each vertex of a mesh.
     pub fn new(space: &'a Space<D>) -> Self {
         let mut around = vec![Vec::new(); space.nodes.len()];
         for (index, cell) in space.cells.chunks_exact(space.stride).enumerate() {
@@ -21,18 +21,18 @@ impl<'a, const D: usize> Rings<'a, D> {
         Self { space, around, cells: Marked::new(space.cell_count()), nodes: Marked::new(space.nodes.len()) }
     }
 
-    /// Whether a node is a vertex.
+    /// Return whether a node is a vertex.
     pub fn is_vertex(&self, node: usize) -> bool {
         !self.around[node].is_empty()
     }
 
-    /// Take the cells at a vertex.
+    /// Select the cells at a vertex.
     pub fn begin(&mut self, vertex: usize) {
         self.cells.clear();
         self.cells.extend(&self.around[vertex]);
     }
 
-    /// Add the cells that touch those that are taken.
+    /// Add the cells that touch the selected ones.
     pub fn widen(&mut self) {
         self.nodes.clear();
         for &cell in &self.cells.list {
@@ -41,7 +41,7 @@ impl<'a, const D: usize> Rings<'a, D> {
         self.nodes.list.iter().for_each(|&vertex| self.cells.extend(&self.around[vertex as usize]));
     }
 
-    /// Nodes of the cells that are taken.
+    /// Return the nodes of the selected cells.
     pub fn nodes(&mut self) -> &[u32] {
         self.nodes.clear();
         for &cell in &self.cells.list {
@@ -55,7 +55,7 @@ fn nodes_of<const D: usize>(space: &Space<D>, cell: u32) -> &[u32] {
     &space.cells[cell as usize * space.stride..][..space.stride]
 }
 
-/// Numbers without repetition, in the order in which they came.
+/// Numbers without repetition, in the order in which they were added.
 struct Marked {
     list: Vec<u32>,
     is_in: Vec<bool>,

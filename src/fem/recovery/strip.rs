@@ -1,7 +1,8 @@
 //! The strip of a body between straight facets and the smooth boundary through their vertices.
 //!
-//! Over a straight facet the boundary rises by delta = sum r_ij l_i l_j, one r an edge: the surface of second degree through the vertices of
-//! the facet that is nearest to those of the facets around it. Facets that meet at a corner do not know each other.
+//! Over a straight facet the boundary rises by delta = sum r_ij l_i l_j, with one rise r_ij for each edge and barycentric
+//! coordinates l_i. It is the surface of second degree through the vertices of the facet that is nearest to the vertices of the
+//! facets around it. Facets that meet at a corner have no influence on each other.
 
 use super::{Law, Recovery};
 use crate::fem::{EDGES, Facets, Space, area_vector, assemble, element, quadrature};
@@ -10,18 +11,19 @@ use crate::problem::order::Order;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
-/// Cosine of the angle at which facets meet in a corner: 40 degrees, as where Gmsh makes surfaces of triangles (its tutorial t13). A
-/// circle of nine edges is one.
+/// Cosine of the angle, 40 degrees, at which facets meet in a corner. Gmsh uses the same angle where it makes surfaces of
+/// triangles (its tutorial t13). A circle of nine edges is still smooth.
 const CORNER: f64 = 0.766;
 
-/// Least share of the squared heights over squared distances of the vertices around a facet that a surface of second degree explains. On cylinders
-/// and spheres it leaves at most 0.02, with 38 degrees a facet; beside the edge of a roof at least 0.23 in space and half in the plane.
+/// Smallest explained share of the sum of squared curvatures, which are heights of the vertices around a facet over squared
+/// distances. It is what a surface of second degree explains. On cylinders and spheres the rest is at most 0.02, with 38 degrees
+/// per facet. Beside the edge of a roof it is at least 0.23 in space and half in the plane.
 const EXPLAINED: f64 = 0.9;
 
-/// Straight facets with what the boundary rises over their edges, in the order of [`EDGES`]: positive outwards.
+/// Straight facets with the rise of the boundary over their edges, in the order of [`EDGES`], positive outwards.
 struct Strip<const D: usize> {
     facets: Facets<D>,
-    /// The cell that each facet bounds.
+    /// Cell that each facet bounds.
     cells: Vec<usize>,
     rise: Vec<Vector3<f64>>,
 }
@@ -31,7 +33,7 @@ impl<const D: usize> Strip<D> {
         let places: Vec<(usize, usize)> = space.lone_facets().collect();
         let all = space.facets_of(places.iter().copied());
         let straight = |i: &usize| assemble::is_straight(&all.coordinates(*i, space), D);
-        // quadratic facets have the boundary of the mesh: where one is curved, the straight ones are so
+        // Quadratic facets represent the boundary of the mesh. If one is curved, the straight ones are exact, too.
         let is_known = space.order == Order::P2 && !(0..all.count()).all(|i| straight(&i));
         let inside = |i: usize| all.facet(i)[..D].iter().all(|&node| space.on_axis(node));
         let around = Around::new(space, &all);
@@ -47,12 +49,12 @@ impl<const D: usize> Strip<D> {
     }
 }
 
-/// Facets beside each other.
+/// Neighbouring facets.
 struct Around<'a, const D: usize> {
     space: &'a Space<D>,
     facets: &'a Facets<D>,
     normal: Vec<[f64; D]>,
-    /// Facets that go on smoothly beyond the edge (in the plane: node) opposite to each vertex.
+    /// Facet that continues smoothly beyond the edge (in the plane: node) opposite to each vertex.
     beside: Vec<[Option<usize>; D]>,
 }
 
@@ -79,7 +81,7 @@ impl<'a, const D: usize> Around<'a, D> {
         &self.facets.facet(i)[..D]
     }
 
-    /// Vertices of the facets that touch facet `i` and go on smoothly.
+    /// Return the vertices of the facets that touch facet `i` and continue it smoothly.
     fn ring(&self, i: usize) -> Vec<[f64; D]> {
         let own = self.vertices(i);
         let (mut found, mut nodes, mut next) = (vec![i], Vec::<u32>::new(), 0);
@@ -95,7 +97,7 @@ impl<'a, const D: usize> Around<'a, D> {
         nodes.sort_unstable();
         nodes.dedup();
         let mut ring: Vec<[f64; D]> = nodes.into_iter().map(|node| self.space.nodes[node as usize]).collect();
-        // beyond the axis a body of revolution goes on as its mirror image
+        // Beyond the axis, a body of revolution continues as its mirror image.
         let mirrored = |n: &[f64; D]| n[1] * n[1] - n[0] * n[0] >= CORNER;
         if own.iter().any(|&node| self.space.on_axis(node)) && mirrored(&self.normal[i]) {
             let others = own.iter().filter(|node| !self.space.on_axis(**node));
@@ -108,9 +110,9 @@ impl<'a, const D: usize> Around<'a, D> {
         ring
     }
 
-    /// Rises over the edges of facet `i`; `None` where it is a part of a plane, or of no smooth surface.
+    /// Return the rises over the edges of facet `i`, or `None` if it is part of a plane or of no smooth surface.
     ///
-    /// A height at the distance d misses the next term of Taylor's series, d^3: squares have the weight d^-6.
+    /// The error of a height at the distance d is the next term of Taylor's series, d^3, so squares have the weight d^-6.
     fn rise(&self, i: usize) -> Option<Vector3<f64>> {
         let x = self.facets.coordinates(i, self.space);
         let (normal, dual) = (&self.normal[i], dual(&x));
@@ -129,7 +131,7 @@ impl<'a, const D: usize> Around<'a, D> {
             right += near.powi(3) * height * row;
             heights.push((near, row, height));
         }
-        // planes have no more than rounding, as edges that are straight
+        // In planes heights are rounding only, as along straight edges.
         if heights.iter().all(|(_, _, height)| height.abs() <= 1e-9) {
             return None;
         }
@@ -137,7 +139,8 @@ impl<'a, const D: usize> Around<'a, D> {
         let least = 1e-6 * of.eigenvalues.max();
         let inverse = of.eigenvalues.map(|value| if value > least { 1.0 / value } else { 0.0 });
         let rise = of.eigenvectors * inverse.component_mul(&(of.eigenvectors.transpose() * right));
-        // as curvatures, so that the far side of the facet counts: the vertices beside it alone do not know a roof from a cylinder
+        // Heights are compared as curvatures, so that the far side of the facet has weight. The vertices beside it alone do not
+        // distinguish a roof from a cylinder.
         let sum = |of: &dyn Fn(&Vector3<f64>, f64) -> f64| -> f64 {
             heights.iter().map(|(near, row, height)| (near * of(row, *height)).powi(2)).sum()
         };
@@ -147,11 +150,12 @@ impl<'a, const D: usize> Around<'a, D> {
 }
 
 impl<const D: usize> Recovery<'_, D> {
-    /// Adds the residual of the strip between straight facets and the curved boundary to `residual`, one entry a dof:
+    /// Add the residual of the strip between straight facets and the curved boundary to `residual`, one entry per dof. It is
     /// `-int delta (sigma - sigma_nn) : grad v` along the facets for every shape function v, with the recovered stress sigma.
     ///
-    /// The strip is a part of the body that cells do not have; it carries sigma. The pressure -sigma_nn on the boundary works on the curve and not on
-    /// the facet: the difference is that of div v in the strip. Other loads on it, and those of bodies, change less.
+    /// The strip is a part of the body that cells do not cover, and it carries sigma. The pressure -sigma_nn acts on the curve
+    /// and not on the facet; the difference of its work is that of div v in the strip. Other loads on the boundary, and body
+    /// forces, change less.
     pub fn add_strip(&self, law: Law<D>, residual: &mut [f64]) {
         let strip = Strip::of(self.space);
         if strip.is_empty() {
@@ -187,13 +191,14 @@ impl<const D: usize> Recovery<'_, D> {
     }
 }
 
-/// l_i l_j of the edges of a facet.
+/// Return l_i l_j for the edges of a facet.
 fn products(l: &[f64]) -> Vector3<f64> {
     let edges = l.len() * (l.len() - 1) / 2;
     Vector3::from_fn(|k, _| if k < edges { l[EDGES[k].0] * l[EDGES[k].1] } else { 0.0 })
 }
 
-/// Gradients of the barycentric coordinates in the plane of a facet with these corners; that of the first is not made.
+/// Return the gradients of the barycentric coordinates in the plane of a facet with these corners. That of the first is not
+/// computed.
 fn dual<const D: usize>(x: &[[f64; D]]) -> [[f64; D]; D] {
     let arm = |k: usize| -> [f64; D] { std::array::from_fn(|c| x[k][c] - x[0][c]) };
     let mut dual = [[0.0; D]; D];
@@ -220,7 +225,7 @@ mod tests {
     use super::*;
     use crate::fem::sample::block;
 
-    /// The cube of `sample::block` in coordinates without its skew.
+    /// Return the coordinates of a point in the cube of `sample::block` without its skew.
     fn straight<const D: usize>(x: &[f64; D]) -> [f64; D] {
         let mut a = *x;
         (0..D - 1).rev().for_each(|c| a[c] -= 0.2 * a[c + 1]);
@@ -239,12 +244,12 @@ mod tests {
         x
     }
 
-    /// A block bent into paraboloids, which chords miss at one side and exceed at the other.
+    /// Check a block bent into paraboloids. Its chords lie inside at one side and outside at the other.
     fn curves_are_seen<const D: usize>(order: Order) {
         let mut space = block::<D>(6, order);
         space.nodes.iter_mut().for_each(|x| *x = bent(*x));
         if order == Order::P2 {
-            // with straight edges, as of a mesh of first order
+            // The edges are straight, as in a mesh of first order.
             for cell in space.cells.chunks_exact(space.stride) {
                 for (k, &(i, j)) in EDGES[..D * (D + 1) / 2].iter().enumerate() {
                     let ends = [cell[i], cell[j]].map(|node| space.nodes[node as usize]);
@@ -277,11 +282,11 @@ mod tests {
         curves_are_seen::<3>(Order::P2);
     }
 
-    /// Planes, a roof of planes, and quadratic facets that are curved as the boundary is.
+    /// Check planes, a roof of planes, and quadratic facets that are curved like the boundary.
     fn nothing_is_missed<const D: usize>() {
         let mut roof = block::<D>(4, Order::P1);
         assert!(Strip::of(&roof).is_empty());
-        // the planes meet at 33 degrees, less than a corner
+        // The planes meet at 33 degrees, which is less than a corner.
         roof.nodes.iter_mut().for_each(|x| x[D - 1] += 0.3 * (straight(x)[0] - 0.5).abs());
         let strip = Strip::of(&roof);
         assert!(strip.is_empty(), "{D}: {} of {} facets", strip.rise.len(), roof.boundary().count());

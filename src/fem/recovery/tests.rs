@@ -4,14 +4,14 @@ use super::*;
 use crate::fem::assemble::interpolate;
 use crate::fem::sample::block;
 
-/// A polynomial displacement of a degree, with a gradient.
+/// Return a polynomial displacement of this degree.
 fn field<const D: usize>(degree: i32, x: &[f64; D]) -> [f64; D] {
     let s: f64 = (0..D).map(|i| (1.0 + 0.3 * i as f64) * x[i]).sum();
     std::array::from_fn(|c| (1.0 + c as f64) * s.powi(degree) + x[c] * x[(c + 1) % D].powi(degree - 1))
 }
 
-/// A displacement of one degree more than the elements is recovered exactly, at the boundary too, so that the error of its
-/// interpolant is known exactly.
+/// Check that a displacement of one degree more than the elements is recovered exactly, at the boundary too. Then the error of
+/// its interpolant is exact.
 fn next_degree_is_exact<const D: usize, const N: usize>(order: Order) {
     let degree = if order == Order::P1 { 2 } else { 3 };
     let space = block::<D>(3, order);
@@ -43,14 +43,15 @@ fn a_polynomial_of_the_next_degree_is_recovered() {
     next_degree_is_exact::<3, 4>(Order::P2);
 }
 
-/// A wave of wavenumber k that falls off from the face z = 1, with k h = 0.8.
+/// Return a wave of wavenumber k that decays from the face z = 1, with k h = 0.8.
 fn wave(x: &[f64; 3]) -> [f64; 3] {
     let k = 0.8 * 6.0;
     let falling = (k * (x[2] - 1.0)).exp();
     [(k * x[0]).sin() * falling, 0.3 * (k * x[1]).cos() * falling, (k * x[0]).cos() * falling]
 }
 
-/// Return how much of the error of the interpolant of a wave is seen in the cells at its face: the factor by which what is seen has to be taken to be nearest to it.
+/// Return the share of the error of the interpolant of a wave that is recovered in the cells at its face. It is the least-squares
+/// factor from the exact error to the recovered one.
 fn seen_of_wave(order: Order) -> f64 {
     let space = block::<3>(6, order);
     let u: Vec<f64> = space.nodes.iter().flat_map(wave).collect();
@@ -82,7 +83,7 @@ fn a_wave_is_seen_at_the_boundary() {
     }
 }
 
-/// In curved cells the gradient of what the interpolant misses is that of its values.
+/// In curved cells, the gradient of the interpolation error is consistent with its values.
 #[test]
 fn the_gradient_is_that_of_the_values_in_curved_cells() {
     let mut space = block::<3>(3, Order::P2);
