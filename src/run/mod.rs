@@ -7,7 +7,7 @@ mod alike;
 mod balance;
 mod beyond;
 pub mod clock;
-mod deal;
+mod distributed;
 pub mod ended;
 pub mod inner;
 pub mod look;

@@ -14,7 +14,7 @@ const MESSAGES: usize = 1000;
 
 /// Return whether each body is distributed over all ranks. The largest ones are, as many as make the sweep shortest. Each other
 /// body stays whole on one rank. If there are as many bodies as ranks and they are about equally large, all stay whole.
-pub fn dealt_out(plans: &[Plan], ranks: usize) -> Vec<bool> {
+pub fn distributed_bodies(plans: &[Plan], ranks: usize) -> Vec<bool> {
     let loads: Vec<usize> = plans.iter().map(|plan| plan.dofs).collect();
     let may: Vec<bool> = plans.iter().map(|plan| plan.preset != Preset::Condensed && is_for_several(plan)).collect();
     largest(&loads, &may, ranks)
@@ -27,13 +27,14 @@ fn largest(loads: &[usize], may: &[bool], ranks: usize) -> Vec<bool> {
     // One rank gains nothing.
     order.truncate(if ranks > 1 { order.len() } else { 0 });
     let among = |count: usize| {
-        let mut dealt = vec![false; loads.len()];
-        order[..count].iter().for_each(|&body| dealt[body] = true);
-        dealt
+        let mut distributed = vec![false; loads.len()];
+        order[..count].iter().for_each(|&body| distributed[body] = true);
+        distributed
     };
     let time = |count: &usize| {
-        let dealt = among(*count);
-        let whole: Vec<usize> = loads.iter().zip(&dealt).map(|(load, dealt)| if *dealt { 0 } else { *load }).collect();
+        let distributed = among(*count);
+        let whole: Vec<usize> =
+            loads.iter().zip(&distributed).map(|(load, distributed)| if *distributed { 0 } else { *load }).collect();
         let mut busy = vec![0; ranks];
         owners(&whole, ranks).into_iter().zip(&whole).for_each(|(rank, load)| busy[rank] += load);
         let together: usize = order[..*count].iter().map(|&body| loads[body] / ranks + MESSAGES).sum();
@@ -68,17 +69,17 @@ mod tests {
     /// than its messages take. If there are as many equal bodies as ranks, none is distributed. With one body too many, one is.
     #[test]
     fn large_bodies_are_dealt_out() {
-        let dealt = |loads: &[usize], ranks| largest(loads, &vec![true; loads.len()], ranks);
-        assert_eq!(dealt(&[100_000], 2), [true]);
-        assert_eq!(dealt(&[100_000], 1), [false]);
-        assert_eq!(dealt(&[1_500, 80_000], 2), [false, true]);
-        assert_eq!(dealt(&[10_000, 80_000], 2), [true, true]);
-        assert_eq!(dealt(&[50_000, 50_000], 2), [false, false]);
-        assert_eq!(dealt(&[50_000, 50_000], 3), [true, true]);
-        assert_eq!(dealt(&[50_000; 3], 2), [true, false, false]);
-        assert_eq!(dealt(&[50_000; 64], 8), [false; 64]);
+        let distributed = |loads: &[usize], ranks| largest(loads, &vec![true; loads.len()], ranks);
+        assert_eq!(distributed(&[100_000], 2), [true]);
+        assert_eq!(distributed(&[100_000], 1), [false]);
+        assert_eq!(distributed(&[1_500, 80_000], 2), [false, true]);
+        assert_eq!(distributed(&[10_000, 80_000], 2), [true, true]);
+        assert_eq!(distributed(&[50_000, 50_000], 2), [false, false]);
+        assert_eq!(distributed(&[50_000, 50_000], 3), [true, true]);
+        assert_eq!(distributed(&[50_000; 3], 2), [true, false, false]);
+        assert_eq!(distributed(&[50_000; 64], 8), [false; 64]);
         // The messages take longer than the gain.
-        assert_eq!(dealt(&[600, 600], 3), [false, false]);
+        assert_eq!(distributed(&[600, 600], 3), [false, false]);
         assert_eq!(largest(&[80_000, 10_000], &[false, true], 4), [false, false]);
     }
 }
