@@ -54,7 +54,7 @@ pub enum Status {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inaccuracy {
     /// The error that the run would have ended with.
-    pub told: f64,
+    pub reported: f64,
     /// The largest error that was found.
     pub found: f64,
     /// Where that error is.

@@ -148,7 +148,7 @@ impl<const D: usize> Post for OnPart<D> {
         let (exact, Forces { part, elasticity, .. }) = (self.exact.as_ref()?, &self.forces);
         let at = |x: [f64; D]| {
             let x = &part.space.in_scene(x)[..D];
-            norms::Known {
+            norms::Exact {
                 value: std::array::from_fn(|i| exact[i].eval(x)),
                 gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
             }

@@ -17,7 +17,7 @@ pub struct Norms {
 
 /// A known displacement u at a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known<const D: usize> {
+pub struct Exact<const D: usize> {
     /// Components u_i.
     pub value: [f64; D],
     /// Derivatives du_i/dx_j.
@@ -33,7 +33,7 @@ pub fn error<const D: usize>(
     cells: impl Iterator<Item = usize>,
     elasticity: &Elasticity,
     u: &[f64],
-    exact: &dyn Fn([f64; D]) -> Known<D>,
+    exact: &dyn Fn([f64; D]) -> Exact<D>,
 ) -> [Norms; 2] {
     let rule = quadrature::simplex(D + 1, 5);
     let mut squares = [Norms::default(); 2];

@@ -68,7 +68,7 @@ mod tests {
     /// A single body is distributed. If bodies are unequal, the large one is distributed, and the other one if that gains more
     /// than its messages take. If there are as many equal bodies as ranks, none is distributed. With one body too many, one is.
     #[test]
-    fn large_bodies_are_dealt_out() {
+    fn large_bodies_are_distributed() {
         let distributed = |loads: &[usize], ranks| largest(loads, &vec![true; loads.len()], ranks);
         assert_eq!(distributed(&[100_000], 2), [true]);
         assert_eq!(distributed(&[100_000], 1), [false]);

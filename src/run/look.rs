@@ -56,9 +56,9 @@ pub fn look(done: &mut Done, recovered: &All) {
     let lost = ended.max(rounding);
     // NaN is never confirmed
     if is_solved && !is_confirmed {
-        done.outcome.status = Status::Inaccurate(Inaccuracy { told: reported, found, whose });
+        done.outcome.status = Status::Inaccurate(Inaccuracy { reported, found, whose });
     } else if is_solved && lost > ONE_DIGIT {
-        done.outcome.status = Status::Inaccurate(Inaccuracy { told: reported, found: lost, whose: Whose::Rounding });
+        done.outcome.status = Status::Inaccurate(Inaccuracy { reported, found: lost, whose: Whose::Rounding });
     }
     done.look = Some(Look { reached, whose, seconds: began.elapsed().as_secs_f64() });
 }

@@ -61,7 +61,7 @@ mod tests {
         let asking = |minutes| Requests::new(&Interrupt::default(), minutes).bits();
         assert_eq!([asking(None), asking(Some(1e9)), asking(Some(0.0))], [0, 0, CHECKPOINT]);
         assert_eq!((signal(CHECKPOINT | SNAPSHOT), is_snapshot(CHECKPOINT)), (None, false));
-        let told = [0b111, 0b110, 0b100].map(signal_name);
-        assert_eq!(told, ["SIGTERM", "SIGINT", "SIGHUP"]);
+        let reported = [0b111, 0b110, 0b100].map(signal_name);
+        assert_eq!(reported, ["SIGTERM", "SIGINT", "SIGHUP"]);
     }
 }

@@ -118,7 +118,7 @@ fn unbounded(moving: &[Moved], model: &Model) -> String {
 }
 
 /// Return the message on a result that the last look found to be inaccurate.
-fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> String {
+fn inaccurate(Inaccuracy { reported, found, whose }: &Inaccuracy, model: &Model) -> String {
     let what = match whose {
         Whose::Body(body) => format!("body `{}`: its forces, summed anew, lack balance", model.bodies[*body].name),
         Whose::Pair(pair) => {
@@ -137,7 +137,7 @@ fn inaccurate(Inaccuracy { told, found, whose }: &Inaccuracy, model: &Model) -> 
         "{what}: the relative error is {} at least, where the run saw {}: leave options of the inner solver (-ksp_..., -pc_..., -mat_...) and \
          method.robin at their defaults, or take another solver (--set solver=mumps)",
         sci(*found, 1),
-        sci(*told, 1)
+        sci(*reported, 1)
     )
 }
 
