@@ -57,6 +57,7 @@ mod until;
 mod vector;
 mod waiting;
 mod words;
+mod wrap;
 
 pub use around::Subspace;
 pub use blas::{cholesky, cholesky_solve};
