@@ -1,5 +1,5 @@
 //! The commands, one file each: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`], [`new`](mod@new). This file has what
-//! several of them take from the command line and print. What they share with the library is in [`run`](crate::run).
+//! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
 pub mod adapt;
 mod adapted;

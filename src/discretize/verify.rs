@@ -39,7 +39,7 @@ struct Head {
     lying: Lying,
 }
 
-/// Find the bodies of a scene and check its mesh once, see [`roster::bodies`] and [`Mesh::check`]. The first rank reads and
+/// Find the bodies of a scene and check its mesh once, see `roster::bodies` and [`Mesh::check`]. The first rank reads and
 /// checks the mesh. Collective.
 ///
 /// # Errors

@@ -253,7 +253,7 @@ mod tests {
             for cell in space.cells.chunks_exact(space.stride) {
                 for (k, &(i, j)) in EDGES[..D * (D + 1) / 2].iter().enumerate() {
                     let ends = [cell[i], cell[j]].map(|node| space.nodes[node as usize]);
-                    let between = space.nodes.iter_mut().nth(cell[D + 1 + k] as usize).expect("a node");
+                    let between = &mut space.nodes[cell[D + 1 + k] as usize];
                     *between = std::array::from_fn(|c| 0.5 * (ends[0][c] + ends[1][c]));
                 }
             }
