@@ -5,8 +5,7 @@
 //! The datum lies near the mesh and is subtracted once, where the mesh is loaded. All of these then round relative to the size
 //! of the mesh. Coordinates of the scene return in expressions and in output alone.
 
-use super::Mesh;
-use crate::linalg::{bounds, pad};
+use crate::linalg::bounds;
 
 /// Distance of the centre of a mesh from the origin, in sizes of the mesh, below which the mesh keeps its coordinates. At most
 /// three bits are lost there, and the numbers of scenes near the origin do not change.
@@ -26,17 +25,6 @@ pub fn of<const D: usize>([low, high]: [[f64; 3]; 2], along: [bool; D]) -> [f64;
         let datum = (middle / unit).round() * unit;
         if along[c] && middle.abs() > FAR * size && datum.is_finite() { datum } else { 0.0 }
     })
-}
-
-impl<const D: usize> Mesh<D> {
-    /// Measure the coordinates from a datum near the mesh if the origin is far away; see the module. `along` tells along which
-    /// axes the origin may move.
-    pub fn measure_nearby(&mut self, along: [bool; D]) {
-        self.datum = of(bounds(self.points.iter().copied().map(pad)), along);
-        for x in &mut self.points {
-            (0..D).for_each(|c| x[c] -= self.datum[c]);
-        }
-    }
 }
 
 /// Return the coordinates in the scene of a point that is measured from a datum.

@@ -46,7 +46,7 @@ pub use quality::Quality;
 pub use sizes::{unstructured, view};
 pub use trust::{Breach, breach};
 
-use crate::linalg::pad;
+use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;
 use std::path::PathBuf;
 
@@ -101,6 +101,15 @@ impl<const D: usize> Mesh<D> {
     /// Return the coordinates (x, y, z) of a point in the scene.
     pub fn in_scene(&self, x: [f64; D]) -> [f64; 3] {
         pad(datum::in_scene(&self.datum, x))
+    }
+
+    /// Measure the coordinates from a datum near the mesh if the origin is far away; see [`datum`]. `along` tells along which
+    /// axes the origin may move.
+    pub fn measure_nearby(&mut self, along: [bool; D]) {
+        self.datum = datum::of(bounds(self.points.iter().copied().map(pad)), along);
+        for x in &mut self.points {
+            (0..D).for_each(|c| x[c] -= self.datum[c]);
+        }
     }
 
     /// Drop the numbers of the elements in the file, which only messages of the checks need.
