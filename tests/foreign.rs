@@ -143,6 +143,7 @@ fn files_of_abaqus_and_calculix() {
     refused("type=C3D8R", "type=C3D20", &["elements of type `C3D20` cannot be used", "a.inp:21"]);
     refused("Upper, LOWER", "Upper, LOWR", &["there is no set `LOWR`"]);
     refused("2, 11, 12, 13, 15, 16, 17", "2, 11, 12, 13, 15, 16", &["an element has 6 nodes here, not 5"]);
+    refused("17, 18\n*ELSET", "17,\n*ELSET", &["an element has 6 nodes here, not 5"]);
     refused("2, 11, 12, 13, 15, 16, 17", "2, 11, 12, 13, 15, 16, 99", &["the node 99, which is not there"]);
     refused("15, 18, 1", "1, 18446744073709551615", &["more members, from 1 to 18446744073709551615", "a.inp:"]);
     refused("LOWER, S1", "LOWER, T1", &["is no face of elements"]);

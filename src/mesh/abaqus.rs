@@ -108,10 +108,11 @@ pub fn convert(path: &Path, text: &str) -> Result<String> {
         }
         let refuse = |message: String| Error::mesh(path, Some(number + 1), message);
         data = match line.strip_prefix('*') {
-            Some(keyword) => model.begin(keyword).map_err(refuse)?,
+            Some(keyword) => model.end(&data).and_then(|()| model.begin(keyword)).map_err(refuse)?,
             None => model.read(data, line).map_err(refuse)?,
         };
     }
+    model.end(&data).map_err(|message| Error::mesh(path, None, message))?;
     if model.nodes.is_empty() || model.elements.is_empty() {
         return Err(Error::mesh(path, None, "this file has no nodes or no elements")
             .help("an input file of Abaqus or CalculiX has them under *NODE and *ELEMENT"));
@@ -172,6 +173,23 @@ impl Model {
         })
     }
 
+    /// Check that no element is left open where its data lines end.
+    fn end(&self, data: &Data) -> TextResult<()> {
+        match data {
+            Data::Elements { kind, open, .. } if !open.is_empty() => self.check_count(*kind, open),
+            _ => Ok(()),
+        }
+    }
+
+    /// Check the number of nodes behind the tag of an element.
+    fn check_count(&self, kind: usize, open: &[u64]) -> TextResult<()> {
+        let nodes = self.kinds[kind].nodes;
+        match open.len() == nodes + 1 {
+            true => Ok(()),
+            false => Err(format!("an element has {nodes} nodes here, not {}", open.len() - 1)),
+        }
+    }
+
     /// Read a data line.
     fn read(&mut self, data: Data, line: &str) -> TextResult<Data> {
         let continues = line.ends_with(',');
@@ -191,13 +209,10 @@ impl Model {
                 for word in &words {
                     open.push(count(word)?);
                 }
-                let nodes = self.kinds[kind].nodes;
-                if open.len() < nodes + 1 && continues {
+                if open.len() < self.kinds[kind].nodes + 1 && continues {
                     return Ok(Data::Elements { kind, set, open });
                 }
-                if open.len() != nodes + 1 {
-                    return Err(format!("an element has {nodes} nodes here, not {}", open.len() - 1));
-                }
+                self.check_count(kind, &open)?;
                 let tag = open.remove(0);
                 set.iter().for_each(|set| self.element_sets.entry(set.clone()).or_default().push(tag));
                 if self.elements.insert(tag, (kind, open)).is_some() {
@@ -209,15 +224,7 @@ impl Model {
                 let sets = if nodes { &mut self.node_sets } else { &mut self.element_sets };
                 let mut members = Vec::new();
                 if generate {
-                    let [first, last] = [count::<u64>(words[0])?, count(words.get(1).copied().unwrap_or_default())?];
-                    let step =
-                        words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?.max(1);
-                    if last.saturating_sub(first) / step as u64 >= self.bytes as u64 {
-                        return Err(format!(
-                            "the set `{set}` has more members, from {first} to {last}, than the file has bytes"
-                        ));
-                    }
-                    members.extend((first..=last).step_by(step));
+                    members = generated(&set, &words, self.bytes)?;
                 } else {
                     for word in words.iter().filter(|word| !word.is_empty()) {
                         match word.parse() {
@@ -336,6 +343,16 @@ impl Model {
         }
         text.push_str("$EndElements\n");
         Ok(())
+    }
+}
+
+/// Return the members of the set that a data line `first, last, step` generates. A file of so many `bytes` has no more of them.
+fn generated(set: &str, words: &[&str], bytes: usize) -> TextResult<Vec<u64>> {
+    let [first, last] = [count::<u64>(words[0])?, count(words.get(1).copied().unwrap_or_default())?];
+    let step = words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count::<usize>(word))?.max(1);
+    match last.saturating_sub(first) / step as u64 >= bytes as u64 {
+        true => Err(format!("the set `{set}` has more members, from {first} to {last}, than the file has bytes")),
+        false => Ok((first..=last).step_by(step).collect()),
     }
 }
 
