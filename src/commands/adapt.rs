@@ -22,7 +22,7 @@ use crate::solver::options;
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Cells of a body's first mesh.
+/// Cells of a body's first mesh. A cube with three cells along each edge, six tetrahedra each, has 162; with two it has a single inner node.
 const FIRST_CELLS: usize = 150;
 
 /// Ratio of the error that the next mesh aims at to the error asked for. An estimate a little too good then costs no further mesh.

@@ -28,7 +28,7 @@ const FORMAT: &str = "winkler checkpoint 5";
 /// The beginning of the first line in all versions.
 const ANY_FORMAT: &[u8] = b"winkler checkpoint ";
 
-/// Number of bytes of the digest at the end.
+/// Number of bytes of the digest at the end, SHA-256.
 const DIGEST_BYTES: usize = 32;
 
 /// The part of a checkpoint that is written as JSON.

@@ -34,7 +34,7 @@ struct Numbers {
     counts: Vec<Vec<usize>>,
 }
 
-/// The mark of a node without a number.
+/// The mark of a node without a number. No node has it, since numbers of dofs, at least twice as large, fit 32 bits with a sign.
 const NONE: u32 = u32::MAX;
 
 impl Numbers {

@@ -58,9 +58,11 @@ pub fn fix<const D: usize>(
         }
     }
     (0..search.parts.len()).for_each(|body| search.balance(&search.of_one(body)));
-    let bodies = search.parts.iter_mut().zip(&*search.interfaces).zip(&mut search.unconstrained);
-    let fixed: Vec<_> =
-        bodies.map(|((part, interface), unconstrained)| gauge::fix(part, interface, unconstrained)).collect();
+    let mut fixed = Vec::new();
+    for body in 0..search.parts.len() {
+        let (part, interface) = (&mut search.parts[body], &search.interfaces[body]);
+        fixed.push(gauge::fix(part, interface, &mut search.unconstrained[body]));
+    }
     let gauged = fixed.into_iter().enumerate().map(|(body, fixed)| search.fix_round(body, fixed)).collect();
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
         search.fix_some();

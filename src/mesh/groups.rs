@@ -90,7 +90,7 @@ pub fn used(groups: &[Group], count: usize) -> Vec<bool> {
 }
 
 /// Return the number of each used point among all used points. The entries of other points are meaningless.
-pub fn compact(used: &[bool]) -> Vec<u32> {
+fn compact(used: &[bool]) -> Vec<u32> {
     let mut next = 0;
     let number = |used: &bool| {
         next += u32::from(*used);

@@ -285,7 +285,7 @@ unsafe fn create(comm: MPI_Comm, rows: *mut Rows) -> Result<(ffi::Mat, *mut f64)
         Scope::Process => unsafe { petsc!(MatCreateSeqAIJWithArrays(comm, n, n, i, j, values, &mut mat)) },
         Scope::World => {
             let (other_i, other_j) = (rows.other_row_ptr.as_mut_ptr(), rows.other_columns.as_mut_ptr());
-            // SAFETY: as above; the values in other columns follow those in own columns, of which there are as many as column numbers.
+            // SAFETY: as above. `values` first has one value for each entry of `columns`, and then those of the other columns.
             unsafe {
                 let other_values = values.add(rows.columns.len());
                 petsc!(MatCreateMPIAIJWithSplitArrays(

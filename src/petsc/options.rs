@@ -1,4 +1,4 @@
-//! PETSc's options, of which a process has one table.
+//! PETSc's table of options. A process has one such table.
 
 use super::error::string;
 use super::library::petsc;

@@ -20,7 +20,7 @@ pub fn distributed_bodies(plans: &[Plan], ranks: usize) -> Vec<bool> {
     largest(&loads, &may, ranks)
 }
 
-/// Return the same for bodies with these numbers of dofs, of which only those marked in `may` can be distributed.
+/// Return whether each body is distributed, from the dofs of each (`loads`) and from whether it `may` be distributed.
 fn largest(loads: &[usize], may: &[bool], ranks: usize) -> Vec<bool> {
     let mut order: Vec<usize> = (0..loads.len()).filter(|&body| may[body]).collect();
     order.sort_by_key(|&body| (std::cmp::Reverse(loads[body]), body));
