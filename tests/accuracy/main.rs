@@ -1,0 +1,13 @@
+//! Answers against closed forms and known solutions.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod axisymmetric;
+mod cases;
+mod elasticity;
+mod layers;
+mod manufactured;
+mod space;
+mod supports;
+mod verification;

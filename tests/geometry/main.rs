@@ -1,0 +1,13 @@
+//! Meshes, shapes and surfaces: what is read, what is refused, and what lies opposite what.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod curved;
+mod foreign;
+mod gmsh;
+mod meshes;
+mod patterns;
+mod pieces;
+mod round;
+mod surfaces;

@@ -1,0 +1,462 @@
+//! Meshes that are none are refused with body, place and element; those that are give what they gave.
+
+use crate::common::{Run, Scene, output, root, solve, solve_on, text_of};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
+use winkler::problem::order::Order;
+
+/// The mesh of a script as Gmsh writes it.
+fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (geo, out) = (folder.path().join("a.geo"), folder.path().join("a.msh"));
+    std::fs::write(&geo, script).expect("a script");
+    let mut command = Command::new("gmsh");
+    command.args(["-v", "0", "-2", "-format", "msh41"]).args(arguments).arg("-o").arg(&out).arg(&geo);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+    std::fs::read(out).expect("a mesh")
+}
+
+/// Solves the patch of two blocks on a mesh of these bytes, with one text of its scene replaced; two and three ranks find what one does.
+fn on_mesh(bytes: &[u8], from: &str, to: &str) -> Run {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mesh = folder.path().join("a.msh");
+    std::fs::write(&mesh, bytes).expect("a mesh");
+    let text = text_of("patch");
+    let line = text.lines().find(|line| line.starts_with("mesh =")).expect("a mesh");
+    let text = text.replace(line, &format!("mesh = \"{}\"", mesh.display()));
+    assert!(from.is_empty() || text.matches(from).count() == 1, "`{from}`");
+    let scene = Scene::new(if from.is_empty() { text } else { text.replace(from, to) });
+    let serial = solve(&scene, &[]);
+    for ranks in [2, 3] {
+        let parallel = solve_on(ranks, &scene, &[]);
+        assert_eq!(parallel.code, serial.code, "{}", parallel.said());
+        match serial.code {
+            0 => {
+                for body in [0, 1] {
+                    for what in ["cells", "nodes", "inner_facets", "boundary_facets", "parts"] {
+                        let [one, other] = [&serial, &parallel].map(|run| run.count(&format!("bodies/{body}/{what}")));
+                        assert_eq!(one, other, "{what} on {ranks} ranks");
+                    }
+                }
+            }
+            // then mpiexec has words of its own
+            _ => assert!(parallel.stderr.starts_with(&serial.stderr), "{}\n{}", serial.said(), parallel.said()),
+        }
+    }
+    serial
+}
+
+fn refused(run: &Run, words: &[&str]) {
+    assert_eq!(run.code, 4, "{}", run.said());
+    assert!(run.report.is_null() && run.stdout.is_empty(), "{}", run.said());
+    for word in words.iter().chain(&["a.msh", "help: "]) {
+        assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+    }
+}
+
+/// The patch with two elements along each side, its sides named.
+fn script() -> String {
+    let path = root().join("meshes/patch/patch.geo");
+    let text = std::fs::read_to_string(path).expect("a script").replace("{4, Name", "{2, Name");
+    text + "Physical Curve(\"lower_sides\") = {2, 4};\nPhysical Curve(\"upper_sides\") = {12, 14};\n"
+}
+
+#[test]
+fn what_is_checked_is_counted() {
+    let run = on_mesh(&gmsh(&script(), &[]), "", "").converged();
+    for body in [0, 1] {
+        let count = |what: &str| run.count(&format!("bodies/{body}/{what}"));
+        // two triangles in each of 2 x 2 squares
+        assert_eq!(["inner_facets", "boundary_facets", "parts"].map(count), [8, 8, 1]);
+    }
+}
+
+/// The text of a mesh with another line for an element of a block, found by dimension and entity.
+fn element(text: &str, dimension: usize, entity: usize, which: usize, nodes: impl Fn(&[u64]) -> Vec<u64>) -> String {
+    let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    let elements = lines.iter().position(|line| line == "$Elements").expect("elements");
+    let numbers = |line: &str| line.split_whitespace().map(|word| word.parse().expect("a tag")).collect::<Vec<u64>>();
+    let mut block = elements + 2;
+    loop {
+        let head = numbers(&lines[block]);
+        if head[..2] == [dimension as u64, entity as u64] {
+            break;
+        }
+        block += 1 + head[3] as usize;
+    }
+    let words = numbers(&lines[block + 1 + which]);
+    let changed = nodes(&words[1..]);
+    lines[block + 1 + which] =
+        format!("{} {}", words[0], changed.iter().map(u64::to_string).collect::<Vec<_>>().join(" "));
+    lines.join("\n") + "\n"
+}
+
+#[test]
+fn wrong_elements_are_named() {
+    let text = String::from_utf8(gmsh(&script(), &[])).expect("a text");
+    let first = |dimension: usize, entity: usize, which: usize| {
+        let found = std::cell::RefCell::new(Vec::new());
+        element(&text, dimension, entity, which, |nodes| {
+            found.borrow_mut().extend_from_slice(nodes);
+            nodes.to_vec()
+        });
+        found.into_inner()
+    };
+    // the second cell of the lower block in the place of the first
+    let twice = element(&text, 2, 1, 0, |_| first(2, 1, 1));
+    refused(&on_mesh(twice.as_bytes(), "", ""), &["body `lower`", "share"]);
+    // a cell of the lower block on a node of the upper one
+    let upper = first(2, 2, 0)[0];
+    let foreign = element(&text, 2, 1, 0, |nodes| [&[upper], &nodes[1..]].concat());
+    refused(&on_mesh(foreign.as_bytes(), "", ""), &["body `"]);
+    // a loaded facet across the block: its load would act nowhere
+    let chord = [first(1, 11, 0)[0], first(1, 13, 0)[0]];
+    let lost = element(&text, 1, 11, 0, |_| chord.to_vec());
+    refused(&on_mesh(lost.as_bytes(), "", ""), &["group `upper_face` bounds no body", "element"]);
+    // the same for what is held, and for a contact
+    let held = element(&text, 1, 1, 0, |_| vec![first(1, 1, 0)[0], first(1, 3, 0)[0]]);
+    refused(&on_mesh(held.as_bytes(), "", ""), &["group `lower_face` belongs to no body"]);
+    let contact = element(&text, 1, 13, 0, |_| chord.to_vec());
+    refused(&on_mesh(contact.as_bytes(), "", ""), &["group `upper_bottom` bounds no body"]);
+}
+
+/// Two thin rings, one around the other.
+const RINGS: &str = r#"SetFactory("OpenCASCADE");
+// two thin rings, one around the other, with few elements along the circles: the arcs are higher than the rings are thick
+DefineConstant[ h = {1, Name "h"} ];
+For s In {0 : 1}
+  inner = 1.0 + 0.05*s; outer = inner + 0.05;
+  Circle(10*s + 1) = {0, 0, 0, inner, 0, Pi/2};
+  Circle(10*s + 2) = {0, 0, 0, outer, 0, Pi/2};
+  Line(10*s + 3) = {4*s + 1, 4*s + 3};
+  Line(10*s + 4) = {4*s + 2, 4*s + 4};
+  Curve Loop(s + 1) = {10*s + 1, 10*s + 4, -(10*s + 2), -(10*s + 3)};
+  Plane Surface(s + 1) = {s + 1};
+  Physical Surface(Sprintf("ring%g", s)) = {s + 1};
+  Physical Curve(Sprintf("inner%g", s)) = {10*s + 1};
+  Physical Curve(Sprintf("outer%g", s)) = {10*s + 2};
+  Physical Curve(Sprintf("x%g", s)) = {10*s + 4};
+  Physical Curve(Sprintf("y%g", s)) = {10*s + 3};
+EndFor
+Mesh.MeshSizeMin = h; Mesh.MeshSizeMax = h; Mesh.MinimumCirclePoints = 4;
+"#;
+
+const RINGS_SCENE: &str = r#"dimension = 2
+mesh = "ring.geo"
+[[body]]
+name = "ring0"
+young = 1e3
+poisson = 0.3
+order = 2
+fix = [{ on = "x0", symmetry = true }, { on = "y0", symmetry = true }]
+load = [{ on = "inner0", pressure = 1 }]
+[[body]]
+name = "ring1"
+young = 1e3
+poisson = 0.3
+order = 2
+fix = [{ on = "x1", symmetry = true }, { on = "y1", symmetry = true }]
+[[contact]]
+between = ["outer0", "inner1"]
+layer = { linear = { stiffness = 1e5 } }
+"#;
+
+/// Arcs that are higher than a ring is thick fold its quadratic cells: these become straight, and are counted.
+#[test]
+fn folded_cells_become_straight() {
+    let scene = Scene::new(RINGS_SCENE);
+    std::fs::write(scene.path.with_file_name("ring.geo"), RINGS).expect("a file");
+    let with = |h: &str| solve(&scene, &["--set", &format!("mesh={{geo=\"ring.geo\",set={{h={h}}}}}")]).converged();
+    let coarse = with("0.5");
+    assert!(coarse.warnings().contains("8 quadratic cells were folded"), "{}", coarse.warnings());
+    let fine = with("0.2");
+    assert!(!fine.warnings().contains("folded"), "{}", fine.warnings());
+    let two = solve_on(2, &scene, &["--set", "mesh={geo=\"ring.geo\",set={h=0.5}}"]).converged();
+    assert_eq!(two.warnings(), coarse.warnings());
+}
+
+#[test]
+fn bodies_in_parts() {
+    // a third block for the group of the upper one, far from it
+    let far = "Point(21) = {5, 1, 0};\nPoint(22) = {6, 1, 0};\nPoint(23) = {5, 2, 0};\nLine(21) = {21, 22};\n\
+               Line(22) = {22, 23};\nLine(23) = {23, 21};\nTransfinite Curve {21, 22, 23} = 2;\n\
+               Curve Loop(3) = {21, 22, 23};\nPlane Surface(3) = {3};\nPhysical Surface(\"upper\") = {2, 3};\n";
+    let mesh = gmsh(&script().replace("Physical Surface(\"upper\") = {2};", far), &[]);
+    let run = on_mesh(&mesh, "", "");
+    refused(&run, &["body `upper` is in 2 parts", "the one at (5, 1, 0) is not held", "make a body of each part"]);
+    // each part held as a whole
+    let run = on_mesh(&mesh, "fix = [{ on = \"upper_pin\", x = 0 }]", "fix = [{ on = \"upper\", x = 0, y = -1e-4 }]");
+    assert_eq!((run.code, run.count("bodies/1/parts")), (0, 2), "{}", run.said());
+}
+
+/// Damage that shows while the file is read.
+#[test]
+fn files_that_are_damaged() {
+    let mesh = String::from_utf8(gmsh(&script(), &[])).expect("text");
+    let lost = element(&mesh, 2, 2, 0, |nodes| vec![nodes[0], nodes[1], 9999]);
+    refused(&on_mesh(lost.as_bytes(), "", ""), &["uses node 9999, which does not exist"]);
+    let flat = element(&mesh, 2, 1, 1, |nodes| vec![nodes[0], nodes[1], nodes[1]]);
+    refused(&on_mesh(flat.as_bytes(), "", ""), &["of group `lower` has zero area"]);
+    let end = mesh.find("$EndElements").expect("an end");
+    refused(&on_mesh(&mesh.as_bytes()[..end - 8], "", ""), &["a.msh:"]);
+    let binary = gmsh(&script(), &["-bin"]);
+    refused(&on_mesh(&binary[..binary.len() - 200], "", ""), &["it was cut short"]);
+}
+
+#[test]
+fn bodies_that_share_nodes() {
+    let joined = script().replace("Physical Surface(\"lower\")", "Coherence;\nPhysical Surface(\"lower\")");
+    let joined = joined.replace("{13}", "{3}");
+    refused(&on_mesh(&gmsh(&joined, &[]), "", ""), &["shares a node with body `lower`", "between = \"auto\""]);
+}
+
+/// What a mesh is computed with: for each group its simplices by the places of their points.
+type Used = BTreeMap<String, Vec<Vec<[u64; 2]>>>;
+
+fn used(mesh: &Mesh<2>) -> Used {
+    let place = |&point: &u32| mesh.points[point as usize].map(f64::to_bits);
+    let of = |group: &winkler::mesh::Group| {
+        let sorted = |simplex: &[u32]| {
+            let mut places: Vec<[u64; 2]> = simplex.iter().map(place).collect();
+            places.sort_unstable();
+            places
+        };
+        let mut all: Vec<_> = group.simplices().map(sorted).collect();
+        all.sort_unstable();
+        all
+    };
+    mesh.groups.iter().map(|group| (group.name.clone(), of(group))).collect()
+}
+
+/// What a changed file still gives, by section of the file.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord, Clone, Copy)]
+enum Kind {
+    Refused,
+    /// The same mesh: what changed is not read, or not used.
+    Same,
+    /// A name that the scene does not find.
+    Named,
+    /// Nodes at other places.
+    Moved,
+    /// Another node for a point.
+    Point,
+    /// Another facet of the boundary for one facet of a group.
+    Facet,
+    /// Anything else.
+    Wrong,
+}
+
+/// Whether one group has another facet in the place of one of its own, with one node the same.
+fn one_facet(found: &Used, known: &Used) -> bool {
+    let without = |a: &Used, b: &Used| -> Vec<(String, Vec<[u64; 2]>)> {
+        let own = |(name, all): (&String, &Vec<Vec<[u64; 2]>>)| {
+            let own = all.iter().filter(|simplex| !b[name].contains(simplex));
+            own.map(|simplex| (name.clone(), simplex.clone())).collect::<Vec<_>>()
+        };
+        a.iter().flat_map(own).collect()
+    };
+    match (without(found, known).as_slice(), without(known, found).as_slice()) {
+        ([(group, facet)], [(of, instead)]) => group == of && facet.iter().any(|place| instead.contains(place)),
+        _ => false,
+    }
+}
+
+/// Reads a mesh as the patch asks for it.
+fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
+    let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, Maker::User) else { return Kind::Refused };
+    if good.groups.iter().any(|group| mesh.group(&group.name).is_none()) {
+        return Kind::Named;
+    }
+    let body = |name, groups: &[(&'static str, Duty)]| Asked { name, order: mesh.order, groups: groups.to_vec() };
+    let bodies = [
+        body("lower", &[("lower_face", Duty::Holds), ("lower_sides", Duty::Holds), ("lower_pin", Duty::Holds)]),
+        body("upper", &[("upper_face", Duty::Acts), ("upper_sides", Duty::Acts), ("upper_pin", Duty::Holds)]),
+    ];
+    if mesh.check(&bodies, &["lower_top", "upper_bottom"], false).is_err() {
+        return Kind::Refused;
+    }
+    let found = used(&mesh);
+    let connectivity = |mesh: &Mesh<2>| mesh.groups.iter().map(|group| group.connectivity.clone()).collect::<Vec<_>>();
+    if found == *known {
+        Kind::Same
+    } else if mesh.points.len() == good.points.len() && connectivity(&mesh) == connectivity(good) {
+        Kind::Moved
+    } else {
+        let only = |dimension: usize| {
+            let of = |groups: &Used| {
+                let mut all: Vec<_> = good
+                    .groups
+                    .iter()
+                    .filter(|group| group.dimension == dimension)
+                    .flat_map(|group| groups[&group.name].clone())
+                    .collect();
+                all.sort_unstable();
+                all
+            };
+            of(&found) == of(known)
+        };
+        match [0, 1, 2].map(only) {
+            [false, true, true] => Kind::Point,
+            [true, false, true] if one_facet(&found, known) => Kind::Facet,
+            _ => Kind::Wrong,
+        }
+    }
+}
+
+const SECTIONS: [&str; 5] = ["$MeshFormat", "$PhysicalNames", "$Entities", "$Nodes", "$Elements"];
+
+/// Every change of one bit of a mesh, text and binary, of both orders. What still runs is another good mesh (a node moved, a point
+/// or entity that the file itself puts elsewhere) or the same one: docs/meshes.md says why no check can tell.
+#[test]
+fn one_bit_changes() {
+    for arguments in [&[][..], &["-bin"], &["-bin", "-order", "2"]] {
+        let bytes = gmsh(&script(), arguments);
+        let good = parse::<2>(Path::new("a.msh"), &bytes, Maker::User).expect("a mesh");
+        assert_eq!(good.order == Order::P2, arguments.len() == 3);
+        let known = used(&good);
+        assert_eq!(kind(&bytes, &good, &known), Kind::Same);
+        let mut counts: BTreeMap<(&str, Kind), usize> = BTreeMap::new();
+        let mut section = "";
+        for position in 0..bytes.len() {
+            if let Some(begun) = SECTIONS.iter().find(|name| bytes[position..].starts_with(name.as_bytes())) {
+                section = begun;
+            }
+            for bit in 0..8 {
+                let mut changed = bytes.clone();
+                changed[position] ^= 1 << bit;
+                let kind = kind(&changed, &good, &known);
+                let of_section = match kind {
+                    Kind::Refused | Kind::Same => true,
+                    Kind::Named => section == "$PhysicalNames",
+                    Kind::Moved => section == "$Nodes",
+                    Kind::Point | Kind::Facet => section == "$Elements",
+                    Kind::Wrong => false,
+                };
+                *counts.entry((section, kind)).or_default() += 1;
+                assert!(of_section, "{arguments:?} {section} bit {bit} of byte {position}: {kind:?}");
+            }
+        }
+        println!("{arguments:?}");
+        counts.iter().for_each(|((section, kind), count)| println!("  {section} {kind:?}: {count}"));
+        // a node moved by half its place or more is a fold here or lies outside
+        let of = |kind: Kind| counts.iter().filter(|entry| entry.0.1 == kind).map(|entry| entry.1).sum::<usize>();
+        assert!(of(Kind::Refused) > 2 * of(Kind::Moved) && of(Kind::Moved) > 0);
+    }
+}
+
+/// `winkler mesh` of a square as a scene's only body, in a folder of its own, with variables of the environment.
+struct Script {
+    folder: tempfile::TempDir,
+}
+
+impl Script {
+    fn new(text: &str) -> Self {
+        let script = Self { folder: tempfile::tempdir().expect("a folder") };
+        let scene = "dimension = 2\nmesh = { geo = \"a.geo\" }\n[[body]]\nname = \"all\"\nyoung = 1\npoisson = 0\n";
+        let scene = scene.to_owned() + "[[body]]\nname = \"other\"\nyoung = 1\npoisson = 0\n[[contact]]\n";
+        let scene = scene + "between = [\"top\", \"bottom\"]\nlayer = { linear = { stiffness = 1 } }\n";
+        script.write("scene.toml", &scene);
+        script.write("a.geo", &(text.to_owned() + SQUARES));
+        script
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).expect("a file");
+    }
+
+    /// Whether the mesh comes from the cache in a folder, and the number of its nodes.
+    fn mesh(&self, cache: &Path, set: &[(&str, &str)]) -> (bool, u64) {
+        let mut command = Command::new(crate::common::WINKLER);
+        command.args(["mesh", "scene.toml", "--json"]).current_dir(self.folder.path());
+        command
+            .env_remove("XDG_CACHE_HOME")
+            .env_remove("N")
+            .envs(set.iter().copied())
+            .env("WINKLER_CACHE", cache)
+            .env("HOME", self.path("home"));
+        let (status, said, complaint) = output(command, Duration::from_secs(60));
+        assert!(status.success(), "{said}{complaint}");
+        let facts: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+        (facts["origin"] == "from the cache", facts["nodes"].as_u64().expect("a number"))
+    }
+}
+
+/// Two squares, one on the other, with `n` elements along their sides.
+const SQUARES: &str = "
+SetFactory(\"OpenCASCADE\");
+Rectangle(1) = {0, 0, 0, 1, 1}; Rectangle(2) = {0, 1, 0, 1, 1};
+Transfinite Curve {:} = n + 1; Transfinite Surface {:};
+Physical Surface(\"all\") = {1}; Physical Surface(\"other\") = {2};
+Physical Curve(\"top\") = {3}; Physical Curve(\"bottom\") = {5};
+";
+
+/// All that a script can learn from outside belongs to the key of its mesh, or its mesh is not kept.
+#[test]
+fn no_mesh_of_other_inputs_comes_from_the_cache() {
+    let nodes = |n: u64| 2 * (n + 1) * (n + 1);
+    let by_name = "n = 2; If (!StrCmp(GetEnv(\"N\"), \"three\")) n = 3; EndIf\n";
+    let script = Script::new(by_name);
+    let mesh = |set: &[(&str, &str)]| script.mesh(&script.path("cache"), set);
+    assert_eq!([mesh(&[]), mesh(&[])], [(false, nodes(2)), (true, nodes(2))]);
+    let three = [("N", "three")];
+    assert_eq!([mesh(&three), mesh(&three), mesh(&[])], [(false, nodes(3)), (true, nodes(3)), (true, nodes(2))]);
+    // options of the user do not reach Gmsh
+    std::fs::create_dir_all(script.path("home")).expect("a folder");
+    script.write("home/.gmsh-options", "Mesh.ElementOrder = 2;\n");
+    script.write(".gmsh-options", "Mesh.ElementOrder = 2;\n");
+    script.write("a.geo", &format!("n = 5;{SQUARES}"));
+    assert_eq!(mesh(&[]), (false, nodes(5)));
+    // but those beside the script do
+    script.write("a.geo.opt", "n = 4;\nTransfinite Curve {:} = n + 1;\n");
+    assert_eq!([mesh(&[]), mesh(&[])], [(false, nodes(4)), (true, nodes(4))]);
+    script.write("a.geo.opt", "n = 6;\nTransfinite Curve {:} = n + 1;\n");
+    assert_eq!(mesh(&[]), (false, nodes(6)));
+    for text in [
+        "n = 2 + 0*Rand(1);",
+        "n = 2 + 0*Cpu;",
+        "n = 2; If (FileExists(\"more\")) n = 3; EndIf",
+        "n = 2; If (StrFind(CurrentDirectory, \"nowhere\")) n = 3; EndIf",
+        "n = 2; s = Today;",
+        "n = 2; s = Str(GetEnv(StrCat(\"N\", \"\")));",
+    ] {
+        let script = Script::new(text);
+        let mesh = || script.mesh(&script.path("cache"), &[]);
+        assert_eq!([mesh(), mesh()], [(false, nodes(2)); 2], "{text}");
+    }
+    // a run says why
+    let script = Script::new("n = 2 + 0*Rand(1);");
+    let checked = crate::common::winkler(&["check", script.path("scene.toml").to_str().expect("a path")]);
+    assert!(checked.stdout.contains("is meshed anew in each run, since it uses `Rand`"), "{}", checked.said());
+}
+
+/// What another user may have put into a cache is no answer to this scene, and nothing is written there.
+#[test]
+fn a_cache_of_others_is_not_used() {
+    use std::os::unix::fs::{PermissionsExt, chown};
+    let script = Script::new("n = 2;");
+    let (cache, own) = (script.path("cache"), script.path("home/.cache/winkler"));
+    let mesh = || script.mesh(&cache, &[]).0;
+    let count = |folder: &Path| std::fs::read_dir(folder).map_or(0, |entries| entries.count());
+    assert_eq!([mesh(), mesh()], [false, true]);
+    let file = std::fs::read_dir(&cache).expect("a cache").next().expect("a mesh").expect("a mesh").path();
+    let allow = |path: &Path, mode| std::fs::set_permissions(path, PermissionsExt::from_mode(mode)).expect("ours");
+    allow(&cache, 0o777);
+    assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
+    allow(&cache, 0o755);
+    assert!(mesh());
+    // only root gives files away
+    if chown(&file, Some(54_321), None).is_err() {
+        return;
+    }
+    assert_eq!([mesh(), mesh()], [false, true], "their file is replaced by ours");
+    chown(&cache, Some(54_321), None).expect("given away");
+    std::fs::remove_dir_all(&own).expect("removed");
+    assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
+}

@@ -1,0 +1,154 @@
+//! Bodies that are dealt out: each rank recovers and writes its part, and all parts together are the body of one rank.
+
+use crate::common::{Run, case, solve, solve_on};
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+use vtkio::model::{Attribute, DataSet, Piece, UnstructuredGridPiece, Vtk};
+
+/// The pieces of a file, as they stand there.
+fn pieces(path: &Path) -> Vec<Piece<UnstructuredGridPiece>> {
+    let bytes = fs::read(path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()));
+    match Vtk::parse_xml(bytes.as_slice()).unwrap_or_else(|cause| panic!("{}: {cause}", path.display())).data {
+        DataSet::UnstructuredGrid { pieces, .. } => pieces,
+        _ => panic!("{} is no grid", path.display()),
+    }
+}
+
+type Place = [u64; 3];
+
+/// A body by its places: numbers at each point, whichever file they are in, and all cells.
+struct Body {
+    /// Displacement, stress, von Mises stress, principal stresses.
+    at: BTreeMap<Place, Vec<Vec<f64>>>,
+    cells: Vec<BTreeSet<Place>>,
+}
+
+impl Body {
+    fn read(folder: &Path, file: &str) -> Self {
+        let mut body = Body { at: BTreeMap::new(), cells: Vec::new() };
+        let mut rest = vec![file.to_owned()];
+        while let Some(file) = rest.pop() {
+            for piece in pieces(&folder.join(&file)) {
+                match piece {
+                    Piece::Source(file, _) => rest.push(file),
+                    Piece::Inline(piece) => body.add(*piece),
+                    Piece::Loaded(_) => panic!("{file}"),
+                }
+            }
+        }
+        body.cells.sort();
+        body
+    }
+
+    fn add(&mut self, piece: UnstructuredGridPiece) {
+        let points = piece.points.cast_into::<f64>().expect("numbers");
+        let places: Vec<Place> = points.chunks_exact(3).map(|x| [0, 1, 2].map(|k| x[k].to_bits())).collect();
+        let mut numbers = vec![Vec::new(); places.len()];
+        for attribute in &piece.data.point {
+            let Attribute::DataArray(array) = attribute else { panic!("a field") };
+            let all = array.data.cast_into::<f64>().expect("numbers");
+            numbers.iter_mut().zip(all.chunks_exact(array.num_comp())).for_each(|(to, value)| to.extend(value));
+        }
+        places.iter().zip(numbers).for_each(|(place, numbers)| self.at.entry(*place).or_default().push(numbers));
+        let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
+        let mut start = 0;
+        for end in offsets {
+            self.cells.push(connectivity[start..end as usize].iter().map(|&node| places[node as usize]).collect());
+            start = end as usize;
+        }
+    }
+}
+
+const STOP: &str = "method.stop={residual=1e-11}";
+
+/// The fields of `body` in the run on several ranks are those of one rank, at each point of each part; whether
+/// parts share points.
+fn same_fields(serial: &Run, parallel: &Run, body: &str, file: &str) -> bool {
+    let (whole, parts) = (Body::read(&serial.folder, &format!("{body}.vtu")), Body::read(&parallel.folder, file));
+    assert_eq!(whole.cells, parts.cells, "{body}: each cell once");
+    assert!(whole.at.keys().eq(parts.at.keys()), "{body}: all points");
+    let size = |k: usize| whole.at.values().map(|all| all[0][k].abs()).fold(0.0, f64::max);
+    let sizes: Vec<f64> = (0..whole.at.values().next().expect("a point")[0].len()).map(size).collect();
+    // displacement 3, stress 6, von Mises 1, principal 3
+    let largest = |range: std::ops::Range<usize>| sizes[range].iter().copied().fold(0.0, f64::max);
+    let of = [largest(0..3), largest(3..13)];
+    for (place, all) in &parts.at {
+        assert!(
+            all.iter().all(|numbers| *numbers == all[0]),
+            "{body}: parts differ at {:?}",
+            place.map(f64::from_bits)
+        );
+        for numbers in all {
+            for (k, (a, b)) in whole.at[place][0].iter().zip(numbers).enumerate() {
+                let to = 1e-8 * of[usize::from(k >= 3)];
+                assert!((a - b).abs() <= to, "{body}: {a} and {b} at {:?}", place.map(f64::from_bits));
+            }
+        }
+    }
+    parts.at.values().any(|all| all.len() > 1)
+}
+
+/// Plane, of revolution, in space, P1 and P2, on springs with a rigid surface, and parts of which some are empty.
+#[test]
+fn parts_have_the_fields_of_the_whole() {
+    let scenes: [(&str, usize, &[&str]); 5] = [
+        ("groove3d", 3, &["mesh.set.n=4"]),
+        ("flange", 4, &["mesh.set.n=2", "body.0.order=2", "body.1.order=2"]),
+        ("hertz-sphere", 3, &["mesh.set.n=3"]),
+        ("coating", 3, &["mesh.set.n=4"]),
+        ("patch-3d", 24, &["mesh.set={nl=2,nu=2}"]),
+    ];
+    for (scene, ranks, sets) in scenes {
+        let mut words = vec!["--method", "newton", "--set", "solver=hypre", "--set", STOP, "--vtu"];
+        sets.iter().for_each(|set| words.extend(["--set", set]));
+        let serial = solve(case(scene), &words).converged();
+        let parallel = solve_on(ranks, case(scene), &words).converged();
+        let collection = fs::read_to_string(parallel.folder.join("bodies.pvd")).expect("a collection");
+        let files: Vec<&str> =
+            parallel.report["files"].as_array().into_iter().flatten().filter_map(|f| f.as_str()).collect();
+        let mut in_parts = 0;
+        for body in serial.report["bodies"].as_array().into_iter().flatten().filter_map(|body| body["name"].as_str()) {
+            let [joined, alone] = ["pvtu", "vtu"].map(|ending| format!("{body}.{ending}"));
+            let parts = files.iter().filter(|file| file.starts_with(&format!("{body}-r"))).count();
+            let file = if parts > 0 { joined } else { alone };
+            in_parts += usize::from(same_fields(&serial, &parallel, body, &file));
+            assert!(collection.contains(&format!("file=\"{file}\"")), "{scene}: {collection}");
+        }
+        assert!(in_parts > 0, "{scene}: {files:?}");
+        let lost: Vec<_> = files.iter().filter(|file| !parallel.folder.join(file).is_file()).collect();
+        assert!(lost.is_empty(), "{scene}: the report names {lost:?}");
+    }
+}
+
+/// The page shows the same body, whoever wrote its parts; Gmsh gets parts whose tags do not clash.
+#[test]
+fn the_page_and_gmsh_join_the_parts() {
+    let words = ["--method", "newton", "--set", "solver=mumps", "--set", STOP, "--set", "mesh.set.n=4"];
+    let words = [&words[..], &["--vtu", "--msh", "--report"]].concat();
+    let serial = solve(case("groove3d"), &words).converged();
+    let parallel = solve_on(3, case("groove3d"), &words).converged();
+    let corners = |run: &Run| {
+        let text = fs::read_to_string(run.folder.join("report.html")).expect("a page");
+        assert!(text.contains("id=\"view\""), "bodies to turn");
+        text.len()
+    };
+    // digits of numbers differ, and the table of files
+    let [a, b] = [&serial, &parallel].map(corners);
+    assert!(a.abs_diff(b) * 50 < a, "{a} and {b} bytes");
+    let merged = parallel.folder.join("all.msh");
+    let parts = fs::read_dir(&parallel.folder).expect("results").flatten().map(|entry| entry.path());
+    let mut parts: Vec<_> = parts.filter(|path| path.extension().is_some_and(|ending| ending == "msh")).collect();
+    parts.sort();
+    assert!(parts.len() > 4, "{parts:?}");
+    let mut gmsh = std::process::Command::new("gmsh");
+    gmsh.args(&parts).args(["-save", "-format", "msh41", "-o"]).arg(&merged);
+    let (status, said, complaint) = crate::common::output(gmsh, std::time::Duration::from_secs(60));
+    assert!(status.success() && !said.contains("Error") && !said.contains("uplicate"), "{said}{complaint}");
+    let text = String::from_utf8_lossy(&fs::read(&merged).expect("a mesh")).into_owned();
+    let cells: usize = (0..2).map(|body| serial.count(&format!("bodies/{body}/cells"))).sum();
+    let all =
+        text.split("$Elements\n").nth(1).and_then(|rest| rest.split_whitespace().nth(1)).and_then(|n| n.parse().ok());
+    let all: usize = all.expect("a number of elements");
+    assert!(all >= cells && all < 2 * cells, "{all} elements of {cells} cells");
+}

@@ -1,0 +1,260 @@
+//! Data of files as functions of a scene, through the whole program.
+
+use crate::common::{Run, Scene, solve, solve_on, text_of, winkler};
+use serde_json::Value;
+use std::f64::consts::PI;
+use std::fs;
+use winkler::commands::checkpoint::settings_digest;
+use winkler::scene::load;
+
+/// A bilinear function on 4 x 4 points three apart, from -1 on, as a file.
+fn bilinear(value: impl Fn(f64, f64) -> f64) -> String {
+    let place = |k: usize| -1.0 + 3.0 * k as f64;
+    let row = |j: usize| (0..4).map(|i| format!("{:e}", value(place(i), place(j)))).collect::<Vec<_>>().join(",");
+    (0..4).map(|j| row(j) + "\n").collect()
+}
+
+/// Scattered points with the values of a function.
+fn points(value: impl Fn(f64, f64) -> f64) -> String {
+    let place = |k: usize| [-1.0 + 1.37 * (k % 7) as f64, -1.0 + 1.1 * (k / 7) as f64 + 0.1 * (k % 3) as f64];
+    (0..49).map(place).map(|[x, y]| format!("{x} {y} {:e}\n", value(x, y))).collect()
+}
+
+/// Two blocks whose gap, layer, modulus and load vary; `fields` are these, in this order.
+fn blocks(data: &str, fields: [&str; 4]) -> Scene {
+    let [gap, layer, young, load] = fields;
+    let text = text_of("patch-2d")
+        .replacen("young = 2.1e5", &format!("young = \"{young}\""), 1)
+        .replace("pressure = 10", &format!("pressure = \"{load}\""))
+        .replace("B = 2.5e-5", &format!("B = \"{layer}\""))
+        .replace("layer =", &format!("gap = \"{gap}\"\nlayer ="))
+        .replace("[[contact]]", &format!("{data}\n[[contact]]"));
+    Scene::new(text)
+}
+
+/// Scene whose fields come from files beside it.
+fn measured() -> Scene {
+    let grid =
+        |name: &str| format!("[data.{name}]\nfile = \"{name}.csv\"\norigin = -1\nspacing = 3\noutside = \"clamp\"\n");
+    let scattered = "[data.E]\nfile = \"E.txt\"\npoints = true\nunit = 1e5\n";
+    let data = ["g", "b", "q"].map(grid).join("\n") + "\n" + scattered;
+    let scene = blocks(&data, ["1e-5*g(x, y)", "b(x, 2*y)", "E(x, y)", "q(x)"]);
+    let folder = scene.path.parent().expect("a folder");
+    for (name, text) in [
+        ("g.csv", bilinear(|x, y| 1.0 + x + 0.5 * x * y)),
+        ("b.csv", bilinear(|x, y| 2.5e-5 * (1.0 + 0.2 * x + 0.1 * y))),
+        ("q.csv", "7,10,13,16\n".to_owned()),
+        ("E.txt", points(|x, y| 2.0 + 0.3 * x - 0.2 * y)),
+    ] {
+        fs::write(folder.join(name), text).expect("a file");
+    }
+    scene
+}
+
+/// The same typed in.
+const TYPED: [&str; 4] = ["1e-5*(1 + x + 0.5*x*y)", "2.5e-5*(1 + 0.2*x + 0.2*y)", "1e5*(2 + 0.3*x - 0.2*y)", "8 + x"];
+
+fn agree(one: &Run, other: &Run, within: f64) {
+    let (a, b) = (one.contact(), other.contact());
+    for q in 0..a.rows() {
+        let (p, r) = (a["pressure"][q], b["pressure"][q]);
+        assert!((p - r).abs() < within * r.abs(), "point {q}: {p} {r}");
+    }
+}
+
+/// Gap, layer, modulus and load from files give what the same functions typed in give, on any number of ranks.
+#[test]
+fn data_are_functions_of_every_expression() {
+    let scene = measured();
+    let ours = solve(&scene, &[]).converged();
+    let typed = solve(blocks("", TYPED), &[]).converged();
+    assert!(typed.contact()["pressure"].iter().any(|p| (p / 10.0 - 1.0).abs() > 1e-2), "a scene where all that counts");
+    agree(&ours, &typed, 1e-9);
+    agree(&solve_on(2, &scene, &[]).converged(), &ours, 1e-9);
+    assert_eq!(ours.text("settings/data/E/interpolate"), "linear");
+    // other keys by overrides
+    let doubled = solve(&scene, &["--set", "data.q.unit=2", "--set", "data.q.interpolate=cubic"]).converged();
+    let load = format!("body.upper.load.0.pressure=2*({})", TYPED[3]);
+    agree(&doubled, &solve(blocks("", TYPED), &["--set", &load]).converged(), 1e-9);
+}
+
+/// A run goes on only with the same numbers, wherever they are; files that nothing asks for count nothing and are not read.
+#[test]
+fn contents_are_part_of_the_scene() {
+    let scene = measured();
+    let digest = |sets: &[&str]| {
+        let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+        settings_digest(&load(&scene.path, &sets).unwrap_or_else(|error| panic!("{error}")))
+    };
+    let folder = scene.path.parent().expect("a folder");
+    let first = digest(&[]);
+    fs::copy(folder.join("g.csv"), folder.join("copy.csv")).expect("a copy");
+    assert_eq!(digest(&["data.g.file=copy.csv"]), first);
+    assert_ne!(digest(&["data.g.outside=error"]), first);
+    fs::write(folder.join("g.csv"), bilinear(|x, y| 1.0 + x + 0.501 * x * y)).expect("a file");
+    assert_ne!(digest(&[]), first);
+    fs::write(folder.join("g.csv"), "no numbers at all").expect("a file");
+    assert_ne!(digest(&["contact.0.gap=0"]), first);
+}
+
+/// One message that names data, place, body or pair; exit code of a scene.
+#[test]
+fn places_without_a_value_are_refused() {
+    let scene = measured();
+    for (set, words) in [
+        (
+            "contact.0.gap=g(x + 20, y)",
+            ["the gap: data `g` have no value at (20, 1)", "contact of `lower_top` and `upper_bottom`", "outside ="],
+        ),
+        (
+            "contact.0.layer.power.B=b(x, -5)",
+            ["B: data `b` have no value at (0, -5)", "contact of `lower_top` and `upper_bottom`", ""],
+        ),
+        (
+            "contact.0.layer={pressure=\"1e5*c*q(30)\"}",
+            ["pressure of the layer: data `q` have no value at (30)", "contact of `lower_top`", ""],
+        ),
+        ("body.lower.young=E(x, 9 + y)", ["young: data `E` have no value at (", "for body `lower`", "\"clamp\""]),
+        ("body.upper.load.0.pressure=q(x - 9)", ["this load: data `q` have no value at (-", "for body `upper`", ""]),
+        ("body.upper.force=[0, \"q(-3)\"]", ["the expression: data `q` have no value at (-3)", "", ""]),
+        (
+            "body.upper.fix.0.x=q(x - 9)",
+            ["the displacement of this support: data `q` have no value", "for body `upper`", ""],
+        ),
+    ] {
+        let sets = ["data.g.outside=error", "data.b.outside=error", "data.q.outside=error", set];
+        let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        let run = solve(&scene, &sets);
+        assert_eq!(run.code, 3, "{set}: {}", run.said());
+        assert_eq!(run.stderr.matches("error:").count(), 1, "{}", run.said());
+        words.iter().for_each(|word| assert!(run.stderr.contains(word), "{word}: {}", run.said()));
+    }
+}
+
+#[test]
+fn slips_in_data_are_pointed_at() {
+    let scene = measured();
+    let path = scene.path.display().to_string();
+    for (sets, words) in [
+        (&["data.g.file=missing.csv"][..], "there is no file"),
+        (&["data.g.file=."], "is not a file"),
+        (&["data.g.filee=g.csv"], "did you mean `file`?"),
+        (&["data.g.spacing=0"], "the spacing is 0"),
+        (&["data.g.spacing=[1, 2, 3]"], "one number, or two in a list"),
+        (&["data.g.unit=0"], "the unit is 0"),
+        (&["data.g.outside=wrap"], "it is one of error, clamp, periodic"),
+        (&["data.g.interpolate=spline"], "it is one of linear, cubic"),
+        (&["data.h.file=g.csv"], "[data.h] has no `spacing`"),
+        (&["data.x={file=\"g.csv\",spacing=1}"], "data cannot be called `x`"),
+        (&["data.a-b={file=\"g.csv\",spacing=1}"], "data cannot be called `a-b`"),
+        (&["data.file=g.csv"], "in data without a name"),
+        (&["contact.0.gap=g(x)"], "`g` takes 2 values, not 1"),
+        (&["contact.0.gap=q(x, y)"], "`q` takes 1 value, not 2"),
+        (&["contact.0.gap=g"], "`g` needs its value in parentheses"),
+        (&["contact.0.gap=gg(x, y)"], "did you mean `g`?"),
+        (&["data.g.points=true"], "g.csv has 4 numbers in a row"),
+        (&["data.E.interpolate=cubic"], "no cubic interpolation"),
+        (&["data.E.outside=periodic"], "no period"),
+    ] {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let run = winkler(&["check", &path].into_iter().chain(sets).collect::<Vec<_>>());
+        assert_eq!(run.code, 3, "{}", run.said());
+        assert!(run.stderr.contains(words), "{words}: {}", run.said());
+    }
+}
+
+/// What `check` says as JSON.
+fn checked(scene: &Scene, args: &[&str]) -> Value {
+    let run = winkler(&[&["check", &scene.path.display().to_string(), "--json"], args].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    serde_json::from_str(&run.stdout).expect("JSON")
+}
+
+/// A wave of five facets: straight lines between its nodes leave out 1 - 4 (1 - cos t)/t^2 + (2 + cos t)/3 of its variance, t = 2 pi/5.
+#[test]
+fn what_the_mesh_cannot_follow_is_known() {
+    let text = text_of("patch").replace("layer =", "gap = \"1e-6*wave(x)\"\nlayer =");
+    let data = "[data.wave]\nfile = \"wave.csv\"\nspacing = 1.25e-3\noutside = \"periodic\"\ninterpolate = \"cubic\"\n";
+    let scene = Scene::new(text.replace("[[contact]]", &format!("{data}\n[[contact]]")));
+    let wave: String = (0..200).map(|k| format!("{}\n", (2.0 * PI * f64::from(k) / 200.0).cos())).collect();
+    fs::write(scene.path.parent().expect("a folder").join("wave.csv"), wave).expect("a file");
+    let found = checked(&scene, &["--set", "mesh.set={nl=20,nu=20}"]);
+    let number =
+        |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found:#}"));
+    let t = 2.0 * PI / 5.0;
+    let share = 1.0 - 4.0 * (1.0 - t.cos()) / (t * t) + (2.0 + t.cos()) / 3.0;
+    let near = |ours: f64, exact: f64, within: f64| assert!((ours / exact - 1.0).abs() < within, "{ours} {exact}");
+    near(number("/pairs/0/surface/gap_followed/variance_left_out"), share, 1e-2);
+    near(number("/pairs/0/surface/gap_followed/rms_height"), 1e-6 * 0.5_f64.sqrt(), 1e-3);
+    near(number("/pairs/0/surface/gap_followed/side"), 0.05, 1e-9);
+    near(number("/data/wave/rms_slope"), 8.0 * PI * 0.5_f64.sqrt(), 1e-3);
+    // ten facets a wave: nowhere a tenth of the height
+    let fine = checked(&scene, &["--set", "mesh.set={nl=80,nu=80}"]);
+    assert_eq!(fine.pointer("/pairs/0/surface/gap_followed/area_left_out").and_then(Value::as_f64), Some(0.0));
+    // of five facets two are around the wave's zeros, where it is nearly straight
+    near(number("/pairs/0/surface/gap_followed/area_left_out"), 0.6, 1e-9);
+    // nothing is drawn that nobody asked for
+    let folder = scene.path.parent().expect("a folder").join("pictures");
+    let run = winkler(&["check", &scene.path.display().to_string(), "-o", &folder.display().to_string()]);
+    assert!(run.stdout.contains("data wave: ") && run.stdout.contains("rms slope"), "{}", run.said());
+    let drawn: Vec<_> = fs::read_dir(&folder).expect("pictures").flatten().map(|file| file.file_name()).collect();
+    assert_eq!(drawn, ["data-wave.svg"]);
+    assert!(fs::read_to_string(folder.join("data-wave.svg")).expect("a picture").contains("</svg>"));
+}
+
+/// A layer of summits of one height is Hertz' law; those of data are counted by the program.
+#[test]
+fn layers_of_asperities() {
+    // 2 x 2 periods with one summit in each: cos x + cos y of amplitude 1e-3
+    let period = 0.1;
+    let (n, k) = (40, 2.0 * PI / period);
+    let wave = |i: usize| 1e-3 * (2.0 * PI * i as f64 / n as f64).cos();
+    let rows: String = (0..2 * n)
+        .map(|j| (0..2 * n).map(|i| (wave(i) + wave(j)).to_string()).collect::<Vec<_>>().join(" ") + "\n")
+        .collect();
+    let text = text_of("patch").replace(
+        "[[contact]]",
+        "[data.rough]\nfile = \"rough.txt\"\nspacing = 2.5e-3\noutside = \"periodic\"\n[[contact]]",
+    );
+    let scene = Scene::new(text);
+    fs::write(scene.path.parent().expect("a folder").join("rough.txt"), rows).expect("a file");
+    let set = ["--set", "contact.0.layer={asperities={data=\"rough\",modulus=1e5}}", "--set", "method={}"];
+    let table = solve(&scene, &set).converged().contact();
+    // curvature by differences
+    let half = PI / n as f64;
+    let radius = 1.0 / (1e-3 * (k * half.sin() / half).powi(2));
+    let stiffness = 4.0 / 3.0 * 1e5 * radius.sqrt() / (period * period);
+    for q in 0..table.rows() {
+        let exact = (table["pressure"][q] / stiffness).powf(2.0 / 3.0);
+        assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-6, "{}", table["pressure"][q]);
+        assert!((table["compression"][q] / exact - 1.0).abs() < 1e-4, "{} {exact}", table["compression"][q]);
+    }
+    // the same summits as numbers with hardly any spread, and what `check` says of them
+    let numbers = format!(
+        "contact.0.layer={{asperities={{density={},radius={radius},deviation=1e-7,modulus=1e5}}}}",
+        1.0 / (period * period)
+    );
+    let other = solve(&scene, &["--set", &numbers, "--set", "method={}"]).converged().contact();
+    let shift = other["compression"][0] - table["compression"][0];
+    assert!((shift / 4e-7 - 1.0).abs() < 0.05, "the highest is 4 deviations above the mean: {shift}");
+    let law = &checked(&scene, &set)["pairs"][0]["surface"]["law"];
+    assert_eq!(law.as_array().map(Vec::len), Some(8), "{law}");
+    for (layer, words) in [
+        ("{modulus=1e5}", "has no `deviation`"),
+        ("{data=\"rough\"}", "has no `modulus`"),
+        ("{data=\"ruogh\",modulus=1}", "did you mean `rough`?"),
+        ("{data=\"rough\",modulus=1,radius=2}", "has both `data` and `radius`"),
+        ("{data=\"rough\",modulus=-1}", "the modulus is -1"),
+        ("{density=1,radius=1,deviation=0,modulus=1}", "the deviation is 0"),
+        ("{density=1,radius=1,deviation=1,modulus=1,highest=-1}", "the highest summit is -1"),
+        ("{density=1,radius=1,deviation=1,modulus=1,hihgest=1}", "did you mean `highest`?"),
+        ("{density=\"x\",radius=1,deviation=1,modulus=1}", "expected a number"),
+        ("7", "expected a table"),
+    ] {
+        let run = solve(&scene, &["--set", &format!("contact.0.layer={{asperities={layer}}}")]);
+        assert_eq!(run.code, 3, "{}", run.said());
+        assert!(run.stderr.contains(words), "{words}: {}", run.said());
+    }
+    let flat = solve(&scene, &["--set", set[1], "--set", "data.rough.points=true"]);
+    assert!(flat.stderr.contains("80 numbers in a row"), "{}", flat.said());
+}

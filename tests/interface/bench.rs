@@ -1,0 +1,351 @@
+//! `winkler bench` and `winkler mesh`: rows, errors that fall with the mesh, failures as rows.
+
+use crate::common::{Run, Table, case, winkler};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+/// Runs a benchmark in a folder of its own; gives the run and the rows, a map from column to text each.
+fn bench(args: &[&str]) -> (Run, Vec<BTreeMap<String, String>>) {
+    let run = winkler(&[&["bench"], args, &["-o", "out"]].concat());
+    let rows = rows(&run.folder.join("out/bench.csv"));
+    (run, rows)
+}
+
+fn rows(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let Ok(mut file) = csv::Reader::from_path(path) else { return Vec::new() };
+    let header = file.headers().expect("a header").clone();
+    let row =
+        |record: csv::StringRecord| header.iter().map(str::to_owned).zip(record.iter().map(str::to_owned)).collect();
+    file.records().map(|record| row(record.expect("whole rows"))).collect()
+}
+
+fn number(row: &BTreeMap<String, String>, column: &str) -> f64 {
+    row[column].parse().unwrap_or_else(|_| panic!("`{column}` is `{}` in {row:?}", row[column]))
+}
+
+fn scene(name: &str) -> String {
+    case(name).display().to_string()
+}
+
+/// The wavy gap has its pressure in closed form once the scene is told: errors fall with the mesh, whatever the solver; and
+/// counts and errors do not depend on the solver.
+#[test]
+fn errors_fall_with_the_mesh_and_rows_are_whole() {
+    let exact = "contact.0.reference=40 + 6.3508814*cos(pi*x)";
+    let solvers = ["--solver", "mumps", "--solver", "-ksp_type cg -pc_type jacobi -ksp_rtol 1e-10"];
+    let over = ["--over", "mesh.set.n=8,16,32", "--repeat", "2", "--linear", "--set", exact, "--method", "ncg"];
+    let (run, rows) = bench(&[&[scene("wavy").as_str()], &solvers[..], &over].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    // three meshes, two solvers, one method and the linear solve
+    assert_eq!(rows.len(), 12);
+    let solved = |solver: &str| -> Vec<&BTreeMap<String, String>> {
+        rows.iter().filter(|row| row["solver"].starts_with(solver) && row["method"] == "ncg").collect()
+    };
+    for solver in ["mumps", "-ksp_type cg"] {
+        let rows = solved(solver);
+        assert_eq!(rows.len(), 3);
+        for pair in rows.windows(2) {
+            let order = (number(pair[0], "error") / number(pair[1], "error")).log2();
+            assert!((1.6..2.6).contains(&order), "{solver}: order {order} of linear elements");
+            assert!(number(pair[1], "dofs") > 3.0 * number(pair[0], "dofs"));
+        }
+        for row in rows {
+            assert_eq!((row["status"].as_str(), row["runs"].as_str()), ("converged", "2"));
+            assert_eq!(row["error_of"], "pressure, reference");
+            for column in
+                ["cpu_seconds", "factor_seconds", "solve_seconds", "iterate_seconds", "linear_solves", "theta"]
+            {
+                assert!(number(row, column) > 0.0, "{column}");
+            }
+            // no two runs take the same time; no process takes more than all cores
+            let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get()) as f64;
+            assert!(number(row, "spread") > 0.0);
+            assert!(number(row, "cpu_seconds") < cores * number(row, "seconds"), "{row:?}");
+            // a process with PETSc in it, and not the machine
+            assert!((10.0..2000.0).contains(&number(row, "memory_mb")), "{row:?}");
+        }
+    }
+    for (direct, krylov) in solved("mumps").iter().zip(solved("-ksp_type cg")) {
+        assert!((number(direct, "error") / number(krylov, "error") - 1.0).abs() < 1e-3);
+        assert_eq!(direct["inner_iterations"], "0");
+        assert!(number(krylov, "inner_iterations") > 100.0);
+    }
+    for name in ["time-error.svg", "time-dofs.svg", "memory-dofs.svg"] {
+        let plot = fs::read_to_string(run.folder.join("out").join(name)).expect(name);
+        assert!(plot.contains("mumps"), "{name}");
+    }
+    let plot = |name: &str| fs::read_to_string(run.folder.join("out").join(name)).unwrap_or_default();
+    assert!(plot("time-error.svg").contains("Pareto front") && plot("time-dofs.svg").contains("(dofs^"));
+    // theta does not change with the mesh alone
+    assert!(!run.folder.join("out/iterations-theta.svg").exists());
+}
+
+/// Without a known answer the finest mesh is the reference, has no error itself, and another table can take its place.
+#[test]
+fn the_finest_mesh_or_a_table_is_the_reference() {
+    let groove = scene("groove");
+    let stop = ["--solver", "mumps", "--set", "method.stop={residual=1e-8}"];
+    let sizes = ["--over", "mesh.set.n=4,8,16", "--order", "1"];
+    let (run, rows) = bench(&[&[groove.as_str()], &stop[..], &sizes].concat());
+    assert_eq!((run.code, rows.len()), (0, 3), "{}", run.said());
+    let errors: Vec<f64> = rows[..2].iter().map(|row| number(row, "error")).collect();
+    assert!(errors[1] < 0.5 * errors[0] && errors[1] > 1e-4, "{errors:?}");
+    assert_eq!((rows[2]["error"].as_str(), rows[1]["error_of"].as_str()), ("", "pressure, finest mesh"));
+    let finest = run.folder.join("out/runs/groove_16_mumps_robin_1_1");
+    let table = finest.join("contact-lower-upper.csv").display().to_string();
+    let (against, rows) = bench(&[&[groove.as_str()], &stop[..], &sizes, &["--against", &table]].concat());
+    assert_eq!(against.code, 0, "{}", against.said());
+    for (row, error) in rows.iter().zip(&errors) {
+        assert!((number(row, "error") / error - 1.0).abs() < 1e-6, "{row:?}");
+    }
+    assert!(number(&rows[2], "error") < 1e-7, "the reference itself");
+}
+
+#[test]
+fn rows_are_their_reports() {
+    check_rows("mumps");
+    check_rows("hypre");
+}
+
+/// Columns are what the report of the run says, and what it says together with that of the linear solve.
+fn check_rows(solver: &str) {
+    let (run, rows) = bench(&[&scene("wavy"), "--set", "mesh.set.n=4", "--solver", solver, "--linear"]);
+    assert_eq!((run.code, rows.len()), (0, 2), "{}", run.said());
+    let folder = |method: &str| run.folder.join(format!("out/runs/wavy_{solver}_{method}_1_1"));
+    let report = |method: &str| -> serde_json::Value {
+        let path = folder(method).join("report.json");
+        serde_json::from_slice(&fs::read(&path).expect("a report")).expect("JSON")
+    };
+    let of = |report: &serde_json::Value, path: &str| report.pointer(path).and_then(|v| v.as_f64()).expect("a number");
+    for row in &rows {
+        let report = report(&row["method"]);
+        for (column, path) in [
+            ("mesh_seconds", "/times/mesh"),
+            ("discretize_seconds", "/times/discretize"),
+            ("set_up_seconds", "/times/set-up"),
+            ("iterate_seconds", "/times/iterate"),
+            ("factor_seconds", "/inner_times/factor"),
+            ("solve_seconds", "/inner_times/solve"),
+            ("sweeps", "/sweeps"),
+            ("factorizations", "/factorizations"),
+            ("residual", "/residual"),
+            ("peak_pressure", "/pairs/0/peak_pressure"),
+        ] {
+            assert_eq!(number(row, column), of(&report, path), "{column}");
+        }
+        let theta = (of(&report, "/pairs/0/theta/0") * of(&report, "/pairs/0/theta/1")).sqrt();
+        assert!((number(row, "theta") / theta - 1.0).abs() < 1e-12);
+    }
+    // two bodies: what one factorisation and one solve of each take
+    let [linear, solved] = &rows[..] else { panic!("two rows") };
+    let yard = report("linear");
+    let each = |time: &str, count: &str| of(&yard, time) / of(&yard, count) * 2.0;
+    let solve = if solver == "mumps" {
+        each("/inner_times/solve", "/body_solves")
+    } else {
+        // of an iterative solver the last sweep, to 1e-8
+        let its = Table::read(&folder("linear").join("history.csv")).counts("inner_iterations");
+        let [first, last] = its[..] else { panic!("{its:?}") };
+        assert!(last - first > 12, "{its:?} iterations are too few for 1e-8");
+        of(&yard, "/inner_times/solve") * (last - first) as f64 / of(&yard, "/inner_iterations")
+    };
+    let first = of(&yard, "/inner_times/first");
+    assert!(0.0 < first && first < of(&yard, "/inner_times/factor"));
+    let seconds = first + solve;
+    assert!((number(linear, "linear_seconds") / seconds - 1.0).abs() < 1e-9);
+    let own = number(solved, "set_up_seconds") + number(solved, "iterate_seconds");
+    assert!((number(solved, "linear_solves") / (own / seconds) - 1.0).abs() < 1e-9);
+}
+
+/// A row names the method that ran beside the one that was asked for, and the last table has every row.
+#[test]
+fn rows_name_what_ran() {
+    let words = ["--solver", "mumps,icc", "--method", "auto", "--over", "mesh.set.n=4,8"];
+    let (run, rows) = bench(&[&[scene("groove-held").as_str()], &words[..]].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    let names = |row: &BTreeMap<String, String>| ["solver", "asked", "method"].map(|name| row[name].clone());
+    let ran = ["mumps auto newton", "icc auto newton-robin"];
+    assert_eq!(rows.iter().map(|row| names(row).join(" ")).collect::<Vec<_>>(), [ran, ran].concat());
+    let lines: Vec<Vec<&str>> = run.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
+    let head =
+        ["mesh.set.n", "solver", "method", "status", "dofs", "iterations", "sweeps", "s", "CPU", "s", "MB", "error"];
+    let at = lines.iter().position(|line| *line == head).expect("a heading");
+    for (line, row) in lines[at + 1..].iter().zip(&rows) {
+        let same = ["mesh.set.n", "solver", "method", "status", "dofs", "iterations", "sweeps"];
+        assert_eq!(line[..same.len()], same.map(|name| row[name].as_str()));
+    }
+}
+
+/// What goes wrong is a row with its words, and the other rows are there.
+#[test]
+fn failures_are_rows() {
+    let methods = ["--method", "robin,ncg,nonsense", "--set", "method.stop={residual=1e-8,iterations=3}"];
+    let solvers = ["--solver", "mumps", "--solver", "-pc_type nonsense", "--over", "mesh.set.n=4,wrong"];
+    let (run, rows) = bench(&[&[scene("groove-held").as_str()], &methods[..], &solvers].concat());
+    assert_eq!(run.code, 1, "{}", run.said());
+    assert_eq!(rows.len(), 12);
+    let of = |n: &str, method: &str, solver: &str| {
+        let is = |row: &&BTreeMap<String, String>| {
+            row["mesh.set.n"] == n && row["method"] == method && row["solver"].contains(solver)
+        };
+        let row = rows.iter().find(is).expect("a row");
+        (row["status"].clone(), row["message"].clone())
+    };
+    let (status, words) = of("4", "robin", "mumps");
+    assert!(status == "iteration-limit" && words.contains("3 iterations"), "{status}: {words}");
+    let (status, words) = of("4", "nonsense", "mumps");
+    assert!(status == "refused" && words.contains("nonsense"), "{status}: {words}");
+    let (status, words) = of("4", "ncg", "-pc_type");
+    assert!(status == "refused" && words.contains("nonsense"), "{status}: {words}");
+    let (status, words) = of("wrong", "ncg", "mumps");
+    assert!(status == "refused" && words.contains("number"), "{status}: {words}");
+    // a run that takes too long
+    let late = ["--solver", "mumps", "--over", "mesh.set.n=64,128", "--order", "1,2", "--timeout", "0.05"];
+    let (run, rows) = bench(&[&[scene("groove-held").as_str()], &late[..]].concat());
+    let status: Vec<&str> = rows.iter().map(|row| row["status"].as_str()).collect();
+    assert_eq!((run.code, &status[..]), (1, &["timeout", "timeout", "skipped", "skipped"][..]), "{}", run.said());
+}
+
+/// Rows of a table that is there already are kept with `--resume`, and only with it, and only under the same settings.
+#[test]
+fn a_benchmark_is_taken_up_again() {
+    let groove = scene("groove");
+    let words = |n: &str| ["bench", &groove, "--solver", "mumps", "--resume", "--over", n, "-o"].map(str::to_owned);
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out").display().to_string();
+    let run = |n: &str, more: &[&str]| {
+        let words = words(n);
+        let args: Vec<&str> =
+            words.iter().map(String::as_str).chain([out.as_str()]).chain(more.iter().copied()).collect();
+        let run = winkler(&args);
+        assert_eq!(run.code, 0, "{}", run.said());
+        run.stdout.matches("(kept)").count()
+    };
+    assert_eq!(run("mesh.set.n=4", &[]), 0);
+    let first = rows(&folder.path().join("out/bench.csv"));
+    assert_eq!(run("mesh.set.n=4,8", &[]), 1);
+    let both = rows(&folder.path().join("out/bench.csv"));
+    assert_eq!((both.len(), &both[0]["seconds"]), (2, &first[0]["seconds"]));
+    assert_eq!(run("mesh.set.n=4,8", &["--set", "method.gamma=0.5"]), 0);
+    // a budget that is spent skips what is not there yet, and another run makes it
+    let spent = [
+        &words("mesh.set.n=4,8,16").map(String::from)[..],
+        std::slice::from_ref(&out),
+        &["--budget".into(), "0".into()],
+    ];
+    let ended = winkler(&spent.concat().iter().map(String::as_str).collect::<Vec<_>>());
+    let status = |rows: &[BTreeMap<String, String>]| rows.iter().map(|row| row["status"].clone()).collect::<Vec<_>>();
+    let left = rows(&folder.path().join("out/bench.csv"));
+    assert_eq!((ended.code, status(&left)), (1, vec!["skipped".to_owned(); 3]), "{}", ended.said());
+    assert_eq!(run("mesh.set.n=4,8,16", &[]), 0);
+    assert_eq!(status(&rows(&folder.path().join("out/bench.csv"))), vec!["converged"; 3]);
+}
+
+/// Rows are answers of a scene, its data and its mesh: where one of them was edited, in place, they are made anew.
+#[test]
+fn rows_of_edited_inputs_are_made_anew() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("a file");
+    let script = fs::read_to_string(case("groove").with_file_name("groove.geo")).expect("a script");
+    let text = fs::read_to_string(case("groove")).expect("a scene");
+    let gap = text.lines().find(|line| line.starts_with("gap =")).expect("a gap");
+    let text = text.replace(gap, "gap = \"rough(x)\"") + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n";
+    let (scene, out) = (folder.path().join("scene.toml"), folder.path().join("out"));
+    let kept = || {
+        let [scene, out] = [&scene, &out].map(|path| path.to_str().expect("a path"));
+        let args = ["bench", scene, "--solver", "mumps", "--resume", "--over", "mesh.set.n=2,4", "-o", out];
+        let run = winkler(&args);
+        assert_eq!(run.code, 0, "{}", run.said());
+        run.stdout.matches("(kept)").count()
+    };
+    write("groove.geo", &script);
+    write("scene.toml", &text);
+    write("rough.csv", "0,0\n4,1e-4\n");
+    assert_eq!([kept(), kept()], [0, 2]);
+    write("rough.csv", "0,0\n4,2e-4\n");
+    assert_eq!([kept(), kept()], [0, 2]);
+    write("groove.geo", &script.replace("height = 1;", "height = 1.5;"));
+    assert_eq!([kept(), kept()], [0, 2]);
+    write("scene.toml", &text.replace("poisson = 0.3", "poisson = 0.25"));
+    assert_eq!([kept(), kept()], [0, 2]);
+    // what is written, and comments, are no part of the answer
+    write("scene.toml", &(text.replace("poisson = 0.3", "poisson = 0.25") + "# more\n[output]\nvtu = true\n"));
+    assert_eq!(kept(), 2);
+    // nobody knows the mesh of a script with random numbers beforehand
+    write("groove.geo", &(script + "If (Rand(1) > 2)\n Point(99) = {0, 0, 0};\nEndIf\n"));
+    assert_eq!([kept(), kept()], [0, 0]);
+}
+
+/// Ranks are started by mpiexec, and theta is varied by the stiffness of the layer.
+#[test]
+fn ranks_and_theta() {
+    let over = ["--over", "contact.0.layer.linear.stiffness=1e4,1e6", "--set", "mesh.set.n=4"];
+    let linear = ["--set", "contact.0.layer={linear={stiffness=1}}", "--ranks", "1,2", "--solver", "mumps"];
+    let (run, rows) =
+        bench(&[&[scene("groove-held").as_str(), "--method", "newton-robin"], &over[..], &linear].concat());
+    assert_eq!((run.code, rows.len()), (0, 4), "{}", run.said());
+    for pair in rows.chunks(2) {
+        assert_eq!((pair[0]["ranks"].as_str(), pair[1]["ranks"].as_str()), ("1", "2"));
+        for column in ["sweeps", "dofs", "theta"] {
+            assert_eq!(pair[0][column], pair[1][column], "{column}");
+        }
+    }
+    assert!(number(&rows[2], "theta") > number(&rows[0], "theta"));
+    assert!(run.folder.join("out/iterations-theta.svg").exists());
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let groove = scene("groove");
+    for (args, code, words) in [
+        (&["--over", "mesh.set.n"][..], 2, "KEY=V1,V2"),
+        (&["--over", "solver=mumps,hypre"], 2, "--solver"),
+        (&["--ranks", "0"], 2, "begin at 1"),
+        (&["--order", "3"], 2, "order 3"),
+        (&["--timeout", "0"], 2, "no time"),
+        (&["--against", "nowhere.csv"], 6, "nowhere.csv"),
+        (&["--set", "mesh.set.m=3", "--against", "/proc/version"], 6, "no contact table"),
+    ] {
+        let (run, _) = bench(&[&[groove.as_str()], args].concat());
+        assert!(run.code == code && run.stderr.contains(words), "{args:?}: {}", run.said());
+    }
+    let run = winkler(&["bench", "nowhere.toml"]);
+    assert!(run.code == 6 && run.stderr.contains("nowhere.toml"), "{}", run.said());
+}
+
+/// The mesh of the groove, counted: 2 x 2 x 8 x n x n triangles at n = 4 in two blocks of a crossed grid.
+#[test]
+fn the_mesh_command_says_what_is_there() {
+    let groove = scene("groove");
+    let words = ["mesh", groove.as_str(), "--set", "mesh.set.n=4", "--json"];
+    let facts: serde_json::Value = serde_json::from_str(&winkler(&words).stdout).expect("JSON");
+    let checked = winkler(&[&["check"], &words[1..]].concat());
+    let checked: serde_json::Value = serde_json::from_str(&checked.stdout).expect("JSON");
+    for body in 0..2 {
+        for key in ["name", "cells", "nodes", "dofs"] {
+            assert_eq!(facts["bodies"][body][key], checked["bodies"][body][key], "{key}");
+        }
+        let shape = &facts["bodies"][body]["quality"];
+        let [least, mean] = ["least", "mean"].map(|key| shape[key].as_f64().expect("a number"));
+        assert!(least > 0.3 && least <= mean && mean <= 1.0, "{least} {mean}");
+    }
+    let run = winkler(&["mesh", groove.as_str(), "--set", "mesh.set.n=4", "-o", "a.msh"]);
+    assert!(
+        run.code == 0 && run.stdout.contains("from the cache") && run.stdout.contains("group lower_top"),
+        "{}",
+        run.said()
+    );
+    let copy = fs::read(run.folder.join("a.msh")).expect("a mesh");
+    assert_eq!(copy, fs::read(facts["file"].as_str().expect("a path")).expect("the cached mesh"));
+    let order = ["--set", "body.0.order=2", "-o", "a.vtu"];
+    let run = winkler(&[&words[..4], &order].concat());
+    let grid = vtkio::Vtk::import(run.folder.join("a.vtu")).expect("a grid");
+    let vtkio::model::DataSet::UnstructuredGrid { pieces, .. } = grid.data else { panic!("another kind of grid") };
+    let piece = pieces[0].load_piece_data(None).expect("its data");
+    let cells: f64 = (0..2).map(|body| facts["bodies"][body]["cells"].as_f64().expect("a count")).sum();
+    assert_eq!(piece.cells.types.len() as f64, cells);
+    assert!(piece.cells.types.iter().all(|&kind| kind == vtkio::model::CellType::QuadraticTriangle));
+    let refused = winkler(&["mesh", groove.as_str(), "-o", "a.stl"]);
+    assert!(refused.code == 2 && refused.stderr.contains(".vtu"), "{}", refused.said());
+}

@@ -1,0 +1,263 @@
+//! The library as a program of one's own uses it: the examples, scenes built in Rust and what is wrong with some, the features.
+
+use crate::common::alone::{alone, expect_success};
+use crate::common::{case, example, output, root};
+use std::process::Command;
+use std::time::Duration;
+use winkler::api::*;
+use winkler::problem::contact::ANGLE;
+
+/// The numbers in a line, signs and exponents included.
+fn numbers(line: &str) -> Vec<f64> {
+    line.split(|c: char| c.is_whitespace() || c == ',').filter_map(|word| word.parse().ok()).collect()
+}
+
+/// The scene in Rust is that of the file, solved to the same digits.
+#[test]
+fn the_groove_built_in_rust_is_that_of_the_file() {
+    let said = example("gmsh", &[]);
+    let run = crate::common::solve(case("groove"), &["--set", "mesh.set.n=16", "--set", "method={}"]).converged();
+    let mut lines = said.lines();
+    let head = numbers(lines.next().expect("a line"));
+    assert_eq!(head[0] as usize, run.count("iterations"), "{said}");
+    assert!((head[1] / run.number("F1") - 1.0).abs() < 1e-9, "{said}");
+    let contact = run.contact();
+    let (x, p) = (&contact["x"], &contact["pressure"]);
+    let mut seen = 0;
+    for (line, q) in lines.zip((0..x.len()).step_by(8)) {
+        let [at, pressure] = numbers(line)[..] else { panic!("{line}") };
+        assert!((at - x[q]).abs() < 1e-3 && (pressure - p[q]).abs() < 1e-6, "{line}: {} {}", x[q], p[q]);
+        seen += 1;
+    }
+    assert!(seen > 8, "{said}");
+}
+
+#[test]
+fn an_own_law_gives_the_closed_form() {
+    let said = example("law", &[]);
+    let found = said.lines().flat_map(numbers).collect::<Vec<f64>>();
+    let [computed, exact, off] = found[..] else { panic!("{said}") };
+    assert!(said.starts_with("converged") && (computed - exact).abs() < 1e-9 && off < 1e-9, "{said}");
+    assert!((exact + 0.48).abs() < 1e-12, "{said}");
+}
+
+/// All rules reach one solution, and Chebyshev's steps in fewer sweeps than the paper's gamma.
+#[test]
+fn an_own_rule_for_gamma_is_one_of_them() {
+    let said = example("gamma", &[]);
+    let row = |line: &str| {
+        assert!(line.contains(" converged in "), "{said}");
+        let [sweeps, peak] = numbers(&line.replace("gamma", ""))[..] else { panic!("{line}") };
+        (sweeps as usize, peak)
+    };
+    let rows: Vec<(usize, f64)> = said.lines().map(row).collect();
+    assert_eq!(rows.len(), 5, "{said}");
+    assert!(rows.iter().all(|(_, peak)| (peak / rows[0].1 - 1.0).abs() < 1e-6), "{said}");
+    assert!(rows[1].0 < rows[0].0 && rows[1].0 > 5, "{said}");
+}
+
+/// Two unit squares, one on the other, each point of the upper one numbered backwards, and a point of nobody.
+fn squares() -> MeshArrays {
+    let square = |y: f64| [[0.0, y, 0.0], [1.0, y, 0.0], [1.0, y + 1.0, 0.0], [0.0, y + 1.0, 0.0]];
+    let mut points = square(0.0).to_vec();
+    points.push([7.0, 7.0, 0.0]);
+    points.extend(square(1.0).iter().rev());
+    MeshArrays::new(points)
+        .group("lower", 2, vec![0, 1, 2, 0, 2, 3])
+        .group("upper", 2, vec![8, 7, 6, 8, 6, 5])
+        .group("base", 1, vec![0, 1])
+        .group("below", 1, vec![3, 2])
+        .group("above", 1, vec![8, 7])
+        .group("top", 1, vec![6, 5])
+}
+
+/// Pressed together by 1 through p = 50 c across a gap of 0.01.
+fn pressed(mesh: MeshArrays) -> Scene {
+    Scene::new(2, mesh)
+        .body(BodySpec::new("lower", 100.0, 0.0).fix("base", [Some(0.0), Some(0.0)]))
+        .body(BodySpec::new("upper", 100.0, 0.0).fix("top", [Some(0.0), None]).pressure("top", |_| 1.0))
+        .contact(ContactSpec::new("below", "above", LayerSpec::linear(|_: [f64; 3]| 50.0)).gap(0.01))
+}
+
+/// A line p = 50 c, with an energy that is not its integral.
+#[derive(Debug)]
+struct Lazy;
+
+impl LayerLaw for Lazy {
+    fn compressed(&self, _point: usize, c: f64) -> Response {
+        Response { pressure: 50.0 * c, tangent: 50.0, energy: 50.0 * c * c }
+    }
+}
+
+struct Lost;
+
+impl GammaRule for Lost {
+    fn gamma(&mut self, _here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+        Ok(f64::NAN)
+    }
+}
+
+#[derive(Default)]
+struct Watching(usize);
+
+impl Observer for Watching {
+    fn row(&mut self, _row: &Row) {
+        self.0 += 1;
+    }
+}
+
+impl Recorder for Watching {}
+
+/// One test for all that needs PETSc: a process has one session.
+#[test]
+fn scenes_are_solved_or_refused() {
+    expect_success(alone("library::scenes_are_solved_or_refused", 0, &[], || {
+        let session = Session::start(&[])?;
+        solves(&session);
+        refuses(&session);
+        Ok(())
+    }));
+}
+
+/// Displacements, pressures, forces and what an observer sees.
+fn solves(session: &Session) {
+    let mut watching = Watching::default();
+    let solution = solve_with(session, pressed(squares()), &mut watching).expect("a solution");
+    assert!(solution.is_converged() && *solution.status() == Status::Converged, "{:?}", solution.status());
+    assert_eq!(watching.0, solution.history().len());
+    assert_eq!((solution.pairs(), solution.report().dofs), (1, 16));
+    let table = solution.contact(0);
+    assert!(table.pressure.iter().all(|p| (p - 1.0).abs() < 1e-9) && table.gap == [0.01; 2], "{table:?}");
+    let forces = solution.report().pairs[0].force;
+    assert!((forces[0][1] + 1.0).abs() < 1e-9 && (forces[1][1] - 1.0).abs() < 1e-9, "{forces:?}");
+    // the gap of 0.01, 0.01 of each body, 0.02 of the layer
+    for (body, sunk) in [(0, [0.0, 0.01]), (1, [0.04, 0.05])] {
+        let field = solution.body(body).expect("all bodies are here").expect("displacements");
+        assert_eq!(field.points.len(), solution.points(body).len());
+        for (node, &point) in solution.points(body).iter().enumerate() {
+            let x = squares().points[point as usize];
+            assert_eq!(field.points[node], x);
+            let expected = -sunk[usize::from(x[1] > body as f64)];
+            assert!((field.displacement[node][1] - expected).abs() < 1e-9, "{x:?}: {:?}", field.displacement[node]);
+        }
+    }
+}
+
+/// Errors of scenes that cannot be solved, with the place in this file where there is one.
+fn refuses(session: &Session) {
+    let refused = |change: &dyn Fn(&mut Scene), words: &str, place: bool| {
+        let mut scene = pressed(squares());
+        change(&mut scene);
+        let error = solve(session, scene).err().unwrap_or_else(|| panic!("not refused: {words}")).to_string();
+        assert!(error.contains(words), "{words}: {error}");
+        assert_eq!(error.contains(&format!("{}:", file!())), place, "{error}");
+    };
+    refused(
+        &|s| s.bodies[1].fix.push(BodySpec::new("a", 1.0, 0.0).fix("tpo", [Some(0.0)]).fix.remove(0)),
+        "`top`?",
+        true,
+    );
+    refused(&|s| s.contacts[0].gap = (|_| f64::NAN).into(), "the gap is NaN at", false);
+    // a scene that a program builds may do no more than one that is read
+    refused(&|s| s.solver.options = ["-ksp_view", ":here"].map(str::to_owned).to_vec(), "ksp_view", false);
+    refused(&|s| s.bodies[0] = BodySpec::new("lower", |x: [f64; 3]| 0.5 - x[1], 0.0), "young is -0.1666", true);
+    refused(
+        &|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.5).fix("base", [Some(0.0); 2]),
+        "between -1 and 0.5",
+        true,
+    );
+    refused(&|s| s.bodies[0] = BodySpec::new("lwer", 1.0, 0.3).fix("base", [Some(0.0); 2]), "`lower`?", true);
+    refused(&|s| s.contacts[0].layer = LayerSpec::power(1.0, 2.0), "must not exceed 1", true);
+    refused(&|s| s.contacts[0].layer = LayerSpec::Own("flim".into()), "no law of a layer is called `flim`", false);
+    let own = |s: &mut Scene| {
+        *s = s.clone().law("lazy", |_| Lazy);
+        s.contacts[0].layer = LayerSpec::Own("lazy".into());
+    };
+    refused(&own, "the energy is not the integral of p", false);
+    let robin = |gamma| MethodSpec { gamma, ..MethodSpec::new(MethodName::Robin) };
+    refused(&|s| s.method = robin(Gamma::Own("mine".into())), "no rule for gamma is called `mine`", false);
+    refused(&|s| s.bodies[0].order = Order::P2, "the scene asks for order 2", false);
+    // a rule that gives no number ends the run, and is seen in its status
+    let mut scene = pressed(squares()).rule("lost", || Lost);
+    scene.method = robin(Gamma::Own("lost".into()));
+    let solution = solve(session, scene).expect("an end");
+    assert!(!solution.is_converged() && *solution.status() != Status::Converged, "{:?}", solution.status());
+}
+
+#[test]
+fn scenes_that_contradict_themselves_are_refused() {
+    let refused = |change: &dyn Fn(&mut Scene), words: &str| {
+        let mut scene = pressed(squares());
+        change(&mut scene);
+        let error = scene.check().expect_err(words).to_string();
+        assert!(error.contains(words), "{words}: {error}");
+    };
+    pressed(squares()).check().expect("nothing is wrong");
+    refused(&|s| *s = Scene::new(4, squares()), "2 or 3");
+    refused(&|s| s.bodies.clear(), "no body");
+    refused(&|s| s.bodies.push(s.bodies[0].clone()), "two bodies are called `lower`");
+    refused(&|s| s.bodies.push(BodySpec::new("Ksp!", 1.0, 0.0)), "cannot be the name of a body");
+    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [None; 2]), "holds no component");
+    refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [Some(0.0); 3]), "`z` in a plane problem");
+    refused(&|s| s.contacts.push(s.contacts[0].clone()), "a second contact of `below` and `above`");
+    refused(&|s| s.contacts[0].angle = 2.0 * ANGLE, "the angle is 120");
+    refused(
+        &|s| s.contacts[0].layer = LayerSpec::Table(vec![[1.0, 1.0], [2.0, 1.0]]),
+        "the pressure 1 of the table does not exceed 1",
+    );
+    refused(&|s| s.contacts[0].layer = LayerSpec::Table(Vec::new()), "the table has no point");
+    refused(&|s| s.method.gamma = Gamma::Stationary(-0.5), "gamma is -0.5");
+    refused(&|s| s.method.gamma = Gamma::Schedule(Vec::new()), "has no value");
+    refused(&|s| s.method.stop.residual = Some(f64::NAN), "the tolerance is NaN");
+    refused(&|s| s.method.stop.residual = None, "has a tolerance");
+    refused(&|s| s.method.steps = History::of_shares(vec![0.5, 0.75]), "not the full load");
+    refused(&|s| s.method.start = Start::Nested, "only the command line");
+    refused(&|s| s.bodies[1] = s.bodies[1].clone().traction("top", [0.0, 0.0, 1.0]), "a load in z");
+    let force = |total| LoadKind::Force { total, rigid: false };
+    refused(&|s| s.bodies[1] = s.bodies[1].clone().load("top", force([0.0, f64::INFINITY, 0.0])), "the force is");
+    // a refusal has the line of the program
+    let scene = pressed(squares()).body(BodySpec::new("Upper", 1.0, 0.0));
+    let place = format!("{}:{}:", file!(), line!() - 1);
+    assert!(scene.check().expect_err("a capital").to_string().contains(&place), "{place}");
+}
+
+/// What is not for a library is not in it.
+#[test]
+fn without_the_command_line_its_crates_are_gone() {
+    let names = |more: &[&str]| {
+        let mut tree = Command::new(env!("CARGO"));
+        tree.args(["tree", "--locked", "--offline", "--edges", "normal", "--prefix", "none"])
+            .args(more)
+            .current_dir(root());
+        let (status, said, complaint) = output(tree, Duration::from_secs(60));
+        assert!(status.success(), "{complaint}");
+        said.lines().filter_map(|line| line.split(' ').next().map(str::to_owned)).collect::<Vec<String>>()
+    };
+    let (with, without) = (names(&[]), names(&["--no-default-features"]));
+    for name in ["clap", "plotters", "indicatif", "comfy-table", "minijinja", "wait4", "anstream"] {
+        let is_in = |names: &[String]| names.iter().any(|other| other == name);
+        assert!(is_in(&with) && !is_in(&without), "{name}");
+    }
+    assert!(without.len() > 20);
+}
+
+/// The script of docs/library.md reads the files of a run to the same numbers, where Python has numpy.
+#[test]
+fn python_reads_the_results() {
+    let python = |words: &[&str]| {
+        let mut command = Command::new("python3");
+        command.args(words).current_dir(root());
+        output(command, Duration::from_secs(60))
+    };
+    if !python(&["-c", "import numpy"]).0.success() {
+        return;
+    }
+    let run =
+        crate::common::solve(case("groove"), &["--set", "mesh.set.n=8", "--set", "method={}", "--vtu"]).converged();
+    let folder = run.folder.display().to_string();
+    let (status, said, complaint) = python(&["scripts/library/results.py", &folder]);
+    assert!(status.success(), "{complaint}");
+    let force = said.lines().find_map(|line| line.strip_prefix("pressures add up to ")).expect("a force");
+    assert!((force.parse::<f64>().expect("a number") / run.forces(0)[1][1] - 1.0).abs() < 1e-12, "{said}");
+    assert!(said.contains(&format!("converged in {} iterations", run.count("iterations"))), "{said}");
+}

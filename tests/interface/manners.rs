@@ -1,0 +1,393 @@
+//! What the program does besides solving: scenes to begin from, completions, man pages, colours.
+
+use crate::common::{case, environment, output, solve, winkler, winkler_on};
+use std::fs;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Both scenes are solved as they stand, by contact that ends inside the surface, and carry the load.
+#[test]
+fn a_new_scene_works() {
+    for (flag, load, dimension) in [(None, 20.0, 2), (Some("--space"), 10.0, 3)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let scene = folder.path().join("trial");
+        let mut words = vec!["new", scene.to_str().expect("UTF-8")];
+        words.extend(flag);
+        let made = winkler(&words);
+        assert_eq!(made.code, 0, "{}", made.said());
+        let run = solve(scene.join("scene.toml"), &["--set", "output.vtu=false"]).converged();
+        let force = run.forces(0)[0][dimension - 1];
+        assert!((force.abs() - load).abs() < 1e-6 * load, "{flag:?}: {force}");
+        let pressure = &run.contact()["pressure"];
+        assert!(pressure.contains(&0.0) && pressure.iter().any(|p| *p > 10.0), "{flag:?}");
+        // what is there stays as it is
+        let again = winkler(&words);
+        assert_eq!(again.code, 6, "{}", again.said());
+        assert!(again.stderr.contains("scene.toml` is there already"), "{}", again.stderr);
+    }
+    let nameless = winkler(&["new", "/"]);
+    assert!(nameless.code == 2 && nameless.stderr.contains("name"), "{}", nameless.stderr);
+}
+
+/// What a beginner gets wrong most easily.
+#[test]
+fn first_mistakes_have_advice() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
+    assert_eq!(winkler(&["new", &path("press")]).code, 0);
+    let (scene, script) = (path("press/scene.toml"), path("press/press.geo"));
+    // places of groups: is `lower_top` the curve that is meant?
+    let mesh = winkler(&["mesh", &scene]);
+    assert!(mesh.stdout.contains("group lower_top: 20 lines, (0.0000, 1.0000) to (2.0000, 1.0000)"), "{}", mesh.said());
+    // a gap of five times the height of a block
+    let warnings =
+        |set: &str| solve(&scene, &["--set", "output.vtu=false", "--set", set]).report["warnings"].to_string();
+    assert!(
+        warnings("contact.0.gap=5").contains("more than a tenth of the body's size: upper"),
+        "{}",
+        warnings("contact.0.gap=5")
+    );
+    assert_eq!(warnings("contact.0.gap=0.1"), "[]");
+    let refused = |file: &str, advice: &str| {
+        let run = winkler(&["check", file]);
+        assert!(run.code == 3 && run.stderr.contains(advice), "{}", run.said());
+    };
+    refused(&script, "a scene is a TOML file that names its script");
+    let text = fs::read_to_string(&scene).expect("a scene");
+    for (name, from, to, advice) in [
+        ("single.toml", "[[body]]", "[body]", "each body begins with two brackets: [[body]]"),
+        ("slip.toml", "on = \"lower_bottom\"", "on = \"lower_botom\"", "no group `lower_botom` for this support"),
+        ("kind.toml", "[\"lower_top\", ", "[\"lower\", ", "`lower` is a group of cells there"),
+    ] {
+        fs::write(folder.path().join("press").join(name), text.replace(from, to)).expect("a scene");
+        refused(&path(&format!("press/{name}")), advice);
+    }
+    for (words, advice) in [
+        (&[scene.as_str()][..], "did you mean `winkler solve "),
+        (&["solve", &scene, "-n", "4"], "the number of ranks is an option of mpiexec"),
+        (&["solve", &scene, "-np", "4"], "mpiexec -n 2 winkler solve"),
+    ] {
+        let run = winkler(words);
+        assert!(run.code == 2 && run.stderr.contains(advice), "{}", run.said());
+    }
+    // a group whose name cannot begin PETSc options
+    let geo = fs::read_to_string(&script).expect("a script");
+    fs::write(&script, geo.replace("(\"upper\")", "(\"Upper\")")).expect("a script");
+    let run = winkler(&["check", &scene]);
+    assert!(run.code == 3 && run.stderr.contains("rename the group `Upper` of the mesh: `upper`"), "{}", run.said());
+}
+
+#[test]
+fn shells_and_man_know_the_commands() {
+    let script = winkler(&["completions", "bash"]);
+    assert!(script.code == 0 && script.stdout.contains("--restart") && script.stdout.contains("sweep"));
+    assert_eq!(winkler(&["completions", "dos"]).code, 2);
+    let folder = tempfile::tempdir().expect("a folder");
+    let pages = folder.path().join("man");
+    let made = winkler(&["man", pages.to_str().expect("UTF-8")]);
+    assert_eq!(made.code, 0, "{}", made.said());
+    let page = fs::read_to_string(pages.join("winkler-solve.1")).expect("a page");
+    assert!(page.contains("checkpoint"), "{page}");
+    assert_eq!(winkler(&["man", "/dev/null/man"]).code, 6);
+}
+
+#[test]
+fn colours_are_asked_for() {
+    let coloured = |words: &[&str], variable: Option<(&str, &str)>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_winkler"));
+        environment(&mut command);
+        command.args(words).arg("mesh").arg("none.toml").envs(variable);
+        let (_, _, complaint) = output(command, Duration::from_secs(60));
+        assert!(complaint.contains("none.toml"), "{complaint}");
+        complaint.contains('\u{1b}')
+    };
+    assert!(!coloured(&[], None) && coloured(&["--color", "always"], None));
+    assert!(coloured(&[], Some(("CLICOLOR_FORCE", "1"))));
+    assert!(!coloured(&["--color", "never"], Some(("CLICOLOR_FORCE", "1"))));
+}
+
+/// With `-q` a run that is solved says where its results are; one that is not says so, too. Warnings stay.
+#[test]
+fn quiet_runs_say_what_matters() {
+    let small = ["--set", "mesh.set.n=4"];
+    let run = solve(case("groove"), &[&small[..], &["-q"]].concat()).converged();
+    assert_eq!(run.stdout.trim_start(), format!("results in {}\n", run.folder.display()), "{}", run.said());
+    assert!(run.stderr.is_empty(), "{}", run.stderr);
+    let slow = ["-q", "--method", "robin", "--set", "method.stop={residual=1e-8,iterations=2}"];
+    let run = solve(case("groove"), &[&small[..], &slow].concat());
+    assert_eq!(run.code, 1, "{}", run.said());
+    let lines: Vec<&str> = run.stdout.lines().collect();
+    assert!(lines.len() == 2 && lines[0].contains("not converged") && lines[1].contains("results in"), "{lines:?}");
+    let free = ["-q", "--method", "newton", "--set", "body.upper.fix=[]"];
+    let run = solve(case("groove"), &[&small[..], &free].concat());
+    assert!(run.stdout.contains("warning: "), "{}", run.said());
+    for words in [["-q", "-v"], ["-q", "--json"]] {
+        let run = solve(case("groove"), &words);
+        assert!(run.code == 2 && run.stderr.contains("cannot be used with"), "{}", run.said());
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let (scene, out) = (case("groove").display().to_string(), folder.path().join("runs").display().to_string());
+    let all = winkler(&["sweep", &scene, "-q", "--over", "mesh.set.n=4,8", "--set", "method={}", "-o", &out]);
+    assert_eq!((all.code, all.stdout.trim()), (0, format!("results in {out}").as_str()), "{}", all.said());
+    let all = winkler(&["bench", &scene, "-q", "--solver", "mumps", "--set", "mesh.set.n=4", "-o", &out]);
+    assert_eq!((all.code, all.stdout.trim()), (0, format!("results in {out}").as_str()), "{}", all.said());
+}
+
+/// With `-v` standard error has the decisions and the PETSc options of each body, typed ones and the program's own.
+#[test]
+fn verbose_runs_say_what_was_decided() {
+    let words = ["--set", "mesh.set.n=4", "--method", "robin", "--set", "solver=mumps", "-upper_ksp_type", "cg"];
+    let usual = solve(case("groove"), &words);
+    let run = solve(case("groove"), &[&words[..], &["-v"]].concat());
+    let without = |text: &str| text.lines().filter(|line| !line.contains(" s")).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(without(&run.stdout).len(), without(&usual.stdout).len(), "what comes out is the same");
+    assert!(usual.stderr.is_empty(), "{}", usual.stderr);
+    for part in ["decided", "method: robin", "until increment <=", "inner solver: ", "points on `", "body lower: "] {
+        assert!(run.stderr.contains(part), "no `{part}` in\n{}", run.stderr);
+    }
+    let options = |body: &str| {
+        let begin = format!("  PETSc options of {body}: ");
+        run.stderr.lines().find_map(|line| line.strip_prefix(&begin)).unwrap_or_default().to_owned()
+    };
+    assert!(options("upper").contains("-upper_ksp_type cg"), "{}", run.stderr);
+    assert!(options("lower").contains("-lower_pc_type cholesky"), "{}", run.stderr);
+    assert!(!options("lower").contains("upper"), "{}", run.stderr);
+}
+
+#[test]
+fn help_has_examples_and_petsc_options() {
+    for command in ["solve", "check", "sweep", "bench"] {
+        let help = winkler(&[command, "--help"]);
+        assert!(help.code == 0 && help.stdout.contains("Examples:\n  winkler "), "{}", help.said());
+    }
+    let help = winkler(&["solve", "--help"]).stdout;
+    assert!(help.contains("-upper_ksp_type cg") && help.contains("-newton_pc_type"), "{help}");
+    // options of the program with one dash look like PETSc's
+    let slip = winkler(&["solve", "scene.toml", "-verbose"]);
+    assert!(slip.code == 2 && slip.stderr.contains("did you mean --verbose?"), "{}", slip.said());
+}
+
+/// A run that would take hours, ended when its test ends.
+struct Endless(Child);
+
+impl Drop for Endless {
+    fn drop(&mut self) {
+        // one that has ended needs no end
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Endless {
+    /// Starts it with results in a folder, and waits until it has rows of its own there.
+    fn start(folder: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_winkler"));
+        environment(&mut command);
+        command.arg("solve").arg(case("groove")).arg("-o").arg(folder);
+        command.args(["--set", "method.gamma=1e-6", "--set", "mesh.set.n=4"]);
+        command.args(["--set", "method.stop={residual=1e-12,iterations=100000000}"]);
+        let log = fs::File::create(folder.with_extension("log")).expect("a file");
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);
+        let run = Self(command.spawn().expect("the program"));
+        let began = Instant::now();
+        let is_at_work = || {
+            let rows = fs::read_to_string(folder.join("history.csv")).map_or(0, |text| text.lines().count());
+            rows > 3 && !folder.join("report.json").exists()
+        };
+        while !is_at_work() {
+            let said = || fs::read_to_string(folder.with_extension("log")).unwrap_or_default();
+            assert!(began.elapsed() < Duration::from_secs(120), "no rows\n{}", said());
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        run
+    }
+}
+
+/// Names of all files in a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).expect("a folder").flatten();
+    let mut names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// A second run in the same folder is refused before it changes anything; a killed one stops nobody.
+#[test]
+fn one_run_at_a_time_has_a_folder() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let folder = scratch.path().join("out");
+    let out = folder.to_str().expect("UTF-8");
+    let running = Endless::start(&folder);
+    let before = names(&folder);
+    let scene = case("groove").display().to_string();
+    let holder = format!("process {} is writing its results to {out}", running.0.id());
+    for words in [
+        &["solve", &scene][..],
+        &["sweep", &scene, "--over", "method.gamma=0.5,0.6"],
+        &["bench", &scene, "--solver", "mumps"],
+        &["check", &scene],
+    ] {
+        let run = winkler(&[words, &["--set", "mesh.set.n=4", "-o", out]].concat());
+        assert!(run.code == 6 && run.stderr.contains(&holder) && run.stderr.contains("-o FOLDER"), "{}", run.said());
+    }
+    let ranks = winkler_on(2, &["solve", &scene, "--set", "mesh.set.n=4", "-o", out]);
+    assert!(ranks.code == 6 && ranks.stderr.matches(&holder).count() == 1, "{}", ranks.said());
+    assert_eq!(names(&folder), before, "nothing of them is there");
+    // dropping it is kill -9
+    drop(running);
+    let run = winkler(&["solve", &scene, "--set", "mesh.set.n=4", "-o", out]);
+    assert_eq!(run.code, 0, "{}", run.said());
+    assert!(names(&folder).iter().all(|name| !name.starts_with('.')), "{:?}", names(&folder));
+}
+
+/// Files of an earlier run are gone when the first row of the next one is there; those of users stay.
+#[test]
+fn nothing_old_stands_beside_what_is_new() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let folder = scratch.path().join("out");
+    let out = folder.to_str().expect("UTF-8");
+    let scene = case("groove-held").display().to_string();
+    let small = ["--set", "mesh.set.n=4", "-o", out];
+    let steps = ["--set", "method.steps=3", "--vtu", "--msh", "--report"];
+    let run = winkler(&[&["solve", &scene], &small[..], &steps].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    let sums = Command::new("sha256sum").args(["-c", "--quiet", "SHA256SUMS"]).current_dir(&folder).output();
+    assert!(sums.is_ok_and(|sums| sums.status.success()), "the sums are those of sha256sum");
+    let users = ["contact-notes.csv", "mesh.vtu", "notes.txt", "part.geo", "steps.toml"];
+    users.iter().for_each(|name| fs::write(folder.join(name), "mine").expect("a file"));
+    fs::write(folder.join("steps/mine.vtu"), "mine").expect("a file");
+    fs::write(folder.join("checkpoint"), "hours of work").expect("a file");
+    // one that is refused has removed nothing
+    let before = names(&folder);
+    let refused = winkler(&[&["solve", &scene], &small[..], &["-ksp_tpye", "cg"]].concat());
+    assert!(refused.code == 5 && names(&folder) == before, "{}", refused.said());
+    drop(Endless::start(&folder));
+    let mut expected = [&users[..], &[".winkler.lock", "checkpoint.old", "history.csv", "steps"]].concat();
+    expected.sort_unstable();
+    assert_eq!(names(&folder), expected);
+    assert_eq!(names(&folder.join("steps")), ["mine.vtu"]);
+    assert_eq!(fs::read_to_string(folder.join("checkpoint.old")).expect("a file"), "hours of work");
+    // a sweep, likewise
+    let sweep = |over: &str, more: &[&str]| {
+        let run = winkler(&[&["sweep", &scene, "--over", over], &small[..], more].concat());
+        assert_eq!(run.code, 0, "{}", run.said());
+    };
+    sweep("contact.0.layer.power.a=0.5,1", &["--set", "method={}"]);
+    assert!(folder.join("pressure.svg").exists());
+    sweep("contact.0.layer.power.a=0.5,1", &["--set", "method={}", "--set", "output.plots=false"]);
+    assert!(folder.join("sweep.csv").exists() && !folder.join("pressure.svg").exists());
+    assert!(users.iter().all(|name| fs::read_to_string(folder.join(name)).is_ok_and(|text| text == "mine")));
+}
+
+/// Tables that grow replace what has their name, as all other files do: a link is not followed, a pipe is no table.
+#[test]
+fn tables_stay_in_their_folder() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let (folder, target) = (scratch.path().join("out"), scratch.path().join("target.csv"));
+    let out = folder.to_str().expect("UTF-8");
+    fs::create_dir(&folder).expect("a folder");
+    fs::write(&target, "a file of somebody else").expect("a file");
+    let tables = ["history.csv", "steps.csv", "sweep.csv", "bench.csv", "report.json"];
+    tables.iter().for_each(|name| symlink(&target, folder.join(name)).expect("a link"));
+    let scene = case("groove-held").display().to_string();
+    let small = ["--set", "mesh.set.n=4", "--method", "newton", "-o", out];
+    for words in [
+        &["solve", &scene, "--set", "method.steps=2"][..],
+        &["sweep", &scene, "--over", "contact.0.layer.power.a=0.5,1"],
+        &["bench", &scene, "--solver", "condensed"],
+    ] {
+        let run = winkler(&[words, &small].concat());
+        assert_eq!(run.code, 0, "{}", run.said());
+    }
+    assert_eq!(fs::read_to_string(&target).expect("a file"), "a file of somebody else");
+    assert!(
+        ["sweep.csv", "bench.csv"].iter().all(|name| folder.join(name).symlink_metadata().is_ok_and(|d| d.is_file()))
+    );
+    for (name, words) in [
+        ("history.csv", &["solve", &scene][..]),
+        ("report.json", &["solve", &scene]),
+        ("sweep.csv", &["sweep", &scene, "--over", "contact.0.layer.power.a=0.5,1"]),
+        ("bench.csv", &["bench", &scene, "--solver", "condensed", "--resume"]),
+        ("page.html", &["report", out]),
+    ] {
+        let path = folder.join(name);
+        // a table of before may be there or not
+        let _ = fs::remove_file(&path);
+        assert!(Command::new("mkfifo").arg(&path).status().expect("mkfifo").success());
+        let page = path.display().to_string();
+        let run = match words[0] {
+            "report" => {
+                assert_eq!(winkler(&[&["solve", &scene], &small[..]].concat()).code, 0);
+                winkler(&[words, &["-o", &page]].concat())
+            }
+            _ => winkler(&[words, &small].concat()),
+        };
+        assert!(run.code == 6 && run.stderr.contains(&format!("{page} is a pipe")), "{name}: {}", run.said());
+        fs::remove_file(&path).expect("the pipe is there");
+    }
+}
+
+/// What is in the way of a folder of results is named.
+#[test]
+fn folders_that_cannot_be_used_are_refused() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let scene = case("groove").display().to_string();
+    let refused = |out: &str, words: &[&str]| {
+        let run = winkler(&["solve", &scene, "--set", "mesh.set.n=4", "-o", out]);
+        assert!(run.code == 6 && words.iter().all(|word| run.stderr.contains(word)), "{}", run.said());
+    };
+    symlink("nowhere", path("dangling")).expect("a link");
+    refused(&path("dangling"), &["dangling is a link to nowhere, which is not there"]);
+    refused(&path("dangling/deep"), &["dangling is a link to nowhere, which is not there"]);
+    fs::write(path("file"), "").expect("a file");
+    refused(&path("file"), &["file is a file, not a folder"]);
+    refused(&path("file/deep"), &["file is a file, not a folder"]);
+    assert!(!scratch.path().join("nowhere").exists());
+    let new = winkler(&["new", &path("dangling")]);
+    assert!(new.code == 6 && new.stderr.contains("is a link to nowhere"), "{}", new.said());
+    // of somebody else: only root can make such a one
+    fs::create_dir(path("theirs")).expect("a folder");
+    if std::os::unix::fs::chown(path("theirs"), Some(12_345), None).is_ok() {
+        refused(&path("theirs"), &["theirs belongs to another user", "chmod g+w"]);
+        assert!(names(Path::new(&path("theirs"))).is_empty());
+        let run = winkler(&["solve", &scene, "--set", "mesh.set.n=4", "-o", &path("ours")]);
+        assert_eq!(run.code, 0, "{}", run.said());
+        std::os::unix::fs::chown(path("ours"), Some(12_345), None).expect("root");
+        let run = winkler(&["report", &path("ours")]);
+        assert!(run.code == 6 && run.stderr.contains("belongs to another user"), "{}", run.said());
+        assert_eq!(winkler(&["report", &path("ours"), "-o", &path("page.html")]).code, 0);
+        fs::set_permissions(path("theirs"), fs::Permissions::from_mode(0o775)).expect("permissions");
+        let run = winkler(&["solve", &scene, "--set", "mesh.set.n=4", "-o", &path("theirs")]);
+        assert_eq!(run.code, 0, "{}", run.said());
+    }
+}
+
+/// On a disk that fills up a sweep goes on: it says so at once and at the end, and prints all that it computed.
+#[test]
+fn a_table_on_a_full_disk_is_a_warning_and_nothing_is_lost() {
+    let scratch = tempfile::tempdir().expect("a folder");
+    let out = scratch.path().join("out");
+    let values: Vec<String> = (0..60).map(|k| format!("{}", 0.5 + 0.005 * f64::from(k))).collect();
+    let mut command = Command::new("bash");
+    // files of 8 kB; a row has some 200 bytes. What is printed goes through a pipe, which has no limit
+    let script = "set -o pipefail; (ulimit -f 8; exec \"$@\") | cat";
+    command.args(["-c", script, "bash", env!("CARGO_BIN_EXE_winkler"), "sweep"]);
+    command.arg(case("groove-held")).arg("-o").arg(&out).args(["--set", "mesh.set.n=2", "--set", "method={}"]);
+    command.args(["--set", "output.plots=false", "--json", "--over"]);
+    command.arg(format!("contact.0.layer.power.a={}", values.join(","))).current_dir(scratch.path());
+    environment(&mut command);
+    assert_eq!(winkler(&["mesh", case("groove-held").to_str().expect("UTF-8"), "--set", "mesh.set.n=2"]).code, 0);
+    let (status, stdout, stderr) = output(command, Duration::from_secs(120));
+    assert_eq!(status.code(), Some(6), "{stderr}");
+    let warns = |line: &&str| line.contains("warning: ") && !line.contains("OPENBLAS_CORETYPE");
+    assert_eq!(stderr.lines().filter(warns).count(), 1, "{stderr}");
+    assert!(stderr.contains("sweep.csv lacks rows") && stderr.contains("cannot write"), "{stderr}");
+    let reports: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
+    assert_eq!(reports.as_array().map(Vec::len), Some(60), "all runs are told");
+    let table = fs::read_to_string(out.join("sweep.csv")).expect("a table");
+    let widths: Vec<usize> = table.lines().map(|line| line.split(',').count()).collect();
+    assert!(table.ends_with('\n') && widths.len() > 5 && widths.iter().all(|width| *width == widths[0]), "{table}");
+}

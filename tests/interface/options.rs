@@ -1,0 +1,588 @@
+//! PETSc options, typed as in any PETSc program, reach the bodies.
+
+use crate::common::{Run, Scene, WINKLER, case, distance, environment, solve, solve_on, text_of, winkler};
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use winkler::solver::options::check_of_scene;
+
+const SCENE: [&str; 2] = ["--set", "mesh.set.n=8"];
+const TIGHT: [&str; 2] = ["--set", "method.stop={residual=1e-8,iterations=5000}"];
+
+/// Solves the groove on a coarse mesh with PETSc options.
+fn groove(options: &str) -> Run {
+    let words: Vec<&str> = options.split_whitespace().collect();
+    solve(case("groove"), &[&SCENE[..], &words].concat())
+}
+
+/// The same, down to a small residual.
+fn tight(options: &str) -> Run {
+    let words: Vec<&str> = options.split_whitespace().collect();
+    solve(case("groove"), &[&SCENE[..], &TIGHT, &words].concat()).converged()
+}
+
+/// The groove on a coarse mesh with a `solver` in the scene.
+fn with_solver(solver: &str) -> Scene {
+    let text = text_of("groove").replace("n = 32", "n = 8");
+    Scene::new(text.replace("dimension = 2", &format!("dimension = 2\nsolver = {solver}")))
+}
+
+#[test]
+fn options_reach_all_bodies_or_one() {
+    let cases = [
+        ("", ["condensed to 32 dofs by mumps"; 2]),
+        ("--set solver=mumps", ["preonly + cholesky by mumps"; 2]),
+        ("-ksp_type cg -pc_type hypre", ["cg + hypre"; 2]),
+        ("-pc_type gamg", ["cg + gamg"; 2]),
+        ("-ksp_type cg", ["cg + cholesky by mumps"; 2]),
+        ("-pc_type lu", ["preonly + lu by mumps"; 2]),
+        ("-pc_type lu -pc_factor_mat_solver_type petsc", ["preonly + lu by petsc"; 2]),
+        ("-upper_pc_type cholesky", ["condensed to 32 dofs by mumps", "preonly + cholesky by mumps"]),
+        ("-upper_ksp_type cg -lower_pc_type gamg", ["cg + gamg", "cg + cholesky by mumps"]),
+        ("-ksp_type cg -pc_type hypre -upper_pc_type jacobi -lower_ksp_type gmres", ["gmres + hypre", "cg + jacobi"]),
+        (
+            "-upper_ksp_type preonly -upper_pc_type cholesky -pc_type hypre -ksp_type fcg",
+            ["fcg + hypre", "preonly + cholesky by mumps"],
+        ),
+    ];
+    for (options, solvers) in cases {
+        let run = groove(options).converged();
+        assert_eq!(run.solvers(), solvers, "{options}");
+        assert_eq!(run.warnings(), "", "{options}");
+    }
+}
+
+/// The line that ends a run must not name a solver that did not run.
+#[test]
+fn the_terminal_names_the_solver_that_ran() {
+    let run = groove("-ksp_type cg -pc_type hypre").converged();
+    assert!(!run.stdout.contains("mumps"), "{}", run.stdout);
+    let run = groove("").converged();
+    assert!(run.stdout.contains("mumps"), "{}", run.stdout);
+}
+
+#[test]
+fn every_solver_ends_at_the_same_answer() {
+    let direct = tight("").contact();
+    let all = [
+        "-upper_ksp_type cg -lower_pc_type gamg",
+        "-ksp_type cg -pc_type hypre",
+        // the residual is exact whatever the inner solve
+        "-ksp_type cg -pc_type hypre -ksp_rtol 0.03",
+        "-ksp_type preonly -pc_type icc",
+        // neither a stale factor nor a stale preconditioner changes the answer
+        "-ksp_reuse_preconditioner",
+        "-ksp_type cg -ksp_reuse_preconditioner",
+    ];
+    for options in all {
+        let run = tight(options);
+        assert!(distance(&run.contact()["pressure"], &direct["pressure"]) < 1e-6, "{options}");
+    }
+}
+
+/// preonly never runs on a stale factor: the history is the same to rounding.
+/// What is typed for the matrix of all bodies reaches it, whatever the program would have chosen for them, and by `auto`, too.
+#[test]
+fn options_of_all_bodies_together() {
+    let expected = [("hypre", "cg + hypre"), ("gamg", "cg + gamg"), ("cholesky", "cg + cholesky by mumps")];
+    for (method, (pc, solver)) in ["auto", "newton"].into_iter().flat_map(|method| expected.map(|pair| (method, pair)))
+    {
+        let args = ["--method", method, "--set", "mesh.set.n=4", "-newton_ksp_type", "cg", "-newton_pc_type", pc];
+        for ranks in [1, 2] {
+            let run = solve_on(ranks, case("groove3d"), &args).converged();
+            assert_eq!((run.text("method"), run.solvers()), ("newton", vec![solver; 2]), "{method} {pc} {ranks}");
+        }
+    }
+}
+
+#[test]
+fn preonly_factors_anew_although_told_to_reuse() {
+    let (fresh, told) = (tight("--set solver=mumps"), tight("-ksp_reuse_preconditioner"));
+    assert_eq!(fresh.count("iterations"), told.count("iterations"));
+    assert_eq!(fresh.history()["residual"], told.history()["residual"]);
+}
+
+/// With CG a stale preconditioner is the user's good right: then nothing is factored again, and the counter says so.
+#[test]
+fn a_preconditioner_that_is_reused_is_counted_once() {
+    let run = tight("-ksp_type cg -ksp_reuse_preconditioner");
+    assert_eq!(run.count("factorizations"), 2, "the factors of the start serve all sweeps");
+}
+
+#[test]
+fn a_file_of_options_is_read() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("my.opts");
+    fs::write(&file, "# a comment\n-ksp_type cg\n-pc_type hypre\n-upper_pc_type gamg\n").expect("a file");
+    let path = file.display().to_string();
+    assert_eq!(groove(&format!("-options_file {path}")).converged().solvers(), ["cg + hypre", "cg + gamg"]);
+    let run = groove(&format!("-options_file {path} -lower_pc_type jacobi")).converged();
+    assert_eq!(run.solvers(), ["cg + jacobi", "cg + gamg"]);
+    let run = groove("-options_file missing.opts");
+    assert_eq!(run.code, 5, "{}", run.said());
+    assert!(run.stderr.contains("missing.opts"), "{}", run.stderr);
+}
+
+#[test]
+fn options_of_the_scene_are_weaker_than_typed_ones() {
+    let scene = with_solver("{ preset = \"hypre\", options = \"-ksp_type fcg -lower_pc_type gamg\" }");
+    let solvers = |args: &[&str]| -> Vec<String> {
+        solve(&scene, args).converged().solvers().into_iter().map(str::to_owned).collect()
+    };
+    assert_eq!(solvers(&[]), ["fcg + gamg", "fcg + hypre"]);
+    assert_eq!(solvers(&["-ksp_type", "cg"]), ["cg + gamg", "cg + hypre"]);
+    assert_eq!(solvers(&["-lower_pc_type", "jacobi"]), ["fcg + jacobi", "fcg + hypre"]);
+    assert_eq!(solvers(&["-upper_ksp_type", "gmres"]), ["fcg + gamg", "gmres + hypre"]);
+    let presets = [("mumps", "preonly + cholesky by mumps"), ("hypre", "cg + hypre")];
+    for (preset, solver) in presets {
+        let run = solve(with_solver(&format!("\"{preset}\"")), &[]).converged();
+        assert_eq!(run.solvers(), [solver; 2]);
+    }
+}
+
+#[test]
+fn every_run_of_a_sweep_has_its_own_options() {
+    let scene = with_solver("\"condensed\"");
+    let path = scene.path.display().to_string();
+    let over = "solver.options=\"-ksp_type cg\",\"-ksp_type gmres\",\"\"";
+    let run = winkler(&["sweep", &path, "--over", over, "--json", "-o", "out"]);
+    assert_eq!(run.code, 0, "{}", run.said());
+    let list: serde_json::Value = serde_json::from_str(&run.stdout).expect("a list of reports");
+    let solvers: Vec<_> = (0..3).map(|i| list[i]["bodies"][0]["solver"].as_str().unwrap_or_default()).collect();
+    assert_eq!(solvers, ["cg + cholesky by mumps", "gmres + cholesky by mumps", "condensed to 32 dofs by mumps"]);
+}
+
+#[test]
+fn a_good_option_of_a_solver_not_in_use_is_a_warning() {
+    for options in ["-pc_gamg_threshold 0.1", "-upper_pc_hypre_type euclid", "-pc_hypre_boomeramg_max_iter 2"] {
+        let run = groove(options).converged();
+        let name = options.split_whitespace().next().unwrap_or_default();
+        assert!(run.warnings().contains(name), "{}", run.warnings());
+        assert!(run.stdout.contains("warning") && run.stdout.contains(name), "{}", run.stdout);
+    }
+    // it is in use in one body of two
+    assert_eq!(groove("-pc_gamg_threshold 0.1 -lower_pc_type gamg").converged().warnings(), "");
+    let run =
+        solve_on(2, case("groove"), &[&SCENE[..], &["-pc_gamg_threshold", "0.1", "-upper_pc_type", "gamg"]].concat());
+    assert_eq!(run.converged().warnings(), "");
+}
+
+#[test]
+fn petsc_prints_what_it_is_asked_for() {
+    let monitor = groove("-ksp_type cg -ksp_monitor").converged();
+    assert!(monitor.stdout.contains("KSP Residual norm"), "{}", monitor.stdout);
+    let one = groove("-ksp_type cg -upper_ksp_monitor").converged();
+    let count = |run: &Run| run.stdout.matches("KSP Residual norm").count();
+    assert!(count(&one) > 0 && 2 * count(&one) <= count(&monitor) + 4, "{}", one.stdout);
+    let view = groove("-ksp_view -ksp_type preonly").converged();
+    assert!(view.stdout.contains("KSP Object: (upper_)") && view.stdout.contains("mumps"), "{}", view.stdout);
+    let stages = groove("-log_view -ksp_type cg").converged().stdout;
+    for stage in ["mesh", "discretize", "set-up", "iterate", "linear solve", "output"] {
+        assert!(stages.contains(&format!("{stage}: ")), "{stage}: {stages}");
+    }
+    let log = groove("-log_view").converged();
+    assert!(log.stdout.contains("Performance Summary") || log.stdout.contains("MatCholFctrNum"), "{}", log.stdout);
+    let reason = groove("-ksp_type cg -ksp_converged_reason").converged();
+    assert!(reason.stdout.contains("Linear upper_ solve converged"), "{}", reason.stdout);
+    let help = groove("-help");
+    assert_eq!(help.code, 0, "{}", help.stderr);
+    assert!(help.stdout.contains("-ksp_type") && help.stdout.contains("-log_view"), "{}", help.stdout);
+    for run in [monitor, one, view, log, reason, help] {
+        assert_eq!(run.stderr, "");
+    }
+}
+
+/// To end a run at the first solve that does not converge is to steer its solvers: the bodies have some then.
+#[test]
+fn a_solve_that_must_converge_ends_the_run() {
+    let good = groove("-ksp_error_if_not_converged").converged();
+    assert_eq!(good.solvers(), ["preonly + cholesky by mumps"; 2]);
+    let bad = groove("-ksp_type cg -pc_type jacobi -ksp_max_it 3 -ksp_error_if_not_converged");
+    assert_eq!(bad.code, 5, "{}", bad.said());
+    assert!(bad.stderr.contains("not converged") && bad.stderr.contains("DIVERGED_ITS"), "{}", bad.stderr);
+}
+
+/// `groove-held` on a coarse mesh by a method that PETSc's options reach.
+fn held(options: &str) -> Run {
+    let method = if options.contains("--method") { "" } else { "--method auto" };
+    let all = format!("{method} --set mesh.set.n=8 --set method.stop={{residual=1e-8,iterations=200}} {options}");
+    solve(case("groove-held"), &all.split_whitespace().collect::<Vec<_>>())
+}
+
+/// Inner solvers that end too early, or solve something else: forces summed anew find it out, or the answer is right.
+#[test]
+fn options_that_spoil_solves_are_found_out() {
+    let exact = held("").converged();
+    let pressure = &exact.contact()["pressure"];
+    let options = [
+        "-ksp_type cg -pc_type icc -ksp_atol 1e-2",
+        "-ksp_type cg -pc_type hypre -ksp_atol 1",
+        "-newton_ksp_type cg -newton_pc_type hypre -newton_ksp_atol 1e-1",
+        "-ksp_type cg -pc_type icc -ksp_rtol 0.1",
+        "-ksp_type richardson -pc_type icc -ksp_rtol 0.5",
+        "-ksp_type preonly -pc_type icc",
+        "-ksp_type cg -pc_type icc -pc_factor_shift_type nonzero -pc_factor_shift_amount 1e3",
+        "--set solver=mumps -mat_mumps_icntl_35 1 -mat_mumps_cntl_7 1e-2",
+        "--method robin --set method.robin={floor=1e300}",
+    ];
+    let mut found_out = 0;
+    for options in options {
+        let run = held(options);
+        let off = distance(&run.contact()["pressure"], pressure);
+        match run.code {
+            0 => assert!(off < 1e-6, "{options}: {off:e}\n{}", run.said()),
+            1 if run.text("status") == "inaccurate" => {
+                assert!(off > 1e-9, "{options}: {off:e}\n{}", run.said());
+                assert!(run.text("message").contains("r`"), "the body is named\n{}", run.said());
+                // what is reported is what was found
+                let found = run.number("last_look/error");
+                assert!(found <= run.number("error_estimate") && run.report["error_bound"].is_null(), "{options}");
+                found_out += 1;
+            }
+            code => assert_eq!(code, 1, "{options}: {}", run.said()),
+        }
+    }
+    assert!(found_out > 1, "{found_out}");
+}
+
+/// The error of a run that stopped too early, from the look at its forces: never more than that from the energies, and not much less.
+#[test]
+fn the_last_look_sees_the_error_that_is_there() {
+    let sets = ["--set", "mesh.set.n=8", "--set", "contact.0.layer={linear={stiffness=1e5}}", "--method", "robin"];
+    let at = |residual: &str| {
+        let stop = format!("method.stop={{residual={residual},iterations=5000}}");
+        solve(case("groove-held"), &[&sets[..], &["--set", &stop]].concat())
+    };
+    let least = at("1e-9").number("F1");
+    for residual in ["1e-1", "1e-2", "1e-3"] {
+        let run = at(residual);
+        // the gap is small beside the compressions, so that all is about linear, and F1 half of the energy
+        let error = (1.0 - run.number("F1") / least).sqrt();
+        let share = run.number("last_look/error") / error;
+        assert!((0.1..1.3).contains(&share), "{residual}: {share} of {error:e}");
+    }
+}
+
+/// Options that look at a run leave it as it is, bit by bit, and say so where there is nothing to look at.
+#[test]
+fn options_that_look_change_nothing() {
+    let counts = ["iterations", "sweeps", "factorizations", "dense_factorizations"];
+    let of = |run: &Run| {
+        (counts.map(|key| run.count(key)), run.number("residual"), run.report["bodies"][0]["solver"].clone())
+    };
+    for method in ["robin", "newton"] {
+        let plain = groove(&format!("--method {method}")).converged();
+        for options in
+            ["-ksp_view", "-upper_ksp_monitor -ksp_converged_reason", "-mat_view ::ascii_info", "-log_view", "-help"]
+        {
+            let run = groove(&format!("--method {method} {options}")).converged();
+            assert_eq!(of(&run), of(&plain), "{method} {options}");
+            for name in options.split_whitespace().filter(|word| word.starts_with("-ksp") || word.starts_with("-upper"))
+            {
+                let told = format!("{name} ");
+                assert!(
+                    run.warnings().contains(told.trim()) && run.warnings().contains("nothing to show"),
+                    "{}",
+                    run.warnings()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn flags_of_the_program_are_none_of_petscs_business() {
+    let run = groove("-options_left --json -ksp_type cg").converged();
+    let table = run.stdout.split("Option Table entries").nth(1).unwrap_or_else(|| panic!("no table\n{}", run.stdout));
+    assert!(table.contains("-ksp_type cg"), "{table}");
+    assert!(run.stdout.contains("There are no unused options"), "{}", run.stdout);
+    for own in ["-o ", "--set", "-json", "mesh.set.n", "signal_handler", "results"] {
+        assert!(!table.contains(own), "{own}\n{table}");
+    }
+}
+
+#[test]
+fn help_is_shown_without_a_scene() {
+    for word in ["--help", "-h", "-help"] {
+        let run = winkler(&[word]);
+        assert_eq!(run.code, 0, "{word}: {}", run.said());
+        assert!(run.stdout.contains("Usage: winkler"), "{word}: {}", run.said());
+    }
+}
+
+/// What PETSc would say at its end, or in a trap, is said before the first sweep.
+#[test]
+fn options_that_cannot_end_well_are_refused() {
+    let run = groove("-fp_trap");
+    assert_eq!(run.code, 5, "{}", run.said());
+    assert!(run.stderr.starts_with("error: -fp_trap") && run.stderr.contains("help:"), "{}", run.stderr);
+    groove("-fp_trap false").converged();
+    let run = groove("-log_view :${HOME");
+    assert!(run.code == 5 && run.stderr.contains("-log_view begins a variable"), "{}", run.said());
+    let run = groove("-log_view :/nope/x");
+    assert_eq!(run.code, 6, "{}", run.said());
+    assert!(run.stderr.contains("/nope/x") && run.stderr.contains("-log_view"), "{}", run.stderr);
+    // in the folder of results, which is not there before
+    let run = groove("-log_view :results/log.txt").converged();
+    assert!(fs::read_to_string(run.folder.join("log.txt")).expect("a log").contains("Performance Summary"));
+}
+
+/// Quadratic elements have a level of their own: half of the iterations, fewer with each, for the same pressures. What is typed for hypre
+/// means hypre for all nodes.
+#[test]
+fn multigrid_of_quadratic_elements_has_two_levels() {
+    let run_on = |ranks: usize, options: &str| {
+        let words = "--set mesh.set.n=2 --set mesh.set.edge=4 --set method.stop={residual=1e-8} --set solver=hypre";
+        let words: Vec<&str> = words.split_whitespace().chain(options.split_whitespace()).collect();
+        solve_on(ranks, case("hertz-sphere"), &words).converged()
+    };
+    let run = |options: &str| run_on(1, options);
+    let plain = run("-pc_type hypre");
+    let inner = |run: &Run| run.count("inner_iterations");
+    for (options, solver) in [
+        ("", "cg + mg by hypre"),
+        ("-newton_pc_type mg", "cg + mg by hypre"),
+        ("-newton_mg_coarse_pc_type gamg", "cg + mg by gamg"),
+        ("--method newton-robin", "cg + mg by hypre"),
+    ] {
+        let two = run(options);
+        assert!(two.solvers().iter().all(|name| *name == solver), "{options}: {:?}", two.solvers());
+        assert!(distance(&two.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{options}");
+        if ["", "-newton_pc_type mg"].contains(&options) {
+            let counts = [&two, &plain].map(inner);
+            assert!(3 * counts[0] < 2 * counts[1], "{options}: {counts:?}");
+        }
+    }
+    // another smoother, whose bounds hold for one matrix: it is set up for each contact set, where one rank keeps its own
+    let one = inner(&run(""));
+    for ranks in [3, 5] {
+        let dealt = run_on(ranks, "");
+        assert!(distance(&dealt.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{ranks} ranks");
+        assert!(inner(&dealt) < 2 * one, "{ranks} ranks: {} and {one}", inner(&dealt));
+        assert_eq!(dealt.solvers(), ["cg + mg by hypre"; 2]);
+    }
+    let typed = run("-newton_pc_hypre_boomeramg_strong_threshold 0.5");
+    assert!(typed.solvers().iter().all(|name| *name == "cg + hypre"), "{:?}", typed.solvers());
+    // linear elements have one level
+    assert!(run("--set body.0.order=1 --set body.1.order=1").solvers().iter().all(|name| *name == "cg + hypre"));
+}
+
+/// Options of a scene that would do something to the machine, FOLDER being one with a file `kept` and a folder `part` in it.
+const FORBIDDEN: [&str; 34] = [
+    "-draw_save x.$(touch${IFS}FOLDER/new) -ksp_view_eigenvalues draw",
+    "-ksp_view_eigenvalues draw:image -draw_save FOLDER/part",
+    "-ksp_view :FOLDER/kept",
+    "-KSP_View :FOLDER/kept",
+    "-upper_ksp_view :FOLDER/kept",
+    "-ksp_rtol 1e-8 -ksp_view",
+    "-ksp_monitor :FOLDER/kept",
+    "-upper_ksp_monitor_true_residual ascii:FOLDER/kept",
+    "-ksp_view_mat binary:FOLDER/kept",
+    "-ksp_plot_eigenvalues",
+    "-mat_view ascii:FOLDER/kept",
+    "-pc_hypre_mat_view :FOLDER/kept",
+    "-log_view :FOLDER/kept",
+    "-log_trace FOLDER/kept",
+    "-info :FOLDER/kept",
+    "-history FOLDER/kept",
+    "-malloc_dump FOLDER/kept",
+    "-viewer_binary_filename FOLDER/kept",
+    "-dll_append FOLDER/kept",
+    "-dll_prepend FOLDER/kept",
+    "-options_file FOLDER/kept",
+    "-options_file_yaml FOLDER/kept",
+    "-options_string_yaml a:b",
+    "-options_monitor",
+    "-prefix_push upper_",
+    "-on_error_attach_debugger noxterm,touch",
+    "-start_in_debugger noxterm,touch",
+    "-pc_type python -pc_python_type os.abort",
+    "-ksp_type python",
+    "-pc_type shell",
+    "-mat_mumps_ooc_tmpdir FOLDER/part -mat_mumps_icntl_22 1",
+    "-mat_mumps_icntl_2 77 -mat_mumps_icntl_4 4",
+    "-ksp_rtol :FOLDER/kept",
+    "-ksp_norm_type FOLDER/kept",
+];
+
+/// What is in a folder: names, and the contents of files.
+fn contents(folder: &Path) -> Vec<(String, Option<String>)> {
+    let entry = |path: PathBuf| (path.display().to_string(), fs::read_to_string(&path).ok());
+    let mut all: Vec<_> =
+        fs::read_dir(folder).expect("a folder").map(|each| entry(each.expect("an entry").path())).collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn a_scene_chooses_solvers_and_does_nothing_else() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    fs::write(folder.path().join("kept"), "-ksp_type cg\n").expect("a file");
+    fs::create_dir(folder.path().join("part")).expect("a folder");
+    fs::write(folder.path().join("part/kept"), "kept").expect("a file");
+    let before = contents(folder.path());
+    let name = folder.path().display().to_string();
+    let refused = |run: &Run, option: &str, place: &str| {
+        assert_eq!(run.code, 5, "{option}\n{}", run.said());
+        assert_eq!(run.stderr.lines().filter(|line| line.starts_with("error")).count(), 1, "{}", run.said());
+        assert!(run.stderr.contains(place) && run.stderr.contains("help: "), "{option}: {place}\n{}", run.said());
+        assert_eq!(contents(folder.path()), before, "{option}");
+        assert_eq!(contents(&folder.path().join("part")).len(), 1, "{option}");
+    };
+    for option in FORBIDDEN {
+        let option = option.replace("FOLDER", &name);
+        let scene = with_solver(&format!("{{ preset = \"mumps\", options = \"{option}\" }}"));
+        let place = format!("{}:{}:", scene.path.display(), scene.line_of("options = "));
+        refused(&solve(&scene, &[]), &option, &place);
+    }
+    let view = format!("solver.options=\"-ksp_view :{name}/kept\"");
+    refused(&solve(case("groove"), &["--set", &view]), &view, "--set solver.options");
+    let sweep = winkler(&["sweep", &case("groove").display().to_string(), "--over", &view, "-o", "out"]);
+    refused(&sweep, &view, "--over solver.options");
+    // the same option typed does what PETSc's manual says
+    groove(&format!("--set solver=mumps -ksp_view :{name}/kept")).converged();
+    assert!(fs::read_to_string(folder.path().join("kept")).expect("a file").contains("KSP Object"));
+}
+
+/// Whatever the help of PETSc's own solvers calls a viewer, or a text that is not there yet, is not for scenes.
+#[test]
+fn nothing_that_petsc_shows_may_stand_in_a_scene() {
+    let mut names = BTreeSet::new();
+    for solver in ["cg -pc_type gamg", "gmres -pc_type hypre", "lsqr -pc_type asm", "preonly -pc_type cholesky"] {
+        let help = groove(&format!("-help -ksp_type {solver}")).stdout;
+        let lines = help
+            .lines()
+            .filter(|line| ["ascii[:", "(null)", "filename", "tmpdir"].iter().any(|word| line.contains(word)));
+        names.extend(lines.filter_map(|line| {
+            let word = line.trim_start().strip_prefix('-')?;
+            Some(word[..word.find(|sign: char| !sign.is_ascii_alphanumeric() && sign != '_')?].to_owned())
+        }));
+    }
+    assert!(names.len() > 60, "{names:?}");
+    // types that nobody has chosen yet
+    let types = ["ksp_guess_type", "pc_factor_mat_solver_type", "pc_factor_mat_ordering_type"];
+    names.retain(|name| !types.iter().any(|end| name.ends_with(end)));
+    for name in names {
+        for value in [None, Some("1"), Some("true"), Some("cg"), Some(":file")] {
+            assert!(check_of_scene(&format!("-{name}"), value).is_err(), "{name} {value:?}");
+        }
+    }
+}
+
+/// Solves the groove in a folder that stands for the user's own or a stranger's.
+fn groove_in(folder: &Path, home: &Path, ranks: usize, options: &str) -> Run {
+    let _ = fs::remove_dir_all(folder.join("out"));
+    let mut command = match ranks {
+        1 => Command::new(WINKLER),
+        _ => Command::new("mpiexec"),
+    };
+    if ranks > 1 {
+        command.args(["--oversubscribe", "-n", &ranks.to_string(), WINKLER]);
+    }
+    environment(&mut command);
+    command.args(["solve", &case("groove").display().to_string(), "-o", "out"]).args(SCENE);
+    command.args(options.split_whitespace()).current_dir(folder).env("HOME", home);
+    Run::of(command, &folder.join("out"))
+}
+
+/// The file of the home folder is read, those of the current folder only where they are named.
+#[test]
+fn options_of_a_folder_are_read_where_they_are_named() {
+    let [folder, home] = [0; 2].map(|_| tempfile::tempdir().expect("a temporary folder"));
+    let (folder, home) = (folder.path(), home.path());
+    let solver = |run: Run| run.converged().solvers()[0].to_owned();
+    let warned = |run: &Run| [".petscrc of", "petscrc of"].map(|name| run.warnings().matches(name).count());
+    let plain = solver(groove_in(folder, home, 1, ""));
+    fs::write(folder.join(".petscrc"), "-ksp_type minres\n-pc_type jacobi\n").expect("a file");
+    fs::write(folder.join("petscrc"), "-ksp_type cg\n").expect("a file");
+    for ranks in [1, 2] {
+        let run = groove_in(folder, home, ranks, "");
+        assert_eq!(warned(&run), [1, 2], "{}", run.warnings());
+        assert_eq!(solver(run), plain, "{ranks} ranks");
+    }
+    assert_eq!(warned(&groove_in(folder, home, 1, "-skip_petscrc")), [0, 0]);
+    let named = groove_in(folder, home, 1, "-options_file .petscrc");
+    assert_eq!(warned(&named), [0, 1], "{}", named.warnings());
+    assert_eq!(solver(named), "minres + jacobi");
+    fs::write(home.join(".petscrc"), "-pc_type icc\n").expect("a file");
+    for ranks in [1, 2] {
+        assert_eq!(solver(groove_in(folder, home, ranks, "")), "cg + icc by petsc", "{ranks} ranks");
+    }
+    assert_eq!(solver(groove_in(folder, home, 1, "-pc_type jacobi")), "cg + jacobi");
+    assert_eq!(solver(groove_in(folder, home, 1, "-skip_petscrc")), plain);
+    // at home it is one file
+    let run = groove_in(home, home, 1, "");
+    assert_eq!((warned(&run), solver(run).as_str()), ([0, 0], "cg + icc by petsc"));
+}
+
+/// PETSc would follow a ring of files until its stack ends, and read a pipe for ever.
+#[test]
+fn odd_files_of_options_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (folder, home) = (folder.path(), folder.path().join("nobody"));
+    let write = |name: &str, text: &str| fs::write(folder.join(name), text).expect("a file");
+    write("self", "-options_file self\n");
+    write("a", "# a\n-ksp_type cg\n  -options_file b\n");
+    write("b", "-options_file a\n");
+    write("binary", "\u{1}\u{0}-ksp_type cg\n");
+    write("huge", &"# nothing\n".repeat(200_000));
+    write("good", "-ksp_type cg\n-options_file better\n");
+    write("better", "-pc_type jacobi\n");
+    assert!(Command::new("mkfifo").arg(folder.join("pipe")).status().is_ok_and(|status| status.success()));
+    assert_eq!(groove_in(folder, &home, 1, "-options_file good").converged().solvers(), ["cg + jacobi"; 2]);
+    for (file, code, words) in [
+        ("self", 5, "leads back to itself"),
+        ("a", 5, "leads back to itself"),
+        ("binary", 6, "is no text"),
+        ("huge", 6, "has more than 1024 kB"),
+        ("pipe", 6, "is a pipe"),
+        (".", 6, "is a folder"),
+    ] {
+        for run in [
+            groove_in(folder, &home, 1, &format!("-ksp_type cg -options_file {file}")),
+            groove_in(folder, &home, 2, &format!("-Options_File {file}")),
+        ] {
+            assert_eq!(run.code, code, "{file}: {}", run.said());
+            assert!(run.stderr.contains(words) && run.stderr.contains("help: "), "{file}: {}", run.said());
+            assert_eq!(run.stderr.lines().filter(|line| line.starts_with("error")).count(), 1, "{}", run.said());
+        }
+    }
+    let mut command = Command::new(WINKLER);
+    environment(&mut command);
+    command
+        .arg("solve")
+        .arg(case("groove"))
+        .args(SCENE)
+        .current_dir(folder)
+        .env("PETSC_OPTIONS", "-ksp_type cg -options_file a");
+    let run = Run::of(command, &folder.join("out"));
+    assert!(run.code == 5 && run.stderr.contains("leads back to itself"), "{}", run.said());
+}
+
+#[test]
+fn a_solver_without_iterations_is_refused() {
+    let layered = ["--set", "mesh.set.n=4", "--set", "solver=hypre"];
+    for option in ["-ksp_max_it 0", "-newton_ksp_max_it 0", "-ksp_max_it -1", "-ksp_type gmres -ksp_max_it 0"] {
+        let words: Vec<&str> = layered.into_iter().chain(option.split(' ')).collect();
+        // sweeps have no matrix of all bodies
+        let methods = ["newton", "newton-robin"].into_iter().take(if option.starts_with("-newton") { 1 } else { 2 });
+        for method in methods {
+            let run = solve(case("groove3d"), &[&words[..], &["--method", method]].concat());
+            assert_eq!(run.code, 5, "{option} {method}: {}", run.said());
+            assert!(run.stderr.starts_with("error: ") && run.stderr.contains("ksp_max_it"), "{}", run.said());
+        }
+    }
+    for option in ["-pc_type jacobi -ksp_max_it 0", "-pc_type gamg -upper_ksp_max_it 0"] {
+        let run = groove(option);
+        assert!(run.code == 5 && run.stderr.contains("ksp_max_it is 0"), "{option}: {}", run.said());
+    }
+    // the zero guess would do
+    for option in ["-pc_type hypre -ksp_rtol 1", "-pc_type hypre -ksp_rtol -1"] {
+        let run = groove(option);
+        assert!(run.code == 5 && run.stderr.contains("ksp_rtol is"), "{option}: {}", run.said());
+    }
+    // these do not iterate
+    groove("-pc_type cholesky -ksp_max_it 0").converged();
+    groove("-ksp_type preonly -pc_type lu -ksp_max_it 0").converged();
+}

@@ -1,0 +1,586 @@
+//! Wrong input ends in one message that names the place and the way out, and in the exit code of its kind.
+
+use crate::common::{Run, Scene, case, output, root, solve, solve_on, text_of, winkler};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+const SCENE: i32 = 3;
+const MESH: i32 = 4;
+const SOLVER: i32 = 5;
+const FILE: i32 = 6;
+
+/// Asserts that a run was refused with this exit code, one message, and these words in it.
+fn refused(run: &Run, code: i32, words: &[&str]) {
+    assert_eq!(run.code, code, "{}", run.said());
+    let messages = run.stderr.lines().filter(|line| line.starts_with("error")).count();
+    assert_eq!(messages, 1, "one message is enough\n{}", run.said());
+    for word in words {
+        assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+    }
+    assert!(run.report.is_null() && run.stdout.is_empty(), "a refusal has no results\n{}", run.said());
+}
+
+/// Solves the groove with one text of its scene replaced; the refusal must point at the line where `at` stands.
+fn groove_refused(from: &str, to: &str, at: &str, words: &[&str]) {
+    let scene = Scene::edited("groove", from, to);
+    let run = solve(&scene, &[]);
+    refused(&run, SCENE, words);
+    let place = format!("{}:{}:", scene.path.display(), scene.line_of(at));
+    assert!(run.stderr.contains(&place), "it must point at {place}\n{}", run.stderr);
+    assert!(run.stderr.contains('^'), "no caret\n{}", run.stderr);
+}
+
+#[test]
+fn a_scene_that_is_not_there() {
+    let folder = case("groove").parent().expect("a folder").to_owned();
+    refused(&solve(folder.join("scenes.toml"), &[]), FILE, &["scenes.toml", "No such file"]);
+    refused(&solve(folder, &[]), FILE, &["folder", "scene.toml"]);
+    assert_eq!(winkler(&["solve"]).code, 2);
+    assert_eq!(winkler(&["solv", "scene.toml"]).code, 2);
+}
+
+#[test]
+fn keys_and_types() {
+    groove_refused("gamma = 0.6", "gama = 0.6", "gama", &["unknown key `gama`", "did you mean `gamma`?"]);
+    groove_refused("psi = \"active\"", "psi = \"activ\"", "activ\"", &["`activ`", "did you mean `active`?"]);
+    groove_refused("gamma = 0.6", "gamma = \"big\"", "big", &["unknown rule for gamma `big`", "line-search"]);
+    groove_refused("gamma = 0.6", "gamma = -0.6", "-0.6", &["gamma"]);
+    groove_refused("a = 0.5", "a = 1.5", "a = 1.5", &["a is 1.5", "must not exceed 1"]);
+    groove_refused("[method]", "[method", "[method", &["TOML"]);
+    groove_refused("(x - 4)^2", "(x - 4^2", "gap =", &["^"]);
+}
+
+#[test]
+fn known_displacements() {
+    let exact = |value: &str, words: &[&str]| {
+        groove_refused("name = \"lower\"\n", &format!("name = \"lower\"\nexact = {value}\n"), "exact =", words);
+    };
+    exact("[0, \"sqrt(x - 5)\"]", &["the known displacement is NaN at (", "help"]);
+    exact("[0, 0, 0]", &["2 components here, not 3"]);
+    exact("[0, \"2*z\"]", &["`z`"]);
+    exact("[0, true]", &["a number or an expression"]);
+}
+
+#[test]
+fn plane_bodies_in_space() {
+    let scene = Scene::edited("groove", "dimension = 2 ", "dimension = 3 ");
+    refused(&solve(&scene, &[]), MESH, &["groove.geo", "no physical group holds volumes", "dimension = 3", "help"]);
+}
+
+#[test]
+fn names_that_the_mesh_does_not_have() {
+    groove_refused("on = \"lower_axis\"", "on = \"lower_axle\"", "lower_axle", &["`lower_axle`", "lower_axis"]);
+    groove_refused("\"upper_bottom\"]", "\"uper_bottom\"]", "uper_bottom", &["`uper_bottom`", "upper_bottom"]);
+    groove_refused("name = \"upper\"", "name = \"uper\"", "\"uper\"", &["`uper`", "upper"]);
+    groove_refused("groove.geo", "grove.geo", "grove.geo", &["there is no file", "did you mean `groove.geo`?"]);
+    groove_refused("n = 32 }", "m = 32 }", "m = 32", &["`m`", "did you mean `n`?"]);
+}
+
+#[test]
+fn names_of_bodies_that_are_words_of_petsc() {
+    for word in ["mat", "log", "draw"] {
+        let name = format!("name = \"{word}\"");
+        groove_refused("name = \"lower\"", &name, &name, &[&format!("`{word}`"), "PETSc"]);
+    }
+    groove_refused("name = \"lower\"", "name = \"Lower\"", "Lower", &["`Lower`", "small letter"]);
+}
+
+#[test]
+fn supports_and_loads() {
+    let on = "on = \"lower_axis\"";
+    groove_refused(on, "on = \"upper_axis\"", "upper_axis", &["`upper_axis` does not touch body `lower`"]);
+    let on = "on = \"lower_face\"";
+    groove_refused(on, "on = \"upper_face\"", "\"upper_face\", p", &["`upper_face` does not touch body `lower`"]);
+    let meeting = "{ on = \"lower_face\", x = 1 }, { on = \"lower_end\"";
+    groove_refused("{ on = \"lower_end\"", meeting, "lower_end", &["body `lower`", "two values", "x displacement"]);
+    let root = "on = \"lower_face\", pressure = \"sqrt(x - 2)\"";
+    groove_refused(
+        "on = \"lower_face\", pressure = 10",
+        root,
+        "sqrt",
+        &["this load is not a finite number at x = ", "gives NaN"],
+    );
+}
+
+#[test]
+fn contacts() {
+    let between = "[\"lower_top\", \"upper_bottom\"]";
+    let away = "[\"lower_axis\", \"upper_axis\"]";
+    groove_refused(between, away, "between =", &["`lower_axis`", "`upper_axis`", "do not face each other"]);
+    let itself = "[\"lower_top\", \"lower_end\"]";
+    groove_refused(between, itself, "between =", &["both surfaces belong to body `lower`"]);
+    groove_refused(between, "[\"lower_top\", \"lower_top\"]", "between =", &["`lower_top` and itself"]);
+    let gap = "5e-4 * max(0, 1 - (x - 4)^2)^1.5";
+    groove_refused(gap, "sqrt(x - 1)", "gap =", &["the gap is not a finite number at x = 0, ", "gives NaN"]);
+    groove_refused(gap, "1e-3 / x", "gap =", &["the gap is not a finite number at x = 0, ", "gives inf"]);
+    groove_refused("normal = 1e-4", "normal = \"log(x - 1)\"", "log", &["the start is not", "at x = 0, "]);
+}
+
+#[test]
+fn layers() {
+    let law = "power = { B = 2.5e-5, a = 0.5 }";
+    let varying = "power = { B = \"1e-5*(1.45 - x)\", a = 0.5 }";
+    groove_refused(law, varying, "layer =", &["B is -", "at (1.4", "must be greater than 0"]);
+    let missing = "power = { B = \"sqrt(x - 1)\", a = 0.5 }";
+    groove_refused(law, missing, "layer =", &["B is not a finite number at x = 0"]);
+    groove_refused(law, "pressure = \"1e5*c + x\"", "layer =", &["no law of a layer", "p(0) is 0.03"]);
+    groove_refused(law, "pressure = \"1e5*c^0.5\"", "layer =", &["no law of a layer", "p'(0) = infinity"]);
+    groove_refused(law, "pressure = \"1e5*c - 1e7*c^2\"", "layer =", &["does not increase at c =", "up_to = "]);
+    groove_refused(law, "pressure = \"-1e5*c\"", "layer =", &["does not increase at c =", "a wrong sign"]);
+}
+
+#[test]
+fn overrides() {
+    let set = |text: &str, code: i32, words: &[&str]| {
+        refused(&solve(case("groove"), &["--set", text]), code, &[&["--set"], words].concat());
+    };
+    set("method.gama=1", SCENE, &["--set method.gama=1\n", "`gama`", "did you mean `gamma`?"]);
+    set("contact.5.gap=1", SCENE, &["--set contact.5.gap=1\n", "no number 5"]);
+    set("method.gamma=abc", SCENE, &["--set method.gamma=abc\n", "unknown rule for gamma"]);
+    set("body.0.fix.0.on=nothing", SCENE, &["--set body.0.fix.0.on=nothing\n", "`nothing`"]);
+    set("method.gamma", 2, &["without `=`"]);
+    // the place is where the user wrote the name
+    set("mesh.set.m=3", SCENE, &["--set mesh.set.m=3\n", "`m`", "did you mean `n`?"]);
+}
+
+/// What an expression lacks is named with the expression, the place and the value, wherever it stands.
+#[test]
+fn expressions_without_a_value() {
+    for (set, words) in [
+        ("method.psi=sqrt(x-2)", &["psi is not a finite number at x = 0, ", "k = 0", "gives NaN"][..]),
+        ("body.0.load.0.pressure=log(x-3)", &["this load is not", "at x = ", "gives NaN"]),
+        ("body.0.load.0.pressure=1/(x-x)", &["this load is not", "at x = ", "gives inf"]),
+        ("body.1.load.0={on=\"upper_face\", traction=[\"sqrt(x-3)\", 0]}", &["this load is not", "gives NaN"]),
+        ("body.0.force=[\"asin(x)\", 0]", &["this body force is not", "gives NaN"]),
+        ("body.0.young=2e5*sqrt(x-1)", &["young is not", "at x = ", "gives NaN"]),
+        ("contact.0.gap=sqrt(x-2)", &["the gap is not", "at x = ", "gives NaN"]),
+        ("contact.0.reference=sqrt(x-2)", &["the reference is not", "at x = ", "gives NaN"]),
+        ("contact.0.layer.power.B=1e-5*sqrt(x-2)", &["B is not", "at x = ", "gives NaN"]),
+        ("method.start.normal=sqrt(x-2)", &["the start is not", "at x = ", "gives NaN"]),
+    ] {
+        let run = solve(case("groove"), &["--set", "mesh.set.n=8", "--set", set]);
+        refused(&run, SCENE, &[words, &[&format!("| --set {set}"), "^"]].concat());
+    }
+    // the caret stands under the constant that is wrong, not under the first
+    let scene =
+        text_of("groove").replacen("young = 2.1e5\npoisson = 0.3", "young = \"2e5*(1+x)\"\npoisson = \"0.2*x\"", 1);
+    let scene = Scene::new(scene);
+    let run = solve(&scene, &["--set", "mesh.set.n=8"]);
+    refused(&run, SCENE, &["poisson is 0.5", &format!(":{}:", scene.line_of("poisson = \"0.2"))]);
+    // a zone that loses its value later loses what was computed before no less
+    let run = solve(case("groove"), &["--set", "mesh.set.n=8", "--set", "method.psi=sqrt(3-k) >= 0"]);
+    assert!(run.code == SCENE && run.stderr.contains("k = 4"), "{}", run.said());
+    assert_eq!(run.history().rows(), 4);
+}
+
+/// Ranks find the same and one of them says it.
+#[test]
+fn one_message_from_several_ranks() {
+    let run = solve_on(2, case("groove"), &["--set", "mesh.set.n=8", "--set", "method.psi=sqrt(x-2)"]);
+    assert!(run.code == SCENE && run.stderr.matches("psi is not a finite number").count() == 1, "{}", run.said());
+}
+
+#[test]
+fn words_of_the_command_line() {
+    let scene = case("groove");
+    let scene = scene.to_str().expect("a path");
+    refused(&winkler(&["check", scene, "--ksp_type", "cg"]), 2, &["PETSc options take one dash", "-ksp_type?"]);
+    refused(&winkler(&["check", scene, "--tolerance", "-1"]), SCENE, &["| --tolerance -1\n", "the error is -1"]);
+    let stray = winkler(&["check", scene, "-1"]);
+    refused(&stray, 2, &["unexpected argument '-1'"]);
+    assert!(!stray.stderr.contains("-- -1"), "{}", stray.said());
+    use std::os::unix::ffi::OsStrExt;
+    let mut command = Command::new(crate::common::WINKLER);
+    command.arg("check").arg(std::ffi::OsStr::from_bytes(b"caf\xe9.toml"));
+    let (status, _, said) = output(command, Duration::from_secs(60));
+    assert!(status.code() == Some(2) && said.contains("not UTF-8 text: `caf\u{fffd}.toml`"), "{said}");
+}
+
+/// The patch with another mesh.
+fn patch_with(mesh: &Path) -> Scene {
+    let text = text_of("patch");
+    let line = text.lines().find(|line| line.starts_with("mesh =")).expect("a mesh");
+    Scene::new(text.replace(line, &format!("mesh = \"{}\"", mesh.display())))
+}
+
+fn gmsh(format: &[&str], to: &Path) {
+    let script = root().join("meshes/patch/patch.geo");
+    let mut command = Command::new("gmsh");
+    command.args(["-v", "0", "-2"]).args(format).arg("-o").arg(to).arg(script);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+}
+
+#[test]
+fn damaged_meshes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = |name: &str| folder.path().join(name);
+    gmsh(&["-format", "msh22"], &file("old.msh"));
+    solve(patch_with(&file("old.msh")), &["--set", "method.stop.residual=1e-3"]).converged();
+    for (name, format) in [("text.msh", &["-format", "msh41"][..]), ("binary.msh", &["-format", "msh41", "-bin"])] {
+        gmsh(format, &file(name));
+        let whole = patch_with(&file(name));
+        solve(&whole, &["--set", "method.stop.residual=1e-3"]).converged();
+        let bytes = std::fs::read(file(name)).expect("a mesh");
+        for part in [40, bytes.len() / 2, bytes.len() - 20] {
+            std::fs::write(file(name), &bytes[..part]).expect("a shorter mesh");
+            refused(&solve(&whole, &[]), MESH, &[name]);
+        }
+    }
+    // a facet of no length in a loaded surface, named with its line
+    gmsh(&["-format", "msh41"], &file("text.msh"));
+    let text = std::fs::read_to_string(file("text.msh")).expect("a mesh");
+    let mut lines: Vec<&str> = text.lines().collect();
+    let elements = lines.iter().position(|line| *line == "$Elements").expect("elements");
+    let mut blocks =
+        (elements + 2..lines.len()).filter(|&i| lines[i].starts_with("1 ") && lines[i].matches(' ').count() == 3);
+    let facet = blocks.next().expect("a block of facets") + 1;
+    let words: Vec<&str> = lines[facet].split_whitespace().collect();
+    let flat = format!("{} {} {}", words[0], words[1], words[1]);
+    lines[facet] = &flat;
+    std::fs::write(file("flat.msh"), lines.join("\n") + "\n").expect("a mesh");
+    let place = format!("flat.msh:{}:", facet + 1);
+    refused(&solve(patch_with(&file("flat.msh")), &[]), MESH, &[&place, "has zero length"]);
+    std::fs::write(file("empty.msh"), "").expect("a file");
+    refused(&solve(patch_with(&file("empty.msh")), &[]), MESH, &["empty.msh", "$MeshFormat"]);
+}
+
+#[test]
+fn a_script_that_gmsh_refuses() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let script = std::fs::read_to_string(root().join("meshes/patch/patch.geo")).expect("a script");
+    let wrong = script.replace("Line(3) = {3, 4};", "Line(3) = {3, 4;");
+    assert_ne!(script, wrong);
+    // numbers that would keep Gmsh busy for hours, or are none of a mesh
+    for (h, words) in [("1e-9", "take h = 0.00012 or more"), ("0", "numbers above 0"), ("-1", "numbers above 0")] {
+        let run = solve(case("paraboloid"), &["--set", &format!("mesh.set.h={h}")]);
+        refused(&run, MESH, &["paraboloid.geo", words]);
+    }
+    let file = folder.path().join("wrong.geo");
+    std::fs::write(&file, &wrong).expect("a script");
+    let line = 1 + wrong.lines().position(|line| line.contains("{3, 4;")).expect("the line");
+    let run = solve(patch_with(&file), &[]);
+    refused(&run, MESH, &["wrong.geo", &format!("line {line}"), "syntax error"]);
+}
+
+/// The patch with a script of its own, which stands beside it.
+fn patch_with_script(text: &str) -> (tempfile::TempDir, Scene) {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("own.geo");
+    std::fs::write(&file, text).expect("a script");
+    (folder, patch_with(&file))
+}
+
+#[test]
+fn scripts_that_do_more_than_draw() {
+    let script = std::fs::read_to_string(root().join("meshes/patch/patch.geo")).expect("a script");
+    for (command, word) in [
+        ("SystemCall \"touch it\";", "`SystemCall`"),
+        ("Printf(\"x\") > \"it\";", "`Printf(...) > ...`"),
+        ("Save \"it.msh\";", "`Save`"),
+        ("Include \"/etc/hostname\";", "outside its own folder"),
+        ("S2N[\"SystemCall\"] \"touch it\";", "`S2N`"),
+        ("General[0].ErrorFileName = \"it\";", "ErrorFileName"),
+    ] {
+        let (folder, scene) = patch_with_script(&format!("{script}\n{command}\n"));
+        let line = format!("own.geo:{}:", script.lines().count() + 2);
+        refused(&solve(&scene, &[]), MESH, &[&line, word, "--trust-geo"]);
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1, "{command} was run");
+    }
+    // Gmsh reads this file beside the script by itself
+    let (folder, scene) = patch_with_script(&script);
+    std::fs::write(folder.path().join("own.geo.opt"), "SystemCall \"touch it\";\n").expect("a file");
+    refused(&solve(&scene, &[]), MESH, &["own.geo.opt:1:", "`SystemCall`", "--trust-geo"]);
+    // a script that the cache does not know from an earlier run of this test
+    let now = std::time::UNIX_EPOCH.elapsed().expect("a clock").as_nanos();
+    let (folder, scene) = patch_with_script(&format!("{script}\n// {now}\nCreateDir \"it\";\n"));
+    solve(&scene, &["--trust-geo"]).converged();
+    assert!(folder.path().join("it").is_dir());
+}
+
+#[test]
+fn scripts_that_take_too_much() {
+    let limited = |scene: &Scene, more: &str| {
+        let file = scene.text.lines().find_map(|line| line.strip_prefix("mesh = ")).expect("a mesh").to_owned();
+        solve(scene, &["--set", &format!("mesh={{geo={file}, {more}}}")])
+    };
+    let (_folder, endless) = patch_with_script("For i In {0:1e15}\nx = i;\nEndFor\n");
+    refused(&limited(&endless, "timeout=1"), MESH, &["own.geo", "has not finished", "`timeout`"]);
+    let square = "SetFactory(\"OpenCASCADE\"); Rectangle(1) = {0, 0, 0, 1, 1}; Transfinite Curve{1:4} = 1e9;\n";
+    let (_folder, huge) = patch_with_script(square);
+    refused(&limited(&huge, "timeout=60, memory=2"), MESH, &["own.geo", "more memory", "2.0 GB", "`memory`"]);
+}
+
+/// A killed run leaves no Gmsh behind, and the next one removes its folder.
+#[test]
+fn gmsh_ends_with_a_killed_run() {
+    let (folder, scene) = patch_with_script("For i In {0:1e15}\nx = i;\nEndFor\n");
+    let cache = folder.path().join("cache");
+    let mut command = Command::new(crate::common::WINKLER);
+    crate::common::environment(&mut command);
+    command.arg("mesh").arg(&scene.path).env("WINKLER_CACHE", &cache);
+    let mut run = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a run");
+    let wait = |what: &dyn Fn() -> bool| {
+        let began = std::time::Instant::now();
+        while !what() {
+            assert!(began.elapsed() < Duration::from_secs(30), "it never comes");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let child = || std::fs::read_to_string(format!("/proc/{0}/task/{0}/children", run.id())).unwrap_or_default();
+    let name = |pid: &str| std::fs::read_to_string(format!("/proc/{}/comm", pid.trim())).unwrap_or_default();
+    wait(&|| name(&child()).starts_with("gmsh"));
+    let gmsh = child();
+    run.kill().expect("a signal");
+    run.wait().expect("an end");
+    wait(&|| !name(&gmsh).starts_with("gmsh"));
+    let left = || {
+        std::fs::read_dir(&cache)
+            .expect("a cache")
+            .filter(|entry| entry.as_ref().is_ok_and(|e| e.path().is_dir()))
+            .count()
+    };
+    assert_eq!(left(), 1);
+    let mut command = Command::new(crate::common::WINKLER);
+    crate::common::environment(&mut command);
+    command.arg("mesh").arg(case("patch")).env("WINKLER_CACHE", &cache);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+    assert_eq!(left(), 0);
+}
+
+#[test]
+fn petsc_options() {
+    let typed = |options: &[&str], words: &[&str]| refused(&solve(case("groove"), options), SOLVER, words);
+    typed(&["-ksp_tpye", "cg"], &["-ksp_tpye", "did you mean -ksp_type?"]);
+    typed(&["-uper_ksp_type", "cg"], &["-uper_ksp_type", "did you mean -upper_ksp_type?"]);
+    typed(&["-upper_ksp_tpye", "cg"], &["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]);
+    typed(&["-ksp_type", "cg", "-pc_hypre_tpe", "euclid"], &["-pc_hypre_tpe", "did you mean -pc_hypre_type?"]);
+    typed(&["-ksp_type", "nonsense"], &["nonsense", "KSP"]);
+    typed(&["-pc_type", "nonsense"], &["nonsense", "PC"]);
+    typed(&["-ksp_type", "cg", "-ksp_rtol", "abc"], &["abc"]);
+    // in the scene as well
+    let scene = Scene::edited("groove", "dimension = 2", "solver = { options = \"-ksp_tpye cg\" }\ndimension = 2");
+    refused(&solve(&scene, &[]), SOLVER, &["-ksp_tpye", "did you mean -ksp_type?"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").expect("a file");
+    let scene = case("groove").display().to_string();
+    for to in [file.clone(), file.join("below")] {
+        let to = to.display().to_string();
+        let run = winkler(&["solve", &scene, "-o", &to]);
+        refused(&run, FILE, &[&to, "-o"]);
+    }
+}
+
+/// Asserts that a run ended without an answer: this status, these words in its message, every file of it written.
+fn failed(run: &Run, status: &[&str], words: &[&str]) {
+    assert_eq!(run.code, 1, "{}", run.said());
+    assert!(status.contains(&run.text("status")), "{}: {}", run.text("status"), run.said());
+    for word in words {
+        assert!(run.text("message").contains(word), "no `{word}` in: {}", run.text("message"));
+        assert!(run.stdout.contains(word), "no `{word}`\n{}", run.said());
+    }
+    let files: Vec<&str> = run.report["files"].as_array().expect("files").iter().filter_map(|f| f.as_str()).collect();
+    for name in ["report.json", "history.csv", "contact-lower-upper.csv", "convergence.svg", "pressure.svg"] {
+        assert!(files.contains(&name), "{name} is not in {files:?}");
+    }
+    for name in files {
+        assert!(run.folder.join(name).is_file(), "{name} is not there");
+    }
+    let rows = run.history();
+    assert_eq!(rows.rows(), run.count("sweeps"), "one row a sweep");
+    // null is honest, zero is not
+    assert!(run.report["residual"].as_f64().is_none_or(|residual| residual > 0.0), "{}", run.report["residual"]);
+}
+
+/// The patch with an upper body that slides freely and is pushed aside.
+fn pushed_aside() -> Scene {
+    let free = crate::common::text_of("patch").replace("fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
+    Scene::new(free.replace("{ on = \"upper_face\", pressure = 10 }", "{ on = \"upper_face\", traction = [1, -10] }"))
+}
+
+/// The same body without the push keeps its place: one node is fixed, nothing else changes.
+#[test]
+fn a_body_that_slides_freely_without_load() {
+    let free = Scene::edited("patch", "fix = [{ on = \"upper_pin\", x = 0 }]\n", "");
+    let run = solve(&free, &[]).converged();
+    assert!(run.warnings().contains("body upper: nothing holds its translation along x"), "{}", run.warnings());
+    assert!(run.contact()["pressure"].iter().all(|p| (p / 10.0 - 1.0).abs() < 1e-10));
+}
+
+#[test]
+fn a_body_that_nothing_holds() {
+    let run = solve(pushed_aside(), &[]);
+    failed(&run, &["underconstrained"], &["`upper`", "translation along x", "iteration 0", "support"]);
+    // not even contact, at first
+    let apart = Scene::edited("patch", "start = { normal = 1e-4 }", "start = \"zero\"");
+    failed(&solve(&apart, &[]), &["underconstrained"], &["`upper`", "iteration 0", "method.start"]);
+}
+
+const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
+
+#[test]
+fn a_gamma_that_is_too_large() {
+    for (gamma, status) in [
+        ("1.5", &["cycle"][..]),
+        ("2.5", &["cycle", "not-finite", "iteration-limit"]),
+        ("3", &["cycle", "not-finite", "iteration-limit"]),
+        ("1e200", &["not-finite"]),
+    ] {
+        let gamma = format!("method.gamma={gamma}");
+        let run = solve(case("groove"), &[&COARSE[..], &["--set", &gamma]].concat());
+        failed(&run, status, &["iteration", "method.gamma"]);
+    }
+    let stiff = ["--set", "method.gamma=1", "--set", "contact.0.layer={linear={stiffness=1e9}}"];
+    let run = solve(case("groove"), &[&COARSE[..], &stiff].concat());
+    failed(&run, &["cycle"], &["every 2 iterations", "smaller method.gamma"]);
+}
+
+#[test]
+fn too_few_iterations() {
+    let run = solve(case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
+    failed(&run, &["iteration-limit"], &["3 iterations", "method.stop.iterations"]);
+    assert_eq!((run.count("iterations"), run.count("sweeps")), (3, 4));
+}
+
+/// p(1) = (1e6)^10 = 1e60: nothing of what follows has a right digit, so it must not pass for an answer.
+#[test]
+fn a_start_so_large_that_the_law_overflows() {
+    // far away, but not lost: what it says has converged is the answer
+    let far = ["--set", "contact.0.layer.power={a=0.1,B=1e-6}", "--set", "method.stop={residual=1e-9}"];
+    let near = solve(case("groove"), &[&COARSE[..], &far, &["--method", "newton"]].concat()).converged();
+    let run = solve(case("groove"), &[&COARSE[..], &far, &["--set", "method.start.normal=1"]].concat()).converged();
+    assert!(crate::common::distance(&run.contact()["pressure"], &near.contact()["pressure"]) < 1e-6);
+    for start in ["1e20", "1e40"] {
+        let start = format!("method.start.normal={start}");
+        let law = ["--set", "contact.0.layer.power={a=0.1,B=1e-6}", "--set", &start];
+        let rules = ["--set", "method.stop={residual=1e-8,iterations=200}"];
+        let run = solve(case("groove"), &[&COARSE[..], &law, &rules].concat());
+        failed(&run, &["not-finite", "cycle", "iteration-limit"], &["iteration"]);
+    }
+}
+
+#[test]
+fn an_inner_solver_that_gives_up() {
+    let options = ["-ksp_type", "cg", "-pc_type", "none", "-upper_ksp_max_it", "2"];
+    let run = solve(case("groove"), &[&COARSE[..], &options].concat());
+    failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
+}
+
+// Two ranks: one message, the right code, and no waiting for each other.
+
+/// Bodies of revolution have an axis, and nothing around it that is not the same all around.
+#[test]
+fn axisymmetric_scenes() {
+    let scene = |from: &str, to: &str| {
+        Scene::edited("groove", "dimension = 2 ", "plane = \"axisymmetric\"\ndimension = 2 ").text.replace(from, to)
+    };
+    let refused_for = |from: &str, to: &str, code: i32, words: &[&str]| {
+        refused(&solve(Scene::new(scene(from, to)), &[]), code, words);
+    };
+    refused_for("pressure = 10", "force = [1, -10]", SCENE, &["force across the axis", "must be 0", "pressure = p"]);
+    refused_for("\"axisymmetric\"", "\"axisymetric\"", SCENE, &["`axisymetric`", "did you mean `axisymmetric`?"]);
+    let axis = "on = \"lower_end\", x = ";
+    refused_for(
+        &format!("{axis}0"),
+        &format!("{axis}0.1"),
+        SCENE,
+        &["two values of the x displacement", "on the axis"],
+    );
+    refused_for("{ on = \"lower_face\",", "{ on = \"lower_end\",", SCENE, &["`lower_end` lies on the axis", "no area"]);
+    let spring = "name = \"lower\"\nspring = [{ on = \"lower_end\", normal = 1 }]";
+    refused_for("name = \"lower\"", spring, SCENE, &["`lower_end` lies on the axis"]);
+    let fibres = "orthotropic = { E1 = 5, E2 = 1, E3 = 1, nu12 = 0.3, nu13 = 0.3, nu23 = 0.3, G12 = 1, G13 = 1, G23 = 1 }\n\
+                  axes = { angle = 0.5, axis = [1, 1, 0] }\n";
+    let lower = "name = \"lower\"\nyoung = 2.1e5\npoisson = 0.3\n";
+    refused_for(lower, &format!("name = \"lower\"\n{fibres}"), SCENE, &["`lower`", "would twist", "turn axes 1 and 2"]);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (script, moved) = (root().join("meshes/patch/patch.geo"), folder.path().join("moved.geo"));
+    let text = std::fs::read_to_string(&script).expect("a script");
+    std::fs::write(&moved, text.replace("Point(4) = {0,", "Point(4) = {-0.5,")).expect("a script");
+    let scene = Scene::edited("patch", "dimension = 2 ", "plane = \"axisymmetric\"\ndimension = 2 ");
+    let scene = Scene::new(scene.text.replace(&script.display().to_string(), &moved.display().to_string()));
+    refused(&solve(&scene, &[]), MESH, &["moved.geo", "`lower` has a negative radius at (-", "x >= 0"]);
+    let space = Scene::edited("patch-3d", "dimension = 3", "plane = \"axisymmetric\"\ndimension = 3");
+    refused(&solve(&space, &[]), SCENE, &["`plane` in a problem in space"]);
+}
+
+#[test]
+fn a_scene_refused_on_two_ranks() {
+    let scene = Scene::edited("groove", "gamma = 0.6", "gama = 0.6");
+    refused(&solve_on(2, &scene, &[]), SCENE, &["`gama`", "did you mean `gamma`?", "scene.toml"]);
+    let scene = Scene::edited("groove", "on = \"lower_axis\"", "on = \"upper_axis\"");
+    refused(&solve_on(2, &scene, &[]), SCENE, &["`upper_axis` does not touch body `lower`"]);
+    let wrong = ["--set", "contact.0.gap=sqrt(x-1)"];
+    refused(&solve_on(2, case("groove"), &wrong), SCENE, &["the gap is not a finite number"]);
+}
+
+/// Only the owner of a body looks at its loads.
+#[test]
+fn a_load_refused_on_one_of_two_ranks() {
+    for body in ["lower", "upper"] {
+        let load = format!("on = \"{body}_face\", pressure = ");
+        let scene = Scene::edited("groove", &format!("{load}10"), &format!("{load}\"sqrt(x - 2)\""));
+        let line = format!(":{}:", scene.line_of("sqrt"));
+        refused(&solve_on(2, &scene, &[]), SCENE, &[&line, "this load is not a finite number"]);
+    }
+}
+
+#[test]
+fn an_option_refused_on_two_ranks() {
+    for (options, words) in [
+        (["-ksp_tpye", "cg"], ["-ksp_tpye", "did you mean -ksp_type?"]),
+        (["-upper_ksp_tpye", "cg"], ["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]),
+        (["-pc_type", "nonsense"], ["nonsense", "PC"]),
+    ] {
+        refused(&solve_on(2, case("groove"), &options), SOLVER, &words);
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let missing = folder.path().join("missing.opts").display().to_string();
+    refused(&solve_on(2, case("groove"), &["-options_file", &missing]), SOLVER, &["missing.opts"]);
+}
+
+/// Only the owner of a body makes its solver.
+#[test]
+fn an_option_refused_on_one_of_two_ranks() {
+    for option in ["-lower_pc_type", "-upper_pc_type"] {
+        refused(&solve_on(2, case("groove"), &[option, "nonsense"]), SOLVER, &["nonsense", "PC"]);
+    }
+}
+
+#[test]
+fn not_converging_on_two_ranks() {
+    let run = solve_on(2, case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
+    failed(&run, &["iteration-limit"], &["3 iterations"]);
+    failed(&solve_on(2, pushed_aside(), &[]), &["underconstrained"], &["`upper`", "translation along x"]);
+}
+
+#[test]
+fn an_inner_solver_that_gives_up_on_one_of_two_ranks() {
+    for body in ["lower", "upper"] {
+        let limit = format!("-{body}_ksp_max_it");
+        let options = ["-ksp_type", "cg", "-pc_type", "none", &limit, "2"];
+        let run = solve_on(2, case("groove"), &[&COARSE[..], &options].concat());
+        failed(&run, &["inner-solver"], &[&format!("`{body}`"), "iteration 0"]);
+    }
+}
+
+/// `winkler ... | head` ends in silence.
+#[test]
+fn a_reader_that_goes_away() {
+    for args in [&["check"][..], &["solve", "-o", "out"]] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut command = Command::new(crate::common::WINKLER);
+        crate::common::environment(&mut command);
+        command.args(args).arg(case("groove")).args(COARSE).current_dir(folder.path());
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("the program ends");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+    }
+}

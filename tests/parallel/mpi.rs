@@ -1,0 +1,181 @@
+//! Several ranks give what one gives.
+
+use crate::common::{Run, Scene, WINKLER, apart, case, root, solve, solve_on, text_of, winkler_on};
+use std::fs;
+
+#[test]
+fn two_ranks_give_the_serial_history_and_files() {
+    let serial = solve(case("groove"), &["--vtu"]).converged();
+    let parallel = solve_on(2, case("groove"), &["--vtu"]).converged();
+    let lines = |run: &crate::common::Run, name: &str| -> Vec<String> {
+        let text = fs::read_to_string(run.folder.join(name)).expect("a result");
+        text.lines().map(str::to_owned).collect()
+    };
+    // seconds come last
+    let history = |run: &crate::common::Run| -> Vec<String> {
+        let cut = |line: String| line.rsplit_once(',').map(|(front, _)| front.to_owned());
+        lines(run, "history.csv").into_iter().map(|line| cut(line).expect("several columns")).collect()
+    };
+    assert_eq!(serial.history().names.last().map(String::as_str), Some("seconds"));
+    assert_eq!(history(&serial), history(&parallel));
+    assert_eq!(history(&serial).len(), 1 + 8);
+    for name in ["contact-lower-upper.csv", "lower.vtu", "upper.vtu", "bodies.pvd", "pressure.svg"] {
+        assert_eq!(lines(&serial, name), lines(&parallel, name), "{name}");
+    }
+    assert_eq!(serial.report["files"], parallel.report["files"]);
+    let names = |run: &crate::common::Run| {
+        let mut names: Vec<_> =
+            fs::read_dir(&run.folder).expect("results").flatten().map(|file| file.file_name()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(names(&serial), names(&parallel));
+    assert_eq!(parallel.stderr, "");
+}
+
+#[test]
+fn two_ranks_report_what_one_reports() {
+    let serial = solve(case("groove"), &[]).converged();
+    let parallel = solve_on(2, case("groove"), &[]).converged();
+    assert_eq!((serial.count("ranks"), parallel.count("ranks")), (1, 2));
+    let differ = ["petsc", "ranks", "messages", "times", "inner_times", "bodies", "command", "directory", "last_look"];
+    let (ours, theirs) = (serial.report.as_object(), parallel.report.as_object());
+    let (ours, theirs) = (ours.expect("a table"), theirs.expect("a table"));
+    assert!(ours.keys().eq(theirs.keys()));
+    let differs = |key: &str| differ.contains(&key) || key.starts_with("memory");
+    for (key, value) in ours.iter().filter(|(key, _)| !differs(key)) {
+        assert_eq!(value, &theirs[key], "{key}");
+    }
+    let ranks = |run: &crate::common::Run| [run.count("bodies/0/rank"), run.count("bodies/1/rank")];
+    assert_eq!(ranks(&serial), [0, 0]);
+    assert_eq!(ranks(&parallel), [0, 1]);
+    for body in ["/bodies/0/balance", "/bodies/1/balance"] {
+        assert!(serial.report.pointer(body).is_some());
+        assert_eq!(serial.report.pointer(body), parallel.report.pointer(body));
+    }
+    // a body of another rank has a solver, too
+    assert_eq!(parallel.solvers(), serial.solvers());
+}
+
+/// One collective call a sweep. Besides: largest stiffness of each body, trace of the start, spectrum, counts of the report, and of the last look traces,
+/// forces on hats, and energies.
+#[test]
+fn messages_are_one_a_sweep_and_seven() {
+    for (ranks, gamma) in [(2, "0.6"), (2, "0.3")] {
+        let gamma = format!("method.gamma={gamma}");
+        let run = solve_on(ranks, case("groove"), &["--set", "mesh.set.n=8", "--set", &gamma]).converged();
+        assert_eq!(run.count("messages"), run.count("sweeps") + 7, "{gamma}");
+    }
+    assert_eq!(solve(case("groove"), &["--set", "mesh.set.n=8"]).converged().count("messages"), 0);
+}
+
+/// Conjugate gradients send two messages a step, and the last one is not needed; a Newton step sends its traces and its sums, a run the
+/// largest stiffnesses and counts of the report. Deflation sends none a step: one for the work on rigid motions before the first, and one
+/// for those of the start. The step that measures a claim adds no traces and sums. The last look sends two.
+#[test]
+fn deflation_sends_no_message() {
+    for (scene, of_linear, others) in [("groove", 1, 3), ("groove-held", 2, 5)] {
+        let sets = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.stop={residual=1e-8}"];
+        let run = solve_on(2, case(scene), &sets).converged();
+        let expected = 2 * run.count("sweeps") + of_linear * run.count("iterations") + others;
+        assert_eq!(run.count("messages"), expected, "{scene}");
+    }
+}
+
+#[test]
+fn a_rank_without_a_body_is_told_of() {
+    let run = solve_on(3, case("groove"), &["--set", "mesh.set.n=8"]).converged();
+    assert!(run.warnings().contains("1 of 3 ranks"), "{}", run.warnings());
+    assert_eq!([run.count("bodies/0/rank"), run.count("bodies/1/rank")], [0, 1]);
+    let serial = solve(case("groove"), &["--set", "mesh.set.n=8"]).converged();
+    assert_eq!(serial.warnings(), "");
+    assert_eq!(run.contact()["pressure"], serial.contact()["pressure"]);
+}
+
+#[test]
+fn json_is_printed_once() {
+    let run = solve_on(2, case("groove"), &["--set", "mesh.set.n=8", "--json"]).converged();
+    let printed: serde_json::Value = serde_json::from_str(&run.stdout).expect("one JSON text and nothing else");
+    assert_eq!(printed, run.report);
+    let table = solve_on(2, case("groove"), &["--set", "mesh.set.n=8"]).converged();
+    assert_eq!(table.stdout.matches("converged in 7 iterations").count(), 1, "{}", table.stdout);
+}
+
+#[test]
+fn krylov_solvers_run_on_two_ranks() {
+    let options = ["--set", "mesh.set.n=8", "-ksp_type", "cg", "-pc_type", "hypre", "-upper_pc_type", "gamg"];
+    let (serial, parallel) = (solve(case("groove"), &options), solve_on(2, case("groove"), &options));
+    let (serial, parallel) = (serial.converged(), parallel.converged());
+    assert_eq!(serial.solvers(), ["cg + hypre", "cg + gamg"]);
+    assert_eq!(parallel.count("inner_iterations"), serial.count("inner_iterations"));
+    assert_eq!(parallel.contact()["pressure"], serial.contact()["pressure"]);
+}
+
+/// A refusal that all ranks share: its code, its words once, and no results.
+fn refused(run: &Run, code: i32, words: &[&str]) {
+    assert_eq!(run.code, code, "{}", run.said());
+    assert_eq!(run.stderr.matches("error: ").count(), 1, "{}", run.said());
+    for word in words {
+        assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+    }
+    assert!(run.report.is_null() && !run.stdout.contains("converged"), "{}", run.said());
+}
+
+/// Ranks on machines whose files are not the same would solve no problem at all, or wait for each other for ever.
+#[test]
+fn ranks_that_read_other_scenes_data_or_tables_are_refused() {
+    let text = text_of("groove");
+    let gap = text.lines().find(|line| line.starts_with("gap =")).expect("a gap");
+    let with_data = text.replace(gap, "gap = \"rough(x)\"") + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n";
+    let method = text.split_once("[method]").expect("a method").0;
+    let with_table = format!("{method}[method]\nname = \"newton\"\nsteps = {{ table = \"path.csv\" }}\n");
+    let folders = |text: &str, files: [&str; 2], name: &str| {
+        files.map(|content| {
+            let scene = Scene::new(text);
+            fs::write(scene.path.with_file_name(name), content).expect("a file");
+            scene
+        })
+    };
+    let solve = |scenes: &[Scene; 2]| {
+        let folders = scenes.each_ref().map(|scene| scene.path.parent().expect("a folder"));
+        apart(folders, &[], &["solve", "scene.toml", "--set", "mesh.set.n=4"])
+    };
+    let data = ["0,0\n8,1e-4\n", "0,0\n8,2e-4\n"];
+    refused(&solve(&folders(&with_data, data, "rough.csv")), 3, &["rank 1 reads another scene", "`data.rough`"]);
+    solve(&folders(&with_data, [data[0]; 2], "rough.csv")).converged();
+    let tables = ["factor\n0.5\n1\n", "factor\n0.25\n1\n"];
+    refused(&solve(&folders(&with_table, tables, "path.csv")), 3, &["rank 1 reads another scene", "`method`"]);
+    let other = [Scene::new(text.as_str()), Scene::new(text.replace("pressure = 10", "pressure = 11"))];
+    refused(&solve(&other), 3, &["rank 1 reads another scene", "other values of `body`"]);
+    // one that is refused alone is as ever
+    let wrong = [Scene::new(text.as_str()), Scene::new(text.replace("pressure = 10", "presure = 10"))];
+    refused(&solve(&wrong), 3, &["did you mean `pressure`?"]);
+}
+
+/// Every rank says what it was told before it goes its way, also one that would end at once.
+#[test]
+fn ranks_with_other_words_are_refused() {
+    let scene = case("groove").display().to_string();
+    let first = ["solve", scene.as_str(), "--set", "mesh.set.n=4"];
+    let others: [&[&str]; 5] = [
+        &["check", &scene],
+        &["--help"],
+        &["solve", "--no-such-option"],
+        &["solve", &scene, "--set", "mesh.set.n=4", "-ksp_type", "cg"],
+        &["schema"],
+    ];
+    for (number, other) in others.into_iter().enumerate() {
+        let [one, two] = if number % 2 == 0 { [&first[..], other] } else { [other, &first[..]] };
+        let run = winkler_on(2, &[one, &[":", "-n", "1", WINKLER], two].concat());
+        refused(&run, 2, &["different command lines", "ranks 0, 1: ", "rank 2: "]);
+    }
+    let petsc = apart([root(); 2], &["-x", "PETSC_OPTIONS=-ksp_type cg"], &first);
+    refused(&petsc, 5, &["different values of PETSC_OPTIONS", "rank 0: nothing", "rank 1: -ksp_type cg"]);
+    let version = winkler_on(2, &["--version"]);
+    assert_eq!((version.code, version.stdout.lines().count()), (0, 1), "{}", version.said());
+    // what one rank refuses all refuse, in the words of the first
+    let wrong = winkler_on(2, &["solve", "--no-such-option"]);
+    assert_eq!((wrong.code, wrong.stderr.matches("error: ").count()), (2, 1), "{}", wrong.said());
+    let mesh = winkler_on(2, &["mesh", &scene]);
+    assert_eq!((mesh.code, mesh.stdout.matches("body lower").count()), (0, 1), "{}", mesh.said());
+}

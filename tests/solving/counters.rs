@@ -1,0 +1,292 @@
+//! The work that the program does is the work that the method needs: exact counts.
+//!
+//! For two bodies: the start factors each body with springs of its own and solves it a few times; every sweep solves each
+//! body once; a body is factored when its Robin term changed.
+
+use crate::common::{Run, case, distance, solve, winkler};
+
+/// Bodies that factor their own G; condensed ones count at the end.
+const COARSE: [&str; 4] = ["--set", "mesh.set.n=8", "--set", "solver=mumps"];
+
+fn coarse(name: &str, args: &[&str]) -> Run {
+    solve(case(name), &[&COARSE, args].concat()).converged()
+}
+
+/// Counts of a run, by name.
+fn counts<const N: usize>(run: &Run, names: [&str; N]) -> [usize; N] {
+    names.map(|name| run.count(name))
+}
+
+/// Solves of bodies in sweeps: all without those of the start, which are 1 to 4 a body. They are even as both bodies of
+/// these scenes need the same, so a solve too many or too few in a sweep shows.
+fn assert_solves(run: &Run, in_sweeps: usize) {
+    let in_start = run.count("body_solves") - in_sweeps;
+    assert!((2..=8).contains(&in_start) && in_start.is_multiple_of(2), "{in_start} solves in the start");
+}
+
+#[test]
+fn a_nonlinear_layer_factors_every_body_in_every_sweep() {
+    let run = solve(case("groove"), &["--set", "solver=mumps"]).converged();
+    assert_eq!(counts(&run, ["iterations", "sweeps"]), [7, 8]);
+    // 2 for the start, 2 in each sweep; the pattern once a body
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [18, 2, 2]);
+    // the lift asks for the springs that set-up has given already
+    assert_eq!(counts(&run, ["robin_updates", "robin_updates_skipped"]), [18, 2]);
+    assert_solves(&run, 2 * 8);
+    assert_eq!(run.count("body_solves_skipped"), 0);
+    assert_eq!(counts(&run, ["inner_iterations", "messages"]), [0, 0]);
+    let history = run.history();
+    assert_eq!(history.counts("iteration"), (0..8).collect::<Vec<_>>());
+    assert_eq!(history.counts("sweeps"), (1..=8).collect::<Vec<_>>());
+    assert_eq!(history.counts("factorizations"), (2..=9).map(|k| 2 * k).collect::<Vec<_>>());
+}
+
+#[test]
+fn without_a_robin_term_stiffness_is_factored_once() {
+    let layer = "contact.0.layer={linear={stiffness=1e3}}";
+    let rules = ["method.psi=none", "method.gamma=0.5", "method.stop={residual=1e-8}", layer];
+    let run = coarse("groove", &rules.map(|rule| ["--set", rule]).concat());
+    let sweeps = run.count("sweeps");
+    assert!(sweeps > 5, "{sweeps} sweeps tell nothing");
+    assert_eq!(run.count("iterations") + 1, sweeps);
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "robin_updates"]), [4, 2, 4]);
+    assert_eq!(run.count("robin_updates_skipped"), 2 + 2 * (sweeps - 1));
+    assert_solves(&run, 2 * sweeps);
+}
+
+fn full_contact(layer: &[&str]) {
+    let run = coarse("wavy", &[&["--set", "method.start.normal=3e-4"], layer].concat());
+    let history = run.history();
+    assert_eq!(history["closed"], history["points"], "the contact must be full in all iterations");
+    let sweeps = run.count("sweeps");
+    assert_eq!(counts(&run, ["factorizations", "robin_updates"]), [4, 4]);
+    assert_eq!(run.count("robin_updates_skipped"), 2 + 2 * (sweeps - 1));
+    assert_solves(&run, 2 * sweeps);
+}
+
+fn changing_contact(layer: &str) {
+    let run = coarse("groove", &["--set", layer, "--set", "method.stop={residual=1e-10}"]);
+    let history = run.history();
+    let (closed, factored) = (history.counts("closed"), history.counts("factorizations"));
+    assert_eq!(factored[0], 4);
+    let mut changes = 0;
+    for k in 1..closed.len() {
+        let new = factored[k] - factored[k - 1];
+        assert!(new == 0 || new == 2, "row {k}: {new} factorisations");
+        if closed[k] != closed[k - 1] {
+            assert_eq!(new, 2, "row {k}: the contact set changed");
+            changes += 1;
+        }
+    }
+    assert!(changes > 0, "a contact set that never changes tells nothing");
+    let last = factored.len() - 1;
+    assert_eq!(factored[last], factored[last - 3], "the contact set has settled by then: {closed:?}, {factored:?}");
+    assert_eq!(run.count("robin_updates"), run.count("factorizations"));
+    assert_eq!(run.count("robin_updates") + run.count("robin_updates_skipped"), 2 * (run.count("sweeps") + 2));
+}
+
+#[test]
+fn a_linear_layer_in_full_contact_is_factored_once() {
+    full_contact(&[]);
+}
+
+#[test]
+fn a_linear_layer_is_factored_again_only_when_the_contact_set_changes() {
+    changing_contact("contact.0.layer={linear={stiffness=4e4}}");
+}
+
+/// The power law with a = 1 is the linear one, its tangent 1/B to the last digit.
+#[test]
+fn a_power_layer_that_is_linear_is_factored_like_one() {
+    full_contact(&["--set", "contact.0.layer={power={B=1e-5,a=1}}"]);
+    changing_contact("contact.0.layer={power={B=2.5e-5,a=1}}");
+}
+
+/// r = (1 - gamma) r_last with the same G needs no solve. One sweep with gamma = 1 gives the answer without that.
+#[test]
+fn bodies_that_never_touch_are_solved_once() {
+    let apart = ["--set", "contact.0.gap=1", "--set", "method.stop={residual=1e-5}"];
+    let run = coarse("groove", &apart);
+    let direct = coarse("groove", &[&apart[..], &["--set", "method.gamma=1"]].concat());
+    let sweeps = run.count("sweeps");
+    assert!(sweeps > 10, "{sweeps} sweeps tell nothing");
+    assert_solves(&run, 2);
+    assert_eq!(run.count("body_solves_skipped"), 2 * (sweeps - 1));
+    // the start, then K
+    assert_eq!(counts(&run, ["factorizations", "robin_updates"]), [4, 4]);
+    // with gamma = 1 all that is left is rounding, which is nobody's multiple
+    assert_eq!(counts(&direct, ["iterations", "body_solves_skipped"]), [1, 0]);
+    let (skipped, solved) = (run.contact(), direct.contact());
+    for column in ["u_n_lower", "u_n_upper", "compression"] {
+        assert!(distance(&skipped[column], &solved[column]) < 1e-4, "{column}");
+    }
+    assert!((run.number("F1") / direct.number("F1") - 1.0).abs() < 1e-9);
+    // where rounding is a part of the residual the solves are done again
+    let far = coarse("groove", &[&apart[..2], &["--set", "method.stop={residual=1e-12}"]].concat());
+    assert!(far.count("body_solves_skipped") < 2 * (far.count("sweeps") - 1));
+    assert!(run.contact()["pressure"].iter().all(|&p| p == 0.0));
+}
+
+/// Preconditioners count as factorisations, Krylov iterations are counted, and direct solves have none.
+#[test]
+fn krylov_iterations_are_counted() {
+    let run = coarse("groove", &["-ksp_type", "cg", "-pc_type", "icc"]);
+    let history = run.history();
+    assert_eq!(run.count("factorizations"), 2 + 2 * run.count("sweeps"));
+    let iterations = history.counts("inner_iterations");
+    assert!(iterations.windows(2).all(|pair| pair[0] < pair[1]), "{iterations:?}");
+    assert_eq!(iterations.last(), Some(&run.count("inner_iterations")));
+    let mixed = coarse("groove", &["-upper_ksp_type", "cg", "-upper_pc_type", "icc"]);
+    assert!(mixed.count("inner_iterations") < run.count("inner_iterations"));
+}
+
+#[test]
+fn multigrid_is_kept_while_the_robin_term_moves_a_little_and_cycles_precondition_newton() {
+    let args = ["--method", "newton-robin", "-pc_type", "hypre"];
+    let run = coarse("groove-held", &args);
+    let updates = run.count("robin_updates");
+    assert!(updates > run.count("factorizations"), "{updates} changes, and a set-up for each");
+    let always = coarse("groove-held", &[&args[..], &["-ksp_reuse_preconditioner", "0"]].concat());
+    assert_eq!(always.count("robin_updates"), always.count("factorizations"));
+    assert!(distance(&run.contact()["pressure"], &always.contact()["pressure"]) < 1e-6);
+    // an application of the preconditioner for each step of conjugate gradients, a solve only for each iterate
+    let each = |run: &Run| run.count("inner_iterations") as f64 / run.count("sweeps") as f64;
+    let solves = coarse("groove-held", &["--method", "ncg", "-pc_type", "hypre"]);
+    assert!(each(&run) < 0.7 * each(&solves), "{} and {} in a sweep", each(&run), each(&solves));
+}
+
+/// The weights of the contact table are the lengths that the report sums up, and theta is that of `check`.
+#[test]
+fn the_table_has_the_lengths_and_the_report_theta() {
+    let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
+    let table = run.contact();
+    let closed = |q: &usize| table["compression"][*q] > 0.0;
+    let length: f64 = (0..table.rows()).filter(closed).map(|q| table["weight"][q]).sum();
+    assert!((length / run.number("pairs/0/contact_length") - 1.0).abs() < 1e-12, "{length}");
+    let check = winkler(&["check", case("groove-held").to_str().expect("a path"), "--set", "mesh.set.n=4", "--json"]);
+    let checked: serde_json::Value = serde_json::from_str(&check.stdout).expect("JSON");
+    assert_eq!(run.report["pairs"][0]["theta"], checked["pairs"][0]["theta"]);
+    // both inner phases were measured, and lie within the run
+    let inner = ["factor", "solve"].map(|phase| run.number(&format!("inner_times/{phase}")));
+    assert!(inner.iter().all(|&seconds| seconds > 0.0) && inner.iter().sum::<f64>() < run.number("times/total"));
+}
+
+/// Condensed, K is factored once a body; what a changed Robin term costs is a small dense factorisation.
+#[test]
+fn a_condensed_body_is_factored_once() {
+    let run = solve(case("groove"), &[]).converged();
+    assert_eq!(counts(&run, ["iterations", "sweeps"]), [7, 8]);
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [2, 2, 2]);
+    // 2 for the start, 2 in each sweep
+    assert_eq!(counts(&run, ["dense_factorizations", "robin_updates", "robin_updates_skipped"]), [18, 18, 2]);
+    assert_solves(&run, 2 * 8);
+    assert_eq!(run.history().counts("factorizations"), [2; 8]);
+    // a linear layer in full contact: the start, and once more
+    let full = solve(case("wavy"), &["--set", "mesh.set.n=8", "--set", "method.start.normal=3e-4"]).converged();
+    assert_eq!(counts(&full, ["factorizations", "dense_factorizations", "robin_updates"]), [2, 4, 4]);
+}
+
+/// K and f depend neither on the method nor on layers and gaps: a sweep over these factors each body once, and every run is the
+/// one that `solve` makes.
+#[test]
+fn a_sweep_keeps_condensed_bodies() {
+    let sweep = |over: &[&str], more: &[&str]| -> Vec<serde_json::Value> {
+        let path = case("groove").display().to_string();
+        let over: Vec<&str> = over.iter().flat_map(|over| ["--over", over]).collect();
+        let run =
+            winkler(&[&["sweep", &path, "-o", "out", "--json", "--set", "mesh.set.n=8"][..], &over, more].concat());
+        assert_eq!(run.code, 0, "{}", run.said());
+        serde_json::from_str(&run.stdout).expect("a list of reports")
+    };
+    let done =
+        ["assemblies", "factorizations", "symbolic_factorizations", "assemblies_avoided", "factorizations_avoided"];
+    let counts = |report: &serde_json::Value| done.map(|name| report[name].as_u64().expect("a count"));
+    let (once, never) = ([2, 2, 2, 0, 0], [0, 0, 0, 2, 2]);
+    let overs: [&[&str]; 5] = [
+        &["method.gamma=0.5,0.6"],
+        &["contact.0.layer.power.a=0.5,1", "contact.0.gap=0,\"1e-4*abs(x-4)\""],
+        &["method.name=newton-robin,ncg", "contact.0.layer.power.B=2.5e-5,1e-5"],
+        &["body.1.load.0.pressure=10,\"8 + x\""],
+        &["body.0.load=[],[{ on = \"lower_face\", pressure = 3 }]"],
+    ];
+    for over in overs {
+        let reports = sweep(over, &[]);
+        assert_eq!(counts(&reports[0]), once, "{over:?}");
+        assert!(reports.len() > 1 && reports[1..].iter().all(|report| counts(report) == never), "{over:?}");
+    }
+    // each method with its own linear steps, whatever the one before had
+    let methods = ["newton-robin", "newton", "robin", "newton-robin", "ncg", "newton"];
+    let reports = sweep(&[&format!("method.name={}", methods.join(","))], &["--set", "method.gamma=0.6"]);
+    assert!(reports.iter().zip(methods).all(|(report, method)| report["method"] == method));
+    assert!(reports[1..].iter().all(|report| report["factorizations"] == 0));
+    let reports = sweep(&["contact.0.gap=0,\"1e-4*abs(x-4)\"", "method.gamma=0.5,0.6"], &[]);
+    for (report, (gap, gamma)) in reports.iter().zip([("0", "0.5"), ("0", "0.6"), ("W", "0.5"), ("W", "0.6")]) {
+        let gap = format!("contact.0.gap={}", gap.replace('W', "\"1e-4*abs(x-4)\""));
+        let gamma = format!("method.gamma={gamma}");
+        let alone = solve(case("groove"), &["--set", "mesh.set.n=8", "--set", &gap, "--set", &gamma]);
+        for name in ["iterations", "residual", "F1", "body_solves", "dense_factorizations"] {
+            assert_eq!(report[name], alone.report[name], "{name} of {gap}, {gamma}");
+        }
+    }
+    // loads and moved supports, one of which bends the body
+    let (load, fix) = ("body.1.load.0.pressure", "body.0.fix.0.x");
+    let reports = sweep(&[&format!("{load}=10,\"8 + x\""), &format!("{fix}=0,1e-4,\"1e-4*y\"")], &[]);
+    let values = ["10", "\"8 + x\""].map(|p| ["0", "1e-4", "\"1e-4*y\""].map(|u| [p, u])).concat();
+    for (report, [p, u]) in reports.iter().zip(values) {
+        let sets = ["mesh.set.n=8".to_owned(), format!("{load}={p}"), format!("{fix}={u}")];
+        let alone = solve(case("groove"), &sets.each_ref().map(|set| ["--set", set]).concat());
+        for name in ["iterations", "residual", "F1", "pairs"] {
+            assert_eq!(report[name], alone.report[name], "{name} of {p}, {u}");
+        }
+    }
+    assert!(reports[1..].iter().all(|report| counts(report) == never));
+    // another mesh, another body, other prescribed dofs, another solver: nothing is left
+    let held = "body.0.fix.0={ on = \"lower_axis\", x = 0 },{ on = \"lower_axis\", normal = 0 }";
+    for over in [held, "mesh.set.n=4,8", "body.0.young=1e5,2e5", "solver=mumps,condensed"] {
+        assert!(sweep(&[over], &[]).iter().all(|report| counts(report)[3..] == [0, 0]), "{over}");
+    }
+    assert_eq!(counts(&sweep(&["method.gamma=0.5,0.6"], &["--set", "solver=mumps"])[1])[0], 2);
+}
+
+/// Bodies that Newton's method joins have no preconditioner of their own, that of all is made before the first step and serves while
+/// it is good, and the first step is as rough as the next.
+#[test]
+fn newton_over_multigrid_makes_one_preconditioner_of_all_bodies() {
+    let run = coarse("groove", &["--set", "solver=hypre", "--set", "method={}"]);
+    assert_eq!(run.text("method"), "newton");
+    assert_eq!(counts(&run, ["iterations", "factorizations", "symbolic_factorizations"]), [6, 1, 1]);
+    assert_eq!(counts(&run, ["body_solves", "sweeps", "robin_updates", "dense_factorizations"]), [0; 4]);
+    let its = run.history().counts("inner_iterations");
+    assert_eq!(its.last(), Some(&run.count("inner_iterations")));
+    let steps: Vec<usize> = (0..its.len()).map(|k| its[k] - if k > 0 { its[k - 1] } else { 0 }).collect();
+    assert!(steps.iter().all(|&step| step < 60), "{steps:?}");
+    assert!(2 * steps[0] < its[its.len() - 1] / 2, "{steps:?}");
+}
+
+/// One factor of all bodies a step with one pattern, none of a body.
+#[test]
+fn newton_by_factorisation_factors_all_bodies_once_a_step() {
+    let run = coarse("groove-held", &["--set", "method={}"]);
+    let steps = run.count("iterations");
+    assert_eq!(counts(&run, ["factorizations", "symbolic_factorizations", "assemblies"]), [steps, 1, 2]);
+    assert_eq!(counts(&run, ["body_solves", "sweeps", "robin_updates", "inner_iterations"]), [0; 4]);
+    assert_eq!(run.history().counts("factorizations"), (1..=steps).collect::<Vec<_>>());
+    assert_eq!(run.history().counts("iteration"), (1..=steps).collect::<Vec<_>>());
+}
+
+#[test]
+fn petsc_is_loaded_only_by_runs_that_make_its_objects() {
+    assert!(coarse("groove", &["--set", "solver=condensed"]).report["petsc"].is_null());
+    for words in [["--set", "solver=mumps"], ["--set", "solver=hypre"], ["-ksp_type", "cg"]] {
+        assert!(coarse("groove", &words).text("petsc").starts_with("3."), "{words:?}");
+    }
+}
+
+/// The first set-up of a body's multigrid is one of those that take the time of all: benchmarks count in it.
+#[test]
+fn the_first_set_up_is_timed() {
+    let run =
+        solve(case("groove"), &["--method", "robin", "--set", "mesh.set.n=8", "--set", "solver=hypre"]).converged();
+    let (first, all) = (run.number("inner_times/first"), run.number("inner_times/factor"));
+    assert!(first <= all && first > all / (4.0 * run.count("factorizations") as f64), "{first} of {all}");
+}

@@ -1,0 +1,15 @@
+//! Methods and solvers: one answer by each of them, and the work that each may take.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod condensed;
+mod counters;
+mod forecast;
+mod histories;
+mod many;
+mod mechanisms;
+mod methods;
+mod robustness;
+mod steps;
+mod stopping;

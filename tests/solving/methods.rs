@@ -1,0 +1,364 @@
+//! Every method minimises the same functional: one answer, and the sweeps that each may take.
+
+use crate::common::{Run, Scene, case, distance, root, solve, solve_on, text_of};
+
+/// The relaxed iteration with each rule, and the other methods.
+const METHODS: [&str; 10] = [
+    "{name=\"robin\", gamma=0.6}",
+    "{name=\"robin\", gamma=[0.9, 0.5, 0.6]}",
+    "{name=\"robin\", gamma=\"line-search\"}",
+    "{name=\"robin\", gamma=\"aitken\"}",
+    "{name=\"robin\", gamma=\"barzilai-borwein\"}",
+    "{name=\"robin\", gamma=\"spectral\"}",
+    "{name=\"ncg\"}",
+    "{name=\"anderson\", depth=4}",
+    "{name=\"newton-robin\"}",
+    "{name=\"newton\"}",
+];
+
+fn with(scene: &str, method: &str, more: &[&str]) -> Run {
+    let method = format!("method={method}");
+    solve(case(scene), &[&["--set", "mesh.set.n=16", "--set", &method][..], more].concat()).converged()
+}
+
+#[test]
+fn all_methods_give_one_pressure() {
+    for scene in ["groove", "groove-held"] {
+        let stop = ["--set", "method.stop={residual=1e-9}"];
+        let reference = with(scene, "{name=\"newton\"}", &["--set", "method.stop={residual=1e-12}"]).contact();
+        for method in METHODS {
+            let run = with(scene, method, &stop);
+            let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
+            assert!(apart < 1e-7, "{scene} by {method}: {apart:e}");
+            // the bodies transmit the load whatever the method
+            if scene == "groove-held" {
+                assert!((run.number("pairs/0/force/0/1") + 40.0).abs() < 1e-5, "{method}");
+            }
+        }
+    }
+}
+
+/// Robin coefficients change the way, not the goal; a frozen one is factored once a body besides the start.
+#[test]
+fn robin_coefficients_give_one_pressure() {
+    let stop = ["--set", "method.stop={residual=1e-9}"];
+    let reference = with("groove-held", "{name=\"newton\"}", &stop).contact();
+    for robin in ["\"tangent\"", "\"frozen\"", "\"auto\"", "{floor=1e4}"] {
+        let run = with("groove-held", &format!("{{name=\"ncg\", robin={robin}, start={{normal=1e-4}}}}"), &stop);
+        let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
+        assert!(apart < 1e-6, "{robin}: {apart:e}");
+        if robin == "\"frozen\"" {
+            assert_eq!(run.count("dense_factorizations"), 4);
+        }
+    }
+}
+
+/// psi changes the way as well: full Robin acts on open points too, so it is not the active zone.
+#[test]
+fn zones_give_one_pressure() {
+    let stop = ["--set", "method.stop={residual=1e-9}"];
+    let run = |psi: &str| with("groove", &format!("{{psi=\"{psi}\", gamma=\"line-search\"}}"), &stop);
+    let [active, full, none, half] = ["active", "full", "none", "x > 2"].map(run);
+    for other in [&full, &none, &half] {
+        assert!(distance(&other.contact()["pressure"], &active.contact()["pressure"]) < 1e-6);
+    }
+    assert_ne!(full.count("iterations"), active.count("iterations"));
+    assert!(none.count("dense_factorizations") == 4, "S is factored once a body, and the start");
+}
+
+/// A case without its method: default settings.
+fn plain(scene: &str) -> Scene {
+    Scene::new(text_of(scene).split("[method]").next().unwrap_or_default())
+}
+
+/// What issue and guide promise of the default on the paper's mesh.
+#[test]
+fn the_default_is_fast() {
+    let solved = |scene: &Scene, more: &[&str]| {
+        let run = solve(scene, more).converged();
+        assert!(run.number("residual") <= 1e-8, "{}", run.said());
+        run
+    };
+    let held = plain("groove-held");
+    let hard = ["--set", "contact.0.layer.power={B=1e-6, a=0.1}"];
+    for (scene, more, steps) in [(&plain("groove"), &[][..], 7), (&held, &[], 5), (&held, &hard, 3)] {
+        let run = solved(scene, more);
+        assert_eq!((run.text("method"), run.count("iterations"), run.count("sweeps")), ("newton", steps, 0));
+        // K is eliminated once a body, the joint matrix is factored once a step, and no body is solved for
+        let work = ["factorizations", "dense_factorizations", "body_solves"].map(|name| run.count(name));
+        assert_eq!(work, [2, steps, 0]);
+    }
+    // by sweeps, and with bodies that are too large to condense: one factorisation a step
+    let sweeps = solved(&held, &[&hard[..], &["--method", "newton-robin"]].concat());
+    assert!(sweeps.count("sweeps") <= 350, "{}", sweeps.count("sweeps"));
+    let large = solved(&held, &[&hard[..], &["--set", "solver=mumps"]].concat());
+    assert_eq!((large.text("method"), large.count("iterations"), large.count("factorizations")), ("newton", 3, 3));
+}
+
+/// Layers from far stiffer than the blocks to far softer, linear to a = 0.02, from both starts: few steps, and of those that
+/// cannot be had to 1e-8 it is said so.
+#[test]
+fn any_power_law_takes_few_steps() {
+    for (scene, most) in [("groove-held", 5), ("groove", 12)] {
+        for start in ["\"auto\"", "{normal=1e-4}"] {
+            for b in ["1e-12", "1e-7", "1e-5", "2e-4", "1e-2"] {
+                for a in ["0.02", "0.1", "0.3", "1"] {
+                    let sets = [&format!("contact.0.layer.power={{B={b}, a={a}}}"), &format!("method.start={start}")];
+                    let run = solve(plain(scene), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
+                    // p'(c) times the rounding of c is 1e-8 of p and more
+                    let rounded = b == "1e-12" && a != "1";
+                    let steps = run.count("iterations");
+                    match run.text("status") {
+                        "roundoff-limited" if rounded => {
+                            assert!(run.number("residual") < 4e-7 && steps <= 10, "{}", run.said())
+                        }
+                        status => {
+                            assert!(status == "converged" && steps <= most, "{scene} B={b} a={a}: {}", run.said())
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Newton's method with condensed bodies joins their Schur complements: the sparse matrix of whole bodies has the same steps.
+#[test]
+fn newton_on_condensed_bodies() {
+    for (scene, sets, steps) in
+        [("groove-held", "mesh.set.n=16", 5), ("stack", "mesh.set.n1=6", 3), ("patch-3d", "mesh.set.nl=4", 1)]
+    {
+        let run = |solver: &str| {
+            let solver = format!("solver={solver}");
+            solve(plain(scene), &["--method", "newton", "--set", &solver, "--set", sets]).converged()
+        };
+        let (small, whole) = (run("condensed"), run("mumps"));
+        assert_eq!((small.text("method"), whole.text("method")), ("newton", "newton"));
+        assert_eq!([small.count("iterations"), whole.count("iterations")], [steps; 2], "{scene}");
+        let bodies = small.solvers().len();
+        assert_eq!(small.count("factorizations"), bodies, "{scene}: one elimination a body, no other sparse factor");
+        assert_eq!([small.count("dense_factorizations"), whole.count("dense_factorizations")], [steps, 0]);
+        assert_eq!(whole.count("factorizations"), steps, "{scene}: one factor a step, none of a body");
+        for pair in 0..bodies - 1 {
+            let (ours, theirs) = (small.contact_of(pair), whole.contact_of(pair));
+            assert!(distance(&ours["pressure"], &theirs["pressure"]) < 1e-9, "{scene}");
+        }
+    }
+}
+
+/// Bodies with multigrid: the Newton matrix has one multigrid for all, and bodies have none of their own.
+#[test]
+fn multigrid_over_all_bodies() {
+    let run = |solver: &str| {
+        let solver = format!("solver={solver}");
+        let sets = ["mesh.set.n=6", "body.0.order=1", "body.1.order=1", "method={}", &solver];
+        solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+    };
+    let (multigrid, condensed) = (run("hypre"), run("condensed"));
+    assert_eq!((multigrid.text("method"), condensed.text("method")), ("newton", "newton"));
+    assert!(distance(&multigrid.contact()["pressure"], &condensed.contact()["pressure"]) < 1e-7);
+    // as many steps, although they are inexact; one set-up a step at most
+    let steps = multigrid.count("iterations");
+    assert_eq!([steps, condensed.count("iterations")], [3, 3]);
+    assert!((1..=steps).contains(&multigrid.count("factorizations")), "{}", multigrid.count("factorizations"));
+    assert_eq!([multigrid.count("body_solves"), multigrid.count("sweeps")], [0, 0]);
+    // what is typed for one body reaches it: then bodies have multigrid of their own
+    let sweeps = run("{preset=\"hypre\",options=\"-lower_ksp_rtol 1e-8\"}");
+    assert_eq!(sweeps.text("method"), "newton-robin");
+    assert!(sweeps.count("inner_iterations") > multigrid.count("inner_iterations"));
+    assert_eq!(sweeps.count("body_solves"), 2 * sweeps.count("sweeps"));
+}
+
+/// Linear steps end by what the laws leave: pressures of stiff layers are right as soon as with exact steps, and no step is restarted once
+/// the contact is found.
+#[test]
+fn inexact_steps_are_as_many_as_exact_ones() {
+    for stiffness in ["1e5", "1e9"] {
+        let run = |solver: &str| {
+            let (solver, layer) =
+                (format!("solver={solver}"), format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}"));
+            let sets = ["body.0.order=1", "body.1.order=1", "method={}", &solver, &layer];
+            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        };
+        let (inexact, exact) = (run("hypre"), run("condensed"));
+        assert_eq!(inexact.count("iterations"), exact.count("iterations"), "{stiffness}");
+        assert!(distance(&inexact.contact()["pressure"], &exact.contact()["pressure"]) < 2e-8, "{stiffness}");
+    }
+}
+
+/// Stiff and changed rows are solved exactly: one set-up serves all steps, and a run with layers that are all but rigid costs at most half as many
+/// iterations more than one with soft ones (ten times as many if nothing is solved exactly). Elements of both orders, which have two kinds of
+/// multigrid.
+#[test]
+fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
+    for order in ["1", "2"] {
+        let run = |stiffness: &str| {
+            let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
+            let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+            let sets = [&orders[0], &orders[1], "method={}", "solver=hypre", &layer];
+            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        };
+        let (soft, rigid) = (run("1e4"), run("1e9"));
+        assert_eq!((soft.count("patches"), soft.count("factorizations")), (0, 1));
+        assert_eq!((rigid.count("patches"), rigid.count("factorizations")), (rigid.count("iterations"), 1));
+        let [hard, easy] = [&rigid, &soft].map(|run| run.count("inner_iterations"));
+        assert!(2 * hard <= 3 * easy, "order {order}: {hard} {easy}");
+    }
+}
+
+/// Rigid motions of all bodies around multigrid: iterations do not grow with the number of bodies (56, 150 and 223 without). Two bodies of
+/// which one is held have no use for them.
+#[test]
+fn many_bodies_cost_multigrid_no_more_iterations() {
+    for k in [2, 4, 6] {
+        let set = format!("mesh.set.k={k}");
+        let run = solve(case("blocks"), &["--set", &set, "--set", "solver=hypre", "--set", "output.plots=false"]);
+        let run = run.converged();
+        assert!(run.count("inner_iterations") <= 40, "{} bodies: {}", k * k * k, run.said());
+        assert_eq!(run.text("linear_step"), "cg + hypre with rigid motions of all bodies");
+    }
+    let alone = solve(case("groove3d"), &["--set", "mesh.set.n=4", "--set", "method={}", "--set", "solver=hypre"]);
+    assert_eq!(alone.converged().text("linear_step"), "cg + hypre");
+}
+
+/// Rigid bodies foretell a large curved contact, and Newton's steps need not grow it from within.
+#[test]
+fn rigid_bodies_foretell_the_contact() {
+    let sets = ["mesh.set={n=14,edge=1}", "body.0.order=1", "body.1.order=1", "solver=hypre", "method={}"];
+    let run = solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+    assert!(run.count("iterations") <= 6, "{}", run.said());
+    // the first step finds the contact but for its edge: 200 points
+    let closed = run.history().counts("closed");
+    let last = closed[closed.len() - 1];
+    assert!(last > 100 && closed[0].abs_diff(last) <= 40, "{closed:?}");
+}
+
+/// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
+#[test]
+fn the_spectrum_is_symmetric_about_one() {
+    let run = with("groove-held", "{name=\"robin\", gamma=\"spectral\"}", &["--set", "method.stop={residual=1e-8}"]);
+    let (low, high) = (run.number("spectrum/0"), run.number("spectrum/1"));
+    // Ritz values come from inside
+    assert!(high < 2.0 - low + 1e-6 && high > 1.7 && low > 0.26 && low < 0.27, "{low} {high}");
+    let error = run.number("error_estimate") / run.number("residual");
+    assert!((error - low.recip().sqrt()).abs() < 1e-6, "{error}");
+}
+
+/// Loads that push a body off its contact have no solution: said at once, by every method.
+#[test]
+fn a_body_that_is_pulled_off() {
+    for method in ["auto", "robin", "newton", "ncg"] {
+        let off = ["--method", method, "--set", "body.1.load.0.pressure=-10", "--set", "mesh.set.n=4"];
+        let run = solve(case("groove-held"), &off);
+        assert_eq!((run.code, run.text("status"), run.count("sweeps")), (1, "unbounded", 0), "{method}");
+    }
+}
+
+/// Two ranks, one body each, give the serial history also by Newton's method.
+#[test]
+fn newton_on_two_ranks() {
+    let args = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.start=\"auto\""];
+    let serial = solve(case("groove-held"), &args).converged();
+    let parallel = solve_on(2, case("groove-held"), &args).converged();
+    let (ours, theirs) = (serial.history(), parallel.history());
+    for column in ["residual", "energy", "sweeps", "factorizations", "closed"] {
+        assert_eq!(ours[column], theirs[column], "{column}");
+    }
+    assert_eq!(serial.contact()["pressure"], parallel.contact()["pressure"]);
+}
+
+/// A tower of blocks that only contact holds, under a load that leans: each joint carries the whole of it. Rigid motions are deflated, so
+/// its height hardly matters: without that the sweeps are 27 and 53.
+#[test]
+fn a_tower_takes_as_long_as_a_wall() {
+    let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
+    let tower = |rows: usize| {
+        let mut text =
+            format!("dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = {rows}, n1 = 4, n2 = 3, n3 = 5 }} }}\n");
+        for block in 1..=rows {
+            let bottom = if block == 1 { "{ on = \"b1_bottom\", y = 0 }, " } else { "" };
+            let fix = format!("fix = [{bottom}{{ on = \"b{block}_left\", x = 0 }}]");
+            text += &format!("[[body]]\nname = \"b{block}\"\nyoung = 2.1e5\npoisson = 0.3\n{fix}\n");
+        }
+        text += &format!("load = [{{ on = \"b{rows}_top\", pressure = \"10 + 2*x\" }}]\n");
+        for block in 1..rows {
+            let between = format!("between = [\"b{block}_top\", \"b{}_bottom\"]", block + 1);
+            text += &format!("[[contact]]\n{between}\nlayer = {{ linear = {{ stiffness = 2e5 }} }}\n");
+        }
+        let run = solve(Scene::new(text), &["--method", "newton-robin"]).converged();
+        for joint in 0..rows - 1 {
+            let force = run.number(&format!("pairs/{joint}/force/0/1"));
+            assert!((force + 11.0).abs() < 1e-6, "joint {joint} of {rows} blocks carries {force}");
+        }
+        run.count("sweeps")
+    };
+    let sweeps = [tower(4), tower(12)];
+    assert_eq!(sweeps, [17, 19]);
+}
+
+/// Two clamped leaves of a spring, the shorter one below, which touch at its tip alone; `n` elements along the upper.
+fn leaves(n: usize, layer: &str) -> Scene {
+    let mesh = root().join("tests/stress/meshes/leaves.geo");
+    let set = format!("l1 = 200, t1 = 4, n1 = {}, l2 = 300, t2 = 6, n2 = {n}, through = 2", 7 * n / 10);
+    let body = |name: &str, more: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\norder = 2\nyoung = 2.1e5\npoisson = 0\nfix = [{{ on = \"{name}_left\", x = 0, y = 0 }}]\n{more}\n"
+        )
+    };
+    Scene::new(format!(
+        "dimension = 2\nplane = \"stress\"\nmesh = {{ geo = \"{}\", set = {{ {set} }} }}\n{}{}[[contact]]\nbetween = [\"b2_bottom\", \"b1_top\"]\nlayer = {{ {layer} }}\n",
+        mesh.display(),
+        body("b2", "load = [{ on = \"b2_right\", force = [0, -5] }]"),
+        body("b1", ""),
+    ))
+}
+
+/// Slender bodies peel off each other in a few steps, as many on fine meshes as on coarse ones, by smoothed laws; to the answer of a start that
+/// needs none. Beams share the load of 5 so that 2 goes through the tip.
+#[test]
+fn leaves_peel_in_a_few_steps() {
+    for layer in ["linear = { stiffness = 1e7 }", "power = { B = 1e-5, a = 0.5 }"] {
+        let mut steps = Vec::new();
+        for n in [60, 120] {
+            let run = solve(&leaves(n, layer).path, &["--method", "newton"]).converged();
+            steps.push(run.count("iterations"));
+            let smoothed = run.history().counts("smoothed");
+            assert_eq!(smoothed.last(), Some(&run.count("smoothed_steps")));
+            assert!(run.count("smoothed_steps") > 0, "{}", run.said());
+            assert!((run.number("pairs/0/force/0/1") - 2.0).abs() < 2e-3, "{}", run.said());
+            let nested = ["--set", "method={name=\"newton\", start=\"nested\"}"];
+            let reference = solve(&leaves(n, layer).path, &nested).converged().contact();
+            let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
+            assert!(apart < 1e-7, "{layer} {n}: {apart:e}");
+        }
+        assert!(steps[0].abs_diff(steps[1]) <= 1 && steps[0].max(steps[1]) <= 15, "{layer}: {steps:?}");
+    }
+}
+
+/// Smoothed laws are the same with multigrid, by one factorisation, on two ranks, and where a run pauses at each iterate.
+#[test]
+fn leaves_peel_by_any_linear_step() {
+    let scene = leaves(60, "linear = { stiffness = 1e5 }");
+    let whole = solve(&scene.path, &["--method", "newton"]).converged();
+    let pressure = &whole.contact()["pressure"];
+    let others: [(usize, &[&str]); 4] = [
+        (1, &["--method", "newton", "--set", "solver=hypre"]),
+        (1, &["--method", "newton", "--set", "solver=mumps"]),
+        (2, &["--method", "newton"]),
+        (1, &["--method", "newton", "--checkpoint", "1e-9"]),
+    ];
+    for (ranks, args) in others {
+        let run = solve_on(ranks, &scene.path, args);
+        // MUMPS leaves about as much rounding as is allowed
+        assert_eq!(run.code, 0, "{args:?}: {}", run.said());
+        // inexact steps may come to the laws without the path
+        let is_smoothed = run.count("smoothed_steps") > 0 || args.contains(&"solver=hypre");
+        assert!(is_smoothed && run.count("iterations") <= 15, "{args:?}: {}", run.said());
+        let apart = distance(&run.contact()["pressure"], pressure);
+        assert!(apart < 1e-6, "{args:?}: {apart:e}");
+        if args.contains(&"--checkpoint") {
+            assert_eq!(run.count("iterations"), whole.count("iterations"));
+            assert_eq!(run.contact()["pressure"], whole.contact()["pressure"]);
+        }
+    }
+}

@@ -1,0 +1,681 @@
+//! What a run keeps when a signal, a kill or a full disk ends it.
+
+use crate::common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of, winkler};
+use serde_json::Value;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+
+/// A run that would take hours: the paper's iteration with tiny steps.
+const ENDLESS: [&str; 4] = ["--set", "method.gamma=1e-6", "--set", "method.stop={residual=1e-12,iterations=100000000}"];
+
+/// A short one with steps enough to be stopped between.
+const SHORT: [&str; 6] =
+    ["--set", "method.gamma=0.05", "--set", "method.stop={residual=1e-8}", "--set", "mesh.set.n=8"];
+
+/// The program at work in a folder of its own.
+struct Working {
+    child: Guard,
+    scratch: TempDir,
+}
+
+/// A process that does not outlive its test.
+struct Guard(Child);
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        // one that has ended needs no end
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Working {
+    /// Starts `words` with results in `results` of a new folder.
+    fn start(words: &[&str], ranks: usize) -> Self {
+        Self::start_in(TempDir::new().expect("a temporary folder"), words, ranks, &[])
+    }
+
+    fn start_in(scratch: TempDir, words: &[&str], ranks: usize, variables: &[(&str, &Path)]) -> Self {
+        let winkler = env!("CARGO_BIN_EXE_winkler");
+        // tests may run under nohup, whose signals a program leaves ignored
+        let mut command = Command::new("env");
+        command.arg("--default-signal=HUP,INT,TERM");
+        if ranks > 1 {
+            command.args(["mpiexec", "--oversubscribe", "-n", &ranks.to_string()]);
+        }
+        command.arg(winkler);
+        environment(&mut command);
+        command.args(words).arg("-o").arg(scratch.path().join("results")).current_dir(scratch.path());
+        command.envs(variables.iter().copied()).env("OMPI_MCA_orte_tmpdir_base", scratch.path());
+        let file = |name: &str| Stdio::from(File::create(scratch.path().join(name)).expect("a file"));
+        command.stdin(Stdio::null()).stdout(file("out")).stderr(file("err"));
+        let child = Guard(command.spawn().expect("the program"));
+        Self { child, scratch }
+    }
+
+    fn results(&self) -> PathBuf {
+        self.scratch.path().join("results")
+    }
+
+    /// Waits until something is there.
+    fn until(&mut self, what: &str, is_there: impl Fn(&Path) -> bool) {
+        let began = Instant::now();
+        while !is_there(self.scratch.path()) {
+            let ended = self.child.0.try_wait().expect("a child").map(|status| format!("ended with {status}"));
+            let late = (began.elapsed() > Duration::from_secs(60)).then(|| "takes too long".to_owned());
+            if let Some(why) = ended.or(late) {
+                panic!("before {what} the program {why}\n{}", self.said());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    fn until_rows(&mut self, rows: usize) {
+        let count = |path: &Path| fs::read_to_string(path).map_or(0, |text| text.lines().count());
+        self.until("its rows", |folder| count(&folder.join("results/history.csv")) > rows);
+    }
+
+    /// The processes that this one started, by their numbers.
+    fn children(&self) -> Vec<u32> {
+        let id = self.child.0.id();
+        let path = format!("/proc/{id}/task/{id}/children");
+        fs::read_to_string(path)
+            .unwrap_or_default()
+            .split_whitespace()
+            .map(|id| id.parse().expect("a number"))
+            .collect()
+    }
+
+    fn signal(&self, name: &str) {
+        signal(self.child.0.id(), name);
+    }
+
+    fn said(&self) -> String {
+        ["out", "err"].map(|name| fs::read_to_string(self.scratch.path().join(name)).unwrap_or_default()).concat()
+    }
+
+    /// Its exit status, which must come soon, and its folder.
+    fn end(mut self) -> (ExitStatus, TempDir, String) {
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.child.0.try_wait().expect("a child") {
+                let said = self.said();
+                return (status, self.scratch, said);
+            }
+            if began.elapsed() > Duration::from_secs(60) {
+                let _ = self.child.0.kill();
+                panic!("it does not end\n{}", self.said());
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+fn signal(id: u32, name: &str) {
+    let sent = Command::new("kill").args(["-s", name, &id.to_string()]).status().expect("kill");
+    assert!(sent.success(), "no process {id} to send {name} to");
+}
+
+fn report(folder: &Path) -> Value {
+    serde_json::from_slice(&fs::read(folder.join("report.json")).expect("a report")).expect("JSON")
+}
+
+fn words<'a>(scene: &'a Path, args: &[&'a str]) -> Vec<&'a str> {
+    [&["solve", scene.to_str().expect("a path")], args].concat()
+}
+
+/// Goes on in the same folder.
+fn restart(scratch: &TempDir, ranks: usize, scene: &Path, args: &[&str]) -> Run {
+    let from = scratch.path().join("results").display().to_string();
+    solve_on(ranks, scene, &[args, &["--restart", &from]].concat())
+}
+
+/// Iterates are numbered through, without a gap or a repetition.
+fn numbered(run: &Run, first: usize) {
+    let numbers = run.history().counts("iteration");
+    assert!(numbers.iter().copied().eq(first..first + numbers.len()), "{numbers:?}");
+    assert_eq!(run.count("iterations"), numbers[numbers.len() - 1]);
+}
+
+#[test]
+fn a_signal_ends_a_run_with_its_results() {
+    let scene = case("groove");
+    for (name, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+        let mut run = Working::start(&words(&scene, &ENDLESS), 1);
+        run.until_rows(5);
+        run.signal(name);
+        let (status, scratch, said) = run.end();
+        assert_eq!(status.code(), Some(code), "{said}");
+        let folder = scratch.path().join("results");
+        let report = report(&folder);
+        assert_eq!(report["status"], "interrupted");
+        assert!(report["message"].as_str().is_some_and(|text| text.contains(&format!("SIG{name}"))), "{report}");
+        let rows = fs::read_to_string(folder.join("history.csv")).expect("a history").lines().count() - 1;
+        assert_eq!(report["iterations"], rows - 1);
+        // the tables are those of the last row: a run that may make as many iterations has the same
+        let limit = format!("method.stop={{residual=1e-12,iterations={}}}", rows - 1);
+        let same = solve(&scene, &["--set", "method.gamma=1e-6", "--set", &limit]);
+        assert_eq!(same.report["status"], "iteration-limit");
+        let table = |folder: &Path| fs::read_to_string(folder.join("contact-lower-upper.csv")).expect("a table");
+        assert_eq!(table(&folder), table(&same.folder));
+        assert_eq!(report["residual"], same.report["residual"]);
+        assert_eq!(report["files"], same.report["files"]);
+    }
+}
+
+#[test]
+fn a_snapshot_is_written_and_the_run_goes_on() {
+    let mut run = Working::start(&words(&case("groove"), &ENDLESS), 1);
+    run.until_rows(3);
+    let mut reached = 0;
+    for _ in 0..2 {
+        let path = run.results().join("report.json");
+        let _ = fs::remove_file(&path);
+        run.signal("USR1");
+        // the report is written before what is larger, and again behind it
+        let files = || serde_json::from_slice::<Value>(&fs::read(&path).unwrap_or_default()).unwrap_or_default();
+        run.until("the snapshot", |_| files()["files"].as_array().is_some_and(|files| files.len() >= 6));
+        run.until_rows(reached + 3);
+        let report = report(&run.results());
+        assert_eq!(report["status"], "running");
+        let now = report["iterations"].as_u64().expect("a number") as usize;
+        assert!(now > reached);
+        reached = now;
+        // a second one has no names of its own
+        assert_eq!(report["files"].as_array().map(Vec::len), Some(6), "{}", report["files"]);
+    }
+    run.signal("TERM");
+    let (status, scratch, said) = run.end();
+    assert_eq!(status.code(), Some(143), "{said}");
+    let report = report(&scratch.path().join("results"));
+    assert!(report["iterations"].as_u64().is_some_and(|now| now as usize > reached));
+}
+
+/// A run that pauses at each iterate takes the same steps, to the last digit, also where the laws have a barrier meanwhile.
+#[test]
+fn pauses_change_nothing() {
+    let sets = [
+        "mesh.set.n=7",
+        "body.0.order=2",
+        "body.1.order=2",
+        "method={name=\"newton\", start={normal=3e-4}}",
+        "contact.0.layer={linear={stiffness=1e9}}",
+    ];
+    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let whole = solve(case("groove"), &args);
+    let paused = solve(case("groove"), &[&args[..], &["--checkpoint", "1e-9"]].concat());
+    let table = |run: &Run| fs::read_to_string(run.folder.join("contact-lower-upper.csv")).expect("a table");
+    assert_eq!(table(&paused), table(&whole));
+    for name in ["status", "iterations", "residual", "F1"] {
+        assert_eq!(paused.report[name], whole.report[name], "{name}");
+    }
+}
+
+/// A solve that never ends hears one signal, and ends by the second.
+#[test]
+fn a_second_signal_ends_at_once() {
+    let stuck = ["-ksp_type", "richardson", "-pc_type", "none", "-ksp_rtol", "1e-14", "-ksp_max_it", "2000000000"];
+    let scene = case("groove");
+    let args = [&ENDLESS[..], &["-ksp_richardson_scale", "1e-12"], &stuck].concat();
+    let mut run = Working::start(&words(&scene, &args), 1);
+    // the extension of the start is the first solve; the table of rows is there before it
+    run.until("the history", |folder| folder.join("results/history.csv").exists());
+    std::thread::sleep(Duration::from_millis(300));
+    run.signal("INT");
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(run.child.0.try_wait().expect("a child").is_none(), "the first signal waits for the step\n{}", run.said());
+    run.signal("TERM");
+    let (status, scratch, said) = run.end();
+    assert_eq!(status.code(), Some(143), "{said}");
+    assert!(!scratch.path().join("results/report.json").exists());
+}
+
+/// A run that was stopped anywhere ends as if nothing had happened: sweeps to the last digit, Newton's method to rounding.
+#[test]
+fn a_killed_run_goes_on_to_the_same_end() {
+    let (groove, held) = (case("groove"), case("groove-held"));
+    let newton = ["--method", "newton", "--set", "mesh.set.n=8", "--set", "method.stop={residual=1e-10}"];
+    let steps = [&newton[..], &["--set", "method.steps=40"]].concat();
+    let swept = [&SHORT[..], &["--set", "method.steps=[0.5,1]"]].concat();
+    let cases: [(&Path, &[&str], usize, f64); 4] =
+        [(&groove, &SHORT, 0, 0.0), (&groove, &swept, 0, 0.0), (&held, &steps, 1, 1e-9), (&held, &newton, 1, 1e-9)];
+    for (scene, args, first, most) in cases {
+        let whole = solve(scene, args).converged();
+        let rows = whole.history().rows();
+        let mut run = Working::start(&words(scene, &[args, &["--checkpoint", "1e-9"]].concat()), 1);
+        run.until_rows(rows / 2);
+        // it may have come to its end meanwhile, and has no checkpoint then
+        let _ = run.child.0.kill();
+        let (_, scratch, _) = run.end();
+        if !scratch.path().join("results/checkpoint").exists() {
+            assert_eq!(report(&scratch.path().join("results"))["status"], "converged");
+            continue;
+        }
+        // not a row that was seen in the table is lost
+        let again = restart(&scratch, 1, scene, args).converged();
+        assert_eq!(again.count("iterations"), whole.count("iterations"), "{args:?}");
+        let (ours, theirs) = (again.contact(), whole.contact());
+        assert!(distance(&ours["pressure"], &theirs["pressure"]) <= most, "{args:?}");
+        assert_eq!(again.history().rows(), rows, "{args:?}");
+        if !args.iter().any(|arg| arg.contains("steps")) {
+            numbered(&again, first);
+        }
+        let steps = |run: &Run| run.report["steps"].as_array().expect("a list").len();
+        assert_eq!(steps(&again), steps(&whole));
+    }
+}
+
+/// A rank that is killed at any moment ends the others within seconds.
+#[test]
+fn a_killed_rank_ends_all() {
+    let (scene, sets) = (case("groove3d"), ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=10"]);
+    let mut killed = 0;
+    for wait in [30, 200, 500] {
+        let mut run = Working::start(&words(&scene, &sets), 3);
+        run.until("its ranks", |_| true);
+        std::thread::sleep(Duration::from_millis(wait));
+        let Some(&rank) = run.children().last() else { continue };
+        // it may have come to its end meanwhile
+        if !Command::new("kill").args(["-s", "KILL", &rank.to_string()]).status().expect("kill").success() {
+            continue;
+        }
+        let began = Instant::now();
+        let (status, _, said) = run.end();
+        assert!(!status.success() && began.elapsed() < Duration::from_secs(5), "{wait}: {said}");
+        killed += 1;
+    }
+    assert!(killed > 0);
+}
+
+/// Less and less memory: a run that does not get what it wants says so, with its code, and never hangs.
+#[test]
+fn memory_ends_with_a_message() {
+    let scene = case("patch-3d");
+    // makes the mesh, which Gmsh cannot with so little
+    let mut command = Command::new(crate::common::WINKLER);
+    environment(&mut command);
+    command.arg("check").arg(&scene).args(["--set", "mesh.set={nl=24,nu=24}"]);
+    assert!(output(command, Duration::from_secs(60)).0.success());
+    let mut told = 0;
+    for megabytes in (60..400).step_by(20) {
+        let mut command = Command::new("sh");
+        environment(&mut command);
+        let line = format!("ulimit -v {megabytes}000; exec \"$@\"");
+        command.args(["-c", &line, "sh", crate::common::WINKLER, "check"]).arg(&scene);
+        command.args(["--set", "mesh.set={nl=24,nu=24}"]).env("OPENBLAS_NUM_THREADS", "1");
+        let (status, _, said) = output(command, Duration::from_secs(60));
+        if said.contains("out of memory") {
+            assert!(status.code() == Some(5) && said.matches("error:").count() == 1, "{megabytes}: {said}");
+            told += 1;
+        } else if told > 0 {
+            assert!(status.success(), "{megabytes}: {said}");
+            break;
+        }
+    }
+    assert!(told > 0);
+}
+
+/// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper
+/// block is carried by its supports as one.
+#[test]
+fn an_interrupted_load_step_has_its_share_of_the_loads() {
+    let geo = root().join("meshes/stack/stack.geo").display().to_string();
+    let scene = |share: f64| {
+        let block = |name: &str, fix: &str| {
+            format!(
+                "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0.3\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
+            )
+        };
+        Scene::new(format!(
+            "dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}\
+             load = [{{ on = \"b1_right\", pressure = {} }}]\n{}[[contact]]\nbetween = [\"b1_top\", \"b2_bottom\"]\n\
+             gap = 0.002\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
+            block("b1", "{ on = \"b1_bottom\", y = 0 }"),
+            0.3 * share,
+            block("b2", &format!("{{ on = \"b2_top\", y = {} }}", -0.02 * share))
+        ))
+    };
+    let method =
+        |steps: &str, most: usize| format!("method={{gamma=1e-6, {steps} stop={{residual=1e-15, iterations={most}}}}}");
+    for solver in ["solver=condensed", "solver=mumps"] {
+        let (whole, endless) = (scene(1.0), method("steps=[0.5, 1],", 100_000_000));
+        let mut run = Working::start(&words(&whole.path, &["--set", &endless, "--set", solver]), 1);
+        run.until_rows(5);
+        run.signal("TERM");
+        let (status, scratch, said) = run.end();
+        assert_eq!(status.code(), Some(143), "{said}");
+        let folder = scratch.path().join("results");
+        let report = report(&folder);
+        let most = report["iterations"].as_u64().expect("a number") as usize;
+        let half = solve(scene(0.5), &["--set", &method("", most), "--set", solver]);
+        let table = |folder: &Path| -> Vec<f64> {
+            let text = fs::read_to_string(folder.join("contact-b1-b2.csv")).expect("a table");
+            text.lines().skip(1).flat_map(|line| line.split(',')).map(|word| word.parse().expect("a number")).collect()
+        };
+        let (ours, theirs) = (table(&folder), table(&half.folder));
+        assert!(
+            ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-9 * y.abs().max(1e-3)),
+            "{ours:?}\n{theirs:?}"
+        );
+        let balance = |report: &Value, body: usize| report["bodies"][body]["balance"].to_string();
+        for body in 0..2 {
+            let stress = |report: &Value| report["bodies"][body]["max_von_mises"].as_f64().expect("a number");
+            assert!((stress(&report) / stress(&half.report) - 1.0).abs() < 1e-9, "{report}");
+            for (part, at) in [("loads", ""), ("contacts", ""), ("supports", "/0"), ("supports", "/1")] {
+                for c in 0..2 {
+                    let of = |report: &Value| {
+                        let path = format!("/bodies/{body}/balance/{part}{at}/force/{c}");
+                        report.pointer(&path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {path}"))
+                    };
+                    let (x, y) = (of(&report), of(&half.report));
+                    assert!(
+                        (x - y).abs() < 1e-9,
+                        "{x} {y}\n{}\n{}",
+                        balance(&report, body),
+                        balance(&half.report, body)
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// An interrupted run has a checkpoint, which any number of ranks can take; one that is solved has none left.
+#[test]
+fn an_interrupted_run_goes_on_with_other_ranks() {
+    let scene = case("groove");
+    for (ranks, then) in [(1, 2), (2, 1)] {
+        let slow = [&["--set", "method.gamma=1e-4"], &SHORT[4..], &ENDLESS[2..]].concat();
+        let mut run = Working::start(&words(&scene, &slow), ranks);
+        run.until_rows(5);
+        // any rank may hear it
+        let heard = if ranks > 1 { *run.children().last().expect("a rank") } else { run.child.0.id() };
+        signal(heard, "TERM");
+        let (status, scratch, said) = run.end();
+        assert_eq!(status.code(), Some(143), "{said}");
+        let stopped = report(&scratch.path().join("results"));
+        assert_eq!(
+            (&stopped["status"], &stopped["ranks"]),
+            (&Value::from("interrupted"), &Value::from(ranks)),
+            "{said}"
+        );
+        let done = stopped["iterations"].as_u64().expect("a number") as usize;
+        let limit = format!("method.stop={{residual=1e-12,iterations={}}}", done + 20);
+        let args = ["--set", "method.gamma=1e-4", "--set", "mesh.set.n=8", "--set", &limit];
+        let (again, whole) = (restart(&scratch, then, &scene, &args), solve(&scene, &args));
+        assert_eq!([again.count("iterations"), again.count("ranks")], [done + 20, then]);
+        numbered(&again, 0);
+        assert_eq!(again.contact()["pressure"], whole.contact()["pressure"]);
+        // bodies that are not condensed have other states: their traces are extended
+        let other = [&args[..], &["-ksp_type", "preonly", "-pc_type", "cholesky"]].concat();
+        let again = restart(&scratch, 1, &scene, &other);
+        assert!(again.solvers().iter().all(|solver| solver.contains("cholesky")), "{}", again.said());
+        assert_eq!(again.count("iterations"), done + 20);
+        assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-9);
+    }
+}
+
+/// A run that ends in a later direction of its loads goes on there, with the rows of all steps before.
+#[test]
+fn a_history_goes_on_in_its_step() {
+    let text = text_of("groove")
+        .replace("on = \"lower_face\", pressure = 10", "on = \"lower_face\", pressure = 10, path = \"low\"");
+    assert!(text.contains("path"));
+    let scene = Scene::new(text.split_once("[method]").expect("a method").0);
+    fs::write(scene.path.with_file_name("path.csv"), "low,factor\n0,0\n1,1\n0.5,1\n1,0.5\n").expect("a table");
+    let method = |most: usize| {
+        let stop = format!("stop={{residual=1e-12,iterations={most}}}");
+        format!("method={{name=\"robin\",gamma=1e-4,steps={{table=\"path.csv\"}},{stop}}}")
+    };
+    let endless = ["--set", &method(100_000_000), "--set", "mesh.set.n=8"];
+    let mut run = Working::start(&words(&scene.path, &endless), 1);
+    run.until_rows(8);
+    run.signal("TERM");
+    let (status, scratch, said) = run.end();
+    assert_eq!(status.code(), Some(143), "{said}");
+    let stopped = report(&scratch.path().join("results"));
+    let rows = |folder: &Path| -> Vec<String> {
+        let text = fs::read_to_string(folder.join("steps.csv")).expect("a table of steps");
+        text.lines().map(str::to_owned).collect()
+    };
+    let before = rows(&scratch.path().join("results"));
+    assert_eq!([stopped["steps"].as_array().map(Vec::len), Some(before.len())], [Some(2), Some(3)], "{stopped}");
+    assert!(before[2].contains("interrupted"), "{before:?}");
+    let done = stopped["iterations"].as_u64().expect("a number") as usize;
+    let limited = ["--set", &method(done + 3), "--set", "mesh.set.n=8"];
+    let (again, whole) = (restart(&scratch, 2, &scene.path, &limited), solve(&scene, &limited));
+    let (ours, theirs) = (rows(&again.folder), rows(&whole.folder));
+    assert_eq!((ours.len(), &ours[1]), (5, &before[1]));
+    assert!(ours[2..].iter().all(|row| row.contains("iteration-limit")), "{ours:?}");
+    for (ours, theirs) in ours[1..].iter().zip(&theirs[1..]) {
+        let numbers = |row: &str| row.split(',').filter_map(|word| word.parse::<f64>().ok()).collect::<Vec<_>>();
+        let (ours, theirs) = (numbers(ours), numbers(theirs));
+        assert!(ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-8), "{ours:?}\n{theirs:?}");
+    }
+    assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-8);
+}
+
+#[test]
+fn a_checkpoint_of_something_else_is_refused() {
+    let scene = case("groove");
+    let mut run = Working::start(&words(&scene, &[&SHORT[4..], &ENDLESS].concat()), 1);
+    run.until_rows(2);
+    run.signal("INT");
+    let (_, scratch, _) = run.end();
+    let refused = |run: Run, code: i32, words: &str| {
+        assert_eq!(run.code, code, "{}", run.said());
+        assert!(run.stderr.contains(words), "{}", run.said());
+        assert!(run.report.is_null());
+    };
+    let args = |gamma: &'static str, n: &'static str| ["--set", gamma, "--set", n];
+    refused(restart(&scratch, 1, &scene, &args("method.gamma=0.5", "mesh.set.n=8")), 3, "another scene");
+    refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=9")), 3, "another scene");
+    // another mesh by the same settings
+    let geo = fs::read_to_string(root().join("meshes/groove/groove.geo")).expect("a script");
+    fs::write(scratch.path().join("groove.geo"), geo.replace("length = 4", "length = 5")).expect("a file");
+    let moved = text_of("groove")
+        .replace(&root().join("meshes/groove").display().to_string(), &scratch.path().display().to_string());
+    refused(
+        restart(&scratch, 1, &Scene::new(moved).path, &args("method.gamma=1e-6", "mesh.set.n=8")),
+        3,
+        "another mesh",
+    );
+    let file = scratch.path().join("results/checkpoint");
+    let mut bytes = fs::read(&file).expect("a checkpoint");
+    let before = [b"winkler checkpoint 3", &bytes[20..]].concat();
+    fs::write(&file, before).expect("a file");
+    refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "another version");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&file, &bytes).expect("a file");
+    refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "is damaged");
+    fs::remove_file(&file).expect("a file");
+    refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "cannot read");
+}
+
+/// Meshes with as many nodes, cells and contact points, and data of the same name, are others: whatever differs between them is refused, on any
+/// number of ranks, and what is the same goes on, wherever it lies.
+#[test]
+fn a_checkpoint_of_a_mesh_or_data_of_equal_counts_is_refused() {
+    let made = winkler(&["mesh", case("groove").to_str().expect("a path"), "--set", "mesh.set.n=8", "-o", "a.msh"]);
+    assert_eq!(made.code, 0, "{}", made.said());
+    let folder = TempDir::new().expect("a folder");
+    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).expect("a file");
+    let mesh = fs::read(made.folder.join("a.msh")).expect("a mesh");
+    let data = |most: &str| format!("0,0\n8,{most}\n");
+    let text = text_of("groove");
+    let line = |key: &str| text.lines().find(|line| line.starts_with(key)).expect(key).to_owned();
+    let text = text.replace(&line("mesh ="), "mesh = \"a.msh\"").replace(&line("gap ="), "gap = \"rough(x)\"");
+    let scene = folder.path().join("scene.toml");
+    write("a.msh", &mesh);
+    write("rough.csv", data("1e-4").as_bytes());
+    write("scene.toml", (text + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n").as_bytes());
+    let mut run = Working::start(&words(&scene, &ENDLESS), 1);
+    run.until_rows(2);
+    run.signal("INT");
+    let (_, scratch, said) = run.end();
+    let done = report(&scratch.path().join("results"))["iterations"].as_u64().expect(&said);
+    let limit = format!("method.stop={{residual=1e-12,iterations={}}}", done + 2);
+    let again = |ranks: usize| restart(&scratch, ranks, &scene, &["--set", "method.gamma=1e-6", "--set", &limit]);
+    let refused = |what: &str| {
+        for ranks in [1, 2] {
+            let run = again(ranks);
+            assert!(run.code == 3 && run.stderr.contains(&format!("is of another {what}")), "{}", run.said());
+        }
+    };
+    write("rough.csv", data("2e-4").as_bytes());
+    refused("scene");
+    write("rough.csv", data("1e-4").as_bytes());
+    // one coordinate of a node inside a body
+    let moved = moved_inside(&folder.path().join("a.msh"), &mesh);
+    write("a.msh", &moved);
+    refused("mesh");
+    write("a.msh", &mesh);
+    for ranks in [1, 2] {
+        assert_eq!(again(ranks).count("iterations"), done as usize + 2);
+    }
+}
+
+/// The mesh, in which numbers have eight bytes, with a node inside a body a little aside.
+fn moved_inside(path: &Path, bytes: &[u8]) -> Vec<u8> {
+    let mesh = winkler::mesh::parse::<2>(path, bytes, winkler::mesh::Maker::User).expect("a mesh");
+    let on_surfaces: Vec<u32> =
+        mesh.groups.iter().filter(|group| group.dimension < 2).flat_map(|group| group.connectivity.clone()).collect();
+    let inside = |point: &usize| {
+        let [x, y] = mesh.points[*point];
+        !on_surfaces.contains(&(*point as u32)) && (1.0..3.0).contains(&x) && (0.3..0.7).contains(&y)
+    };
+    let [x, y] = mesh.points[(0..mesh.points.len()).find(inside).expect("a node inside")];
+    let place = [x.to_le_bytes(), y.to_le_bytes()].concat();
+    let at = bytes.windows(16).position(|window| window == place).expect("its coordinates");
+    let mut moved = bytes.to_vec();
+    moved[at..at + 8].copy_from_slice(&(x + 1e-3).to_le_bytes());
+    moved
+}
+
+/// A script that sleeps: while Gmsh works a signal ends it, and nothing is left in the cache.
+#[test]
+fn a_signal_ends_gmsh() {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let geo = fs::read_to_string(root().join("meshes/groove/groove.geo")).expect("a script");
+    let (script, cache) = (scratch.path().join("slow.geo"), scratch.path().join("cache"));
+    fs::write(&script, geo + "\nSleep 60;\n").expect("a file");
+    let scene = scratch.path().join("scene.toml");
+    let text = text_of("groove")
+        .replace(&root().join("meshes/groove/groove.geo").display().to_string(), &script.display().to_string());
+    fs::write(&scene, text).expect("a file");
+    let path = scene.display().to_string();
+    let mut run = Working::start_in(scratch, &["solve", &path], 1, &[("WINKLER_CACHE", &cache)]);
+    // the first thing that Gmsh's own folder has
+    let said = |folder: &Path| {
+        fs::read_dir(folder.join("cache"))
+            .is_ok_and(|mut all| all.any(|one| one.is_ok_and(|one| one.path().join("said").exists())))
+    };
+    run.until("Gmsh", said);
+    while run.children().is_empty() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let gmsh = run.children()[0];
+    run.signal("TERM");
+    let began = Instant::now();
+    let (status, scratch, text) = run.end();
+    assert_eq!(status.code(), Some(143), "{text}");
+    assert!(began.elapsed() < Duration::from_secs(30), "it waited for Gmsh");
+    assert!(text.contains("SIGTERM"), "{text}");
+    assert!(!Path::new(&format!("/proc/{gmsh}")).exists(), "Gmsh goes on");
+    let left = |name: &str| fs::read_dir(scratch.path().join(name)).expect("a folder").count();
+    assert_eq!([left("cache"), left("results")], [0, 0]);
+}
+
+#[test]
+fn a_sweep_that_is_ended_has_its_rows() {
+    let path = case("groove").display().to_string();
+    let stop = "method.stop={residual=1e-9,iterations=100000000}";
+    let over = ["sweep", &path, "--set", "mesh.set.n=8", "--set", stop, "--over", "method.gamma=0.6,1e-7,0.5"];
+    let mut run = Working::start(&over, 1);
+    let rows =
+        |folder: &Path| fs::read_to_string(folder.join("results/sweep.csv")).map_or(0, |text| text.lines().count());
+    run.until("the first run", |folder| rows(folder) == 2);
+    std::thread::sleep(Duration::from_millis(200));
+    run.signal("HUP");
+    let (status, scratch, said) = run.end();
+    assert_eq!(status.code(), Some(129), "{said}");
+    let text = fs::read_to_string(scratch.path().join("results/sweep.csv")).expect("a table");
+    let lines: Vec<&str> = text.lines().skip(1).collect();
+    assert_eq!(lines.len(), 2, "{text}");
+    assert!(lines[0].starts_with("0.6,converged") && lines[1].starts_with("1e-7,interrupted"), "{text}");
+    assert!(scratch.path().join("results/pressure.svg").exists());
+}
+
+/// Files may have 40 kB: what is small is written, and the code tells of what is not.
+#[test]
+fn a_full_disk_takes_fields_and_not_results() {
+    let limited = |blocks: usize, scene: &Path, args: &[&str], cache: Option<&Path>| {
+        let folder = TempDir::new().expect("a temporary folder");
+        let mut command = Command::new("sh");
+        let script = format!("ulimit -f {blocks}; exec \"$@\"");
+        command.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_winkler"), "solve"]).arg(scene);
+        command.arg("-o").arg(folder.path()).args(args).current_dir(folder.path());
+        environment(&mut command);
+        command.envs(cache.map(|cache| ("WINKLER_CACHE", cache)));
+        let (status, stdout, stderr) = output(command, Duration::from_secs(60));
+        (status.code(), folder, stdout, stderr)
+    };
+    // its mesh is in the cache then; a block of `ulimit` has 512 or 1024 bytes
+    solve(case("groove"), &[]).converged();
+    let (code, folder, stdout, stderr) = limited(60, &case("groove"), &["--vtu", "--json"], None);
+    assert_eq!(code, Some(6), "{stderr}");
+    assert!(stderr.contains("lower.vtu"), "{stderr}");
+    let report = report(folder.path());
+    assert_eq!(report["status"], "converged");
+    assert_eq!(serde_json::from_str::<Value>(&stdout).expect("JSON")["status"], "converged");
+    assert!(folder.path().join("contact-lower-upper.csv").exists() && folder.path().join("pressure.svg").exists());
+    let cache = TempDir::new().expect("a temporary folder");
+    let (code, _, _, stderr) = limited(20, &case("groove"), &[], Some(cache.path()));
+    assert_eq!(code, Some(6), "{stderr}");
+    assert!(stderr.contains(&cache.path().display().to_string()) && stderr.contains("ulimit"), "{stderr}");
+    assert_eq!(fs::read_dir(cache.path()).expect("a folder").count(), 0);
+}
+
+#[test]
+fn a_standard_output_that_takes_nothing_is_told_of() {
+    let path = case("groove").display().to_string();
+    for args in [&["solve", &path, "--json"][..], &["check", &path], &["mesh", &path, "--json"], &["--help"]] {
+        let folder = TempDir::new().expect("a temporary folder");
+        let mut command = Command::new("sh");
+        command.args(["-c", "exec \"$@\" > /dev/full", "sh", env!("CARGO_BIN_EXE_winkler")]).args(args);
+        environment(&mut command);
+        let (status, _, stderr) = output(
+            {
+                command.current_dir(folder.path());
+                command
+            },
+            Duration::from_secs(60),
+        );
+        assert_eq!(status.code(), Some(6), "{args:?} {stderr}");
+        assert!(stderr.contains("standard output"), "{stderr}");
+        // what could be written is there
+        assert_eq!(folder.path().join("results/groove/report.json").exists(), args[0] == "solve");
+    }
+}
+
+#[test]
+fn devices_and_pipes_are_no_input() {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let pipe = scratch.path().join("pipe.msh");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    let name = pipe.display().to_string();
+    let refused = |run: &Run, code: i32, words: [&str; 2]| {
+        assert_eq!(run.code, code, "{}", run.said());
+        assert!(words.iter().all(|word| run.stderr.contains(word)), "{}", run.said());
+    };
+    refused(&solve("/dev/zero", &[]), 6, ["/dev/zero", "a device"]);
+    refused(&solve(&pipe, &[]), 6, [&name, "a pipe"]);
+    refused(&solve(case("groove"), &["--set", &format!("mesh=\"{name}\"")]), 3, [&name, "not a file"]);
+    refused(&solve(case("groove"), &["-options_file", &name]), 6, [&name, "a pipe"]);
+    let bench = crate::common::winkler(&["bench", &case("groove").display().to_string(), "--against", &name]);
+    refused(&bench, 6, [&name, "a pipe"]);
+}
