@@ -71,7 +71,13 @@ impl Report {
         ))
     }
 
-    /// Return a line per body on its balance, or one line for many bodies; none before the first iterate.
+    /// Return the words on the largest displacement and von Mises stress of all bodies, empty where none is known.
+    fn largest_fields(&self) -> String {
+        let most = |field: fn(&BodyReport) -> Option<f64>| self.bodies.iter().filter_map(field).reduce(f64::max);
+        largest(most(|body| body.max_displacement), most(|body| body.max_von_mises), "")
+    }
+
+    /// Return a line per body on its extreme fields and its balance, or one line for many bodies; none before the first iterate.
     fn balance_lines(&self) -> Vec<String> {
         if self.residual.is_none() {
             return Vec::new();
@@ -85,12 +91,19 @@ impl Report {
                 .map_or(String::new(), |(most, name)| format!("{} (`{name}`)", sci(most, 1)))
         };
         vec![format!(
-            "  {} bodies: imbalance at most {} of forces, {} of moments",
+            "  {} bodies: {}imbalance at most {} of forces, {} of moments",
             self.bodies.len(),
+            self.largest_fields(),
             worst(|balance| balance.force_imbalance),
             worst(|balance| balance.moment_imbalance)
         )]
     }
+}
+
+/// Return the words on the largest displacement and von Mises stress, followed by a semicolon; empty where a field is not known.
+fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str) -> String {
+    let (Some(displacement), Some(von_mises)) = (displacement, von_mises) else { return String::new() };
+    format!("displacement up to {}, von Mises stress up to {}{place}; ", sci(displacement, 3), readable(von_mises, 6))
 }
 
 /// Return the line of a load step; `number` counts from 1.
@@ -120,11 +133,11 @@ fn pair_line(pair: &PairReport) -> String {
     if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
         return format!("{names}: no contact");
     }
-    let [x, y, z] = pair.peak_at.map(|x| readable(x, 4));
     format!(
-        "{names}: force {}, peak pressure {} at ({x}, {y}, {z}), contact {}, open {}",
+        "{names}: force {}, peak pressure {} at {}, contact {}, open {}",
         vector(pair.force[0]),
         readable(pair.peak_pressure, 6),
+        point(pair.peak_at),
         readable(pair.extent.contact(), 6),
         readable(pair.extent.open(), 6)
     )
@@ -138,8 +151,10 @@ fn balance_line(body: &BodyReport) -> String {
         if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
     };
     let reactions = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
+    let place = body.max_von_mises_at.map_or(String::new(), |x| format!(" at {}", point(x)));
+    let fields = largest(body.max_displacement, body.max_von_mises, &place);
     format!(
-        "  {}: {reactions}imbalance {} of forces, {} of moments",
+        "  {}: {fields}{reactions}imbalance {} of forces, {} of moments",
         body.name,
         sci(*force_imbalance, 1),
         sci(*moment_imbalance, 1)
@@ -153,6 +168,11 @@ pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
         lines.push(format!("  and {} more warnings: {others} has all", warnings.len() - LISTED));
     }
     lines
+}
+
+/// Format the coordinates of a point.
+fn point(x: [f64; 3]) -> String {
+    format!("({})", x.map(|x| readable(x, 4)).join(", "))
 }
 
 /// Format a vector.

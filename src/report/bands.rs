@@ -12,6 +12,8 @@ use std::fmt::Write;
 pub const BANDS: usize = 12;
 /// Width of a picture, and its largest height, in pixels.
 const SIZE: [f64; 2] = [760.0, 620.0];
+/// Colour of surfaces without pressure.
+const OPEN: &str = "#b8b8b8";
 /// Steps of the integer coordinates per pixel, so that pictures can be enlarged.
 const FINE: f64 = 50.0;
 
@@ -95,12 +97,13 @@ impl Canvas {
 
     /// Return the SVG picture of bodies with title and legend. For `scale` and `alone` see [`svg`].
     pub fn draw(&self, bodies: Vec<Shape>, title: &str, scale: f64, alone: bool) -> Result<String, minijinja::Error> {
+        let is_open = bodies.iter().flat_map(|body| &body.pieces).any(|piece| piece.fill == OPEN);
         let [width, height] = [0, 1].map(|k| (self.high[k] - self.low[k]) / self.pixel);
         super::words::environment().render_named_str(
             "bands.svg.html",
             include_str!("bands.svg"),
             context! {
-                bodies, title, alone, scale, width, height, fine => FINE, colors => colors().to_vec(),
+                bodies, title, alone, scale, width, height, is_open, fine => FINE, colors => colors().to_vec(),
                 levels => (0..=BANDS).map(|band| self.level(band)).collect::<Vec<_>>(),
             },
         )
@@ -145,7 +148,7 @@ pub fn pressure(surface: &Part, axes: [usize; 2], title: &str, alone: bool) -> R
     let places: Vec<[f64; 2]> = flat.iter().map(|x| canvas.place(x)).collect();
     let region = |level: f64| path(&surface.triangles, &places, &pressures, level);
     let outline = region(f64::NEG_INFINITY);
-    let mut pieces = vec![Piece { fill: "#b8b8b8".to_owned(), path: outline.clone() }];
+    let mut pieces = vec![Piece { fill: OPEN.to_owned(), path: outline.clone() }];
     for (band, fill) in colors().into_iter().enumerate() {
         pieces.push(Piece { fill, path: region(canvas.level(band).max(1e-9 * most)) });
     }

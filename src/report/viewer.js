@@ -19,12 +19,15 @@
     }`, `#version 300 es
     precision highp float;
     in float shade; in vec3 place; out vec4 color;
-    uniform vec3 colors[12], toward; uniform float squares;
+    uniform vec3 colors[12], toward; uniform vec4 cut; uniform float squares;
     void main() {
+      if (dot(place, cut.xyz) > cut.w) discard;
       vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
       float light = 0.55 + 0.45 * abs(dot(normal, toward));
       int band = clamp(int((squares > 0.5 ? sqrt(max(shade, 0.0)) : shade) * 12.0), 0, 11);
-      vec3 paint = shade > 1.00001 ? vec3(0.72) : colors[band];
+      // beyond a section the inner side of the surface is seen, which is grey like points without a value
+      bool inner = cut.xyz != vec3(0.0) && !gl_FrontFacing;
+      vec3 paint = inner || shade > 1.00001 ? vec3(0.72) : colors[band];
       color = vec4(paint * light, 1.0);
     }`]);
   const part = (part, kind) => {
@@ -50,9 +53,15 @@
     const fits = aspect > 1 ? Math.max(up, right / aspect) : Math.max(right, up * aspect);
     Object.assign(eye, { turn, rise, zoom: 0.5 * size / fits || 1, right: 0, up: 0 });
   };
-  const what = figure.querySelector("select"), scale = figure.querySelector("input[type=range]");
-  const shown = figure.querySelector("output"), bar = figure.querySelector(".bar");
+  const [what, across] = figure.querySelectorAll("select"), [scale, depth] = figure.querySelectorAll("input[type=range]");
+  const shown = figure.querySelector("output"), bar = figure.querySelector(".bar"), open = figure.querySelector(".open");
   const factor = () => scale.value / 50 * data.scale;
+  // the plane of the section: what lies beyond it along x, y or z is not drawn
+  const section = () => {
+    const k = "xyz".indexOf(across.value);
+    const normal = [0, 1, 2].map(axis => axis === k ? 1 : 0);
+    return [...normal, k < 0 ? 1 : data.low[k] + depth.value / 100 * (data.high[k] - data.low[k])];
+  };
   const number = v => Number(v.toPrecision(3)).toString();
 
   let waiting = false;
@@ -71,7 +80,7 @@
     const flat = m4.ortho(eye.right - w, eye.right + w, eye.up - h, eye.up + h, -20 * size, 40 * size);
     gl.useProgram(program.program);
     const pressure = what.value === "pressure";
-    const lit = { view: m4.multiply(flat, m4.inverse(camera)), toward, colors, scale: factor(), travel: data.travel };
+    const lit = { view: m4.multiply(flat, m4.inverse(camera)), toward, colors, cut: section(), scale: factor(), travel: data.travel };
     for (const part of parts) {
       if (!part.shown || pressure !== (part.kind === "surface")) continue;
       twgl.setBuffersAndAttributes(gl, program, part.buffer);
@@ -89,6 +98,8 @@
       cell.textContent = k % 3 ? "" : number(low + (high - low) * share);
       return cell;
     }), "to " + number(high));
+    open.hidden = what.value !== "pressure";
+    depth.hidden = !across.value;
     redraw();
   }
 
@@ -116,8 +127,8 @@
   });
   canvas.addEventListener("wheel", e => { e.preventDefault(); eye.zoom *= Math.exp(-e.deltaY * 0.001); redraw(); }, { passive: false });
   canvas.addEventListener("contextmenu", e => e.preventDefault());
-  what.addEventListener("change", legend);
-  scale.addEventListener("input", redraw);
+  for (const choice of [what, across]) choice.addEventListener("change", legend);
+  for (const slider of [scale, depth]) slider.addEventListener("input", redraw);
   figure.querySelector("button").addEventListener("click", () => { reset(); redraw(); });
   for (const box of figure.querySelectorAll("input[type=checkbox]"))
     box.addEventListener("change", () => { parts[box.value].shown = box.checked; redraw(); });
