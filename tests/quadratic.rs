@@ -215,6 +215,7 @@ impl Two<'_> {
             "inp" => inp(&nodes, &groups, of),
             "unv" => unv(&nodes, &groups, of),
             "bdf" => bdf(&nodes, &groups, of),
+            "msh2" => msh2(&nodes, &groups, of),
             _ => msh(format, &nodes, &groups, of),
         }
     }
@@ -261,6 +262,26 @@ fn msh(format: &str, nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell)
         }
     }
     text + &format!("$EndNodes\n$Elements\n{count} {total} 1 {total}\n{blocks}$EndElements\n")
+}
+
+/// Format 2.2.
+fn msh2(nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell) -> Vec<usize>) -> String {
+    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n", groups.len());
+    for (tag, group) in (1..).zip(groups) {
+        let _ = writeln!(text, "{} {tag} \"{}\"", group.elements[0].2.shape.dimension(), group.name);
+    }
+    let _ = writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", nodes.len());
+    nodes.iter().for_each(|(number, x)| text += &format!("{number} {}\n", words(x, " ")));
+    let total: usize = groups.iter().map(|group| group.elements.len()).sum();
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{total}");
+    let mut next = 0;
+    for (tag, group) in (1..).zip(groups) {
+        for (_, _, cell) in &group.elements {
+            next += 1;
+            let _ = writeln!(text, "{next} {} 2 {tag} {tag} {}", cell.shape.kind("msh"), words(&of(group, cell), " "));
+        }
+    }
+    text + "$EndElements\n"
 }
 
 /// Abaqus: element sets, and surfaces by the numbers of faces.
@@ -362,7 +383,7 @@ fn written(two: &Two, format: &str, template: &str) -> Scene {
             }
         }
     }
-    let ending = if format == "full" { "msh" } else { format };
+    let ending = if ["full", "msh2"].contains(&format) { "msh" } else { format };
     let scene = Scene::new(format!("mesh = \"mesh.{ending}\"\n{text}"));
     fs::write(scene.path.with_file_name(format!("mesh.{ending}")), two.text(format)).expect("a mesh");
     scene
@@ -403,7 +424,7 @@ fn plane(body: usize, [a, b, _]: [f64; 3]) -> [f64; 3] {
 #[test]
 fn quadrangles_have_constant_pressure() {
     let two = Two { blocks: [Block::new(Quadrangle, &[2, 2]), Block::new(Quadrangle, &[3, 1])], place: &plane };
-    for format in ["msh", "full", "inp", "unv", "bdf"] {
+    for format in ["msh", "full", "msh2", "inp", "unv", "bdf"] {
         is_patch(&solve(patch(&two, format, 2), &[]).converged(), format, 1e-8);
     }
 }
@@ -411,7 +432,7 @@ fn quadrangles_have_constant_pressure() {
 #[test]
 fn hexahedra_and_prisms_have_constant_pressure() {
     let two = Two { blocks: [Block::new(Hexahedron, &[2, 2, 1]), Block::new(Prism, &[1, 2, 1])], place: &sheared };
-    for format in ["msh", "full", "inp", "unv", "bdf"] {
+    for format in ["msh", "full", "msh2", "inp", "unv", "bdf"] {
         is_patch(&solve(patch(&two, format, 2), &[]).converged(), format, 1e-8);
     }
     // Straight ones serve order 1.
@@ -423,18 +444,27 @@ fn hexahedra_and_prisms_have_constant_pressure() {
 #[test]
 fn pyramids_have_constant_pressure() {
     let two = Two { blocks: [Block::new(Pyramid, &[1, 2, 1]), Block::new(Hexahedron, &[2, 1, 1])], place: &sheared };
-    for format in ["msh", "full", "bdf"] {
+    for format in ["msh", "full", "msh2", "bdf"] {
         is_patch(&solve(patch(&two, format, 2), &[]).converged(), format, 1e-8);
     }
 }
 
 /// Two quarters of rings, the outer one pressed: radii 0.5, 1 and 1.6, contact pressure 8.985959 by Lamé.
 fn rings(two: &Two, format: &str) -> Scene {
-    let (c, axial) = if two.blocks[0].counts.len() == 2 { ("b", ["", ""]) } else {
-        ("c", [", { on = \"{lower:b0}\", z = 0 }, { on = \"{lower:b1}\", z = 0 }",
-               ", { on = \"{upper:b0}\", z = 0 }, { on = \"{upper:b1}\", z = 0 }"])
+    let (c, axial) = if two.blocks[0].counts.len() == 2 {
+        ("b", ["", ""])
+    } else {
+        (
+            "c",
+            [
+                ", { on = \"{lower:b0}\", z = 0 }, { on = \"{lower:b1}\", z = 0 }",
+                ", { on = \"{upper:b0}\", z = 0 }, { on = \"{upper:b1}\", z = 0 }",
+            ],
+        )
     };
-    let fix = |body: &str, more: &str| format!("fix = [{{ on = \"{{{body}:a0}}\", x = 0 }}, {{ on = \"{{{body}:a1}}\", y = 0 }}{more}]");
+    let fix = |body: &str, more: &str| {
+        format!("fix = [{{ on = \"{{{body}:a0}}\", x = 0 }}, {{ on = \"{{{body}:a1}}\", y = 0 }}{more}]")
+    };
     let text = format!(
         "dimension = {{dimension}}\n[[body]]\nname = \"{{lower}}\"\norder = 2\nyoung = 2.1e5\npoisson = 0.3\n{}\n\
          [[body]]\nname = \"{{upper}}\"\norder = 2\nyoung = 7e4\npoisson = 0.2\n{}\n\
@@ -468,7 +498,8 @@ fn rings_of_quadrangles_have_lames_pressure() {
         let [x, y] = polar(body, a, b);
         [x, y, 0.0]
     };
-    let two = |n: i32| Two { blocks: [Block::new(Quadrangle, &[n, n]), Block::new(Quadrangle, &[n + 1, n])], place: &place };
+    let two =
+        |n: i32| Two { blocks: [Block::new(Quadrangle, &[n, n]), Block::new(Quadrangle, &[n + 1, n])], place: &place };
     let coarse = ["msh", "full", "inp", "unv", "bdf"].map(|format| error(rings(&two(3), format), format));
     let fine = error(rings(&two(6), "msh"), "fine");
     println!("{coarse:?} {fine}");

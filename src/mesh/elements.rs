@@ -33,7 +33,7 @@ pub fn read<const D: usize>(
     cursor.size()?;
     cursor.end()?;
     let mut seen: usize = 0;
-    let (mut orders, mut in_parts, mut of_face) = (Orders::default(), 0, HashMap::new());
+    let (mut orders, mut in_parts, mut known) = (Orders::default(), 0, HashMap::new());
     let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
         let head = Head::read(cursor)?;
@@ -58,7 +58,7 @@ pub fn read<const D: usize>(
         let mut rest = count;
         while rest > 0 {
             let slice = Block { kind, split, count: rest.min(SLICE), name: &name };
-            let (connectivity, tags) = slice.read::<D>(cursor, nodes, &mut of_face)?;
+            let (connectivity, tags) = slice.read::<D>(cursor, nodes, &mut known)?;
             physical.extend((dimension, tag), kind.stride, &connectivity, &tags);
             rest -= slice.count;
         }
@@ -167,12 +167,12 @@ struct Block<'a> {
 
 impl Block<'_> {
     /// Read the elements. Return the connectivity, `stride` point numbers per simplex in our local order, and the tag of each
-    /// simplex. Cells are turned to positive volume. `of_face` has the nodes in the middle of divided faces.
+    /// simplex. Cells are turned to positive volume. `known` has the nodes in the middle of divided faces and hexahedra.
     fn read<const D: usize>(
         &self,
         cursor: &mut Cursor,
         nodes: &mut Nodes,
-        of_face: &mut HashMap<[u32; 4], u32>,
+        known: &mut HashMap<[u32; 4], u32>,
     ) -> Result<(Vec<u32>, Vec<u64>)> {
         let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = Vec::with_capacity(self.count * stride);
@@ -197,7 +197,7 @@ impl Block<'_> {
             let mut parts;
             let simplices = match self.split {
                 Some(split) => {
-                    parts = Middles { points: &mut nodes.points, of_face }.simplices(&split, &points);
+                    parts = Middles { points: &mut nodes.points, known }.simplices(&split, &points);
                     &mut parts[..]
                 }
                 None => {

@@ -8,14 +8,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// Cards of elements with optional mid-edge nodes, with the numbers of vertices and of all nodes.
-const CARDS: [(&str, usize, usize); 6] = [
-    ("CHEXA", 8, 20),
-    ("CPENTA", 6, 15),
-    ("CPYRAM", 5, 13),
-    ("CTETRA", 4, 10),
-    ("CQUAD8", 4, 8),
-    ("CTRIA6", 3, 6),
-];
+const CARDS: [(&str, usize, usize); 6] =
+    [("CHEXA", 8, 20), ("CPENTA", 6, 15), ("CPYRAM", 5, 13), ("CTETRA", 4, 10), ("CQUAD8", 4, 8), ("CTRIA6", 3, 6)];
 
 /// Return the bulk data with such cards in small fields, with all continuation fields.
 ///
@@ -96,7 +90,10 @@ fn element((name, vertices, all): (&'static str, usize, usize), lines: &[&str]) 
         }
         linear => {
             fields.truncate(2 + vertices);
-            [("CQUAD8", "CQUAD4"), ("CTRIA6", "CTRIA3")].into_iter().find(|(own, _)| *own == linear).map_or(linear, |(_, other)| other)
+            [("CQUAD8", "CQUAD4"), ("CTRIA6", "CTRIA3")]
+                .into_iter()
+                .find(|(own, _)| *own == linear)
+                .map_or(linear, |(_, other)| other)
         }
     };
     let card = Card { name, fields };
@@ -138,10 +135,16 @@ mod tests {
             format!("{first:<8}{}\n", fields.iter().map(|field| format!("{field:>16}")).collect::<String>())
         };
         let nodes: Vec<u32> = [7, 2].into_iter().chain(11..26).collect();
-        let rows: Vec<String> = (0..5).map(|k| wide(["CPENTA*", "*"][usize::from(k > 0)], &nodes[4 * k..17.min(4 * k + 4)])).collect();
+        let rows: Vec<String> =
+            (0..5).map(|k| wide(["CPENTA*", "*"][usize::from(k > 0)], &nodes[4 * k..17.min(4 * k + 4)])).collect();
         let small = |mark: &str| {
             let row = |fields: &[u32]| fields.iter().map(|field| format!("{field:<8}")).collect::<String>();
-            format!("CPENTA  {}{mark}\n{mark:<8}{}{mark}\n{mark:<8}{}\n", row(&nodes[..8]), row(&nodes[8..16]), row(&nodes[16..]))
+            format!(
+                "CPENTA  {}{mark}\n{mark:<8}{}{mark}\n{mark:<8}{}\n",
+                row(&nodes[..8]),
+                row(&nodes[8..16]),
+                row(&nodes[16..])
+            )
         };
         let expected = "CPENTA  7       2       11      12      13      14      15      16      +\n\
                         +       17      18      19      20      21      22      23      24      +\n\
@@ -159,7 +162,9 @@ mod tests {
 
     #[test]
     fn elements_have_all_mid_edge_nodes_or_none() {
-        assert!(made("$\nCTRIA6,1,1,1,2,3,4,,6\n").contains("a.bdf:2: CTRIA6: element 1 has some of its mid-edge nodes"));
+        assert!(
+            made("$\nCTRIA6,1,1,1,2,3,4,,6\n").contains("a.bdf:2: CTRIA6: element 1 has some of its mid-edge nodes")
+        );
         assert!(made("CTRIA6,1,1,1,2,3,4,x,6\n").contains("`x` is no number"));
         assert!(made("CTRIA6,1,1,1,2,3\n").starts_with("CTRIA3  1 "));
         assert!(made("CQUAD8,1,1,1,2,3,4,,\n,,,0.5\n").starts_with("CQUAD4  1 "));
