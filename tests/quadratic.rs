@@ -417,8 +417,9 @@ fn sheared(body: usize, [a, b, c]: [f64; 3]) -> [f64; 3] {
     [a + 0.3 * b * (1.0 - b), b, c + body as f64]
 }
 
+/// The unit square, the upper body above it, with curved edges inside.
 fn plane(body: usize, [a, b, _]: [f64; 3]) -> [f64; 3] {
-    [a + 0.3 * b * (1.0 - b), b + body as f64, 0.0]
+    [a + 0.8 * a * (1.0 - a) * b * (1.0 - b), b + body as f64, 0.0]
 }
 
 #[test]

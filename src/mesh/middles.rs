@@ -122,8 +122,8 @@ mod tests {
                 };
                 // The derivatives along the barycentric coordinates.
                 let mut along = [Vector3::zeros(); 4];
-                for i in 0..4 {
-                    along[i] += Vector3::from(points[simplex[i] as usize]) * (4.0 * l[i] - 1.0);
+                for (along, (node, l)) in along.iter_mut().zip(simplex.iter().zip(&l)) {
+                    *along += Vector3::from(points[*node as usize]) * (4.0 * l - 1.0);
                 }
                 for ([a, b], node) in EDGES.iter().zip(&simplex[4..]) {
                     let x = Vector3::from(points[*node as usize]) * 4.0;
