@@ -314,9 +314,9 @@ fn unv(nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell) -> Vec<usize>
         let _ = writeln!(text, "{number:>10}{:>10}{:>10}{:>10}\n{x:>25.16e}{y:>25.16e}{z:>25.16e}", 1, 1, 11);
     }
     text += "    -1\n    -1\n  2412\n";
-    let (mut next, mut members) = (0, String::new());
+    let (mut next, mut members) = (0_usize, String::new());
     for (tag, group) in (1..).zip(groups) {
-        let count = group.elements.len();
+        let (count, first) = (group.elements.len(), next);
         let _ = writeln!(members, "{tag:>10}{0:>10}{0:>10}{0:>10}{0:>10}{0:>10}{0:>10}{count:>10}\n{1}", 0, group.name);
         for (_, _, cell) in &group.elements {
             next += 1;
@@ -329,7 +329,13 @@ fn unv(nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell) -> Vec<usize>
             for row in nodes.chunks(8) {
                 let _ = writeln!(text, "{}", row.iter().map(|node| format!("{node:>10}")).collect::<String>());
             }
-            let _ = writeln!(members, "{:>10}{next:>10}{:>10}{:>10}", 8, 0, 0);
+            let _ = write!(members, "{:>10}{next:>10}{:>10}{:>10}", 8, 0, 0);
+            if (next - first).is_multiple_of(2) {
+                members.push('\n');
+            }
+        }
+        if !members.ends_with('\n') {
+            members.push('\n');
         }
     }
     text + "    -1\n    -1\n  2467\n" + &members + "    -1\n"
