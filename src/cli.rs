@@ -98,6 +98,9 @@ enum Command {
         /// Two blocks in space instead of the plane
         #[arg(long)]
         space: bool,
+        /// Two cylinders as bodies of revolution instead of the plane
+        #[arg(long, conflicts_with = "space")]
+        axisymmetric: bool,
     },
     /// Print the JSON schema of scene files, by which editors complete and check them
     Schema,
@@ -243,7 +246,14 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusa
 fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) -> i32 {
     let ended = match command {
         Command::Solving(_) => unreachable!("these commands have a session"),
-        Command::New { folder, space } => new::new(&folder, space),
+        Command::New { folder, space, axisymmetric } => {
+            let kind = match (space, axisymmetric) {
+                (true, _) => new::Example::Space,
+                (_, true) => new::Example::Revolution,
+                _ => new::Example::Plane,
+            };
+            new::new(&folder, kind)
+        }
         Command::Schema => say(format_args!("{:#}", crate::scene::schema())).map(|()| 0),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "winkler", &mut std::io::stdout());

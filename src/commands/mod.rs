@@ -33,7 +33,7 @@ use std::rc::Rc;
 #[derive(Args)]
 pub struct VerbosityArgs {
     /// Print errors, warnings and the folder of the results only
-    #[arg(short, long, conflicts_with_all = ["verbose", "json"])]
+    #[arg(short, long, conflicts_with = "verbose")]
     quiet: bool,
     /// Print what is decided and why, with the PETSc options of each body, on standard error
     #[arg(short, long)]

@@ -1,10 +1,10 @@
 //! What `check` prints and draws of measured surfaces and of the layers made from them.
 
-use crate::data::{Data, Roughness};
+use crate::data::{Data, Detrend, Fill, Roughness, Trend};
 use crate::discretize::resolution::{Resolution, resolution};
 use crate::error::Result;
 use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, sci};
-use crate::problem::{AsperitySpec, ContactSpec, Depths, LayerSpec, label};
+use crate::problem::{AsperitySpec, ContactSpec, Depths, LayerSpec, label, name_of};
 use crate::run::stages::Built;
 use crate::run::words::numbered;
 use serde_json::{Value, json};
@@ -39,7 +39,10 @@ pub fn data_lines(built: &Built) -> Vec<String> {
 
 fn lines_of_data(data: &Data) -> Vec<String> {
     let (name, file) = (&data.spec.name, data.spec.file.display());
-    let Some(grid) = data.grid() else { return vec![format!("  data {name}: {file}, points on no regular grid")] };
+    let Some(grid) = data.grid() else {
+        let first = format!("  data {name}: {file}, points on no regular grid");
+        return [first].into_iter().chain(changes(data)).collect();
+    };
     let counts: Vec<String> =
         grid.axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.count.to_string()).collect();
     let ranges: Vec<String> = grid.axes[..counts.len()]
@@ -61,6 +64,7 @@ fn lines_of_data(data: &Data) -> Vec<String> {
             sci(curvature, 3)
         ),
     ];
+    lines.extend(changes(data));
     lines.extend(grid.summits().map(|summits| {
         format!(
             "    {} summits, {} in a unit of area, mean radius {}",
@@ -70,6 +74,28 @@ fn lines_of_data(data: &Data) -> Vec<String> {
         )
     }));
     lines
+}
+
+/// Return the lines that describe what was done to the heights of a file.
+fn changes(data: &Data) -> Vec<String> {
+    let filled = match data.grid() {
+        Some(_) => format!("filled ({})", name_of(&Fill::ALL, &data.spec.fill)),
+        None => "left out".to_owned(),
+    };
+    let gaps = (data.missing() > 0).then(|| format!("    {} points without a height are {filled}", data.missing()));
+    let trend = data.trend().map(|Trend { slope: [a, b], second: [xx, xy, yy] }| {
+        let slopes = format!("slopes {} and {}", sci(a, 3), sci(b, 3));
+        match data.spec.detrend {
+            Detrend::Parabola => format!(
+                "    subtracted: a parabola with {slopes} in the middle, second derivatives {} (xx), {} (xy), {} (yy)",
+                sci(xx, 3),
+                sci(xy, 3),
+                sci(yy, 3)
+            ),
+            _ => format!("    subtracted: a plane with {slopes}"),
+        }
+    });
+    gaps.into_iter().chain(trend).collect()
 }
 
 /// Return how well the mesh follows the gap of a pair; none for a gap without data.
@@ -151,7 +177,11 @@ pub fn data_to_json(built: &Built) -> Value {
     let data = in_contacts(built).into_iter();
     data.filter_map(|(name, data)| {
         let Roughness { range, height, slope, curvature } = data.grid()?.roughness();
-        Some((name, json!({ "range": range, "rms_height": height, "rms_slope": slope, "rms_curvature": curvature })))
+        let missing = data.missing();
+        let found = json!({
+            "range": range, "rms_height": height, "rms_slope": slope, "rms_curvature": curvature, "missing": missing
+        });
+        Some((name, found))
     })
     .collect()
 }

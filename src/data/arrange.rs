@@ -2,9 +2,11 @@
 
 use super::grid::{Axis, Grid};
 use super::knots::Knots;
-use super::rows::Rows;
+use super::rows::{Frame, Rows};
 use super::rule::{DataSpec, Interpolation, Outside};
 use super::scattered::Scattered;
+use super::trend::Trend;
+use super::{fill, gaps, trend};
 use crate::error::Result;
 
 /// A function of one coordinate or two, by the places of its points.
@@ -18,6 +20,17 @@ pub enum Shape {
     Scattered(Scattered, [[f64; 2]; 2]),
 }
 
+/// A function with what was done to the heights of its file.
+#[derive(Debug, Clone)]
+pub struct Arranged {
+    /// The function.
+    pub shape: Shape,
+    /// Number of points of the file without a height.
+    pub missing: usize,
+    /// The polynomial that was subtracted, if any.
+    pub trend: Option<Trend>,
+}
+
 /// Largest distance of a point from its place on a regular grid, as a multiple of the spacing.
 ///
 /// Coordinates in files are rounded. A place that is wrong by so much changes a height by a hundredth of the difference to the next height.
@@ -26,22 +39,24 @@ const ROUNDED: f64 = 1e-2;
 /// Return the function that the numbers of a file give.
 ///
 /// # Errors
-/// Numbers that give no function, or not one that the scene asks for.
-pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Shape> {
-    match (spec.points, rows.columns) {
-        _ if rows.values.is_empty() => Err(spec.refuse("has no numbers", "write heights in rows")),
-        (false, _) => matrix(spec, rows),
-        (true, 2) => profile(spec, &rows),
-        (true, 3) => surface(spec, &rows),
-        (true, columns) => Err(spec.refuse(
-            format!("has {columns} numbers in a row"),
-            "a point is x and a height, or x, y and a height; for heights in rows and columns leave out `points`",
-        )),
+/// Numbers that give no function, or not one that the scene asks for; points without a height that the scene does not expect.
+pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Arranged> {
+    if rows.values.is_empty() {
+        return Err(spec.refuse("has no numbers", "write heights in rows"));
     }
+    if spec.points && !matches!(rows.columns, 2 | 3) {
+        return Err(spec.refuse(
+            format!("has {} numbers in a row", rows.columns),
+            "a point is x and a height, or x, y and a height; for heights in rows and columns leave out `points`",
+        ));
+    }
+    let missing = gaps::count(spec, &rows)?;
+    let (shape, trend) = if spec.points { points(spec, &rows)? } else { matrix(spec, rows)? };
+    Ok(Arranged { shape, missing, trend })
 }
 
 /// Return the function of heights in rows and columns. A single row or column is a profile.
-fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape> {
+fn matrix(spec: &DataSpec, rows: Rows) -> Result<(Shape, Option<Trend>)> {
     let mut counts = [rows.columns, rows.count()];
     if counts[0] == 1 {
         counts.swap(0, 1);
@@ -49,25 +64,46 @@ fn matrix(spec: &DataSpec, rows: Rows) -> Result<Shape> {
     if counts[0] < 2 {
         return Err(spec.refuse("has one number", "two points or more make a function"));
     }
-    let values = rows.values.iter().map(|value| spec.unit * value).collect();
-    let axes = [0, 1].map(|d| Axis { origin: spec.origin[d], spacing: spec.spacing[d], count: counts[d] });
-    grid(spec, axes, values)
+    let mut values: Vec<f64> = rows.values.iter().map(|value| spec.unit * value).collect();
+    let frame = rows.frame.unwrap_or(Frame { origin: [0.0; 2], spacing: [1.0; 2] });
+    let origin = |d: usize| spec.origin[d] + spec.spacing[d] * frame.origin[d];
+    let axes =
+        [0, 1].map(|d| Axis { origin: origin(d), spacing: spec.spacing[d] * frame.spacing[d], count: counts[d] });
+    let place = |k: usize| {
+        let index = [k % counts[0], k / counts[0]];
+        [0, 1].map(|d| axes[d].origin + axes[d].spacing * index[d] as f64)
+    };
+    let trend = trend::subtract(spec.detrend, place, &mut values);
+    Ok((grid(spec, axes, values)?, trend))
 }
 
-/// Return a regular grid, with the interpolation that the scene asks for.
-fn grid(spec: &DataSpec, axes: [Axis; 2], values: Vec<f64>) -> Result<Shape> {
+/// Return a regular grid, with the interpolation that the scene asks for. Values that are NaN are gaps.
+fn grid(spec: &DataSpec, axes: [Axis; 2], mut values: Vec<f64>) -> Result<Shape> {
     let thin = |axis: &Axis| axis.count != 1 && axis.count < 3;
     if spec.interpolation == Interpolation::Cubic && axes.iter().any(thin) {
         return Err(spec.refuse("has two points in a direction", "cubic interpolation needs three: take \"linear\""));
     }
+    fill::grid(spec.fill, &axes, &mut values);
     Ok(Shape::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
 }
 
-/// Return the function of points (x, height) in any order.
-fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
-    let points = rows.values.chunks_exact(2).map(|point| placed(spec, [point[0], 0.0], point[1]));
-    let points: Vec<[f64; 3]> = points.collect();
+/// Return the function of points in any order: (x, height) or (x, y, height).
+fn points(spec: &DataSpec, rows: &Rows) -> Result<(Shape, Option<Trend>)> {
+    let point = |row: &[f64]| match *row {
+        [x, y, height] => placed(spec, [x, y], height),
+        _ => placed(spec, [row[0], 0.0], row[1]),
+    };
+    let mut points: Vec<[f64; 3]> = rows.values.chunks_exact(rows.columns).map(point).collect();
     refuse_twins(spec, &points, rows)?;
+    let mut heights: Vec<f64> = points.iter().map(|point| point[2]).collect();
+    let trend = trend::subtract(spec.detrend, |k| [points[k][0], points[k][1]], &mut heights);
+    points.iter_mut().zip(heights).for_each(|(point, height)| point[2] = height);
+    let shape = if rows.columns == 2 { profile(spec, points)? } else { surface(spec, points)? };
+    Ok((shape, trend))
+}
+
+/// Return the function of points of a profile, (x, 0, height). Points without a height are gaps of a grid, and are left out elsewhere.
+fn profile(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
     if points.len() < 2 {
         return Err(spec.refuse("has one point", "two points or more make a function"));
     }
@@ -77,30 +113,32 @@ fn profile(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
         return grid(spec, [axis, Axis { origin: 0.0, spacing: 1.0, count: 1 }], values);
     }
     only_linear(spec)?;
+    points.retain(|point| !point[2].is_nan());
+    if points.len() < 2 {
+        return Err(spec.refuse("has one point with a height", "two points or more make a function"));
+    }
     let mut knots: Vec<[f64; 2]> = points.iter().map(|&[x, _, height]| [x, height]).collect();
     knots.sort_by(|a, b| a[0].total_cmp(&b[0]));
     Ok(Shape::Knots(Knots(knots)))
 }
 
-/// Return the function of points (x, y, height) in any order.
-fn surface(spec: &DataSpec, rows: &Rows) -> Result<Shape> {
-    let points = rows.values.chunks_exact(3).map(|point| placed(spec, [point[0], point[1]], point[2]));
-    let points: Vec<[f64; 3]> = points.collect();
-    refuse_twins(spec, &points, rows)?;
+/// Return the function of points (x, y, height). Points without a height are gaps of a grid, and are left out elsewhere.
+fn surface(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
     let axes = [0, 1].map(|d| regular(points.iter().map(|point| point[d])));
     if let [Some(across), Some(down)] = axes
         && across.count.checked_mul(down.count) == Some(points.len())
         && across.count.min(down.count) > 1
     {
-        let mut values = vec![f64::NAN; points.len()];
+        let mut values = vec![None; points.len()];
         points.iter().for_each(|&[x, y, height]| {
-            values[nearest(&across, x) + across.count * nearest(&down, y)] = height;
+            values[nearest(&across, x) + across.count * nearest(&down, y)] = Some(height);
         });
-        if values.iter().all(|value| !value.is_nan()) {
+        if let Some(values) = values.into_iter().collect() {
             return grid(spec, [across, down], values);
         }
     }
     only_linear(spec)?;
+    points.retain(|point| !point[2].is_nan());
     let range = [0, 1].map(|d| {
         let along = || points.iter().map(|point| point[d]);
         [along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max)]

@@ -1,9 +1,10 @@
 //! The data of a scene as functions.
 
-use super::arrange::{self, Shape};
+use super::arrange::{self, Arranged, Shape};
 use super::grid::Grid;
 use super::read;
 use super::rule::{DataSpec, Outside, Sample};
+use super::trend::Trend;
 use crate::error::{Error, Place, Result, shown};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
@@ -17,13 +18,13 @@ pub struct Data {
     /// The settings of the scene.
     pub spec: DataSpec,
     /// The function, once the file is read.
-    shape: OnceLock<Shape>,
+    arranged: OnceLock<Arranged>,
 }
 
 impl Data {
     /// Return a function whose file is not read yet.
     pub fn new(spec: DataSpec) -> Self {
-        Self { spec, shape: OnceLock::new() }
+        Self { spec, arranged: OnceLock::new() }
     }
 
     /// Read the file, unless that was done.
@@ -31,17 +32,32 @@ impl Data {
     /// # Errors
     /// The file cannot be read, or is no surface and no profile; the refusal names its line.
     pub fn load(&self) -> Result<()> {
-        if self.shape.get().is_some() {
+        if self.arranged.get().is_some() {
             return Ok(());
         }
-        let shape = arrange::shape(&self.spec, read::rows(&self.spec)?)?;
-        self.shape.get_or_init(|| shape);
+        let arranged = arrange::shape(&self.spec, read::rows(&self.spec)?)?;
+        self.arranged.get_or_init(|| arranged);
         Ok(())
+    }
+
+    /// Return the function, if the file is read.
+    fn shape(&self) -> Option<&Shape> {
+        self.arranged.get().map(|arranged| &arranged.shape)
+    }
+
+    /// Return the number of points of the file without a height; zero if the file is not read yet.
+    pub fn missing(&self) -> usize {
+        self.arranged.get().map_or(0, |arranged| arranged.missing)
+    }
+
+    /// Return the polynomial that was subtracted from the heights, if any.
+    pub fn trend(&self) -> Option<Trend> {
+        self.arranged.get().and_then(|arranged| arranged.trend)
     }
 
     /// Return the number of arguments: 1 for a profile, 2 for a surface.
     pub fn arguments(&self) -> usize {
-        match self.shape.get() {
+        match self.shape() {
             Some(Shape::Grid(grid)) if grid.axes[1].count > 1 => 2,
             Some(Shape::Scattered(..)) => 2,
             _ => 1,
@@ -52,7 +68,7 @@ impl Data {
     pub fn sample(&self, place: &[f64]) -> Sample {
         let at = [place.first(), place.get(1)].map(|x| x.copied().unwrap_or(0.0));
         let holds = self.spec.outside == Outside::Clamp;
-        match self.shape.get() {
+        match self.shape() {
             Some(Shape::Grid(grid)) => grid.sample(at),
             Some(Shape::Knots(knots)) => knots.sample(at[0], holds),
             Some(Shape::Scattered(scattered, _)) => scattered.sample(at, holds),
@@ -62,7 +78,7 @@ impl Data {
 
     /// Return all its numbers in a fixed order; none if the file is not read yet.
     pub fn numbers(&self) -> Box<dyn Iterator<Item = f64> + '_> {
-        match self.shape.get() {
+        match self.shape() {
             Some(Shape::Grid(Grid { axes, values, .. })) => {
                 let counts = axes.iter().flat_map(|axis| [axis.origin, axis.spacing, axis.count as f64]);
                 Box::new(counts.chain(values.iter().copied()))
@@ -75,7 +91,7 @@ impl Data {
 
     /// Return the regular grid, if the file is read and has one.
     pub fn grid(&self) -> Option<&Grid> {
-        match self.shape.get() {
+        match self.shape() {
             Some(Shape::Grid(grid)) => Some(grid),
             _ => None,
         }
@@ -84,7 +100,7 @@ impl Data {
     /// Return the refusal of a place without a value. `what` is the quantity whose expression, at `here`, needs the value.
     pub fn outside(&self, here: &Place, what: &str, place: &[f64]) -> Error {
         let join = |coordinates: &[f64]| coordinates.iter().map(|&x| shown(x)).collect::<Vec<_>>().join(", ");
-        let range = match self.shape.get() {
+        let range = match self.shape() {
             Some(Shape::Grid(grid)) => grid.axes.map(|axis| axis.range()),
             Some(Shape::Knots(knots)) => [knots.range(); 2],
             Some(Shape::Scattered(_, range)) => *range,

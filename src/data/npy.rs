@@ -62,7 +62,7 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
         Order::C => values,
         Order::Fortran => (0..count * columns).map(|k| values[k / columns + count * (k % columns)]).collect(),
     };
-    Ok(Rows { columns, values, lines: Vec::new() })
+    Ok(Rows { columns, values, lines: Vec::new(), frame: None })
 }
 
 /// Refuse a header that is longer than the file, before memory is taken for it.

@@ -35,6 +35,62 @@ impl Outside {
     pub const ALL: [(&str, Self); 3] = [("error", Self::Error), ("clamp", Self::Clamp), ("periodic", Self::Periodic)];
 }
 
+/// What to do about points without a height.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fill {
+    /// Refuse the file.
+    Error,
+    /// Take the height of the nearest point that has one.
+    Nearest,
+    /// Interpolate between the points around a gap, by planes over their Delaunay triangles.
+    Linear,
+}
+
+impl Fill {
+    /// All variants with their names in a scene.
+    pub const ALL: [(&str, Self); 3] = [("error", Self::Error), ("nearest", Self::Nearest), ("linear", Self::Linear)];
+}
+
+/// The shape that is subtracted from the heights, fitted by least squares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Detrend {
+    /// Nothing.
+    None,
+    /// A plane; a straight line for a profile.
+    Plane,
+    /// A polynomial of degree two.
+    Parabola,
+}
+
+impl Detrend {
+    /// All variants with their names in a scene.
+    pub const ALL: [(&str, Self); 3] = [("none", Self::None), ("plane", Self::Plane), ("parabola", Self::Parabola)];
+}
+
+/// What stands in a file for points without a height. NaN always does.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Missing {
+    /// Numbers.
+    pub numbers: Vec<f64>,
+    /// Words in the place of a number; the empty word is a field without characters.
+    pub words: Vec<String>,
+}
+
+/// Relative difference up to which a number of a file is the one that the scene names: people copy such numbers with six digits.
+const SAME: f64 = 1e-6;
+
+impl Missing {
+    /// Return whether a number stands for no height.
+    pub fn has(&self, number: f64) -> bool {
+        !number.is_finite() || self.numbers.iter().any(|&named| (number - named).abs() <= SAME * named.abs())
+    }
+
+    /// Return whether a word stands for no height.
+    pub fn has_word(&self, word: &str) -> bool {
+        self.words.iter().any(|named| named == word)
+    }
+}
+
 /// A value and its gradient; NaN where there is no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
@@ -66,6 +122,12 @@ pub struct DataSpec {
     pub spacing: [f64; 2],
     /// The height in the scene of a height of 1 in the file.
     pub unit: f64,
+    /// What stands for points without a height; none if the scene does not say.
+    pub missing: Option<Missing>,
+    /// What to do about points without a height.
+    pub fill: Fill,
+    /// The shape that is subtracted before gaps are filled.
+    pub detrend: Detrend,
     /// Interpolation between the points.
     pub interpolation: Interpolation,
     /// Values beyond the points.

@@ -12,6 +12,9 @@ fn spec(file: &std::path::Path) -> DataSpec {
         origin: [0.0; 2],
         spacing: [1.0; 2],
         unit: 1.0,
+        missing: None,
+        fill: Fill::Error,
+        detrend: Detrend::None,
         interpolation: Interpolation::Linear,
         outside: Outside::Error,
     }
@@ -232,7 +235,7 @@ fn bad_files_are_refused_with_their_line() {
         ("1,2\n3,4\n5\n", &|_| (), "line 3 has 1 numbers, lines before it 2"),
         ("# c\n1,2\n\n3,oops\n", &|_| (), "line 4: `oops` is not a number"),
         ("1,,2\n", &|_| (), "line 1 lacks a number"),
-        ("1,2\n3,nan\n", &|_| (), "line 2, column 1 (from 0) is NaN"),
+        ("1,2\n3,nan\n", &|_| (), "no height at 1 of 4 points, the first in line 2, column 1"),
         ("1 2\n\0", &|_| (), "is neither text nor a file of NumPy"),
         ("1 2 3 4\n", &points, "has 4 numbers in a row"),
         ("1 2\r3 4\r5\r", &|_| (), "line 3 has 1 numbers, lines before it 2"),
@@ -309,4 +312,99 @@ fn roughness_of_waves_is_known() {
     assert!((found.slope - a * k * factor * 0.5_f64.sqrt()).abs() < 1e-12, "{found:?}");
     assert!((found.curvature - a * k * k * factor * factor * 0.5_f64.sqrt()).abs() < 1e-10, "{found:?}");
     assert_eq!(profile.summits(), None);
+}
+
+/// Grids of geographers say where they are; their first row is the uppermost one with ESRI, the lowest one with Surfer.
+#[test]
+fn grids_with_a_header_are_read() {
+    let esri = "ncols 3\nnrows 2\nxllcorner 10\nyllcorner -20\ncellsize 2\nNODATA_value -1\n4 5 6\n1 2\n-1\n";
+    let filled = |spec: &mut DataSpec| (spec.fill, spec.spacing) = (Fill::Nearest, [0.5; 2]);
+    let data = load(esri, filled).unwrap();
+    let grid = data.grid().unwrap();
+    assert_eq!(grid.values, [1.0, 2.0, 2.0, 4.0, 5.0, 6.0]);
+    // heights are in the middle of cells, half a cell from the corner; the scene has lengths of 2
+    let axis = |origin, count| grid::Axis { origin, spacing: 1.0, count };
+    assert_eq!(grid.axes, [axis(5.5, 3), axis(-9.5, 2)]);
+    assert_eq!(data.missing(), 1);
+    let centre = "NROWS 1\nNCOLS 2\nXLLCENTER 1,5\nYLLCENTER 0\nDX 2\nDY 1\n7 8\n";
+    assert_eq!(load(centre, |_| ()).unwrap().sample(&[2.5]).value, 7.5);
+    let text = "DSAA\n3 2\n10 14\n-20 -18\n1 6\n1 2\n1.70141e+38\n4 5 6\n";
+    assert_eq!(load(text, |spec| spec.fill = Fill::Nearest).unwrap().grid().unwrap().values, grid.values);
+    let numbers = [10.0, 14.0, -20.0, -18.0, 1.0, 6.0_f64].into_iter().flat_map(f64::to_le_bytes);
+    let heights = [1.0, 2.0, 1.70141e38, 4.0, 5.0, 6.0_f32].into_iter().flat_map(f32::to_le_bytes);
+    let binary: Vec<u8> = b"DSBB\x03\0\x02\0".iter().copied().chain(numbers).chain(heights).collect();
+    let read = load(&binary, |spec| spec.fill = Fill::Nearest).unwrap();
+    assert_eq!(read.grid().unwrap().values, grid.values);
+    assert_eq!(read.grid().unwrap().axes[1], grid::Axis { origin: -20.0, spacing: 2.0, count: 2 });
+    let refused = |bytes: &[u8]| load(bytes, |_| ()).expect_err("a bad file").message().to_owned();
+    for length in 4..binary.len() {
+        let words = refused(&binary[..length]);
+        assert!(words.contains("ends within its header") || words.contains("by its header"), "{length}: {words}");
+    }
+    for (text, words) in [
+        (esri, "has no height at 1 of 6 points, the first in line 8, column 2 (from 0)"),
+        (&esri.replace("cellsize", "cellsiz"), "has no `cellsize` in its header"),
+        (&esri.replace("5 6", "5"), "has 5 heights, and 3 x 2 by its header"),
+        (&esri.replace("5 6", "5 x"), "line 7: `x` is not a number"),
+        (&esri.replace("ncols 3", "ncols 3e30"), "has a header of"),
+        (&esri.replace("cellsize 2", "cellsize 0"), "distances of 0 and 0"),
+        (&text.replace("3 2", "-3 2"), "has a header of -3 x 2 heights"),
+        ("DSRB....", "is a grid of Surfer 7"),
+        ("aBCR-1.0\nManufacID = x\n", "is an SDF file"),
+        ("bISO-1.0....", "is an SDF file"),
+        ("PK\u{3}\u{4}....", "as x3p files are"),
+    ] {
+        let found = refused(text.as_bytes());
+        assert!(found.contains(words), "{text}: {found}");
+    }
+}
+
+#[test]
+fn points_without_a_height_are_named_and_filled() {
+    let missing = |numbers: &[f64], words: &[&str]| {
+        let words = words.iter().map(|word| word.to_string()).collect();
+        Some(Missing { numbers: numbers.to_vec(), words })
+    };
+    let values = |text: &str, named: Option<Missing>| {
+        let data = load(text, |spec| (spec.missing, spec.fill) = (named, Fill::Linear)).unwrap();
+        (data.grid().expect("a grid").values.clone(), data.missing())
+    };
+    let plane = (vec![0.0, 1.0, 2.0, 1.0, 2.0, 3.0, 2.0, 3.0, 4.0], 1);
+    for (gap, named) in [
+        ("-9999", missing(&[-9999.0], &[])),
+        ("1.701410009187828e38", missing(&[1.70141e38], &[])),
+        ("***", missing(&[], &["***"])),
+        ("NaN", None),
+        ("inf", None),
+        ("", missing(&[7.0], &["-", ""])),
+    ] {
+        assert_eq!(values(&format!("0,1,2\n1,{gap},3\n2,3,4\n"), named), plane, "{gap}");
+    }
+    // points of a grid make a grid, also where one has no height; other points are left out
+    let points = |last: &str| {
+        let text: String = (0..8).map(|k| format!("{} {} {}\n", k % 3, k / 3, k % 3 + k / 3)).collect();
+        load(text + last, |spec| (spec.points, spec.fill) = (true, Fill::Nearest)).unwrap()
+    };
+    let (on, off) = (points("2 2 NaN\n"), points("2.4 2.1 NaN\n"));
+    assert_eq!((on.grid().map(|grid| grid.values[8]), on.missing()), (Some(3.0), 1));
+    assert!(off.grid().is_none() && off.missing() == 1 && (off.sample(&[1.0, 1.0]).value - 2.0).abs() < 1e-12);
+    let refused =
+        |text: &str, change: &dyn Fn(&mut DataSpec)| load(text, |spec| change(spec)).unwrap_err().message().to_owned();
+    let border: String =
+        (0..6).map(|j| if j == 0 { "-9999,".repeat(6) + "\n" } else { format!("-9999,{j},2,3,4,-9999\n") }).collect();
+    let waves = border.replace(",2,", ",2.5,").replace(",3,4,", ",3.25,4.125,");
+    assert!(refused(&waves, &|_| ()).contains("has -9999 at 16 of 36 points, the first in line 1, column 0 (from 0)"));
+    assert!(
+        refused(&waves, &|spec| spec.missing = missing(&[-9999.0], &[])).contains("has no height at 16 of 36 points")
+    );
+    // who says that nothing stands for a gap has a deep surface
+    assert_eq!(load(&waves, |spec| spec.missing = missing(&[], &[])).unwrap().sample(&[0.0, 0.0]).value, -9999.0);
+    assert!(refused("*** ***\n1 2\n3 4\n", &|_| ()).contains("line 1 has no number, but 2 times `***`"));
+    assert!(refused("nan nan\nnan nan\n", &|_| ()).contains("has no height at any of its 4 points"));
+    assert!(refused("0 0 1\nnan 1 2\n", &|spec| spec.points = true).contains("line 2, column 0 (from 0) is NaN"));
+    // a plane is subtracted before gaps are filled
+    let tilted = "1,3,5\n0,nan,4\n-1,1,3\n";
+    let level = load(tilted, |spec| (spec.detrend, spec.fill) = (Detrend::Plane, Fill::Nearest)).unwrap();
+    assert!(level.grid().expect("a grid").values.iter().all(|height| height.abs() < 1e-12), "{level:?}");
+    assert!(level.trend().is_some_and(|trend| (trend.slope[0] - 2.0).hypot(trend.slope[1] + 1.0) < 1e-12));
 }

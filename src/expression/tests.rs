@@ -1,5 +1,5 @@
 use super::*;
-use crate::data::{DataSpec, Interpolation, Outside};
+use crate::data::{DataSpec, Detrend, Fill, Interpolation, Outside};
 use crate::error::Source;
 use crate::linalg::portable;
 
@@ -274,6 +274,9 @@ fn derivatives_of_data_agree_with_differences() {
         origin: [0.0; 2],
         spacing: [0.5, 0.8],
         unit: 1.0,
+        missing: None,
+        fill: Fill::Error,
+        detrend: Detrend::None,
         interpolation: Interpolation::Cubic,
         outside: Outside::Error,
     };

@@ -6,7 +6,7 @@ use super::inner::{Inner, WHOLE};
 use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Done, Prepared};
 use super::words::in_words;
-use super::{method, steps};
+use super::{method, steps, swapped};
 use crate::contact::pieces::{self, Cut};
 use crate::contact::{ContactPair, Left, LostPieces};
 use crate::ddm::{self, Outcome, Start, Status};
@@ -146,7 +146,12 @@ where
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
         let mesh = read.as_ref().map(|read| read.digest.clone());
-        Ok(Built { scene, discrete, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again })
+        #[rustfmt::skip]
+        let mut built = Built {
+            scene, discrete, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again,
+        };
+        built.warnings.extend(swapped::warnings(&built));
+        Ok(built)
     }
 }
 

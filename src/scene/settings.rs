@@ -3,7 +3,7 @@
 //! A key that is missing here is also ignored where scenes are compared: by a restart, in a sweep, and between ranks. Structs are therefore
 //! taken apart by patterns with all their fields, so that the compiler finds a field that is not echoed.
 
-use crate::data::{DataSpec, Interpolation, Outside};
+use crate::data::{DataSpec, Detrend, Fill, Interpolation, Missing, Outside};
 use crate::expression::Field;
 use crate::problem::{
     AsperitySpec, AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, Guard,
@@ -81,16 +81,25 @@ fn of_mesh(mesh: &MeshSource) -> Value {
 }
 
 fn of_data(data: &DataSpec) -> Value {
-    let DataSpec { name: _, file, place: _, points, origin, spacing, unit, interpolation, outside } = data;
-    json!({
+    #[rustfmt::skip]
+    let DataSpec {
+        name: _, file, place: _, points, origin, spacing, unit, missing, fill, detrend, interpolation, outside,
+    } = data;
+    let named = missing.as_ref().map(|Missing { numbers, words }| {
+        numbers.iter().map(|number| json!(number)).chain(words.iter().map(|word| json!(word))).collect::<Vec<_>>()
+    });
+    without_null(json!({
         "file": file.display().to_string(),
         "points": points,
         "origin": origin,
         "spacing": spacing,
         "unit": unit,
+        "missing": named,
+        "fill": name_of(&Fill::ALL, fill),
+        "detrend": name_of(&Detrend::ALL, detrend),
         "interpolate": name_of(&Interpolation::ALL, interpolation),
         "outside": name_of(&Outside::ALL, outside),
-    })
+    }))
 }
 
 fn of_body(body: &BodySpec, dimension: usize) -> Value {

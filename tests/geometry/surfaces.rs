@@ -258,3 +258,50 @@ fn layers_of_asperities() {
     let flat = solve(&scene, &["--set", set[1], "--set", "data.rough.points=true"]);
     assert!(flat.stderr.contains("80 numbers in a row"), "{}", flat.said());
 }
+
+/// A border of -9999 is refused with what to write; named and filled it changes nothing inside, and a tilt is subtracted.
+#[test]
+fn measurements_have_gaps_and_tilt() {
+    let text = text_of("patch-2d").replace("layer =", "gap = \"1e-3*g(x, y)\"\nlayer =");
+    let data = "[data.g]\nfile = \"g.asc\"\norigin = -1\noutside = \"clamp\"\ndetrend = \"plane\"\n";
+    let scene = Scene::new(text.replace("[[contact]]", &format!("{data}\n[[contact]]")));
+    let file = scene.path.parent().expect("a folder").join("g.asc");
+    // waves on a slope; the first row of the file is the uppermost one
+    let wave = |i: usize, j: usize| (1.7 * i as f64).sin() + (2.3 * j as f64).cos();
+    let height = |i: usize, j: usize, gap: &str| match i.min(j).min(9 - i).min(9 - j) {
+        0 => gap.to_owned(),
+        _ => format!("{:e}", wave(i, j) + 0.25 * i as f64 - 3.0 * j as f64),
+    };
+    let rows = |gap: &str| {
+        (0..10).rev().map(|j| (0..10).map(|i| height(i, j, gap)).collect::<Vec<_>>().join(" ") + "\n").collect()
+    };
+    let header =
+        |nodata: &str| format!("ncols 10\nnrows 10\nxllcenter 0\nyllcenter 0\ncellsize 0.3\nNODATA_value {nodata}\n");
+    let write = |nodata: &str, gap: &str| {
+        let rows: String = rows(gap);
+        fs::write(&file, header(nodata) + &rows).expect("a file");
+    };
+    let refused = |sets: &[&str], words: &str| {
+        let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        let run = winkler(&[&["check", &scene.path.display().to_string()], &sets[..]].concat());
+        assert!(run.code == 3 && run.stderr.contains(words), "{}", run.said());
+    };
+    write("-1", "-9999");
+    refused(&[], "has -9999 at 36 of 100 points, the first in line 16, column 0 (from 0)");
+    refused(&[], "write missing = -9999 and fill =");
+    refused(&["data.g.missing=-9999"], "has no height at 36 of 100 points");
+    refused(&["data.g.missing=-9999", "data.g.fill=best"], "it is one of error, nearest, linear");
+    refused(&["data.g.missing=[[1]]"], "expected");
+    let filled = ["--set", "data.g.fill=linear"];
+    let named = checked(&scene, &[&filled[..], &["--set", "data.g.missing=-9999"]].concat());
+    write("-9999", "-9999");
+    let by_header = checked(&scene, &filled);
+    assert_eq!(named["data"]["g"], by_header["data"]["g"]);
+    assert_eq!(named["data"]["g"]["missing"], 36);
+    // what is left of a slope of 10 are the waves
+    let slope = named["data"]["g"]["rms_slope"].as_f64().expect("a number");
+    assert!((2.0..8.0).contains(&slope), "{slope}");
+    let run = winkler(&[&["check", &scene.path.display().to_string()], &filled[..]].concat());
+    assert!(run.stdout.contains("36 points without a height are filled (linear)"), "{}", run.said());
+    assert!(run.stdout.contains("subtracted: a plane with slopes"), "{}", run.said());
+}

@@ -1,7 +1,7 @@
 //! `[data.NAME]`: files whose numbers are functions for expressions.
 
 use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, choose, file, word};
-use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
+use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, Missing, Outside, has_header};
 use crate::error::{Error, Place, Result};
 use crate::expression::names;
 use crate::scene::read::Entry;
@@ -13,12 +13,17 @@ use std::sync::Arc;
 pub(super) fn shape(name: impl Into<Cow<'static, str>>) -> TableShape {
     use ValueKind::{Either, Flag, Number, Text};
     let one_or_two = || Either(vec![Number, Number.list()]);
+    let number_or_word = || Either(vec![Number, Text]);
+    let number_or_word_or_list = || Either(vec![Number, Text, number_or_word().list()]);
     TableShape::new(name)
-        .required("file", Text, "a table of numbers, or .npy")
+        .required("file", Text, "a table of numbers, .npy, or a grid .asc or .grd")
         .optional("points", Flag, "whether each row is a place and its height; false")
         .optional("origin", one_or_two(), "place of the first height; 0")
         .optional("spacing", one_or_two(), "distance of the heights along a row and from row to row")
         .optional("unit", Number, "what a height of 1 in the file is; 1")
+        .optional("missing", number_or_word_or_list(), "what stands for a point without a height; NaN always does")
+        .optional("fill", word(&Fill::ALL), "what such points get; \"error\"")
+        .optional("detrend", word(&Detrend::ALL), "what is subtracted from the heights; \"none\"")
         .optional("interpolate", word(&Interpolation::ALL), "what is between the heights; \"linear\"")
         .optional("outside", word(&Outside::ALL), "what is beyond them; \"error\"")
 }
@@ -62,7 +67,7 @@ fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
     let path = file(folder, keys.require("file")?)?;
     let points = keys.flag("points", false)?;
     let spacing = match keys.get("spacing") {
-        None if points => [1.0; 2],
+        None if points || has_header(&path.value) => [1.0; 2],
         _ => {
             let node = keys.require("spacing").map_err(|error| error.help(SPACING))?;
             pair(node, |node| node.positive("the spacing"))?
@@ -76,6 +81,9 @@ fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
         origin: keys.read("origin", |node| pair(node, Node::number))?.unwrap_or_default(),
         spacing,
         unit: keys.read("unit", unit)?.unwrap_or(1.0),
+        missing: keys.read("missing", missing)?,
+        fill: keys.read("fill", |node| choose(node, "`fill`", &Fill::ALL))?.unwrap_or(Fill::Error),
+        detrend: keys.read("detrend", |node| choose(node, "`detrend`", &Detrend::ALL))?.unwrap_or(Detrend::None),
         interpolation: keys
             .read("interpolate", |node| choose(node, "interpolation", &Interpolation::ALL))?
             .unwrap_or(Interpolation::Linear),
@@ -89,6 +97,23 @@ fn unit(node: &Node) -> Result<f64> {
         0.0 => Err(node.refuse("the unit is 0").label("all heights would be 0")),
         unit => Ok(unit),
     }
+}
+
+/// Return what stands for points without a height: a number, a word, or a list of these.
+fn missing(node: &Node) -> Result<Missing> {
+    let one = [node];
+    let items: Vec<&Node> = match &node.value {
+        Value::List(items) => items.iter().collect(),
+        _ => one.to_vec(),
+    };
+    let mut missing = Missing::default();
+    for item in items {
+        match &item.value {
+            Value::String(word) => missing.words.push(word.clone()),
+            _ => missing.numbers.push(item.number()?),
+        }
+    }
+    Ok(missing)
 }
 
 /// Return two numbers, each read by `number`; a single number stands for both.
