@@ -5,7 +5,7 @@
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 use winkler::error::Result;
-use winkler::petsc::{Int, Ksp, Matrix, Rows, Schur, Scope, Session};
+use winkler::petsc::{Int, Ksp, Matrix, Rows, Schur, Scope, Session, launcher};
 use winkler::solver::options::{Typed, UnreadKind, unread};
 
 /// After this, ranks that wait for each other are ended.
@@ -22,8 +22,8 @@ fn alone(test: &str, ranks: usize, environment: &[(&str, &str)], body: impl FnOn
     let mut command = match ranks {
         0 => Command::new(program),
         ranks => {
-            let mut command = Command::new("mpiexec");
-            command.args(["--oversubscribe", "-n", &ranks.to_string()]).arg(program);
+            let mut command = launcher();
+            command.args(["-n", &ranks.to_string()]).arg(program);
             // A hang ends the test instead of stopping it for ever.
             command
                 .env("MPIEXEC_TIMEOUT", TIMEOUT.as_secs().to_string())
