@@ -1,4 +1,4 @@
-//! Find PETSc and its MUMPS, refuse unsuitable ones, and generate the Rust declarations of the functions that the binding calls.
+//! Find PETSc, its MUMPS and its MPI, refuse unsuitable ones, and generate the Rust declarations of the functions that the binding calls.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -154,6 +154,9 @@ fn main() {
     println!("cargo:rerun-if-env-changed=PETSC_DIR");
     println!("cargo:rerun-if-env-changed=PETSC_ARCH");
     println!("cargo:rerun-if-env-changed=MUMPS_DIR");
+    for name in ["MPICC", "MPI_PKG_CONFIG", "CRAY_MPICH_DIR"] {
+        println!("cargo:rerun-if-env-changed={name}");
+    }
 
     let petsc = find();
     for header in ["petscconf.h", "petscversion.h"] {
@@ -173,7 +176,9 @@ fn main() {
     }
     println!("cargo:rustc-env=WINKLER_PETSC_LIBRARY={}", library(&petsc).display());
     let mumps = mumps(&petsc.include_paths);
-    declare(&[&petsc.include_paths[..], &mumps].concat());
+    let mpi = mpi();
+    // MPI comes first, since a folder of PETSc that holds all packages of a site may hold another MPI.
+    declare(&[&mpi.include_paths[..], &petsc.include_paths, &mumps].concat(), &mpi);
 }
 
 /// Return the shared library of PETSc, under the name that programs link (`libpetsc.so.3.18`).
@@ -187,6 +192,8 @@ fn library(petsc: &pkg_config::Library) -> PathBuf {
         refuse(&format!("{plain} is not in {:?}: winkler needs PETSc as a shared library", petsc.link_paths));
     };
     let (target, start) = (file.canonicalize().ok(), format!("{plain}."));
+    // Debian's folder of PETSc is one of links that come with the headers; programs run without these.
+    let folder = target.as_ref().and_then(|target: &PathBuf| target.parent()).or(folder.map(PathBuf::as_path));
     let versions = folder.and_then(|folder| folder.read_dir().ok()).into_iter().flatten().flatten();
     let versions = versions.map(|entry| entry.path()).filter(|path| {
         let named = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&start));
@@ -238,19 +245,53 @@ fn find() -> pkg_config::Library {
     probed.unwrap_or_else(|cause| refuse(&format!("PETSc was not found: {cause}")))
 }
 
+/// Find MPI as the crate `mpi` does, so that all headers and libraries belong to one MPI. Programs look for its library where the build
+/// found it, unless LD_LIBRARY_PATH says otherwise.
+fn mpi() -> build_probe_mpi::Library {
+    let mpi = build_probe_mpi::probe().unwrap_or_else(|_| {
+        refuse("MPI was not found: put the `mpicc` of PETSc's MPI into $PATH, or name it in MPICC (Debian: libopenmpi-dev)")
+    });
+    for folder in &mpi.lib_paths {
+        println!("cargo:rustc-link-arg=-Wl,--enable-new-dtags,-rpath,{}", folder.display());
+    }
+    mpi
+}
+
+/// The macros of `mpi.h` that tell one MPI, and its version, from others.
+const VERSIONS: [&str; 5] =
+    ["I_MPI_NUMVERSION", "MVAPICH2_NUMVERSION", "MPICH_NUMVERSION", "OMPI_MAJOR_VERSION", "OMPI_MINOR_VERSION"];
+
+/// Return a line of Rust for each of [`VERSIONS`] in these declarations. It does not compile if the crate `mpi` was built with another
+/// MPI, as it stays when MPICC changes: cargo builds that crate once.
+fn same_mpi(declared: &str) -> String {
+    let words = "the crate mpi was built with another MPI: cargo clean -p mpi-sys";
+    let is_declared = |name: &&&str| declared.contains(&format!("pub const {name}:"));
+    let line = |name: &&str| format!("const _: () = assert!(mpi::ffi::{name} == {name}, \"{words}\");\n");
+    VERSIONS.iter().filter(is_declared).map(line).collect()
+}
+
+/// End the build because the headers cannot be read. `said` is what clang says about them.
+fn refuse_headers(said: &str, folders: &[PathBuf], mpi: &build_probe_mpi::Library) -> ! {
+    let Some(mix) = requirements::mix_of_mpi(said) else {
+        refuse(&format!(
+            "the headers of PETSc, MPI or MUMPS cannot be read: {said}; that takes libclang with the headers of a compiler (Debian: libclang-dev)"
+        ));
+    };
+    let used = mpi.mpicc.as_ref().map_or("pkg-config".to_owned(), |mpicc| format!("`{mpicc} -show`"));
+    refuse(&format!(
+        "{mix}\n\nThe MPI of {used} and PETSc do not belong together: name the mpicc of PETSc's MPI in MPICC, \
+         or point PETSC_DIR at a PETSc that was built with this MPI. Searched for headers: {folders:?}"
+    ))
+}
+
 /// Write the declarations to the build folder.
 ///
 /// `petsc.rs` has the functions of PETSc as fields of `Library`, which are looked up when its file is opened. `mumps.rs` has the function of
 /// MUMPS, which is linked.
-fn declare(petsc: &[PathBuf]) {
-    let mpi = ["mpi-c", "ompi-c", "mpi", "ompi", "mpich"]
-        .iter()
-        .find_map(|name| pkg_config::Config::new().cargo_metadata(false).probe(name).ok())
-        .map(|library| library.include_paths)
-        .unwrap_or_default();
+fn declare(folders: &[PathBuf], mpi: &build_probe_mpi::Library) {
     let common = || {
         bindgen::Builder::default()
-            .clang_args(petsc.iter().chain(&mpi).map(|folder| format!("-I{}", folder.display())))
+            .clang_args(folders.iter().map(|folder| format!("-I{}", folder.display())))
             .rust_edition(bindgen::RustEdition::Edition2024)
             .generate_comments(false)
             .layout_tests(false)
@@ -261,6 +302,7 @@ fn declare(petsc: &[PathBuf]) {
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
         .allowlist_type("(InsertMode|KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool|ScatterMode)")
+        .allowlist_var(VERSIONS.join("|"))
         .dynamic_library_name("Library")
         .dynamic_link_require_all(true);
     for function in FUNCTIONS {
@@ -268,14 +310,10 @@ fn declare(petsc: &[PathBuf]) {
     }
     let mumps = common().header_contents("mumps.h", "#include <dmumps_c.h>").allowlist_function("dmumps_c");
     for (builder, file) in [(library, "petsc.rs"), (mumps, "mumps.rs")] {
-        let bindings = builder.generate().unwrap_or_else(|cause| {
-            refuse(&format!(
-                "bindgen could not read the headers of PETSc or MUMPS: {cause}; it needs `apt-get install libclang-dev`"
-            ))
-        });
+        let bindings = builder.generate().unwrap_or_else(|cause| refuse_headers(&cause.to_string(), folders, mpi));
+        let text = bindings.to_string();
         let file = Path::new(&env::var_os("OUT_DIR").unwrap_or_default()).join(file);
-        bindings
-            .write_to_file(&file)
+        std::fs::write(&file, same_mpi(&text) + &text)
             .unwrap_or_else(|cause| refuse(&format!("cannot write {}: {cause}", file.display())));
     }
 }

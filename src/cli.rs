@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// PETSc options are typed as in every PETSc program, for all bodies (-ksp_type cg -pc_type hypre) or for one
 /// (-upper_ksp_type cg); -help lists them.
 #[derive(Parser)]
-#[command(name = "winkler", version, after_help = EXIT_CODES)]
+#[command(name = "winkler", version, after_help = after_help())]
 struct Cli {
     #[command(flatten)]
     color: colorchoice_clap::Color,
@@ -34,6 +34,13 @@ struct Cli {
 
 const EXIT_CODES: &str = "Exit codes: 0 converged, 1 not converged (results are written), 2 command line, 3 scene, 4 mesh, \
 5 solver or PETSc option, 6 file system, 130, 143 or 129 ended by SIGINT, SIGTERM or SIGHUP (results are written).";
+
+/// Return the end of the program's help: exit codes, and where the examples are.
+fn after_help() -> String {
+    let examples =
+        crate::scene::examples().map_or(String::new(), |folder| format!("\n\nExamples: {}", folder.display()));
+    EXIT_CODES.to_owned() + &examples
+}
 
 const SOLVE: &str = "PETSc options follow the scene, with one dash: for all bodies (-ksp_type cg -pc_type hypre), for the body `upper` \
 (-upper_ksp_type cg), or for the matrix of all bodies in Newton's method (-newton_pc_type hypre). -help lists them; with -v the run \
@@ -176,6 +183,7 @@ pub fn run(words: Vec<OsString>) -> i32 {
     // MPI starts first: the other ranks would wait for a rank that ended before, say after printing help
     let session = match Session::is_one_of_several().then(Session::start_mpi).transpose() {
         Ok(session) => session,
+        Err(error) if error.is_silent() => return error.kind().exit_code(),
         Err(error) => return complain(&error),
     };
     let is_first = session.as_ref().is_none_or(|session| session.rank() == 0);

@@ -56,5 +56,8 @@ pub fn new(folder: &Path, example: Example) -> Result<i32> {
     let path = folder.join("scene.toml");
     let scene = path.display();
     say(format_args!("{scene} and {name}.geo are there. Next:\n  winkler check {scene}\n  winkler solve {scene}"))?;
+    if let Some(examples) = crate::scene::examples() {
+        say(format_args!("More examples are in {}", examples.display()))?;
+    }
     Ok(0)
 }

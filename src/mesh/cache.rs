@@ -1,9 +1,12 @@
 //! The cache of meshes that Gmsh made, with one file for each combination of script, numbers, order, dimension and Gmsh.
+//!
+//! Where there is no Gmsh, the newest mesh of the other inputs serves: the login node of a cluster meshes, and its other nodes solve.
 
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use nix::unistd::geteuid;
 use serde::Serialize;
+use std::cmp::Reverse;
 use std::fs::{DirBuilder, File, Metadata, Permissions};
 use std::io::Write;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, PermissionsExt};
@@ -11,12 +14,32 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Return the name of the file in the cache for a mesh with these inputs. It begins with the name of the script. The digest
+/// Return the name in the cache of a mesh with these inputs, without the Gmsh that makes it. It begins with the name of the script. The digest
 /// includes a version, which changes with the way this program calls Gmsh.
 pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // A prefix of 128 bits is long enough.
-    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 3", made_from)))
+    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 4", made_from)))
+}
+
+/// Return the path of the mesh that a Gmsh makes in a folder, under a name of [`file_name`]. `identity` distinguishes this Gmsh from others.
+pub fn made_by(folder: &Path, name: &str, identity: &str) -> PathBuf {
+    // A prefix of 64 bits distinguishes more than all versions of Gmsh.
+    folder.join(format!("{}{:.16}.msh", start(name), digest(&identity)))
+}
+
+/// Return the paths of the meshes in a folder that any Gmsh made under a name of [`file_name`], newest first.
+pub fn made_by_any(folder: &Path, name: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let named = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(&start(name)));
+    let mut files: Vec<_> = named.map(|entry| entry.path()).collect();
+    files.sort_by_key(|file| Reverse(file.metadata().and_then(|data| data.modified()).ok()));
+    files
+}
+
+/// Return what the names of the meshes of all versions of Gmsh begin with.
+fn start(name: &str) -> String {
+    format!("{}-", name.trim_end_matches(".msh"))
 }
 
 /// Return the folders that may hold the cache, best first. $WINKLER_CACHE stands alone if it is set. Otherwise they are
@@ -124,12 +147,12 @@ impl Workshop {
         }
     }
 
-    /// Move a finished file into the cache, over an older one, and return its path there.
+    /// Move a finished file into the cache, over an older one, and return its path there. `name` gives this path for the cache's folder.
     ///
     /// # Errors
     /// The file system refuses.
-    pub fn publish(&self, file: &Path, name: &str) -> Result<PathBuf> {
-        let to = self.cache.join(name);
+    pub fn publish(&self, file: &Path, name: impl FnOnce(&Path) -> PathBuf) -> Result<PathBuf> {
+        let to = name(&self.cache);
         let owned = |data: Metadata| Permissions::from_mode(data.permissions().mode() & !WRITABLE_BY_ALL);
         let ours = std::fs::metadata(file).and_then(|data| std::fs::set_permissions(file, owned(data)));
         ours.and_then(|()| std::fs::rename(file, &to)).map_err(|cause| Error::file(&to, "create", &cause))?;
@@ -233,7 +256,7 @@ mod tests {
         let workshop = Workshop::open(&[blocked.clone(), good.clone()]).unwrap();
         let file = workshop.path().join("a");
         std::fs::write(&file, "a").unwrap();
-        assert_eq!(workshop.publish(&file, "b.msh").unwrap(), good.join("b.msh"));
+        assert_eq!(workshop.publish(&file, |cache| cache.join("b.msh")).unwrap(), good.join("b.msh"));
         let blamed = |error: Error| workshop.blame(error).message().to_owned();
         assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), "no mesh");
         let left = std::fs::read_dir(workshop.path()).unwrap().map(|entry| entry.unwrap().file_name());

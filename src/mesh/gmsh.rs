@@ -1,7 +1,7 @@
 //! Calls of the program Gmsh.
 
 use super::guard::{self, End};
-use crate::error::{Error, Kind, Result};
+use crate::error::{Error, Result};
 use crate::interrupt::{self, Interrupt};
 use crate::problem::{Guard, Order};
 use signal_hook::consts::SIGXFSZ;
@@ -38,14 +38,16 @@ pub struct Task<'a> {
 
 impl Gmsh {
     /// Find `gmsh` in $PATH.
-    ///
-    /// # Errors
-    /// It is not there.
-    pub fn find() -> Result<Gmsh> {
-        guard::find("gmsh").map(|program| Gmsh { program }).ok_or_else(|| {
-            Error::new(Kind::Mesh, "Gmsh is not installed: there is no `gmsh` in $PATH")
-                .help("run scripts/setup, or `apt-get install gmsh`")
-        })
+    pub fn find() -> Option<Gmsh> {
+        guard::find("gmsh").map(|program| Gmsh { program })
+    }
+
+    /// Return the error of a script or file that cannot be meshed or converted, because there is no Gmsh.
+    pub fn missing(path: &Path) -> Error {
+        Error::mesh(path, None, "the cache has no mesh of it, and there is no `gmsh` in $PATH to make one").help(
+            "put Gmsh 4.8 or newer into $PATH (Debian: gmsh), or make the mesh where there is one: \
+             `winkler mesh SCENE` there keeps it in the cache, and WINKLER_CACHE names a folder that both see",
+        )
     }
 
     /// Return a text that distinguishes this Gmsh from others: its path, size and time of change. To ask for its version would

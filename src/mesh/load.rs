@@ -116,9 +116,8 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
 /// Return a mesh of another program, or of another version of Gmsh's format, as Gmsh converts it.
 fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
-    let gmsh = Gmsh::find()?;
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let name = file_name(("converted", gmsh.identity(), ending, digest_of_bytes(bytes)), path);
+    let name = file_name(("converted", ending, digest_of_bytes(bytes)), path);
     let parse = |file: &mut Digested<File>| {
         msh::read(path, Box::new(file), Maker::Other).map_err(|error| match error.advice() {
             // Advice for scripts does not help with the file of another program.
@@ -127,44 +126,50 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
         })
     };
     let guard = &Guard::default();
-    let make = |work: &Path, made: &Path| {
+    let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
         let script = &foreign::mesh(file, bytes, work)?;
         let task =
             Task { script, shown: path, set: &[], is_mesh: true, dimension: D, order: Order::P1, guard, interrupt };
         gmsh.run(&task, made, work)
     };
-    kept(&name, None, &folders(), parse, make).map_err(|error| error.at(&file.place))
+    kept((path, &name), None, &folders(), parse, make).map_err(|error| error.at(&file.place))
 }
 
-/// Return the mesh `name` from the cache, which is in one of `folders`, or make it.
+/// Return the mesh `name` from the cache, which is in one of `folders`, or make it from `path`. Only the latter takes Gmsh.
 ///
-/// `make` gets a folder to work in and the path of the file that it must write there. `unkept` gives a reason why the name does
+/// `make` gets Gmsh, a folder to work in and the path of the file that it must write there. `unkept` gives a reason why the name does
 /// not identify all that the mesh is made from; then the mesh is always made anew.
 fn kept<const D: usize>(
-    name: &str,
+    (path, name): (&Path, &str),
     unkept: Option<String>,
     folders: &[PathBuf],
     mut parse: impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
-    make: impl FnOnce(&Path, &Path) -> Result<()>,
+    make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
 ) -> Result<Loaded<D>> {
     let mut parse = |file: File| {
         let mut source = Digested::new(file);
         parse(&mut source).map(|mesh| (mesh, source.digest()))
     };
+    let gmsh = Gmsh::find();
+    let candidates = |folder: &PathBuf| match &gmsh {
+        Some(gmsh) => vec![cache::made_by(folder, name, &gmsh.identity())],
+        None => cache::made_by_any(folder, name),
+    };
     // A file of the cache that cannot be read or is damaged counts as absent.
-    for folder in folders.iter().filter(|_| unkept.is_none()) {
-        let cached = folder.join(name);
+    for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
         if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| parse(file).ok()) {
             return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept });
         }
     }
+    let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(name);
     let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
-    let mesh = make(workshop.path(), &made).and_then(|()| parse(open()?));
+    let mesh = make(&gmsh, workshop.path(), &made).and_then(|()| parse(open()?));
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)?, digest, unkept })
+    let file = workshop.publish(&made, |cache| cache::made_by(cache, name, &gmsh.identity()))?;
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file, digest, unkept })
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
@@ -174,7 +179,9 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
         MeshSource::Geo { file, set, sizes, guard, .. } => {
             let script = script(&file.value).ok()?;
             let known = script.inputs.unknown.is_none();
-            known.then(|| key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard)).ok())?
+            let gmsh = Gmsh::find().map(|gmsh| gmsh.identity()).unwrap_or_default();
+            let name = key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard));
+            known.then(|| format!("{name} {gmsh}"))
         }
         MeshSource::Msh { file } => crate::file::read(&file.value).ok().map(|bytes| digest_of_bytes(&bytes)),
         MeshSource::Arrays(_) => None,
@@ -194,12 +201,11 @@ fn key(
     dimension: usize,
     order: Order,
     (set, sizes, guard): (&[(String, f64)], Option<&str>, &Guard),
-) -> Result<String> {
+) -> String {
     // The algorithm depends on whether a number of threads is given, not on the number.
     let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
     let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
-    let made_from = (Gmsh::find()?.identity(), asked, files, script.is_ended(), script.inputs.environment());
-    Ok(file_name(made_from, path))
+    file_name((asked, files, script.is_ended(), script.inputs.environment()), path)
 }
 
 /// Mesh a script on one rank.
@@ -234,11 +240,10 @@ fn meshed<const D: usize>(
     if !guard.trusted {
         script.judge(file)?;
     }
-    let gmsh = Gmsh::find()?;
-    let name = key(path, &script, D, order, (set, sizes, guard))?;
+    let name = key(path, &script, D, order, (set, sizes, guard));
     let unkept = script.inputs.unknown.as_ref();
     let unkept = unkept.map(|word| format!("{} is meshed anew in each run, since it uses `{word}`", path.display()));
-    let make = |work: &Path, made: &Path| {
+    let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
         let own = match is_shape {
             true => foreign::script(path, &script.files[0], D, guard.size, work)?,
             false => path.clone(),
@@ -252,7 +257,7 @@ fn meshed<const D: usize>(
         let script = sized.as_deref().unwrap_or(&own);
         gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
     };
-    kept(&name, unkept, folders, |file| checked(path, file, order), make)
+    kept((path, &name), unkept, folders, |file| checked(path, file, order), make)
 }
 
 /// Return the path of a script in the folder `work` that includes the one at `path`, or `None` if the last line of that script
@@ -276,7 +281,7 @@ pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
     let name = final_name(purpose);
     let made = workshop.path().join(&name);
     std::fs::write(&made, sizes).map_err(|cause| Error::file(&made, "write", &cause))?;
-    workshop.publish(&made, &name).map(|_| ())
+    workshop.publish(&made, |cache| cache.join(&name)).map(|_| ())
 }
 
 /// Return the final sizes of an earlier adaptation for the same `purpose`.

@@ -122,7 +122,6 @@ impl Folder {
 /// # Errors
 /// [`Kind::File`] when it cannot be created, or something else has its name.
 pub fn make_folder(path: &Path) -> Result<()> {
-    let help = "remove it, or name another folder (`-o FOLDER`)";
     // the nearest existing ancestor must be a folder
     let in_the_way = path.ancestors().find(|part| part.symlink_metadata().is_ok()).filter(|part| !part.is_dir());
     if let Some(part) = in_the_way {
@@ -133,9 +132,11 @@ pub fn make_folder(path: &Path) -> Result<()> {
         };
         return Err(Error::new(Kind::File, format!("cannot create the folder {}", path.display()))
             .because(format!("{} is {part_is}", part.display()))
-            .help(help));
+            .help("remove it, or name another folder (`-o FOLDER`)"));
     }
-    fs::create_dir_all(path).map_err(|cause| Error::file(path, "create the folder", &cause).help(help))
+    fs::create_dir_all(path).map_err(|cause| {
+        Error::file(path, "create the folder", &cause).help("name a folder that you can write to (`-o FOLDER`)")
+    })
 }
 
 /// Refuse to write into a folder of another user, as root could do by mistake. A folder that its owner lets a group or

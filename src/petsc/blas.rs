@@ -67,7 +67,7 @@ fn lapack(name: &CStr) -> Result<*mut c_void> {
     if address.is_null() {
         let name = name.to_string_lossy();
         return Err(Error::new(Kind::Solver, format!("no LAPACK is loaded: `{name}` is not there"))
-            .help("install one that PETSc can use, e.g. `apt-get install libopenblas0-pthread`"));
+            .help("install OpenBLAS where PETSc finds it (Debian: libopenblas0-pthread)"));
     }
     Ok(address)
 }

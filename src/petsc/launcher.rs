@@ -12,7 +12,9 @@
 //!
 //! The settings are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them and break.
 
+use crate::error::{Error, Kind, Result};
 use std::env;
+use std::process::Command;
 
 /// The variables of which each launcher of several ranks sets at least one.
 const LAUNCHERS: &str = "OMPI_COMM_WORLD_SIZE PMIX_RANK PMI_RANK PMI_SIZE SLURM_PROCID PALS_RANKID ALPS_APP_PE FLUX_TASK_RANK \
@@ -41,6 +43,53 @@ const TOGETHER: [(&str, &str); 2] = [("OMPI_MCA_pml", "ob1"), ("OMPI_MCA_btl", "
 fn are_together() -> bool {
     let size = env::var("OMPI_COMM_WORLD_SIZE");
     size.is_ok() && size == env::var("OMPI_COMM_WORLD_LOCAL_SIZE")
+}
+
+/// Settings by which launchers start more ranks than there are cores. They are environment variables, since a launcher refuses the options
+/// of another one and ignores its variables. The launcher of MPICH and its relatives starts any number of ranks by itself.
+pub const CROWDED: [(&str, &str); 3] = [
+    // Open MPI 4: --oversubscribe
+    ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+    // Open MPI 5: --map-by :oversubscribe
+    ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
+    // srun: --overcommit
+    ("SLURM_OVERCOMMIT", "1"),
+];
+
+/// Settings of Open MPI 4, Open MPI 5 and srun by which ranks may use all cores. A rank that is bound to one core has one thread of OpenBLAS.
+pub const UNBOUND: [(&str, &str); 3] = [
+    ("OMPI_MCA_hwloc_base_binding_policy", "none"),
+    ("PRTE_MCA_hwloc_default_binding_policy", "none"),
+    ("SLURM_CPU_BIND", "none"),
+];
+
+/// Return the command that starts ranks of a program: the words of `$WINKLER_MPIEXEC`, or else `mpiexec`. Arguments to add are `-n`, the
+/// number of ranks, and the program, which all launchers understand alike. More ranks than cores are allowed.
+pub fn launcher() -> Command {
+    let typed = env::var("WINKLER_MPIEXEC").unwrap_or_default();
+    let mut words = typed.split_whitespace();
+    let mut command = Command::new(words.next().unwrap_or("mpiexec"));
+    command.args(words).envs(CROWDED);
+    command
+}
+
+/// Return the error of a rank that MPI takes for a lone process, though a launcher started it as one of several: the launcher belongs to
+/// another MPI than the program. Only the first rank prints it.
+pub(super) fn refuse_stranger(size: usize, library: &str) -> Result<()> {
+    let Some((started, rank)) = started(|name| env::var(name).ok()).filter(|_| size == 1) else { return Ok(()) };
+    let message = format!(
+        "{started} ranks were started, but each of them is alone: their launcher is not of the MPI of this program, {library}"
+    );
+    let error = Error::new(Kind::Solver, message).help("use the mpiexec of that MPI, or `srun --mpi=pmix`");
+    Err(if rank > 0 { Error::silent(error.kind().exit_code()) } else { error })
+}
+
+/// Return the number of ranks that a launcher of MPI started, if there are several, and the number of this rank. The variables of srun
+/// are left out: without a plugin for MPI it also starts programs that are no ranks.
+fn started(variable: impl Fn(&str) -> Option<String>) -> Option<(usize, usize)> {
+    let number = |names: [&str; 3]| names.into_iter().find_map(|name| variable(name)?.parse::<usize>().ok());
+    let size = number(["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"]).filter(|size| *size > 1)?;
+    Some((size, number(["OMPI_COMM_WORLD_RANK", "PMI_RANK", "MPI_LOCALRANKID"]).unwrap_or(0)))
 }
 
 /// Return whether a launcher such as `mpiexec` started this process.
@@ -92,7 +141,19 @@ pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
 
 #[cfg(test)]
 mod tests {
-    use super::is_several;
+    use super::{is_several, started};
+
+    #[test]
+    fn ranks_that_were_started_are_counted() {
+        let of = |set: &'static [(&str, &str)]| {
+            started(|name| set.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned()))
+        };
+        assert_eq!(of(&[]), None);
+        assert_eq!(of(&[("PMI_SIZE", "1"), ("PMI_RANK", "0")]), None);
+        assert_eq!(of(&[("PMI_SIZE", "4"), ("PMI_RANK", "3")]), Some((4, 3)));
+        assert_eq!(of(&[("OMPI_COMM_WORLD_SIZE", "2"), ("OMPI_COMM_WORLD_RANK", "1")]), Some((2, 1)));
+        assert_eq!(of(&[("SLURM_STEP_NUM_TASKS", "8"), ("SLURM_PROCID", "1")]), None);
+    }
 
     #[test]
     fn launchers_are_known_by_what_they_set() {

@@ -64,6 +64,7 @@ pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
 pub use heap::{Heap, keep_apart, keep_at_hand, leave};
 pub use ksp::{Ksp, Solved};
+pub use launcher::{CROWDED, UNBOUND, launcher};
 pub use matrix::Matrix;
 pub use metis::nested_dissection;
 pub use mumps::Schur;

@@ -4,7 +4,7 @@
 
 use super::{Int, Session, ffi, metis};
 use crate::error::{Error, Kind, Result};
-use mpi::ffi::{MPI_Comm_c2f, RSMPI_COMM_SELF};
+use mpi::ffi::{RSMPI_COMM_SELF, RSMPI_Comm_c2f};
 use std::ptr::null_mut;
 
 /// Space beyond the estimate of the analysis, in per cent; the values are tried one after the other.
@@ -245,7 +245,7 @@ impl Schur {
         let mumps = &mut self.mumps;
         (mumps.sym, mumps.par) = (1, 1);
         // SAFETY: a constant of MPI, which runs as long as the session.
-        mumps.comm_fortran = unsafe { MPI_Comm_c2f(RSMPI_COMM_SELF) };
+        mumps.comm_fortran = unsafe { RSMPI_Comm_c2f(RSMPI_COMM_SELF) };
         self.call(-1)?;
         let icntl = &mut self.mumps.icntl;
         icntl[..4].copy_from_slice(&[-1, -1, -1, 0]);

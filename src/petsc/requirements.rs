@@ -7,8 +7,8 @@
 pub const OLDEST: (u32, u32) = (3, 18);
 
 /// The advice of every refusal. Debian's package has real numbers in double precision, MUMPS and hypre.
-pub const ADVICE: &str = "install one, e.g. `apt-get install petsc-dev` (or run scripts/setup), \
-                          or point PETSC_DIR and PETSC_ARCH at one";
+pub const ADVICE: &str = "point PETSC_DIR and PETSC_ARCH at one that has all of real numbers in double precision, \
+                          MUMPS and hypre (Debian: petsc-dev; scripts/setup lists what else it takes)";
 
 /// Return whether `petscconf.h` defines `name`.
 fn defines(petscconf: &str, name: &str) -> bool {
@@ -18,7 +18,7 @@ fn defines(petscconf: &str, name: &str) -> bool {
     })
 }
 
-/// Check the text of `petscconf.h` for real numbers, double precision, MUMPS and hypre.
+/// Check the text of `petscconf.h` for real numbers, double precision, MPI, MUMPS and hypre.
 ///
 /// # Errors
 /// A sentence that names what is wrong and what to install.
@@ -27,6 +27,8 @@ pub fn check_config(petscconf: &str) -> Result<(), String> {
         "this PETSc computes with complex numbers, but winkler needs one with real numbers"
     } else if !defines(petscconf, "PETSC_USE_REAL_DOUBLE") {
         "this PETSc does not compute in double precision, but winkler needs one that does"
+    } else if defines(petscconf, "PETSC_HAVE_MPIUNI") {
+        "this PETSc was built without MPI, but winkler needs one with MPI"
     } else if !defines(petscconf, "PETSC_HAVE_MUMPS") {
         "this PETSc was built without MUMPS, but winkler needs one with MUMPS"
     } else if !defines(petscconf, "PETSC_HAVE_HYPRE") {
@@ -59,6 +61,13 @@ pub fn check_version(petscversion: &str) -> Result<(), String> {
     Ok(())
 }
 
+/// Return the sentence with which PETSc's headers refuse an `mpi.h` that is not of the MPI that PETSc was built with, if clang reports it.
+/// The headers compare kind and version of the two.
+pub fn mix_of_mpi(said: &str) -> Option<&str> {
+    let at = said.find("PETSc was configured with")?;
+    said[at..].lines().next().map(|line| line.trim_end_matches(['"', '\'']))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -76,6 +85,7 @@ mod tests {
         let refusals = [
             (format!("{GOOD}#define PETSC_USE_COMPLEX 1\n"), "complex"),
             (GOOD.replace("REAL_DOUBLE", "REAL_SINGLE"), "double precision"),
+            (format!("{GOOD}#define PETSC_HAVE_MPIUNI 1\n"), "without MPI"),
             (GOOD.replace("HAVE_MUMPS", "HAVE_MUMPSX"), "without MUMPS"),
             (GOOD.replace("HAVE_HYPRE", "HAVE_HYPREX"), "without hypre"),
         ];
@@ -96,5 +106,12 @@ mod tests {
         assert_eq!(check_version(&text(4, 0)), Ok(()));
         assert!(check_version(&text(3, 9)).is_err_and(|refusal| refusal.contains("3.9")));
         assert!(check_version("").is_err());
+    }
+
+    #[test]
+    fn a_mix_of_two_mpis_is_found_in_what_clang_says() {
+        let said = "petscsys.h:99:6: error: \"PETSc was configured with OpenMPI but now\"\npetscsys.h:100:1: error: unknown type\n";
+        assert_eq!(mix_of_mpi(said), Some("PETSc was configured with OpenMPI but now"));
+        assert_eq!(mix_of_mpi("mpi.h:1:10: error: 'x.h' file not found"), None);
     }
 }

@@ -81,7 +81,7 @@ impl Session {
     /// Start MPI alone, so that ranks can compare their input before PETSc reads options.
     ///
     /// # Errors
-    /// When a session was started before in this process, or MPI runs already.
+    /// When a session was started before in this process, or MPI runs already. When the launcher of several ranks belongs to another MPI.
     pub fn start_mpi() -> Result<Session> {
         if STARTED.swap(true, Ordering::SeqCst) {
             return Err(Error::new(Kind::Solver, "PETSc was already started in this process")
@@ -90,6 +90,7 @@ impl Session {
         let universe = launcher::with_quick_start(mpi::initialize)
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
         let world = SimpleCommunicator::world();
+        launcher::refuse_stranger(world.size() as usize, &mpi_name())?;
         abort_on_panic(world.size() > 1);
         Ok(Session(Rc::new(Running { world, left_out: OnceCell::new(), _universe: universe })))
     }
@@ -197,6 +198,12 @@ impl Drop for Running {
         let _ = library::end();
         drop(waiting::take());
     }
+}
+
+/// Return the name and version of MPI: its first line and words up to a comma, as Open MPI appends its package and date.
+fn mpi_name() -> String {
+    let text = mpi::environment::library_version().unwrap_or_default();
+    text.split([',', '\n', '\0']).next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Return on all ranks the file of the home folder that rank 0 found, or an error if rank 0 has one. Collective.

@@ -20,7 +20,7 @@ pub use schema::schema;
 pub use spec::{AdaptSpec, OutputSpec, Scene};
 
 use crate::error::{Error, Kind, Result, Source};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`, or options that are short for
@@ -47,6 +47,12 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Return the folder of examples, if the source that the program was built from is still there.
+pub fn examples() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes");
+    folder.is_dir().then_some(folder)
+}
+
 fn read_text(path: &Path) -> Result<String> {
     if path.is_dir() {
         let error = Error::new(Kind::File, format!("{} is a folder, not a scene file", path.display()));
@@ -56,7 +62,14 @@ fn read_text(path: &Path) -> Result<String> {
             false => error,
         });
     }
-    let bytes = crate::file::with_unix_lines(crate::file::read(path)?);
+    let bytes = crate::file::read(path).map_err(|error| match path.try_exists() {
+        Ok(false) => {
+            let examples = examples().map_or(String::new(), |folder| format!("; examples are in {}", folder.display()));
+            error.help(format!("`winkler new NAME` writes a scene to begin with{examples}"))
+        }
+        _ => error,
+    })?;
+    let bytes = crate::file::with_unix_lines(bytes);
     if let Some(other) = crate::file::other_encoding(&bytes) {
         return Err(Error::new(Kind::File, format!("{} {other}", path.display())).help("save the scene file as UTF-8"));
     }

@@ -3,6 +3,7 @@
 use std::process::{Command, Output};
 use std::time::Duration;
 use winkler::error::Result;
+use winkler::petsc::launcher;
 
 /// The time after which ranks that wait for each other are ended.
 pub const TIMEOUT: Duration = Duration::from_secs(60);
@@ -24,8 +25,8 @@ pub fn alone(
     let mut command = match ranks {
         0 => Command::new(program),
         ranks => {
-            let mut command = Command::new("mpiexec");
-            command.args(["--oversubscribe", "-n", &ranks.to_string()]).arg(program);
+            let mut command = launcher();
+            command.args(["-n", &ranks.to_string()]).arg(program);
             // A hang ends the test instead of stopping it for ever.
             command
                 .env("MPIEXEC_TIMEOUT", TIMEOUT.as_secs().to_string())

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use winkler::petsc::{CROWDED, UNBOUND, launcher};
 
 /// The program under test.
 pub const WINKLER: &str = env!("CARGO_BIN_EXE_winkler");
@@ -166,18 +167,17 @@ pub fn winkler_on(ranks: usize, args: &[&str]) -> Run {
     finish(command, scratch, folder)
 }
 
-/// Runs the program with these words on two ranks, each in a folder of its own and with more options of mpiexec for the second: variables by
-/// `-x`. Results that the words name are `results` in the folder of the run.
-pub fn apart(folders: [&Path; 2], second: &[&str], args: &[&str]) -> Run {
+/// Runs the program with these words on two ranks, each in a folder of its own and with variables for the second. Results that the words name are `results` in the folder of the run.
+pub fn apart(folders: [&Path; 2], variables: &[&str], args: &[&str]) -> Run {
     let scratch = TempDir::new().expect("a temporary folder");
     let folder = scratch.path().join("results");
-    let mut command = Command::new("mpiexec");
+    let mut command = launcher();
     environment(&mut command);
     let output = ["-o", folder.to_str().expect("a path")];
     let output = if args.contains(&"solve") { &output[..] } else { &[] };
     let words = [&[WINKLER], args, output].concat();
-    command.args(["--oversubscribe", "-n", "1", "-wdir"]).arg(folders[0]).args(&words);
-    command.args([":", "-n", "1", "-wdir"]).arg(folders[1]).args(second).args(&words);
+    command.args(["-n", "1", "-wdir"]).arg(folders[0]).args(&words);
+    command.args([":", "-n", "1", "-wdir"]).arg(folders[1]).arg("env").args(variables).args(&words);
     finish(command, scratch, folder)
 }
 
@@ -186,19 +186,21 @@ fn program(ranks: usize) -> Command {
     let mut command = if ranks == 1 {
         Command::new(WINKLER)
     } else {
-        let mut command = Command::new("mpiexec");
-        // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
-        command.args(["--oversubscribe", "--bind-to", "none", "-n", &ranks.to_string(), WINKLER]);
+        let mut command = launcher();
+        command.args(["-n", &ranks.to_string(), WINKLER]);
         command
     };
     environment(&mut command);
     command
 }
 
-/// Sets what tests need: Open MPI as root, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
+/// Sets what tests need: Open MPI as root, ranks that share cores, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
 /// options from outside.
 pub fn environment(command: &mut Command) {
     command
+        .envs(CROWDED)
+        // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
+        .envs(UNBOUND)
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         .env("OPENBLAS_NUM_THREADS", std::env::var("OPENBLAS_NUM_THREADS").as_deref().unwrap_or("1"))

@@ -373,18 +373,26 @@ impl Script {
 
     /// Whether the mesh comes from the cache in a folder, and the number of its nodes.
     fn mesh(&self, cache: &Path, set: &[(&str, &str)]) -> (bool, u64) {
-        let mut command = Command::new(crate::common::WINKLER);
-        command.args(["mesh", "scene.toml", "--json"]).current_dir(self.folder.path());
+        let (code, said, complaint) = self.ended(cache, set);
+        assert_eq!(code, Some(0), "{said}{complaint}");
+        let facts: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+        (facts["origin"] == "from the cache", facts["nodes"].as_u64().expect("a number"))
+    }
+
+    /// The exit code of `winkler mesh`, what it printed and what it complained about.
+    fn ended(&self, cache: &Path, set: &[(&str, &str)]) -> (Option<i32>, String, String) {
+        let mut command = Command::new("/bin/sh");
+        command
+            .args(["-c", "umask 000; exec \"$0\" mesh scene.toml --json", crate::common::WINKLER])
+            .current_dir(self.folder.path());
         command
             .env_remove("XDG_CACHE_HOME")
             .env_remove("N")
-            .envs(set.iter().copied())
             .env("WINKLER_CACHE", cache)
-            .env("HOME", self.path("home"));
+            .env("HOME", self.path("home"))
+            .envs(set.iter().copied());
         let (status, said, complaint) = output(command, Duration::from_secs(60));
-        assert!(status.success(), "{said}{complaint}");
-        let facts: serde_json::Value = serde_json::from_str(&said).expect("JSON");
-        (facts["origin"] == "from the cache", facts["nodes"].as_u64().expect("a number"))
+        (status.code(), said, complaint)
     }
 }
 
@@ -459,4 +467,57 @@ fn a_cache_of_others_is_not_used() {
     chown(&cache, Some(54_321), None).expect("given away");
     std::fs::remove_dir_all(&own).expect("removed");
     assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
+}
+
+/// The login node of a cluster meshes, and nodes without Gmsh solve. Where there is a Gmsh, no mesh of another one is taken.
+#[test]
+fn a_cached_mesh_serves_without_gmsh() {
+    use std::os::unix::fs::PermissionsExt;
+    let script = Script::new("n = 3;");
+    let (cache, bin) = (script.path("cache"), script.path("bin"));
+    std::fs::create_dir(&bin).expect("a folder");
+    let count = || std::fs::read_dir(&cache).map_or(0, Iterator::count);
+    let bin = bin.display().to_string();
+    let none = [("PATH", bin.as_str())];
+    let (code, _, complaint) = script.ended(&cache, &none);
+    assert_eq!(code, Some(4), "{complaint}");
+    for words in ["a.geo", "no `gmsh` in $PATH", "WINKLER_CACHE"] {
+        assert!(complaint.contains(words), "no `{words}` in {complaint}");
+    }
+    assert!(!complaint.contains("apt"), "{complaint}");
+    assert_eq!((script.mesh(&cache, &[]), count()), ((false, 32), 1));
+    assert_eq!((script.mesh(&cache, &none), count()), ((true, 32), 1));
+    // Another Gmsh makes a mesh of its own.
+    let usual = std::env::var("PATH").expect("a path");
+    let gmsh = std::env::split_paths(&usual).map(|folder| folder.join("gmsh")).find(|file| file.is_file());
+    let other = script.path("bin/gmsh");
+    std::fs::write(&other, format!("#!/bin/sh\nexec {} \"$@\"\n", gmsh.expect("Gmsh").display())).expect("a script");
+    std::fs::set_permissions(&other, PermissionsExt::from_mode(0o755)).expect("a program");
+    let both = format!("{bin}:{usual}");
+    assert_eq!((script.mesh(&cache, &[("PATH", &both)]), count()), ((false, 32), 2));
+    assert_eq!((script.mesh(&cache, &[("PATH", &both)]), count()), ((true, 32), 2));
+    // Without any, a script that has changed has no mesh.
+    std::fs::remove_file(&other).expect("a file");
+    assert!(script.mesh(&cache, &none).0);
+    script.write("a.geo", &format!("n = 4;{SQUARES}"));
+    assert_eq!(script.ended(&cache, &none).0, Some(4));
+}
+
+/// Without a home, or with one that takes no files, meshes are kept in a folder of this user among the temporary ones. Others cannot write
+/// there, whatever the umask.
+#[test]
+fn without_a_home_meshes_are_kept_among_temporary_files() {
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    let script = Script::new("n = 3;");
+    script.write("file", "");
+    let temporary = script.path("tmp");
+    std::fs::create_dir(&temporary).expect("a folder");
+    let [temporary, file] = [temporary, script.path("file/home")].map(|path| path.display().to_string());
+    for (home, origin) in [("", (false, 32)), (&file, (true, 32)), ("/nonexistent/home", (true, 32))] {
+        assert_eq!(script.mesh(Path::new(""), &[("HOME", home), ("TMPDIR", &temporary)]), origin, "{home}");
+    }
+    let made = std::fs::read_dir(&temporary).expect("a folder").next().expect("a cache").expect("a cache");
+    let data = made.metadata().expect("a folder");
+    assert_eq!(made.file_name().to_string_lossy(), format!("winkler-{}", data.uid()));
+    assert_eq!(data.permissions().mode() & 0o022, 0);
 }

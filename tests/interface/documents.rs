@@ -168,7 +168,7 @@ fn the_job_scripts_work() {
         let folder = scratch();
         let base = folder.path();
         let srun = base.join("bin/srun");
-        fs::write(&srun, "#!/bin/sh\nshift\nexec mpiexec --oversubscribe -n 2 \"$@\"\n").expect("a script");
+        fs::write(&srun, "#!/bin/sh\nshift\nexec mpiexec -n 2 \"$@\"\n").expect("a script");
         fs::set_permissions(&srun, fs::Permissions::from_mode(0o755)).expect("a script that runs");
         let mut job = Command::new("bash");
         crate::common::environment(&mut job);
@@ -191,4 +191,44 @@ fn a_wrong_command_fails() {
     let failed = failures(Path::new("README.md"), &wrong);
     assert_eq!(failed.len(), 1, "{failed:?}");
     assert!(failed[0].starts_with("README.md:3: `scripts/run") && failed[0].contains("pach"), "{failed:?}");
+}
+
+/// Where there is no apt, `scripts/setup` names what is missing, and a PETSc of the user's own counts with its MPI and MUMPS. Gmsh is not
+/// required.
+#[test]
+fn setup_without_apt_takes_the_users_own_petsc() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    for name in ["bin", "petsc/lib/pkgconfig", "petsc/include"] {
+        fs::create_dir_all(path(name)).expect("a folder");
+    }
+    fs::write(path("petsc/include/dmumps_c.h"), "").expect("a header");
+    let usual = std::env::var("PATH").expect("a path");
+    for name in ["bash", "cat", "dirname", "env", "grep", "readlink", "sed", "sort", "tail"] {
+        let tool = std::env::split_paths(&usual).map(|folder| folder.join(name)).find(|file| file.is_file());
+        std::os::unix::fs::symlink(tool.expect(name), path("bin").join(name)).expect("a link");
+    }
+    for name in ["cargo", "cc", "mpicc", "pkg-config", "rustc"] {
+        let program = path("bin").join(name);
+        fs::write(&program, "#!/bin/sh\necho rustc 9.9.9\n").expect("a program");
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("a program that runs");
+    }
+    let setup = |variables: &[(&str, &str)]| {
+        let mut command = Command::new("bash");
+        command.arg(root().join("scripts/setup")).env("PATH", path("bin")).env("CARGO_HOME", path("none"));
+        command.env("PETSC_DIR", path("petsc")).env_remove("PETSC_ARCH").env_remove("MPICC").env_remove("MUMPS_DIR");
+        command.envs(variables.iter().copied());
+        let (status, said, complaint) = output(command, Duration::from_secs(20));
+        assert!(!complaint.contains("apt"), "{complaint}");
+        (status.success(), said + &complaint)
+    };
+    let (is_ready, said) = setup(&[]);
+    assert!(is_ready && said.contains("no gmsh in PATH"), "{said}");
+    for (name, value, words) in [
+        ("MPICC", "/nowhere/mpicc", "/nowhere/mpicc: the mpicc of the MPI"),
+        ("PETSC_DIR", "/nowhere", "/nowhere/ has no lib/pkgconfig"),
+    ] {
+        let (is_ready, said) = setup(&[(name, value)]);
+        assert!(!is_ready && said.contains(words), "{name}: {said}");
+    }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use winkler::petsc::launcher;
 use winkler::solver::options::check_of_scene;
 
 const SCENE: [&str; 2] = ["--set", "mesh.set.n=8"];
@@ -475,10 +476,10 @@ fn groove_in(folder: &Path, home: &Path, ranks: usize, options: &str) -> Run {
     let _ = fs::remove_dir_all(folder.join("out"));
     let mut command = match ranks {
         1 => Command::new(WINKLER),
-        _ => Command::new("mpiexec"),
+        _ => launcher(),
     };
     if ranks > 1 {
-        command.args(["--oversubscribe", "-n", &ranks.to_string(), WINKLER]);
+        command.args(["-n", &ranks.to_string(), WINKLER]);
     }
     environment(&mut command);
     command.args(["solve", &case("groove").display().to_string(), "-o", "out"]).args(SCENE);

@@ -169,7 +169,7 @@ fn ranks_with_other_words_are_refused() {
         let run = winkler_on(2, &[one, &[":", "-n", "1", WINKLER], two].concat());
         refused(&run, 2, &["different command lines", "ranks 0, 1: ", "rank 2: "]);
     }
-    let petsc = apart([root(); 2], &["-x", "PETSC_OPTIONS=-ksp_type cg"], &first);
+    let petsc = apart([root(); 2], &["PETSC_OPTIONS=-ksp_type cg"], &first);
     refused(&petsc, 5, &["different values of PETSC_OPTIONS", "rank 0: nothing", "rank 1: -ksp_type cg"]);
     let version = winkler_on(2, &["--version"]);
     assert_eq!((version.code, version.stdout.lines().count()), (0, 1), "{}", version.said());

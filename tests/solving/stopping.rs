@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use winkler::petsc::launcher;
 
 /// A run that would take hours: the paper's iteration with tiny steps.
 const ENDLESS: [&str; 4] = ["--set", "method.gamma=1e-6", "--set", "method.stop={residual=1e-12,iterations=100000000}"];
@@ -44,7 +45,8 @@ impl Working {
         let mut command = Command::new("env");
         command.arg("--default-signal=HUP,INT,TERM");
         if ranks > 1 {
-            command.args(["mpiexec", "--oversubscribe", "-n", &ranks.to_string()]);
+            let launcher = launcher();
+            command.arg(launcher.get_program()).args(launcher.get_args()).args(["-n", &ranks.to_string()]);
         }
         command.arg(winkler);
         environment(&mut command);

@@ -6,6 +6,7 @@ use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
 use crate::output::safe_name;
+use crate::petsc::launcher;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
@@ -114,9 +115,7 @@ impl Runner {
         let mut command = match case.ranks {
             1 => Command::new(&self.program),
             ranks => {
-                let mut command = Command::new("mpiexec");
-                let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-                command.args((ranks > cores).then_some("--oversubscribe"));
+                let mut command = launcher();
                 command.args(["-n", &ranks.to_string()]).arg(&self.program);
                 command
             }
