@@ -16,10 +16,13 @@ use std::ffi::{c_char, c_int, c_void};
 /// PETSc's integer for rows and columns.
 pub type Int = PetscInt;
 
-/// MUMPS, which is linked.
+/// MUMPS' struct.
 pub mod mumps {
     include!(concat!(env!("OUT_DIR"), "/mumps.rs"));
 }
+
+/// MUMPS' integer for rows and columns.
+pub use mumps::MumpsInt;
 
 /// The type of `PetscVFPrintf`, the hook through which PETSc prints everything.
 ///
