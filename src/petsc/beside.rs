@@ -5,7 +5,7 @@
 
 use super::ffi;
 use super::ffi::mumps::DMUMPS_STRUC_C;
-use super::{keep_apart, library};
+use super::keep_apart;
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
 use std::ffi::{CStr, c_void};
@@ -28,7 +28,7 @@ fn opened() -> Result<&'static Library> {
     // SAFETY: initialisers of libraries run as in any program that links them.
     let open = |file| unsafe { Library::new(file) };
     let opened = OPENED.get_or_init(|| {
-        let opened = open(MUMPS).or_else(|_| open(library::FILE)).map_err(|cause| cause.to_string());
+        let opened = open(MUMPS).or_else(|_| open(ffi::FILE)).map_err(|cause| cause.to_string());
         keep_apart();
         opened
     });

@@ -16,6 +16,9 @@ use std::ffi::{c_char, c_int, c_void};
 /// PETSc's integer for rows and columns.
 pub type Int = PetscInt;
 
+/// The file of the PETSc that this program was built with.
+pub const FILE: &str = env!("WINKLER_PETSC_LIBRARY");
+
 /// MUMPS' struct.
 pub mod mumps {
     include!(concat!(env!("OUT_DIR"), "/mumps.rs"));

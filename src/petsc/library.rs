@@ -4,6 +4,7 @@
 //! condensed creates no object of PETSc and never opens it.
 
 use super::error::{check_in, record};
+use super::ffi::FILE;
 use super::{beside, ffi, keep_apart, table, waiting};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
@@ -11,9 +12,6 @@ use std::ffi::{CString, c_char, c_int};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::OnceLock;
-
-/// The file of the PETSc that this program was built with.
-pub(super) const FILE: &str = env!("WINKLER_PETSC_LIBRARY");
 
 /// Option that leaves the signals to Rust, so that a panic or a stack overflow prints its own message.
 const NO_SIGNALS: &str = "-no_signal_handler";
