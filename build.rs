@@ -1,6 +1,8 @@
 //! Find PETSc, its MUMPS and its MPI, refuse unsuitable ones, and generate the Rust declarations of the functions that the binding calls.
 
 use std::env;
+use std::ffi::{CStr, OsStr, c_void};
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::exit;
 
@@ -170,12 +172,17 @@ fn main() {
             "petscconf.h" => requirements::check_config(&text),
             _ => requirements::check_version(&text),
         };
+        if header == "petscconf.h" && requirements::has_hypre(&text) {
+            println!("cargo:rustc-env=WINKLER_HAS_HYPRE=1");
+        }
         if let Err(sentence) = checked {
             refuse(&format!("{}: {sentence}", path.display()));
         }
     }
-    println!("cargo:rustc-env=WINKLER_PETSC_LIBRARY={}", library(&petsc).display());
-    let mumps = mumps(&petsc.include_paths);
+    let library = library(&petsc);
+    println!("cargo:rustc-env=WINKLER_PETSC_LIBRARY={}", library.display());
+    beside(&library);
+    let mumps = mumps_header(&petsc.include_paths);
     let mpi = mpi();
     // MPI comes first, since a folder of PETSc that holds all packages of a site may hold another MPI.
     declare(&[&mpi.include_paths[..], &petsc.include_paths, &mumps].concat(), &mpi);
@@ -202,18 +209,61 @@ fn library(petsc: &pkg_config::Library) -> PathBuf {
     versions.min_by_key(|path| path.as_os_str().len()).unwrap_or(file)
 }
 
-/// Link MUMPS itself, whose Schur complement PETSc does not return in full, and return the folder of its header.
-fn mumps(petsc: &[PathBuf]) -> Vec<PathBuf> {
-    let own = env::var_os("MUMPS_DIR").filter(|root| !root.is_empty()).map(PathBuf::from);
-    let folders = own.iter().map(|root| root.join("include")).chain(petsc.iter().cloned());
-    let Some(folder) = folders.chain(["/usr/include".into()]).find(|folder| folder.join("dmumps_c.h").exists()) else {
-        refuse("dmumps_c.h of MUMPS was not found: `apt-get install libmumps-dev`, or point MUMPS_DIR at its folder");
-    };
-    if let Some(root) = own {
-        println!("cargo:rustc-link-search=native={}", root.join("lib").display());
-        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", root.join("lib").display());
+/// Name the files that have MUMPS and METIS for this PETSc, by the loader's own search: no other ones may come into a process with PETSc.
+///
+/// Libraries that only compute nodes have may be missing here. The program then looks for MUMPS in PETSc's own file.
+fn beside(petsc: &Path) {
+    // SAFETY: initialisers of libraries run as in any program that links them. They stay loaded until the end of this process.
+    let opened = unsafe { libloading::Library::new(petsc) };
+    let file = |function: &CStr| file_of(opened.as_ref().ok()?, function);
+    if let Err(cause) = &opened {
+        println!("cargo:warning={} cannot be opened here: {cause}", petsc.display());
     }
-    println!("cargo:rustc-link-lib=dmumps");
+    let mumps = file(c"dmumps_c");
+    if opened.is_ok() && mumps.is_none() {
+        refuse(&format!(
+            "{} has no dmumps_c: winkler needs PETSc with MUMPS as a shared library, or inside it",
+            petsc.display()
+        ));
+    }
+    println!("cargo:rustc-env=WINKLER_MUMPS_LIBRARY={}", mumps.as_deref().unwrap_or(petsc).display());
+    // SCOTCH has functions of METIS, but not this one
+    if let Some(metis) = file(c"METIS_Free") {
+        println!("cargo:rustc-env=WINKLER_METIS_LIBRARY={}", metis.display());
+    }
+    std::mem::forget(opened);
+}
+
+/// Return the file of a function in a library or those that it needs, as the loader names it.
+fn file_of(library: &libloading::Library, function: &CStr) -> Option<PathBuf> {
+    // SAFETY: the address is not used as a function.
+    let address = *unsafe { library.get::<*mut c_void>(function.to_bytes_with_nul()) }.ok()?;
+    // SAFETY: plain C data, which dladdr fills with pointers to texts that live as long as the library is loaded.
+    let name = unsafe {
+        let mut found: libc::Dl_info = std::mem::zeroed();
+        let known = libc::dladdr(address, &mut found) != 0 && !found.dli_fname.is_null();
+        known.then(|| CStr::from_ptr(found.dli_fname))
+    }?;
+    Some(PathBuf::from(OsStr::from_bytes(name.to_bytes())))
+}
+
+/// Return the folder of MUMPS' header: that of MUMPS_DIR, one that PETSc names, one that the compiler is told of, or the system's.
+///
+/// MUMPS is called directly, since PETSc does not return its Schur complement in full.
+fn mumps_header(petsc: &[PathBuf]) -> Vec<PathBuf> {
+    let own = env::var_os("MUMPS_DIR").filter(|root| !root.is_empty()).map(PathBuf::from);
+    let told: Vec<PathBuf> = ["CPATH", "C_INCLUDE_PATH"]
+        .iter()
+        .filter_map(env::var_os)
+        .flat_map(|paths| env::split_paths(&paths).collect::<Vec<_>>())
+        .collect();
+    let folders = own.iter().map(|root| root.join("include")).chain(petsc.iter().cloned()).chain(told);
+    let Some(folder) = folders.chain(["/usr/include".into()]).find(|folder| folder.join("dmumps_c.h").exists()) else {
+        refuse(
+            "dmumps_c.h of MUMPS was not found: `apt-get install libmumps-dev`, or point MUMPS_DIR at the folder of the \
+             MUMPS that PETSc uses",
+        );
+    };
     vec![folder]
 }
 
@@ -286,8 +336,7 @@ fn refuse_headers(said: &str, folders: &[PathBuf], mpi: &build_probe_mpi::Librar
 
 /// Write the declarations to the build folder.
 ///
-/// `petsc.rs` has the functions of PETSc as fields of `Library`, which are looked up when its file is opened. `mumps.rs` has the function of
-/// MUMPS, which is linked.
+/// `petsc.rs` has the functions of PETSc as fields of `Library`, which are looked up when its file is opened. `mumps.rs` has the struct of MUMPS.
 fn declare(folders: &[PathBuf], mpi: &build_probe_mpi::Library) {
     let common = || {
         bindgen::Builder::default()
@@ -308,7 +357,10 @@ fn declare(folders: &[PathBuf], mpi: &build_probe_mpi::Library) {
     for function in FUNCTIONS {
         library = library.allowlist_function(function);
     }
-    let mumps = common().header_contents("mumps.h", "#include <dmumps_c.h>").allowlist_function("dmumps_c");
+    let mumps = common()
+        .header_contents("mumps.h", "#include <dmumps_c.h>\ntypedef MUMPS_INT MumpsInt;\n")
+        .allowlist_type("DMUMPS_STRUC_C|MumpsInt")
+        .allowlist_var("MUMPS_VERSION");
     for (builder, file) in [(library, "petsc.rs"), (mumps, "mumps.rs")] {
         let bindings = builder.generate().unwrap_or_else(|cause| refuse_headers(&cause.to_string(), folders, mpi));
         let text = bindings.to_string();

@@ -8,19 +8,10 @@
 //! AVX-512. On an EPYC `groove3d` with n = 12 takes 1.19 CPU s by MUMPS with these and 0.92 with those for AVX2. So a run warns, with the
 //! variable to set.
 
+use super::beside::address;
 use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::PathBuf;
-
-/// Return the address of a function of the BLAS or LAPACK in use, or null if it does not exist.
-///
-/// MUMPS is linked and brings them. PETSc, which is opened later, uses the same ones. The linker omits MUMPS from a program that does not
-/// refer to it, hence the reference here.
-fn address(name: &CStr) -> *mut c_void {
-    std::hint::black_box(super::ffi::mumps::dmumps_c as *const c_void);
-    // SAFETY: the name ends with a zero byte.
-    unsafe { libc::dlsym(libc::RTLD_DEFAULT, name.as_ptr()) }
-}
 
 /// Return the file of the library that has the function `dgemm_` of this process, with links resolved.
 ///

@@ -1,6 +1,7 @@
 //! A factorisation of a principal submatrix P'AP, distributed over the processes of A.
 
 use super::indices::Indices;
+use super::integers::flag;
 use super::library::petsc;
 use super::substructures::Substructures;
 use super::{Ksp, Matrix, ffi};
@@ -31,8 +32,8 @@ impl Factor {
         let mut block = owned.submatrix(matrix, owned)?;
         // SAFETY: a matrix of rows and columns of one that is positive definite.
         unsafe {
-            petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, ffi::PetscBool_PETSC_TRUE))?;
-            petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, ffi::PetscBool_PETSC_TRUE))?;
+            petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, flag(true)))?;
+            petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, flag(true)))?;
         }
         let solver = Ksp::factored(session, scope, block, count);
         // SAFETY: our reference; the solver has its own.

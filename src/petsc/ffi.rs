@@ -16,10 +16,16 @@ use std::ffi::{c_char, c_int, c_void};
 /// PETSc's integer for rows and columns.
 pub type Int = PetscInt;
 
-/// MUMPS, which is linked.
+/// The file of the PETSc that this program was built with.
+pub const FILE: &str = env!("WINKLER_PETSC_LIBRARY");
+
+/// MUMPS' struct.
 pub mod mumps {
     include!(concat!(env!("OUT_DIR"), "/mumps.rs"));
 }
+
+/// MUMPS' integer for rows and columns.
+pub use mumps::MumpsInt;
 
 /// The type of `PetscVFPrintf`, the hook through which PETSc prints everything.
 ///

@@ -1,42 +1,44 @@
 //! Bisection of some nodes of a matrix into two halves without coupling, and a separator between them.
 
 use super::indices::row;
-use super::{Int, Matrix, Session, metis};
+use super::integers::fit;
+use super::metis::{self, Graph};
+use super::{Matrix, Session};
 use crate::error::Result;
 use mpi::Count;
 use mpi::datatype::PartitionMut;
 use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 
 /// The label of a node of the separator. The nodes of the halves have the labels 0 and 1.
-pub(super) const SEPARATOR: Int = -1;
+pub(super) const SEPARATOR: i32 = -1;
 
 /// Return the label of each node of the `dofs`: 0 or 1 for its half, or [`SEPARATOR`]. Collective, with the same result on all processes.
 ///
 /// `dofs` are whole nodes in increasing order, the same on all processes. The halves have about the same size, and the separator has few
-/// nodes. One process puts all nodes into half 0.
+/// nodes. One process puts all nodes into half 0, and so do several without METIS.
 ///
 /// # Errors
 /// Those of METIS.
-pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<Int>> {
+pub(super) fn halves(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<i32>> {
     let (session, size) = (matrix.session(), matrix.block_size());
     let nodes: Vec<usize> = dofs.iter().step_by(size).map(|dof| dof / size).collect();
     let mut half = vec![0; nodes.len()];
+    fit::<i32>("METIS", "nodes", nodes.len())?;
     if matrix.scope().processes(session) == 1 {
         return Ok(half);
     }
-    let graph = collect(session, &owned_graph(matrix, &nodes)?);
-    if session.rank() == 0 {
-        let (mut ptr, mut col) = compressed(&graph);
-        half = of_graph(&mut ptr, &mut col)?;
+    let graph = collect(session, &owned_graph(matrix, &nodes)?)?;
+    if session.rank() == 0 && metis::has_metis() {
+        half = of_graph(&compressed(&graph))?;
     }
     session.world().process_at_rank(0).broadcast_into(&mut half[..]);
     Ok(half)
 }
 
 /// Return the neighbours of those `nodes` that this process owns, among `nodes`: for each node their number, then their positions.
-fn owned_graph(matrix: &Matrix, nodes: &[usize]) -> Result<Vec<Int>> {
+fn owned_graph(matrix: &Matrix, nodes: &[usize]) -> Result<Vec<i32>> {
     let (owned, size) = (matrix.own(), matrix.block_size());
-    let (mut graph, mut around) = (Vec::<Int>::new(), Vec::new());
+    let (mut graph, mut around) = (Vec::<i32>::new(), Vec::new());
     for (number, node) in nodes.iter().enumerate().filter(|(_, node)| owned.contains(&(*node * size))) {
         around.clear();
         for dof in node * size..(node + 1) * size {
@@ -47,43 +49,47 @@ fn owned_graph(matrix: &Matrix, nodes: &[usize]) -> Result<Vec<Int>> {
         let at = graph.len();
         graph.push(0);
         let others = around.iter().filter_map(|other| nodes.binary_search(other).ok());
-        graph.extend(others.filter(|other| *other != number).map(|other| other as Int));
-        graph[at] = (graph.len() - at - 1) as Int;
+        graph.extend(others.filter(|other| *other != number).map(|other| other as i32));
+        graph[at] = (graph.len() - at - 1) as i32;
     }
     Ok(graph)
 }
 
-/// Return a graph of [`owned_graph`] in compressed rows: row pointers and columns.
-fn compressed(graph: &[Int]) -> (Vec<Int>, Vec<Int>) {
+/// Return a graph of [`owned_graph`] in compressed rows.
+fn compressed(graph: &[i32]) -> Graph {
     let (mut ptr, mut col, mut rest) = (vec![0], Vec::with_capacity(graph.len()), graph);
     while let [count, others @ ..] = rest {
         let (neighbours, next) = others.split_at(*count as usize);
         col.extend_from_slice(neighbours);
-        ptr.push(col.len() as Int);
+        ptr.push(col.len() as i32);
         rest = next;
     }
-    (ptr, col)
+    Graph { ptr, col }
 }
 
 /// Return the concatenated slices of all processes on rank 0, and an empty vector on other ranks. Collective.
-fn collect(session: &Session, mine: &[Int]) -> Vec<Int> {
+fn collect(session: &Session, mine: &[i32]) -> Result<Vec<i32>> {
     let mut lengths: Vec<Count> = vec![0; session.size()];
-    session.world().all_gather_into(&(mine.len() as Count), &mut lengths[..]);
+    let length: Count = fit("MPI", "neighbours", mine.len())?;
+    session.world().all_gather_into(&length, &mut lengths[..]);
     let first = session.world().process_at_rank(0);
     if session.rank() > 0 {
         first.gather_varcount_into(mine);
-        return Vec::new();
+        return Ok(Vec::new());
     }
+    let total = lengths.iter().map(|length| *length as usize).sum();
+    fit::<Count>("MPI", "neighbours", total)?;
     let starts: Vec<Count> =
         lengths.iter().scan(0, |next, length| Some(std::mem::replace(next, *next + length))).collect();
-    let mut all = vec![0; lengths.iter().sum::<Count>() as usize];
+    let mut all = vec![0; total];
     first.gather_varcount_into_root(mine, &mut PartitionMut::new(&mut all[..], lengths, starts));
-    all
+    Ok(all)
 }
 
-/// Return the labels of the nodes of a graph; the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`.
-fn of_graph(ptr: &mut [Int], col: &mut [Int]) -> Result<Vec<Int>> {
-    let mut half = metis::partition(ptr, col, 2)?;
+/// Return the labels of the nodes of a graph.
+fn of_graph(graph: &Graph) -> Result<Vec<i32>> {
+    let Graph { ptr, col } = graph;
+    let mut half = metis::partition(Graph { ptr: ptr.clone(), col: col.clone() }, 2)?;
     separate(ptr, col, &mut half);
     Ok(half)
 }
@@ -91,9 +97,9 @@ fn of_graph(ptr: &mut [Int], col: &mut [Int]) -> Result<Vec<Int>> {
 /// Move nodes into the separator until no edge joins the halves.
 ///
 /// Nodes with the most such edges come first, so that the separator is small and taken from both halves.
-fn separate(ptr: &[Int], col: &[Int], half: &mut [Int]) {
+fn separate(ptr: &[i32], col: &[i32], half: &mut [i32]) {
     let around = |node: usize| col[ptr[node] as usize..ptr[node + 1] as usize].iter().map(|other| *other as usize);
-    let edges = |node: usize, half: &[Int]| around(node).filter(|&other| half[other] == 1 - half[node]).count();
+    let edges = |node: usize, half: &[i32]| around(node).filter(|&other| half[other] == 1 - half[node]).count();
     let mut cut: Vec<(usize, usize)> = (0..half.len()).map(|node| (edges(node, half), node)).collect();
     cut.retain(|entry| entry.0 > 0);
     cut.sort_unstable_by(|a, b| b.cmp(a));
@@ -117,7 +123,9 @@ mod tests {
             col.extend(beside.chain([i - 10, i + 10].into_iter().filter(|j| (0..600).contains(j))));
             ptr.push(col.len() as i32);
         }
-        let half = of_graph(&mut ptr, &mut col).expect("METIS");
+        let graph = Graph { ptr, col };
+        let half = of_graph(&graph).expect("METIS");
+        let Graph { ptr, col } = graph;
         let count = |of| half.iter().filter(|half| **half == of).count();
         assert!(count(SEPARATOR) <= 12 && count(0).abs_diff(count(1)) <= 24, "{} {}", count(0), count(1));
         let apart = |i: usize, j: i32| half[i] == SEPARATOR || half[j as usize] != 1 - half[i];

@@ -1,5 +1,6 @@
 //! Multigrid of two levels (PCMG) with a given interpolation.
 
+use super::integers::flag;
 use super::library::petsc;
 use super::rows::check;
 use super::vector::DETERMINE;
@@ -88,9 +89,9 @@ impl Ksp {
     ///     let spring = move |j: usize| if i.min(j) < 30 { 0.0 } else { spring * [1.0, -1.0][(i + j) % 2] };
     ///     (0..60).map(move |j| f64::from(u8::from(i == j)) + spring(j))
     /// });
-    /// let columns = (0..n).flat_map(|_| 0..n as i32).collect();
+    /// let columns = (0..n).flat_map(|_| 0..n as _).collect();
     /// let values = (0..n).flat_map(|i| row(0.0, i)).collect();
-    /// let mut a = Matrix::from_csr(&session, 1, (0..=n as i32).map(|i| i * n as i32).collect(), columns, values)?;
+    /// let mut a = Matrix::from_csr(&session, 1, (0..=n).map(|i| (i * n) as _).collect(), columns, values)?;
     /// a.set_spd()?;
     /// let mut ksp = Ksp::new(&session, "")?;
     /// ksp.set_operator(&a)?;
@@ -113,6 +114,8 @@ impl Ksp {
         // SAFETY: the smoother belongs to the preconditioner, and refers to this matrix already.
         unsafe {
             petsc!(PCMGGetSmoother(pc, 1, &mut smoother))?;
+            // newer versions of PETSc keep the smoother's own preconditioner with that of all levels
+            petsc!(KSPSetReusePreconditioner(smoother, flag(false)))?;
             petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
             petsc!(KSPSetUp(smoother))
         }

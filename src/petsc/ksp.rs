@@ -2,6 +2,7 @@
 
 use super::around::Wrapper;
 use super::error::text_from;
+use super::integers::{flag, is_set};
 use super::library::petsc;
 use super::mumps::EXTRA_SPACE;
 use super::table::text;
@@ -104,7 +105,7 @@ impl Ksp {
         // SAFETY: PETSc copies the text.
         unsafe {
             petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
-            petsc!(KSPSetErrorIfNotConverged(ksp, ffi::PetscBool_PETSC_FALSE))?;
+            petsc!(KSPSetErrorIfNotConverged(ksp, flag(false)))?;
         }
         Ok(solver)
     }
@@ -169,7 +170,7 @@ impl Ksp {
         self.check_typed_options()?;
         if self.applies_only() {
             // SAFETY: the solver of this wrapper.
-            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, ffi::PetscBool_PETSC_FALSE)) };
+            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, flag(false))) };
         }
         self.check_tolerances()
     }
@@ -222,10 +223,10 @@ impl Ksp {
 
     /// Return whether the preconditioner is kept when the matrix changes.
     pub fn reuses_preconditioner(&self) -> bool {
-        let mut reuse = ffi::PetscBool_PETSC_FALSE;
+        let mut reuse = flag(false);
         // SAFETY: the solver of this wrapper.
         let asked = unsafe { petsc!(KSPGetReusePreconditioner(self.ksp, &mut reuse)) };
-        asked.is_ok() && reuse != ffi::PetscBool_PETSC_FALSE
+        asked.is_ok() && is_set(reuse)
     }
 
     /// Set up the preconditioner or factorisation of the current matrix, if that has not been done. Every solve does so, too.
@@ -278,10 +279,10 @@ impl Ksp {
         // the preconditioner `eisenstat` alone writes to the right-hand side, and restores it
         let copy = self.writes_to_b.then(|| b.to_vec());
         let b = copy.as_deref().unwrap_or(b);
-        let mut guess = ffi::PetscBool_PETSC_FALSE;
+        let mut guess = flag(false);
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPGetInitialGuessNonzero(self.ksp, &mut guess)) }?;
-        if guess != ffi::PetscBool_PETSC_FALSE {
+        if is_set(guess) {
             x.fill(0.0);
         }
         self.recover()?;
@@ -371,7 +372,7 @@ impl Ksp {
                 .help(format!("take an iterative method, e.g. `{}ksp_type cg`", self.own_options())));
         }
         // SAFETY: the solver of this wrapper.
-        unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, reuse as ffi::PetscBool)) }
+        unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, flag(reuse))) }
     }
 
     /// Return whether the solver applies its preconditioner once and takes that for the solution.

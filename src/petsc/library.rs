@@ -4,16 +4,14 @@
 //! condensed creates no object of PETSc and never opens it.
 
 use super::error::{check_in, record};
-use super::{ffi, keep_apart, table, waiting};
+use super::ffi::FILE;
+use super::{beside, ffi, keep_apart, table, waiting};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ffi::{CString, c_char, c_int};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::OnceLock;
-
-/// The file of the PETSc that this program was built with.
-const FILE: &str = env!("WINKLER_PETSC_LIBRARY");
 
 /// Option that leaves the signals to Rust, so that a panic or a stack overflow prints its own message.
 const NO_SIGNALS: &str = "-no_signal_handler";
@@ -94,6 +92,7 @@ pub(super) fn check(function: &str, call: impl FnOnce(&ffi::Library) -> ffi::Pet
 /// The `home` file exists on rank 0, which reads it for all.
 pub(super) fn start(words: &[String], home: Option<&Path>) -> Result<()> {
     let library = open()?;
+    beside::check_one_mumps(library)?;
     let nul = |_| Error::new(Kind::Solver, "a PETSc option contains a zero byte");
     // PETSc keeps a pointer to these words until its end, so they are leaked, once
     let mut arguments = Vec::with_capacity(words.len() + 4);

@@ -1,5 +1,6 @@
 //! Sparse matrices (MATAIJ).
 
+use super::integers::flag;
 use super::library::petsc;
 use super::rows::{Rows, attach, free};
 use super::vector::{Vector, check_length};
@@ -180,7 +181,7 @@ impl Matrix {
             ffi::MatOption_MAT_SPD_ETERNAL,
         ] {
             // SAFETY: the matrix of this wrapper.
-            unsafe { petsc!(MatSetOption(self.mat, option, ffi::PetscBool_PETSC_TRUE)) }?;
+            unsafe { petsc!(MatSetOption(self.mat, option, flag(true))) }?;
         }
         Ok(())
     }
@@ -205,7 +206,7 @@ impl Matrix {
         let (count, mut space) = (handles.len() as Int, null_mut());
         // SAFETY: `count` vectors; the space keeps references to them, the matrix one to the space.
         unsafe {
-            petsc!(MatNullSpaceCreate(comm, ffi::PetscBool_PETSC_FALSE, count, handles.as_ptr(), &mut space))?;
+            petsc!(MatNullSpaceCreate(comm, flag(false), count, handles.as_ptr(), &mut space))?;
             let set = petsc!(MatSetNearNullSpace(self.mat, space));
             petsc!(MatNullSpaceDestroy(&mut space))?;
             set

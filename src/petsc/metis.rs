@@ -1,80 +1,155 @@
-//! Nested dissection and partition of graphs by METIS, without which Debian's MUMPS is built.
+//! Nested dissection and partition of graphs by METIS.
 //!
-//! The library is loaded when it is first needed and not linked. Its header belongs to another package, and the libraries of SCOTCH that
-//! PETSc loads have functions of the same names with other arguments.
+//! The library is opened when it is first needed: the file that has METIS for PETSc, or else one of METIS' usual names. Its integers have 32 or 64
+//! bits, which it shows itself. Libraries of SCOTCH have some functions of the same names, with other arguments in older versions.
 
+use super::integers::fit;
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
-use std::ffi::{CStr, c_int};
+use std::ffi::{CStr, c_int, c_void};
 use std::ptr::null_mut;
 use std::sync::OnceLock;
 
-/// The library whose functions have the arguments below. Other libraries do not see its symbols.
-const LIBRARY: &str = "libmetis.so.5";
+/// The file that has METIS in the PETSc of the build, and names of METIS 5.
+const LIBRARIES: [Option<&str>; 3] = [option_env!("WINKLER_METIS_LIBRARY"), Some("libmetis.so.5"), Some("libmetis.so")];
 
-type NodeNd = unsafe extern "C" fn(*mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32, *mut i32) -> c_int;
+/// The arguments of METIS_NodeND, with its integers.
+type NodeNd<T> = unsafe extern "C" fn(*mut T, *mut T, *mut T, *mut T, *mut T, *mut T, *mut T) -> c_int;
 
-type PartGraph = unsafe extern "C" fn(
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
-    *mut f32,
-    *mut f32,
-    *mut i32,
-    *mut i32,
-    *mut i32,
+/// The arguments of METIS_PartGraphRecursive, with its integers. Floating-point numbers are always left out.
+type PartGraph<T> = unsafe extern "C" fn(
+    *mut T,
+    *mut T,
+    *mut T,
+    *mut T,
+    *mut T,
+    *mut T,
+    *mut T,
+    *mut T,
+    *mut c_void,
+    *mut c_void,
+    *mut T,
+    *mut T,
+    *mut T,
 ) -> c_int;
 
-/// Return a function of METIS by its name.
-///
-/// # Safety
-/// `T` is the type of the function of this name.
-unsafe fn function<T: Copy>(name: &CStr) -> Result<T> {
-    static METIS: OnceLock<Option<Library>> = OnceLock::new();
-    // SAFETY: its initialisers run as in any program that links it; it stays loaded.
-    let library = METIS.get_or_init(|| unsafe { Library::new(LIBRARY) }.ok());
-    // SAFETY: the caller's promise.
-    let function = library.as_ref().and_then(|library| unsafe { library.get::<T>(name.to_bytes_with_nul()) }.ok());
-    function.map(|function| *function).ok_or_else(|| {
-        Error::new(Kind::Solver, format!("METIS ({LIBRARY}) was not found"))
-            .because("large bodies, and dofs near stiff contact, are eliminated in its order")
-            .help("`apt-get install libmetis5`, or for a condensed body MUMPS' own order: -mat_mumps_icntl_7 0")
-    })
+/// METIS with the width of its integers.
+struct Metis {
+    library: Library,
+    is_wide: bool,
+}
+
+/// Return METIS, which is opened at the first call, or `None` if it is not found.
+fn metis() -> Option<&'static Metis> {
+    static METIS: OnceLock<Option<Metis>> = OnceLock::new();
+    METIS.get_or_init(|| LIBRARIES.iter().flatten().find_map(|name| Metis::open(name))).as_ref()
+}
+
+/// Return whether METIS is there. Without it, elimination takes MUMPS' own order.
+pub fn has_metis() -> bool {
+    metis().is_some()
+}
+
+impl Metis {
+    /// Open a file and find out the width of METIS' integers. Return `None` without METIS 5.
+    fn open(name: &str) -> Option<Self> {
+        // SAFETY: its initialisers run as in any program that links it; it stays loaded.
+        let library = unsafe { Library::new(name) }.ok()?;
+        // SAFETY: METIS 5 has this function with 40 integers, which it sets to -1. SCOTCH has no METIS_Free.
+        let options = unsafe {
+            library.get::<*mut c_void>(b"METIS_Free\0").ok()?;
+            let set = library.get::<unsafe extern "C" fn(*mut i64) -> c_int>(b"METIS_SetDefaultOptions\0").ok()?;
+            let mut options = [0i64; 40];
+            set(options.as_mut_ptr());
+            options
+        };
+        Some(Self { library, is_wide: options[39] == -1 })
+    }
+
+    /// Return a function by its name.
+    ///
+    /// # Safety
+    /// `T` is the type of the function of this name, with integers of the right width.
+    unsafe fn function<T: Copy>(&self, name: &CStr) -> Result<T> {
+        // SAFETY: the caller's promise.
+        let function = unsafe { self.library.get::<T>(name.to_bytes_with_nul()) };
+        function.map(|function| *function).map_err(|cause| missing().because(cause.to_string()))
+    }
+
+    /// Return the result of METIS_NodeND and the position of each node in the order of elimination.
+    fn node_nd<T: Integer>(&self, graph: Graph) -> Result<(c_int, Vec<i32>)> {
+        // SAFETY: METIS 5 has these arguments, and the caller chose the width.
+        let node_nd = unsafe { self.function::<NodeNd<T>>(c"METIS_NodeND") }?;
+        let nodes = graph.ptr.len() - 1;
+        let (mut count, mut ptr, mut col) =
+            (T::from(fit("METIS", "nodes", nodes)?), array(graph.ptr), array(graph.col));
+        let (mut order, mut position) = (vec![T::from(-1); nodes], vec![T::from(-1); nodes]);
+        let (i, j, none) = (ptr.as_mut_ptr(), col.as_mut_ptr(), null_mut());
+        // SAFETY: it reads the graph and writes one number for each node to each of the last two arrays.
+        let code = unsafe { node_nd(&mut count, i, j, none, none, order.as_mut_ptr(), position.as_mut_ptr()) };
+        Ok((code, narrow(position)))
+    }
+
+    /// Return the result of METIS_PartGraphRecursive and the part of each node.
+    fn part_graph<T: Integer>(&self, graph: Graph, parts: i32) -> Result<(c_int, Vec<i32>)> {
+        // SAFETY: METIS 5 has these arguments, and the caller chose the width.
+        let part_graph = unsafe { self.function::<PartGraph<T>>(c"METIS_PartGraphRecursive") }?;
+        let nodes = graph.ptr.len() - 1;
+        let (mut count, mut ptr, mut col) =
+            (T::from(fit("METIS", "nodes", nodes)?), array(graph.ptr), array(graph.col));
+        let (mut constraints, mut parts) = (T::from(1), T::from(parts));
+        let (mut cut, mut part) = (T::from(0), vec![T::from(-1); nodes]);
+        let (i, j, none, nothing) = (ptr.as_mut_ptr(), col.as_mut_ptr(), null_mut(), null_mut());
+        let (parts, cut, to) = (&raw mut parts, &raw mut cut, part.as_mut_ptr());
+        // SAFETY: it reads the graph, writes one number for each node to the last array and one number to the last but one; null means a
+        // default.
+        let code = unsafe {
+            part_graph(&mut count, &mut constraints, i, j, none, none, none, parts, nothing, nothing, none, cut, to)
+        };
+        Ok((code, narrow(part)))
+    }
+}
+
+/// An integer of METIS (idx_t).
+trait Integer: Copy + From<i32> + TryInto<i32> {}
+impl Integer for i32 {}
+impl Integer for i64 {}
+
+/// Convert an array to METIS' integers. Where these have 32 bits, it is not copied.
+fn array<T: Integer>(values: Vec<i32>) -> Vec<T> {
+    values.into_iter().map(T::from).collect()
+}
+
+/// Convert a result of METIS, whose numbers are nodes or parts; others become -1.
+fn narrow<T: Integer>(values: Vec<T>) -> Vec<i32> {
+    values.into_iter().map(|value| value.try_into().unwrap_or(-1)).collect()
+}
+
+/// A symmetric graph: the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself.
+pub struct Graph {
+    /// Starts of the neighbours of each node, one more than there are nodes.
+    pub ptr: Vec<i32>,
+    /// The neighbours.
+    pub col: Vec<i32>,
+}
+
+/// Return the error of a missing METIS.
+fn missing() -> Error {
+    Error::new(Kind::Solver, "METIS 5 was not found").help("`apt-get install libmetis5`, or a PETSc with METIS")
 }
 
 /// Return the position of each node of a graph, from 0, in an elimination order by nested dissection.
 ///
-/// The neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself. The graph is symmetric.
-///
 /// # Errors
-/// When METIS is not installed, or does not return an order.
-pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
-    let nodes = ptr.len() - 1;
-    if col.is_empty() {
+/// When METIS is not there ([`has_metis`]), or does not return an order.
+pub fn nested_dissection(graph: Graph) -> Result<Vec<i32>> {
+    let nodes = graph.ptr.len() - 1;
+    if graph.col.is_empty() {
         // METIS refuses graphs without edges
         return Ok((0..nodes as i32).collect());
     }
-    // SAFETY: METIS 5 has these arguments.
-    let node_nd = unsafe { function::<NodeNd>(c"METIS_NodeND") }?;
-    let (mut count, mut order, mut position) = (nodes as i32, vec![-1; nodes], vec![-1; nodes]);
-    // SAFETY: it reads the graph and writes one number for each node to each of the last two arrays.
-    let code = unsafe {
-        node_nd(
-            &mut count,
-            ptr.as_mut_ptr(),
-            col.as_mut_ptr(),
-            null_mut(),
-            null_mut(),
-            order.as_mut_ptr(),
-            position.as_mut_ptr(),
-        )
-    };
-    // a METIS with 64-bit numbers would not return a permutation
+    let metis = metis().ok_or_else(missing)?;
+    let (code, position) = if metis.is_wide { metis.node_nd::<i64>(graph) } else { metis.node_nd::<i32>(graph) }?;
     let mut seen = vec![false; nodes];
     let valid = position.iter().all(|&at| {
         let slot = usize::try_from(at).ok().and_then(|at| seen.get_mut(at));
@@ -90,38 +165,17 @@ pub fn nested_dissection(ptr: &mut [i32], col: &mut [i32]) -> Result<Vec<i32>> {
 
 /// Return the part of each node of a graph. The `parts` parts have about the same size and few edges between them.
 ///
-/// The arrays are those of [`nested_dissection`].
-///
 /// # Errors
-/// When METIS is not installed, or does not return parts.
-pub fn partition(ptr: &mut [i32], col: &mut [i32], parts: usize) -> Result<Vec<i32>> {
-    let nodes = ptr.len() - 1;
-    if col.is_empty() {
-        return Ok((0..nodes).map(|node| (node * parts / nodes) as i32).collect());
+/// When METIS is not there ([`has_metis`]), or does not return parts.
+pub fn partition(graph: Graph, parts: i32) -> Result<Vec<i32>> {
+    let nodes = graph.ptr.len() - 1;
+    if graph.col.is_empty() {
+        return Ok((0..nodes).map(|node| (node * parts as usize / nodes) as i32).collect());
     }
-    // SAFETY: METIS 5 has these arguments.
-    let part_graph = unsafe { function::<PartGraph>(c"METIS_PartGraphRecursive") }?;
-    let (mut count, mut constraints, mut asked, mut cut) = (nodes as i32, 1, parts as i32, 0);
-    let mut part = vec![-1; nodes];
-    // SAFETY: it reads the graph, writes one number for each node to the last array and one number to the last but one; null means a default.
-    let code = unsafe {
-        part_graph(
-            &mut count,
-            &mut constraints,
-            ptr.as_mut_ptr(),
-            col.as_mut_ptr(),
-            null_mut(),
-            null_mut(),
-            null_mut(),
-            &mut asked,
-            null_mut(),
-            null_mut(),
-            null_mut(),
-            &mut cut,
-            part.as_mut_ptr(),
-        )
-    };
-    if code != 1 || part.iter().any(|part| !(0..asked).contains(part)) {
+    let metis = metis().ok_or_else(missing)?;
+    let (code, part) =
+        if metis.is_wide { metis.part_graph::<i64>(graph, parts) } else { metis.part_graph::<i32>(graph, parts) }?;
+    if code != 1 || part.iter().any(|part| !(0..parts).contains(part)) {
         return Err(Error::new(Kind::Solver, "METIS returned no parts")
             .because(format!("METIS_PartGraphRecursive returned {code}"))
             .help("take another solver: --set solver=mumps"));
@@ -131,25 +185,29 @@ pub fn partition(ptr: &mut [i32], col: &mut [i32], parts: usize) -> Result<Vec<i
 
 #[cfg(test)]
 mod tests {
-    use super::{nested_dissection, partition};
+    use super::{Graph, nested_dissection, partition};
 
     /// The separator in the middle of a chain of nodes comes last.
     #[test]
     fn a_chain_is_cut_in_its_middle() {
-        let (mut ptr, mut col) = (vec![0], Vec::new());
-        for i in 0..401i32 {
-            col.extend([i - 1, i + 1].into_iter().filter(|j| (0..401).contains(j)));
-            ptr.push(col.len() as i32);
-        }
-        let position = nested_dissection(&mut ptr, &mut col).expect("METIS");
+        let chain = || {
+            let (mut ptr, mut col) = (vec![0], Vec::new());
+            for i in 0..401i32 {
+                col.extend([i - 1, i + 1].into_iter().filter(|j| (0..401).contains(j)));
+                ptr.push(col.len() as i32);
+            }
+            Graph { ptr, col }
+        };
+        let without_edges = || Graph { ptr: vec![0; 3], col: Vec::new() };
+        let position = nested_dissection(chain()).expect("METIS");
         let last = position.iter().position(|&at| at == 400).expect("a permutation");
         assert!((100..300).contains(&last), "{last}");
-        assert_eq!(nested_dissection(&mut [0, 0, 0], &mut []).expect("no edges"), [0, 1]);
+        assert_eq!(nested_dissection(without_edges()).expect("no edges"), [0, 1]);
         // two ends and a middle of the same length
-        let thirds = partition(&mut ptr, &mut col, 3).expect("METIS");
+        let thirds = partition(chain(), 3).expect("METIS");
         let changes = thirds.windows(2).filter(|pair| pair[0] != pair[1]).count();
         let most = (0..3).map(|part| thirds.iter().filter(|of| **of == part).count()).max();
         assert!(changes == 2 && most < Some(140), "{changes} {most:?}");
-        assert_eq!(partition(&mut [0, 0, 0], &mut [], 2).expect("no edges"), [0, 1]);
+        assert_eq!(partition(without_edges(), 2).expect("no edges"), [0, 1]);
     }
 }

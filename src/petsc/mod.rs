@@ -24,6 +24,7 @@
 #![warn(clippy::undocumented_unsafe_blocks)]
 
 mod around;
+mod beside;
 mod blas;
 mod error;
 mod factor;
@@ -33,6 +34,7 @@ mod files;
 mod halves;
 mod heap;
 mod indices;
+mod integers;
 mod interpolation;
 mod ksp;
 mod launcher;
@@ -66,7 +68,7 @@ pub use heap::{Heap, keep_apart, keep_at_hand, leave};
 pub use ksp::{Ksp, Solved};
 pub use launcher::{CROWDED, UNBOUND, launcher};
 pub use matrix::Matrix;
-pub use metis::nested_dissection;
+pub use metis::{Graph, has_metis, nested_dissection};
 pub use mumps::Schur;
 pub use options::Options;
 pub use reason::ConvergedReason;
@@ -77,6 +79,9 @@ pub use stage::Stage;
 pub use until::{Enough, Iterate};
 pub use waiting::Entry;
 pub use words::{begins_options, is_family, is_global, is_of_family};
+
+/// Whether PETSc has hypre.
+pub const HAS_HYPRE: bool = option_env!("WINKLER_HAS_HYPRE").is_some();
 
 /// Run `action`, and return its result and PETSc's output meanwhile, which is not shown.
 ///

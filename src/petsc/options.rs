@@ -1,6 +1,7 @@
 //! PETSc's table of options. A process has one such table.
 
 use super::error::string;
+use super::integers::{flag, is_set};
 use super::library::petsc;
 use super::table::{dashed, key, text};
 use super::{Entry, Session, ffi, library, table, waiting};
@@ -123,12 +124,12 @@ impl Options {
             return waiting::used(&dashed(name));
         }
         let Ok(name) = key(name) else { return false };
-        let mut used = ffi::PetscBool_PETSC_FALSE;
+        let mut used = flag(false);
         // this function of PETSc expects the name without its dash
         let bare = &name.as_c_str().to_bytes_with_nul()[1..];
         // SAFETY: the rest of a text that ends with a zero byte and lives until the end of the call.
         let queried = unsafe { petsc!(PetscOptionsUsed(null_mut(), bare.as_ptr().cast(), &mut used)) };
-        queried.is_ok() && used == ffi::PetscBool_PETSC_TRUE
+        queried.is_ok() && is_set(used)
     }
 
     /// Mark an option as read, so that PETSc does not warn about it at its end.

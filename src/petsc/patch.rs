@@ -49,7 +49,7 @@ impl Ksp {
     ///         columns.push(j);
     ///         values.push(if i == j { 2.0 } else { -1.0 });
     ///     }
-    ///     ptr.push(columns.len() as i32);
+    ///     ptr.push(columns.len() as _);
     /// }
     /// let mut matrix = Matrix::from_csr(&session, 1, ptr, columns, values)?;
     /// matrix.set_spd()?;

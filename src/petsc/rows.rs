@@ -1,5 +1,6 @@
 //! The rows of a sparse matrix, which are checked and then belong to PETSc's matrix.
 
+use super::integers::fit;
 use super::library::petsc;
 use super::{Int, Scope, ffi};
 use crate::error::{Error, Kind, Result};
@@ -152,6 +153,7 @@ pub(super) unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
 /// Check that arrays are compressed rows with sorted columns below `width`.
 pub(super) fn check(row_ptr: &[Int], columns: &[Int], values: &[f64], width: usize) -> Result<()> {
     let wrong = |what: &str| Err(Error::new(Kind::Solver, format!("not a sparse matrix in compressed rows: {what}")));
+    fit::<Int>("PETSc", "columns", width)?;
     let Some(&last) = row_ptr.last() else {
         return wrong("row_ptr is empty");
     };

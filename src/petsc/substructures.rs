@@ -131,7 +131,7 @@ struct Layout<'a> {
     matrix: &'a Matrix,
     dofs: &'a [usize],
     /// The half of each node of P.
-    half: Vec<Int>,
+    half: Vec<i32>,
     /// The positions of the interior dofs of this process.
     interior: Vec<usize>,
     /// The number of interface dofs.
@@ -143,7 +143,7 @@ struct Layout<'a> {
 impl<'a> Layout<'a> {
     fn new(matrix: &'a Matrix, dofs: &'a [usize]) -> Result<Self> {
         let half = halves(matrix, dofs)?;
-        let this_half = if matrix.scope() == Scope::World { matrix.session().rank() as Int } else { 0 };
+        let this_half = if matrix.scope() == Scope::World { matrix.session().rank() as i32 } else { 0 };
         let (mut interior, mut border, mut index) = (Vec::new(), 0, vec![0; dofs.len()]);
         for (position, index) in index.iter_mut().enumerate() {
             let half = half[position / matrix.block_size()];

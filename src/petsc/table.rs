@@ -2,6 +2,7 @@
 
 use super::error::{check_in, string};
 use super::ffi;
+use super::integers::flag;
 use crate::error::{Error, Kind, Result};
 use std::ffi::{CString, c_char};
 use std::ptr::{null, null_mut};
@@ -21,7 +22,7 @@ pub(super) fn set(library: &ffi::Library, name: &str, value: Option<&str>) -> Re
 pub(super) fn read(library: &ffi::Library, name: &str) -> Result<Option<String>> {
     let name = key(name)?;
     let mut value: *const c_char = null();
-    let mut set = ffi::PetscBool_PETSC_FALSE;
+    let mut set = flag(false);
     // SAFETY: the name lives until the end of the call; PETSc writes to the two variables only.
     check_in(library, "PetscOptionsFindPair", |petsc| unsafe {
         petsc.PetscOptionsFindPair(null_mut(), null(), name.as_ptr(), &mut value, &mut set)

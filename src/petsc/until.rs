@@ -1,6 +1,7 @@
 //! A linear solve with a stopping test of the caller.
 
 use super::around::ERROR;
+use super::integers::{flag, is_set};
 use super::ksp::Solved;
 use super::library::petsc;
 use super::vector::slice;
@@ -47,7 +48,7 @@ impl Ksp {
     /// PETSc's.
     pub fn estimate_spectrum(&self) -> Result<()> {
         // SAFETY: a solver of ours and a flag.
-        unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, ffi::PetscBool_PETSC_TRUE)) }
+        unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, flag(true))) }
     }
 
     /// Solve `A x = b` from a zero guess until `enough` returns true, or the solver reaches its own tolerances.
@@ -147,11 +148,11 @@ unsafe extern "C" fn is_enough(
 
 /// Return the least eigenvalue that conjugate gradients have found, if they estimate the spectrum.
 fn least_eigenvalue(ksp: ffi::KSP) -> Option<f64> {
-    let (mut least, mut largest, mut estimates) = (0.0, 0.0, ffi::PetscBool_PETSC_FALSE);
+    let (mut least, mut largest, mut estimates) = (0.0, 0.0, flag(false));
     // SAFETY: PETSc's solver during a solve, and variables for its answers.
     unsafe {
         petsc!(KSPGetComputeSingularValues(ksp, &mut estimates)).ok()?;
-        if estimates == ffi::PetscBool_PETSC_FALSE {
+        if !is_set(estimates) {
             return None;
         }
         petsc!(KSPComputeExtremeSingularValues(ksp, &mut largest, &mut least)).ok()?;

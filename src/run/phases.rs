@@ -19,7 +19,7 @@ use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, Mechanism};
 use crate::output::sci;
 use crate::parallel::{Ranks, collectively};
-use crate::petsc::{Session, keep_apart, keep_at_hand};
+use crate::petsc::{Schur, Session, has_metis, keep_apart, keep_at_hand};
 use crate::problem::{Linear, Order};
 use crate::scene::Scene;
 use crate::solver::options;
@@ -135,7 +135,7 @@ where
         clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
-        let mut warnings = warnings(session, &discrete);
+        let mut warnings = warnings(session, &discrete, D);
         warnings.extend(in_parts(verified.mesh.split));
         warnings.extend(made_straight(verified.mesh.straightened));
         warnings.extend(read.iter().filter_map(|read| read.unkept.clone()));
@@ -183,7 +183,7 @@ fn verified<const D: usize>(
     Ok((collectively(session, verified)?, file))
 }
 
-fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
+fn warnings(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<String> {
     let mut warnings = Vec::new();
     if session.blas_name() == "reference BLAS" {
         warnings.push(
@@ -197,6 +197,13 @@ fn warnings(session: &Session, discrete: &Discrete) -> Vec<String> {
              OPENBLAS_CORETYPE={kernels}",
             session.blas_name()
         ));
+    }
+    if discrete.bodies.iter().any(|body| Schur::is_large(dimension, body.dofs)) && !has_metis() {
+        warnings.push(
+            "METIS was not found: large bodies are factored in the order of PORD, with a fifth more memory; \
+             `apt-get install libmetis5`, or a PETSc with METIS"
+                .to_owned(),
+        );
     }
     warnings.extend(session.left_out().iter().map(|file| {
         format!(

@@ -8,7 +8,7 @@ use super::Retained;
 use crate::error::Result;
 use crate::linalg::factorisation;
 use crate::linalg::portable::pow;
-use crate::petsc::nested_dissection;
+use crate::petsc::{Graph, nested_dissection};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 
@@ -199,7 +199,7 @@ fn analysed(body: &Candidate, ptr: &[u32], col: &[u32], speed: f64) -> Result<Co
         others.extend(row.iter().filter(|other| **other as usize != node).map(|&other| other as i32));
         neighbours.push(others.len() as i32);
     }
-    let position = nested_dissection(&mut neighbours, &mut others)?;
+    let position = nested_dissection(Graph { ptr: neighbours, col: others })?;
     // number of dofs of each node that are eliminated
     let mut eliminated = vec![3; nodes];
     body.retained.into_iter().flat_map(|retained| &retained.dofs).for_each(|dof| eliminated[dof / 3] -= 1);

@@ -2,6 +2,8 @@
 
 use super::memory;
 use super::options::Chosen;
+use crate::error::{Error, Kind, Result};
+use crate::petsc::HAS_HYPRE;
 use crate::problem::solver::Preset;
 
 /// Options of hypre's algebraic multigrid for elasticity with many solves for each set-up. docs/solvers.md has the
@@ -27,7 +29,10 @@ const MADE_OFTEN: [(&str, &str); 4] = [
 
 /// The coarse one of two levels of multigrid for quadratic elements. The fine level has a smoother for all nodes, the coarse one algebraic multigrid for
 /// the linear elements with the same vertices. Together they take half the work and memory of algebraic multigrid for all nodes.
-const QUADRATIC: [(&str, &str); 2] = [("mg_coarse_ksp_type", "preonly"), ("mg_coarse_pc_type", "hypre")];
+const QUADRATIC: [(&str, &str); 2] = [("mg_coarse_ksp_type", "preonly"), ("mg_coarse_pc_type", ALGEBRAIC)];
+
+/// The algebraic multigrid of this PETSc. That of PETSc itself takes more iterations than hypre (docs/solvers.md).
+const ALGEBRAIC: &str = if HAS_HYPRE { "hypre" } else { "gamg" };
 
 /// The smoother of the level with quadratic elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,6 +112,18 @@ pub fn in_plane(size: &Size) -> (Preset, String) {
     }
 }
 
+/// Check that PETSc has the solver that a scene asks for.
+///
+/// # Errors
+/// When it is hypre, and PETSc was built without it.
+pub fn check(asked: Option<Preset>, has_hypre: bool) -> Result<()> {
+    if asked != Some(Preset::Hypre) || has_hypre {
+        return Ok(());
+    }
+    Err(Error::new(Kind::Solver, "the solver `hypre` is asked for, but PETSc was built without hypre")
+        .help("take PETSc's own multigrid, --set solver=gamg, or a PETSc with hypre"))
+}
+
 /// Set the options that suit multigrid of a matrix that changes with nearly every solve. To be called before [`apply`].
 pub fn made_often(chosen: &mut Chosen) {
     MADE_OFTEN.iter().for_each(|(name, value)| chosen.set_default(name, value));
@@ -128,7 +145,7 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
         Preset::Condensed => return,
         Preset::Mumps => "cholesky",
         Preset::Hypre if has_levels => "mg",
-        Preset::Hypre => "hypre",
+        Preset::Hypre => ALGEBRAIC,
         Preset::Gamg => "gamg",
         Preset::Icc => "icc",
     };
@@ -158,5 +175,19 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
     }
     if is(chosen, "pc_type", &["icc"]) && preset == Preset::Icc {
         chosen.set_default("pc_factor_levels", "1");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check;
+    use crate::problem::solver::Preset;
+
+    #[test]
+    fn hypre_is_refused_only_where_it_is_missing_and_asked_for() {
+        assert!(check(Some(Preset::Hypre), true).is_ok() && check(None, false).is_ok());
+        assert!(check(Some(Preset::Gamg), false).is_ok());
+        let error = check(Some(Preset::Hypre), false).expect_err("no hypre");
+        assert!(error.render(false).contains("solver=gamg"), "{error}");
     }
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Interpolation;
 use crate::linalg::Csr;
 use crate::model::{Body, BodySlot};
-use crate::petsc::Rows;
+use crate::petsc::{HAS_HYPRE, Rows};
 use crate::problem::{Linear, Order, Preset};
 use crate::solver::options::Chosen;
 use crate::solver::preset::{self, Smoother};
@@ -78,6 +78,7 @@ impl Factory for Inner<'_> {
     type Plan = Decisions;
 
     fn plan(&mut self, outlines: &[Outline]) -> Result<Decisions> {
+        preset::check(self.asked, HAS_HYPRE)?;
         let mut plans = Vec::new();
         // This marks the bodies for which the program is to choose.
         let mut open = Vec::new();
