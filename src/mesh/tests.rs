@@ -3,6 +3,7 @@
 mod cases;
 mod damage;
 mod loading;
+mod mutations;
 
 use super::load::from_script;
 use super::{Group, Loaded, Mesh, msh, simplex};

@@ -146,7 +146,21 @@ where
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
         let mesh = read.as_ref().map(|read| read.digest.clone());
-        Ok(Built { scene, discrete, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again })
+        let splits = verified.splits();
+        Ok(Built {
+            scene,
+            discrete,
+            splits,
+            mesh,
+            linear,
+            whole,
+            interpolation,
+            choice,
+            condensed,
+            options,
+            warnings,
+            again,
+        })
     }
 }
 

@@ -92,7 +92,7 @@ impl<const D: usize> Faces<D> {
     }
 
     /// Return the faces in groups with the same corners.
-    fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
+    pub fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
         let of_least = self.first.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
         of_least.flat_map(|ends| self.list[ends].chunk_by(|a, b| a.rest == b.rest))
     }
