@@ -508,7 +508,7 @@ fn old_formats_have_groups_by_physical_tag() {
     // what is cut short or of another kind is refused with its line
     let text = bar(BAR, ["2 1 0", "2 2 0", "2 3 0", "2 3 0", "2 3 0", "2 3 0"]);
     for (bad, words) in [
-        (text.replace("6\n1 1 2", "7\n1 1 2"), "a.msh:26"),
+        (text.replace("6\n1 1 2", "7\n1 1 2"), "a.msh:27"),
         (text.replace("3 2 2 3 0", "3 92 2 3 0"), "a.msh:23: elements of Gmsh's type 92"),
         (text.replace("$EndElements\n", ""), "`$EndElements` should stand here"),
         (text.replace("4 0 1 0", "4 0 nan 0"), "a.msh:15: a coordinate is NaN"),
