@@ -154,4 +154,5 @@ impl<const D: usize> Faces<D> {
 }
 
 /// The advice about cells that are wrong in themselves.
-const AGAIN: &str = "such a file is damaged or was put together from several: mesh the geometry again";
+const AGAIN: &str =
+    "cells of a body lie beside each other: remove those that lie there twice, or mesh the geometry again";

@@ -131,7 +131,7 @@ fn damaged_files_never_end_the_program() {
     for (place, (name, seed)) in SEEDS.iter().enumerate() {
         read_any(name, seed);
         for number in 0..most {
-            let mut random = Random(1 + ((place as u64) << 40 | number) * 0x9e37_79b9);
+            let mut random = Random(1 + ((place as u64) << 40 | number).wrapping_mul(0x9e37_79b9_7f4a_7c15));
             let mut bytes = seed.to_vec();
             (0..1 + random.below(4)).for_each(|_| random.change(&mut bytes));
             let read = std::panic::catch_unwind(|| read_any(name, &bytes));
