@@ -505,8 +505,11 @@ fn old_formats_have_groups_by_physical_tag() {
     assert_eq!(groups::<2>(bar("", tags).as_bytes()), entities);
     let first = "$NOD\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$ENDNOD\n$ELM\n3\n1 2 4 0 3 1 2 3\n2 1 7 0 2 1 2\n3 1 8 0 2 1 2\n$ENDELM\n";
     assert_eq!(groups::<2>(first.as_bytes()), sizes(&[("curve_7", 1), ("curve_8", 1), ("surface_4", 1)]));
-    // what is cut short or of another kind is refused with its line
+    // a set is a set: an element that stands twice in a group
     let text = bar(BAR, ["2 1 0", "2 2 0", "2 3 0", "2 3 0", "2 3 0", "2 3 0"]);
+    let twice = text.replace("$Elements\n6", "$Elements\n7").replace("$EndE", "7 2 2 3 0 5 2 1\n$EndE");
+    assert_eq!(groups::<2>(twice.as_bytes()), all);
+    // what is cut short or of another kind is refused with its line
     for (bad, words) in [
         (text.replace("6\n1 1 2", "7\n1 1 2"), "a.msh:27"),
         (text.replace("3 2 2 3 0", "3 92 2 3 0"), "a.msh:23: elements of Gmsh's type 92"),
