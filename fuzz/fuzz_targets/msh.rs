@@ -3,8 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
-use winkler::exchange::Serial;
-use winkler::mesh::{Asked, Duty, Maker, Mesh, Portion, parse};
+use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
 
 fuzz_target!(|bytes: &[u8]| {
     read::<2>(bytes);
@@ -27,7 +26,7 @@ fn read<const D: usize>(bytes: &[u8]) {
     let asked = |name| Asked { name, order: mesh.order, groups: groups.clone() };
     let bodies: Vec<Asked> = mesh.group_names(D).map(asked).collect();
     for shared in [false, true] {
-        match Portion::whole(mesh.clone()).check(&bodies, &[], shared, &Serial) {
+        match mesh.check(&bodies, &[], shared) {
             Ok(checked) => {
                 assert_eq!(checked.len(), bodies.len());
                 for (found, body) in checked.iter().zip(&bodies) {

@@ -110,7 +110,8 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
         ..=LISTED => each_body(built),
         _ => all_bodies(built),
     };
-    let lines = lines.into_iter().chain(surfaces::data_lines(built)).chain(match built.discrete.model.pairs.len() {
+    let splits = built.splits.iter().map(|line| format!("  {line}"));
+    let lines = splits.chain(lines).chain(surfaces::data_lines(built)).chain(match built.discrete.model.pairs.len() {
         ..=LISTED => each_pair(built),
         _ => all_pairs(built),
     });

@@ -136,6 +136,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         "nodes": mesh.points.len(),
         "split": mesh.split,
         "straightened": mesh.straightened,
+        "splits": verified.splits(),
         "bodies": bodies,
         "groups": groups,
     }))
@@ -188,6 +189,9 @@ fn print(facts: &Value) -> Result<()> {
         facts["nodes"],
         facts["order"]
     ))?;
+    for line in list("splits") {
+        say(format_args!("  {}", text(&line)))?;
+    }
     for body in list("bodies") {
         say(format_args!(
             "  body {}: {} cells, {} nodes, {} dofs, quality at least {:.3}, mean {:.3}",

@@ -34,14 +34,10 @@ pub fn find_group<'m, const D: usize>(
     if let Some(other) = named {
         return Err(error.help(format!("`{}` is a {} there", name.value, kind(other.dimension))));
     }
-    let odd = |near: &&str| what == "body" && !near.bytes().all(|b| matches!(b, b'a'..=b'z' | b'0'..=b'9' | b'_'));
-    Err(match crate::error::nearest(&name.value, known()).filter(odd) {
-        Some(near) => error.help(format!("rename the group `{near}` of the mesh: `{}`", name.value)),
-        None => error.suggest(&name.value, known(), || match few(known()) {
-            none if none.is_empty() => format!("the mesh has no {wanted} at all"),
-            names => format!("it has: {}", names.join(", ")),
-        }),
-    })
+    Err(error.suggest(&name.value, known(), || match few(known()) {
+        none if none.is_empty() => format!("the mesh has no {wanted} at all"),
+        names => format!("it has: {}", names.join(", ")),
+    }))
 }
 
 /// Return the error of a support or load on a group of another body.

@@ -239,7 +239,7 @@ impl Owners {
                 let bodies = [found[0].0, last].map(|body| parts[body].spec.name.value.clone());
                 let message = format!("surface `{}` bounds both `{}` and `{}`", name.value, bodies[0], bodies[1]);
                 Err(Error::scene(&name.place, message)
-                    .help("the bodies share mesh nodes there: give each its own curve or surface in the geometry"))
+                    .help("give each body a group of its own there (bodies share no nodes), or let contacts be found: between = \"auto\""))
             }
         }
     }

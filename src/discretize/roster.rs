@@ -3,7 +3,7 @@
 use super::find::find_group;
 use crate::error::{Error, Located, Place, Result, few};
 use crate::mesh::{Group, Mesh};
-use crate::problem::body::{BodySpec, LoadKind, fault};
+use crate::problem::body::{BodySpec, LoadKind, fault, plain, plain_pattern};
 use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
 use crate::scene::Scene;
 use std::collections::{BTreeSet, HashMap};
@@ -58,11 +58,16 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
     Ok(bodies)
 }
 
-/// Return whether a table stands for several bodies, or has lines for several groups.
+/// Return whether a table stands for many bodies: its name is a pattern, or it splits groups into their connected parts.
+fn is_for_many(table: &BodySpec) -> bool {
+    is_pattern(&table.name.value) || table.split
+}
+
+/// Return whether a table stands for many bodies, or has lines for many groups.
 fn is_plural(table: &BodySpec) -> bool {
     let lines = table.fix.iter().map(|line| &line.on).chain(table.load.iter().map(|line| &line.on));
     let lines = lines.chain(table.spring.iter().map(|line| &line.on)).chain(table.regions.iter().map(|line| &line.on));
-    is_pattern(&table.name.value) || lines.into_iter().any(|on| is_open(&on.value))
+    is_for_many(table) || lines.into_iter().any(|on| is_open(&on.value))
 }
 
 /// Return whether the name of a group is a pattern, or contains the placeholder for the name of the body.
@@ -75,18 +80,60 @@ pub fn pattern(name: &Located<String>) -> Result<Pattern<'_>> {
     Pattern::new(&name.value).map_err(|flaw| Error::scene(&name.place, flaw))
 }
 
+/// Return how narrow the name of a table that stands for many bodies is. A name whose group is split ranks like the pattern of the
+/// names of its parts.
+fn rank(table: &BodySpec) -> Result<Rank> {
+    let name = &table.name;
+    let parts = Located::new(format!("{}_*", name.value), name.place.clone());
+    pattern(if table.split { &parts } else { name }).map(|pattern| pattern.rank())
+}
+
+/// Split the groups of cells whose narrowest table asks for it into connected parts, which become groups of their own.
+///
+/// # Errors
+/// A name of a table is no pattern, or a part would have the name of another group.
+pub fn split<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<()> {
+    let mut asked = Vec::new();
+    for table in scene.bodies.iter().filter(|table| table.split) {
+        for name in mesh.group_names(D).filter(|name| pattern(&table.name).is_ok_and(|own| own.matches(name))) {
+            let others = scene.bodies.iter().filter(|other| !other.split);
+            let mut matching = others.filter(|other| pattern(&other.name).is_ok_and(|own| own.matches(name)));
+            let own = rank(table)?;
+            if matching.all(|other| is_for_many(other) && rank(other).is_ok_and(|rank| rank < own)) {
+                asked.push((name.to_owned(), table));
+            }
+        }
+    }
+    for (name, table) in asked {
+        if mesh.groups.is_split(&name) {
+            continue;
+        }
+        mesh.split(&name).map_err(|taken| {
+            let message = format!("`{taken}` is a connected part of `{name}`, and the mesh has a group of that name");
+            Error::scene(&table.name.place, message)
+                .help("rename the group of the mesh, or name bodies without `split`")
+        })?;
+    }
+    Ok(())
+}
+
 /// Return the names of the bodies of each table.
 fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
     let patterns = scene.bodies.iter().map(|table| pattern(&table.name)).collect::<Result<Vec<_>>>()?;
-    let single = (0..patterns.len()).filter(|&table| !patterns[table].is_plural());
+    let single = (0..patterns.len()).filter(|&table| !is_for_many(&scene.bodies[table]));
     let named: HashMap<&str, usize> = single.map(|table| (scene.bodies[table].name.value.as_str(), table)).collect();
-    let plural: Vec<(usize, &Pattern, Rank)> =
-        patterns.iter().enumerate().filter(|(_, p)| p.is_plural()).map(|(table, p)| (table, p, p.rank())).collect();
+    let mut plural: Vec<(usize, &Pattern, Rank)> = Vec::new();
+    for (number, table) in scene.bodies.iter().enumerate().filter(|(_, table)| is_for_many(table)) {
+        plural.push((number, &patterns[number], rank(table)?));
+    }
     let mut members = vec![Vec::new(); patterns.len()];
     named.iter().for_each(|(&name, &table)| members[table].push(name));
     let mut unmatched: BTreeSet<usize> = plural.iter().map(|&(table, ..)| table).collect();
-    for name in mesh.group_names(D) {
-        let matching: Vec<_> = plural.iter().filter(|(_, pattern, _)| pattern.matches(name)).collect();
+    for name in mesh.group_names(D).filter(|name| !mesh.groups.is_split(name)) {
+        // A table that splits groups stands for the parts of these groups.
+        let called = |table: usize| if scene.bodies[table].split { mesh.groups.whole(name) } else { Some(name) };
+        let is_for = |table: usize, pattern: &Pattern| called(table).is_some_and(|called| pattern.matches(called));
+        let matching: Vec<_> = plural.iter().filter(|(table, pattern, _)| is_for(*table, pattern)).collect();
         unmatched.retain(|table| matching.iter().all(|(own, ..)| own != table));
         let Some(narrowest) = matching.iter().map(|(.., rank)| rank).max().filter(|_| !named.contains_key(name)) else {
             continue;
@@ -167,6 +214,20 @@ pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
     Ok(lying)
 }
 
+/// Return the names of the groups that a name or pattern of the scene means. If none has such a name, those with the same plain
+/// form count.
+fn called<'a>(wanted: &Located<String>, groups: impl Iterator<Item = &'a &'a Group>) -> Result<Vec<&'a String>> {
+    let names: Vec<&String> = groups.map(|group| &group.name).collect();
+    let exact = pattern(wanted)?;
+    let found: Vec<&String> = names.iter().copied().filter(|name| exact.matches(name)).collect();
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let form = Located::new(plain_pattern(&wanted.value), wanted.place.clone());
+    let form = pattern(&form)?;
+    Ok(names.into_iter().filter(|name| form.matches(&plain(name))).collect())
+}
+
 /// A table with its bodies, and the groups on each of them.
 struct Lines<'a, const D: usize> {
     table: &'a BodySpec,
@@ -188,20 +249,17 @@ impl<const D: usize> Lines<'_, D> {
         let mut given = vec![Vec::new(); self.lying.len()];
         for line in lines {
             let name = on(&mut line.clone()).clone();
-            if !is_pattern(&self.table.name.value) && !is_open(&name.value) {
+            if !is_for_many(self.table) && !is_open(&name.value) {
                 given.iter_mut().for_each(|own| own.push(line.clone()));
                 continue;
             }
             let before: usize = given.iter().map(Vec::len).sum();
             for ((own, groups), body) in given.iter_mut().zip(&self.lying).zip(self.names) {
                 let wanted = Located::new(name.value.replace(BODY, body), name.place.clone());
-                let wanted = pattern(&wanted)?;
-                let kinds = kinds(line);
-                let fitting =
-                    groups.iter().filter(|group| kinds.contains(&group.dimension) && wanted.matches(&group.name));
-                own.extend(fitting.map(|group| {
+                let of_kind = groups.iter().filter(|group| kinds(line).contains(&group.dimension));
+                own.extend(called(&wanted, of_kind)?.into_iter().map(|group| {
                     let mut line = line.clone();
-                    on(&mut line).value.clone_from(&group.name);
+                    on(&mut line).value.clone_from(group);
                     line
                 }));
             }

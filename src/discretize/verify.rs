@@ -3,10 +3,10 @@
 use super::find::point;
 use super::part::Part;
 use super::roster::{self, Lying};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, few};
 use crate::exchange::{Exchange, broadcast};
 use crate::fem::{Extent, RigidMotion, rigid};
-use crate::mesh::{Asked, Checked, Duty, Group, LENGTHS, Mesh, Parts};
+use crate::mesh::{Asked, Checked, Duty, Groups, LENGTHS, Mesh, Parts};
 use crate::problem::body::BodySpec;
 use crate::problem::{Order, Plane};
 use crate::scene::Scene;
@@ -32,7 +32,7 @@ struct Head {
     path: PathBuf,
     order: Order,
     /// Groups without elements.
-    groups: Vec<Group>,
+    groups: Groups,
     split: usize,
     straightened: usize,
     points: usize,
@@ -69,6 +69,7 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     mesh.sort_cells();
     // The radius of a body of revolution is measured from its axis.
     mesh.measure_nearby(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
+    roster::split(scene, &mut mesh)?;
     let lying = roster::lying(scene, &mesh)?;
     let bodies = roster::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
@@ -77,14 +78,36 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into() }, lying))
 }
 
+impl<const D: usize> Verified<D> {
+    /// Return a line for each group that is split into bodies: its name, and the number and names of the bodies.
+    pub fn splits(&self) -> Vec<String> {
+        let mut splits: Vec<(&str, Vec<&str>)> = Vec::new();
+        for body in &self.bodies {
+            let name = body.name.value.as_str();
+            let Some(whole) = self.mesh.groups.whole(name) else { continue };
+            match splits.iter_mut().find(|(known, _)| *known == whole) {
+                Some((_, parts)) => parts.push(name),
+                None => splits.push((whole, vec![name])),
+            }
+        }
+        let line = |(whole, parts): &(&str, Vec<&str>)| {
+            format!(
+                "`{whole}` is split into {} connected parts: {}",
+                parts.len(),
+                few(parts.iter().copied()).join(", ")
+            )
+        };
+        splits.iter().map(line).collect()
+    }
+}
+
 impl Head {
     fn of<const D: usize>(verified: &Verified<D>, lying: Lying) -> Self {
         let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
-        let empty = |group: &Group| Group { connectivity: Vec::new(), tags: Vec::new(), ..group.clone() };
         Self {
             path: path.clone(),
             order: *order,
-            groups: groups.iter().map(empty).collect(),
+            groups: groups.without_simplices(),
             split: *split,
             straightened: *straightened,
             points: verified.points,
@@ -95,7 +118,7 @@ impl Head {
     /// Return the facts of the mesh on a rank that has not read it.
     fn into_verified<const D: usize>(self, scene: &Scene) -> Result<Verified<D>> {
         let Self { path, order, groups, split, straightened, points, lying } = self;
-        let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups.into()) };
+        let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
         let bodies = roster::bodies(scene, &mesh, &lying)?;
         Ok(Verified { mesh, points, bodies, checked: Rc::new([]) })
     }
@@ -167,5 +190,5 @@ pub fn held<const D: usize>(part: &Part<D>, parts: &Parts, mesh: &Mesh<D>) -> Re
     let message =
         format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));
     Err(Error::mesh(&mesh.path, None, message)
-        .help("make a body of each part, support each of them, or let them share facets (in the script: `Coherence;`)"))
+        .help("make a body of each part (`split = true` in its table), support each of them, or let them share facets (in the script: `Coherence;`)"))
 }

@@ -1,9 +1,9 @@
 //! A mesh that a Rust program supplies as arrays.
 
-use super::{Group, Mesh, simplex};
+use super::{Group, Mesh, groups, simplex};
 use crate::error::{Error, Result};
+use crate::problem::body::plain;
 use crate::problem::{GroupArrays, MeshArrays, Order};
-use std::collections::HashSet;
 use std::path::Path;
 
 /// Name in messages, where meshes from files have their path.
@@ -28,11 +28,10 @@ pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>
         let message = format!("point {number} has z = {}, but the scene has dimension 2", points[number][2]);
         return Err(refuse(message).help("draw plane bodies in the plane z = 0"));
     }
-    let mut names = HashSet::new();
-    if let Some(twice) = groups.iter().find(|group| !names.insert(&group.name)) {
-        return Err(refuse(format!("two groups are called `{}`", twice.name)));
-    }
     let groups = groups.iter().map(|group| self::group::<D>(group, points, *own)).collect::<Result<Vec<_>>>()?;
+    if let Some(twice) = groups::twice(&groups) {
+        return Err(refuse(format!("two groups are called `{twice}`")));
+    }
     let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
     Ok(Mesh::new(NAME.into(), points, *own, groups.into()))
 }
@@ -63,7 +62,8 @@ fn group<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order
         }
     }
     let tags = (0..(connectivity.len() / stride) as u64).collect();
-    Ok(Group { name: name.clone(), dimension: *dimension, stride, connectivity, tags })
+    let name = if *dimension == D { plain(name) } else { name.clone() };
+    Ok(Group { name, dimension: *dimension, stride, connectivity, tags })
 }
 
 fn refuse(message: impl Into<String>) -> Error {

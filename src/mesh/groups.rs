@@ -1,5 +1,6 @@
 //! The groups of a mesh by name, and a compact numbering that drops the points of no group.
 
+use crate::problem::body::plain;
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::ops::{Deref, DerefMut};
@@ -37,27 +38,68 @@ impl Group {
 }
 
 /// The groups of a mesh, in the order of the file, with an index by their unique names.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Groups {
     list: Vec<Group>,
     place: HashMap<String, usize>,
+    /// Index of each group by its name in the form of [`plain`], or `None` if several groups have that form.
+    plain: HashMap<String, Option<usize>>,
+    /// Name of the group of which a group is a connected part.
+    whole: HashMap<String, String>,
 }
 
 impl Groups {
-    /// Return the group with this name.
+    /// Return the group with this name; see [`place`](Self::place).
     pub fn named(&self, name: &str) -> Option<&Group> {
         self.place(name).map(|place| &self.list[place])
     }
 
-    /// Return the index of the group with this name.
+    /// Return the index of the group with this name. If there is none, return that of the only group whose name has the same
+    /// plain form: `.inp` files have no capitals, for instance.
     pub fn place(&self, name: &str) -> Option<usize> {
-        self.place.get(name).copied()
+        self.place.get(name).copied().or_else(|| self.plain.get(&plain(name)).copied().flatten())
+    }
+
+    /// Return the name of the group of which this group is a connected part, if it is one.
+    pub fn whole(&self, part: &str) -> Option<&str> {
+        self.whole.get(part).map(String::as_str)
+    }
+
+    /// Return whether the group of this name is split into connected parts.
+    pub fn is_split(&self, name: &str) -> bool {
+        self.whole.values().any(|whole| whole == name)
+    }
+
+    /// Return the groups without their simplices.
+    pub fn without_simplices(&self) -> Self {
+        let empty = |group: &Group| Group {
+            name: group.name.clone(),
+            dimension: group.dimension,
+            stride: group.stride,
+            connectivity: Vec::new(),
+            tags: Vec::new(),
+        };
+        let Self { list, place, plain, whole } = self;
+        let list = list.iter().map(empty).collect();
+        Self { list, place: place.clone(), plain: plain.clone(), whole: whole.clone() }
+    }
+
+    /// Add the connected parts of the group `whole`, with names of their own.
+    pub fn add_parts(&mut self, whole: &str, parts: Vec<Group>) {
+        self.whole.extend(parts.iter().map(|part| (part.name.clone(), whole.to_owned())));
+        let list = std::mem::take(&mut self.list).into_iter().chain(parts).collect::<Vec<_>>();
+        *self = Self { whole: std::mem::take(&mut self.whole), ..list.into() };
     }
 }
 
 impl From<Vec<Group>> for Groups {
     fn from(list: Vec<Group>) -> Self {
-        Self { place: list.iter().zip(0..).map(|(group, place)| (group.name.clone(), place)).collect(), list }
+        let place = list.iter().zip(0..).map(|(group, place)| (group.name.clone(), place)).collect();
+        let mut plain: HashMap<String, Option<usize>> = HashMap::new();
+        for (place, group) in list.iter().enumerate() {
+            plain.entry(self::plain(&group.name)).and_modify(|only| *only = None).or_insert(Some(place));
+        }
+        Self { list, place, plain, whole: HashMap::new() }
     }
 }
 

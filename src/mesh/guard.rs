@@ -4,6 +4,7 @@ use crate::file::bytes_in_proc;
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::Guard;
 use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::time::{Duration, Instant};
@@ -23,7 +24,12 @@ pub enum End {
 /// Return the path of a program in $PATH.
 pub fn find(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
-    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|program| program.is_file())
+    std::env::split_paths(&path).map(|folder| folder.join(name)).find(|program| is_program(program))
+}
+
+/// Return whether a path is a file that somebody may execute.
+fn is_program(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
 /// Return the bytes of memory that a guarded program may take: the user's limit, or else the memory that is available. Return
@@ -94,6 +100,16 @@ mod tests {
         let mut sleep = command(Path::new("/bin/sleep"), bytes);
         sleep.arg("5");
         sleep
+    }
+
+    #[test]
+    fn programs_can_be_executed() {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        let set = |mode| std::fs::set_permissions(file.path(), std::fs::Permissions::from_mode(mode)).expect("a mode");
+        set(0o644);
+        assert!(!is_program(file.path()));
+        set(0o755);
+        assert!(is_program(file.path()) && !is_program(Path::new("/bin")));
     }
 
     #[test]

@@ -3,10 +3,10 @@
 use super::cache::{self, Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
-use super::script::Script;
+use super::script::{Script, quoted};
 use super::{Mesh, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
-use crate::file::{Digested, digest_of_bytes, with_unix_lines};
+use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
 use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
@@ -78,8 +78,11 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     refuse_old_lines(path, &start)?;
     let mut loaded = match foreign::is_mesh(path, &start) {
         true => {
-            let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-            converted(file, &with_unix_lines(bytes), interrupt)?
+            let bytes = with_unix_lines(crate::file::read(path).map_err(|error| error.at(&file.place))?);
+            match foreign::read_abaqus(file, &bytes)? {
+                Some(text) => rewritten(path, &text).map_err(|error| error.at(&file.place))?,
+                None => converted(file, &bytes, interrupt)?,
+            }
         }
         false => {
             let mut source = Digested::new(source);
@@ -113,18 +116,22 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
     }
 }
 
-/// Return a mesh of another program, or of another version of Gmsh's format, as Gmsh converts it.
+/// Return the mesh of a file that was rewritten as `text` in Gmsh's format. The cache keeps the text for `winkler mesh -o`, and it
+/// is made anew in each run.
+fn rewritten<const D: usize>(path: &Path, text: &str) -> Result<Loaded<D>> {
+    let name = file_name(("rewritten", digest_of_bytes(text.as_bytes())), path);
+    let make = |_: &Path, made: &Path| std::fs::write(made, text).map_err(|cause| Error::file(made, "write", &cause));
+    let place = |cache: &Path| cache.join(&name);
+    let loaded = made_anew(&name, &folders(), |file| read_converted(path, file), make, place)?;
+    Ok(Loaded { origin: Origin::File, ..loaded })
+}
+
+/// Return a mesh of another program, or of Gmsh's format 4.0, as Gmsh converts it.
 fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let name = file_name(("converted", ending, digest_of_bytes(bytes)), path);
-    let parse = |file: &mut Digested<File>| {
-        msh::read(path, Box::new(file), Maker::Other).map_err(|error| match error.advice() {
-            // Advice for scripts does not help with the file of another program.
-            Some(advice) if !advice.contains("Physical") => error,
-            _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
-        })
-    };
+    let parse = |file: &mut Digested<File>| read_converted(path, file);
     let guard = &Guard::default();
     let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
         let script = &foreign::mesh(file, bytes, work)?;
@@ -133,6 +140,15 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
         gmsh.run(&task, made, work)
     };
     kept((path, &name), None, &folders(), parse, make).map_err(|error| error.at(&file.place))
+}
+
+/// Read a mesh that was made from the file of another program.
+fn read_converted<const D: usize>(path: &Path, file: &mut Digested<File>) -> Result<Mesh<D>> {
+    msh::read(path, Box::new(file), Maker::Other).map_err(|error| match error.advice() {
+        // Advice for scripts does not help with such a file.
+        Some(advice) if !advice.contains("Physical") => error,
+        _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
+    })
 }
 
 /// Return the mesh `name` from the cache, which is in one of `folders`, or make it from `path`. Only the latter takes Gmsh.
@@ -146,10 +162,6 @@ fn kept<const D: usize>(
     mut parse: impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
     make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
 ) -> Result<Loaded<D>> {
-    let mut parse = |file: File| {
-        let mut source = Digested::new(file);
-        parse(&mut source).map(|mesh| (mesh, source.digest()))
-    };
     let gmsh = Gmsh::find();
     let candidates = |folder: &PathBuf| match &gmsh {
         Some(gmsh) => vec![cache::made_by(folder, name, &gmsh.identity())],
@@ -157,19 +169,41 @@ fn kept<const D: usize>(
     };
     // A file of the cache that cannot be read or is damaged counts as absent.
     for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
-        if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| parse(file).ok()) {
+        if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| digested(file, &mut parse).ok()) {
             return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept });
         }
     }
     let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
+    let place = |cache: &Path| cache::made_by(cache, name, &gmsh.identity());
+    let loaded = made_anew(name, folders, parse, |work, made| make(&gmsh, work, made), place)?;
+    Ok(Loaded { unkept, ..loaded })
+}
+
+/// Return a mesh and the digest of its file.
+fn digested<const D: usize>(
+    file: File,
+    parse: &mut impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
+) -> Result<(Mesh<D>, String)> {
+    let mut source = Digested::new(file);
+    parse(&mut source).map(|mesh| (mesh, source.digest()))
+}
+
+/// Make the mesh `name` and put it into the cache, at the `place` in its folder. `make` gets a folder to work in and the path of the
+/// file that it must write there.
+fn made_anew<const D: usize>(
+    name: &str,
+    folders: &[PathBuf],
+    mut parse: impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
+    make: impl FnOnce(&Path, &Path) -> Result<()>,
+    place: impl FnOnce(&Path) -> PathBuf,
+) -> Result<Loaded<D>> {
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(name);
     let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
-    let mesh = make(&gmsh, workshop.path(), &made).and_then(|()| parse(open()?));
+    let mesh = make(workshop.path(), &made).and_then(|()| digested(open()?, &mut parse));
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
-    let file = workshop.publish(&made, |cache| cache::made_by(cache, name, &gmsh.identity()))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file, digest, unkept })
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, place)?, digest, unkept: None })
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
@@ -183,7 +217,13 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
             let name = key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard));
             known.then(|| format!("{name} {gmsh}"))
         }
-        MeshSource::Msh { file } => crate::file::read(&file.value).ok().map(|bytes| digest_of_bytes(&bytes)),
+        MeshSource::Msh { file } => {
+            let bytes = crate::file::read(&file.value).ok()?;
+            match foreign::is_converted(&file.value, &bytes) {
+                true => Some(digest(&(Gmsh::find()?.identity(), digest_of_bytes(&bytes)))),
+                false => Some(digest_of_bytes(&bytes)),
+            }
+        }
         MeshSource::Arrays(_) => None,
     }
 }
@@ -268,7 +308,7 @@ fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
     }
     let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;
     let made = work.join("ended.geo");
-    let text = format!("Include \"{}\";\n", whole.display());
+    let text = format!("Include {};\n", quoted(&whole)?);
     std::fs::write(&made, text).map_err(|cause| Error::file(&made, "write", &cause)).map(|()| Some(made))
 }
 

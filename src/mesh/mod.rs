@@ -1,8 +1,8 @@
 //! Simplicial meshes with named groups, from Gmsh.
 //!
 //! [`load`] is the entry point. Gmsh meshes a `.geo` script or a file of another program's geometry once, and the cache keeps
-//! the result. A mesh of another format is converted by Gmsh and cached, too. A `.msh` file (format 4.1, text or binary) is
-//! read directly. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
+//! the result. A `.msh` file (text or binary) and an `.inp` file are read directly. A mesh of another format is converted by
+//! Gmsh and cached, too. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
 
 mod abaqus;
 mod arrays;
@@ -24,6 +24,7 @@ mod msh;
 mod nastran;
 mod nodes;
 mod numbering;
+mod old;
 mod orders;
 mod physical;
 mod quality;

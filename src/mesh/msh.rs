@@ -1,13 +1,17 @@
-//! A reader of Gmsh's `.msh` 4.1, text and binary, that makes a [`Mesh`].
+//! A reader of Gmsh's `.msh` 4.1, text and binary, that makes a [`Mesh`]. Formats 1 and 2 are rewritten as 4.1 first.
 
 use super::cursor::{Cursor, Source};
 use super::nodes::Nodes;
 use super::physical::Physical;
 use super::simplex::THINGS;
-use super::{Mesh, elements, groups};
+use super::{Mesh, elements, groups, old};
 use crate::error::{Error, Result};
 use crate::problem::order::Order;
+use std::io::{Read, SeekFrom};
 use std::path::Path;
+
+/// Number of bytes at the start of a file that show its format.
+const START: u64 = 100;
 
 /// The maker of the bytes of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,8 +37,15 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<
 /// # Errors
 /// The file cannot be read, or it is not a mesh of named simplices in `D` dimensions. The latter is a
 /// [`Kind::Mesh`](crate::error::Kind) error with the line or byte and a way out.
-pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Maker) -> Result<Mesh<D>> {
+pub fn read<const D: usize>(path: &Path, mut source: Box<dyn Source + '_>, maker: Maker) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
+    let mut start = Vec::new();
+    // The cursor reports a source that cannot be read.
+    let _ = source.seek(SeekFrom::Start(0)).and_then(|_| source.by_ref().take(START).read_to_end(&mut start));
+    if old::is_old(&start) {
+        let bytes = old::convert(path, source, maker != Maker::User)?;
+        return read(path, Box::new(std::io::Cursor::new(bytes)), Maker::Other);
+    }
     let cursor = &mut Cursor::new(path, source, maker != Maker::User);
     read_format(cursor)?;
     let mut physical = Physical::new(maker == Maker::Other);

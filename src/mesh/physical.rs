@@ -4,7 +4,7 @@ use super::Group;
 use super::cursor::Cursor;
 use super::simplex::THINGS;
 use crate::error::Result;
-use crate::problem::body::is_in_name;
+use crate::problem::body::plain;
 use std::collections::{HashMap, HashSet};
 
 /// The groups of a file, and the entities that belong to them.
@@ -16,8 +16,8 @@ pub struct Physical {
     group_of: HashMap<(usize, i32), usize>,
     /// Indices in `groups` of the groups of each entity of the geometry, by its dimension and tag.
     entities: HashMap<(usize, i32), Vec<usize>>,
-    /// Whether groups without a name get one from their kind and number. If no group of a dimension has a name, each of its
-    /// entities without a group becomes one.
+    /// Whether groups without a name get one from their kind and number. If a dimension has no group, each of its entities
+    /// becomes one.
     named_by_number: bool,
 }
 
@@ -103,24 +103,19 @@ impl Physical {
         self.groups.len() - 1
     }
 
-    /// Return the groups. Other programs leave groups empty and give groups of cells names that no body can have. Such empty
-    /// groups are dropped, and such names are replaced.
+    /// Return the groups. Other programs leave groups empty; these are dropped. Groups of cells get names in the form of bodies.
     pub fn finished(self, space: usize) -> Vec<Group> {
         let mut groups = self.groups;
         if self.named_by_number {
             groups.retain(|group| !group.is_empty());
-            groups
-                .iter_mut()
-                .filter(|group| group.dimension == space)
-                .for_each(|group| group.name = of_body(&group.name));
         }
+        let cells = groups.iter_mut().filter(|group| group.dimension == space);
+        cells.for_each(|group| group.name = plain(&group.name));
         groups
     }
 
     /// Read `$Entities`, which lists the physical groups of each point, curve, surface and volume of the geometry.
     pub fn read_entities(&mut self, cursor: &mut Cursor) -> Result<()> {
-        let named: [bool; 4] =
-            std::array::from_fn(|dimension| self.groups.iter().any(|group| group.dimension == dimension));
         cursor.begin();
         let mut counts = [0; 4];
         for (dimension, count) in counts.iter_mut().enumerate() {
@@ -128,58 +123,63 @@ impl Physical {
         }
         cursor.end()?;
         for (dimension, count) in counts.into_iter().enumerate() {
+            let mut tags = Vec::new();
             for _ in 0..count {
-                cursor.begin();
-                let start = cursor.position();
-                let tag = cursor.int()?;
-                // These are the coordinates of a point, or the corners of the box around the entity.
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
-                    cursor.bound()?;
-                }
-                let mut members: Vec<usize> = Vec::new();
-                for _ in 0..cursor.count(1, 4)? {
-                    // The sign is an orientation.
-                    let physical = i32::try_from(cursor.int()?.unsigned_abs()).unwrap_or(i32::MAX);
-                    if self.named_by_number && !self.group_of.contains_key(&(dimension, physical)) {
-                        self.call(dimension, physical);
-                    }
-                    let Some(group) = self.group_of.get(&(dimension, physical)) else {
-                        let thing = THINGS[dimension];
-                        let message = format!("physical {} {physical} has no name", thing.to_lowercase());
-                        let help = format!("name it: Physical {thing}(\"name\", {physical}) = {{...}};");
-                        return Err(cursor.error_at(start, message).help(help));
-                    };
-                    if !members.contains(group) {
-                        members.push(*group);
-                    }
-                }
-                if members.is_empty() && self.named_by_number && !named[dimension] {
-                    members.push(self.call(dimension, tag));
-                }
-                if dimension > 0 {
-                    for _ in 0..cursor.count(1, 4)? {
-                        cursor.int()?;
-                    }
-                }
-                cursor.end()?;
-                if self.entities.insert((dimension, tag), members).is_some() {
-                    let message = format!("{} {tag} stands twice", THINGS[dimension].to_lowercase());
-                    return Err(cursor.error_at(start, message));
+                tags.push(self.read_entity(cursor, dimension)?);
+            }
+            if self.named_by_number && !self.groups.iter().any(|group| group.dimension == dimension) {
+                for tag in tags {
+                    let group = self.call(dimension, tag);
+                    self.entities.insert((dimension, tag), vec![group]);
                 }
             }
         }
         Ok(())
+    }
+
+    /// Read an entity and its groups, and return its tag.
+    fn read_entity(&mut self, cursor: &mut Cursor, dimension: usize) -> Result<i32> {
+        cursor.begin();
+        let start = cursor.position();
+        let tag = cursor.int()?;
+        // These are the coordinates of a point, or the corners of the box around the entity.
+        for _ in 0..if dimension == 0 { 3 } else { 6 } {
+            cursor.bound()?;
+        }
+        let mut members: Vec<usize> = Vec::new();
+        for _ in 0..cursor.count(1, 4)? {
+            // The sign is an orientation.
+            let physical = i32::try_from(cursor.int()?.unsigned_abs()).unwrap_or(i32::MAX);
+            if self.named_by_number && !self.group_of.contains_key(&(dimension, physical)) {
+                self.call(dimension, physical);
+            }
+            let Some(group) = self.group_of.get(&(dimension, physical)) else {
+                let thing = THINGS[dimension];
+                let message = format!("physical {} {physical} has no name", thing.to_lowercase());
+                let help = format!("name it: Physical {thing}(\"name\", {physical}) = {{...}};");
+                return Err(cursor.error_at(start, message).help(help));
+            };
+            if !members.contains(group) {
+                members.push(*group);
+            }
+        }
+        if dimension > 0 {
+            for _ in 0..cursor.count(1, 4)? {
+                cursor.int()?;
+            }
+        }
+        cursor.end()?;
+        match self.entities.insert((dimension, tag), members) {
+            None => Ok(tag),
+            Some(_) => {
+                let message = format!("{} {tag} stands twice", THINGS[dimension].to_lowercase());
+                Err(cursor.error_at(start, message))
+            }
+        }
     }
 }
 
 /// Return a group without elements. Its stride is final when the first elements are added.
 fn empty(name: String, dimension: usize) -> Group {
     Group { name, dimension, stride: dimension + 1, connectivity: Vec::new(), tags: Vec::new() }
-}
-
-/// Return a name in the form that bodies have.
-fn of_body(name: &str) -> String {
-    let small = name.to_ascii_lowercase();
-    let word: String = small.chars().map(|c| if is_in_name(c) { c } else { '_' }).collect();
-    if word.starts_with(|c: char| c.is_ascii_lowercase()) { word } else { format!("body_{word}") }
 }

@@ -6,7 +6,7 @@
 use super::inputs::Inputs;
 use super::tokens::{Token, tokens};
 use super::trust;
-use crate::error::{Error, Located, Place, Result};
+use crate::error::{Error, Kind, Located, Place, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -134,7 +134,7 @@ impl Script {
     /// The script does more. The error says what, with the line.
     pub fn judge(&self, file: &Located<PathBuf>) -> Result<()> {
         let Some((path, breach)) = &self.breach else { return Ok(()) };
-        let shown = if path.file_name() == file.value.file_name() { &file.value } else { path };
+        let shown = if located(&file.value).as_ref() == Some(path) { &file.value } else { path };
         Err(Error::mesh(shown, Some(breach.line), format!("this script {}", breach.what))
             .at(&file.place)
             .help("Gmsh runs a script as a program: read it, and if you trust it give --trust-geo"))
@@ -167,6 +167,20 @@ impl Script {
             false => format!("it has: {}", known.join(", ")),
         };
         Err(error(format!("{shown} has no number `{name}` to set")).suggest(name, known.iter().copied(), otherwise))
+    }
+}
+
+/// Return a path as a text in a script. Gmsh has no escapes, but two kinds of quotes.
+///
+/// # Errors
+/// The path has both kinds of quotes.
+pub fn quoted(path: &Path) -> Result<String> {
+    let text = path.display().to_string();
+    match (text.contains('"'), text.contains('\'')) {
+        (false, _) => Ok(format!("\"{text}\"")),
+        (true, false) => Ok(format!("'{text}'")),
+        (true, true) => Err(Error::new(Kind::File, format!("{text} has quotes of both kinds in its path"))
+            .help("Gmsh cannot read it: rename the file or its folder")),
     }
 }
 
@@ -240,6 +254,28 @@ mod tests {
         assert!(script.assigned.contains("n"));
         assert!(script.files[0].starts_with(b"Include"));
         assert_eq!(script.files.len(), 3);
+    }
+
+    #[test]
+    fn paths_are_quoted_as_gmsh_reads_them() {
+        let of = |text: &str| quoted(Path::new(text)).ok();
+        assert_eq!(of("/a b/c.geo").as_deref(), Some("\"/a b/c.geo\""));
+        assert_eq!(of("/a'b/c.geo").as_deref(), Some("\"/a'b/c.geo\""));
+        assert_eq!(of("/a\"b/c.geo").as_deref(), Some("'/a\"b/c.geo'"));
+        assert_eq!(of("/a\"b'/c.geo"), None);
+    }
+
+    /// The line of the breach is that of the file with it, also where that file is called like the script.
+    #[test]
+    fn a_breach_is_shown_in_its_own_file() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("parts")).unwrap();
+        let script = folder.path().join("a.geo");
+        std::fs::write(&script, "Include \"parts/a.geo\";\n").unwrap();
+        std::fs::write(folder.path().join("parts/a.geo"), "SystemCall \"id\";\n").unwrap();
+        let file = Located::new(script.clone(), Place::here("mesh"));
+        let error = Script::read(&script).unwrap().judge(&file).unwrap_err().to_string();
+        assert!(error.contains("parts/a.geo:1"), "{error}");
     }
 
     /// Gmsh reads `a.geo.opt` after `a.geo`. It looks for the files that a linked script names beside the link.

@@ -1,6 +1,6 @@
 //! Meshes of prescribed sizes: Gmsh follows a field of sizes instead of those in the user's script.
 
-use super::script::Script;
+use super::script::{Script, quoted};
 use super::tokens::{Token, tokens};
 use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
@@ -31,11 +31,11 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
     }
     let sizes = write("sizes.pos", field)?;
     let text = format!(
-        "Include \"{}\";\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
-         Merge \"{}\";\nBackground Mesh View[PostProcessing.NbViews - 1];\n\
+        "Include {};\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
+         Merge {};\nBackground Mesh View[PostProcessing.NbViews - 1];\n\
          Mesh.MeshSizeMax = View[PostProcessing.NbViews - 1].Max;\n",
-        script.display(),
-        sizes.display()
+        quoted(&script)?,
+        quoted(&sizes)?
     );
     write("sized.geo", &text)
 }

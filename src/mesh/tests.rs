@@ -3,6 +3,7 @@
 mod cases;
 mod damage;
 mod loading;
+mod mutations;
 
 use super::load::from_script;
 use super::{Group, Loaded, Mesh, msh, simplex};
@@ -120,7 +121,7 @@ fn squares_of_both_forms_and_orders() {
                 [count("soft rock"), count("steel"), count("left"), count("outside"), count("corner")],
                 [8, 8, 2, 12, 1]
             );
-            assert_eq!(mesh.group_names(2).collect::<Vec<_>>(), ["soft rock", "steel"]);
+            assert_eq!(mesh.group_names(2).collect::<Vec<_>>(), ["soft_rock", "steel"]);
             assert_eq!(mesh.points.len(), if order == "1" { 15 } else { 45 });
             let size = |name| extent(mesh, mesh.group(name).unwrap());
             for (name, expected) in [("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)] {

@@ -2,6 +2,7 @@
 
 use super::elasticity::{Constants, ElasticitySpec, RegionSpec};
 use super::order::Order;
+use super::pattern::is_pattern;
 use crate::error::{Located, Place};
 use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};
@@ -10,8 +11,10 @@ use crate::petsc::{begins_options, is_family};
 /// [pattern](super::pattern); the table then stands for all bodies whose names match.
 #[derive(Debug, Clone)]
 pub struct BodySpec {
-    /// Name of the physical group of cells. It is a prefix of PETSc options: `[a-z][a-z0-9_]*` without words of PETSc's own.
+    /// Name of the physical group of cells in the form of [`plain`]. It is a prefix of PETSc options, without words of PETSc's own.
     pub name: Located<String>,
+    /// Whether each connected part of the group is a body of its own.
+    pub split: bool,
     /// Elastic constants.
     pub elasticity: ElasticitySpec,
     /// Parts of the body with other elastic constants.
@@ -39,7 +42,8 @@ impl BodySpec {
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
         let constants = Constants::Isotropic { young: young.into(), poisson: poisson.into() };
         Self {
-            name: Located::here(name),
+            name: Located::here(&plain_pattern(name)),
+            split: false,
             elasticity: ElasticitySpec { constants, axes: None, place: Place::here("young, poisson") },
             regions: Vec::new(),
             order: Order::P1,
@@ -50,6 +54,11 @@ impl BodySpec {
             force_factor: 1.0,
             exact: None,
         }
+    }
+
+    /// Let each connected part of the group be a body of its own: `NAME_1`, `NAME_2`, ...
+    pub fn split(self) -> Self {
+        Self { split: true, ..self }
     }
 
     /// Set the order of the elements, which must not exceed that of the mesh.
@@ -166,6 +175,30 @@ pub const SPELLING: [&str; 2] =
 /// 40 320 times as long, which is 14 s.
 const MOST_NUMBERS: usize = 4;
 
+/// Return the name of a body as the program writes it: small letters, digits and `_`, beginning with a letter. This is the one rule
+/// for names in scenes and for names of groups of cells in mesh files of any format. Capitals become small, other characters `_`, and
+/// `body_` stands before a name that begins with something else.
+pub fn plain(name: &str) -> String {
+    let word: String = name.trim().chars().map(plain_character).collect();
+    if word.starts_with(|c: char| c.is_ascii_lowercase()) { word } else { format!("body_{word}") }
+}
+
+/// Return a pattern of names of bodies by the rule of [`plain`]. Signs of patterns stay.
+pub fn plain_pattern(text: &str) -> String {
+    let mut in_class = false;
+    let mut write = |c: char| {
+        let is_sign = matches!(c, '*' | '?' | '[' | ']') || in_class && matches!(c, '!' | '-');
+        in_class = c == '[' || in_class && c != ']';
+        if is_sign { c } else { plain_character(c) }
+    };
+    if is_pattern(text) { text.trim().chars().map(&mut write).collect() } else { plain(text) }
+}
+
+fn plain_character(c: char) -> char {
+    let small = c.to_ascii_lowercase();
+    if is_in_name(small) { small } else { '_' }
+}
+
 /// Return whether names of bodies may have this character.
 pub fn is_in_name(c: char) -> bool {
     c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_'
@@ -193,6 +226,21 @@ pub fn fault(name: &str) -> Option<[&'static str; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_have_one_form() {
+        for (given, name) in [
+            ("lower", "lower"),
+            ("Upper Part", "upper_part"),
+            (" Part-2.1 ", "part_2_1"),
+            ("2nd", "body_2nd"),
+            ("Träger", "tr_ger"),
+        ] {
+            assert_eq!([plain(given), plain(&plain(given)), plain_pattern(given)], [name; 3]);
+        }
+        assert_eq!(plain_pattern("Part-*"), "part_*");
+        assert_eq!(plain_pattern("*B?[!A-C]-[0-9]"), "*b?[!a-c]_[0-9]");
+    }
 
     #[test]
     fn faults_of_names() {

@@ -146,9 +146,10 @@ where
         let scene = scene.clone();
         let (options, again) = (inner.into_options(), None);
         let mesh = read.as_ref().map(|read| read.digest.clone());
+        let splits = verified.splits();
         #[rustfmt::skip]
         let mut built = Built {
-            scene, discrete, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again,
+            scene, discrete, splits, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again,
         };
         built.warnings.extend(swapped::warnings(&built));
         Ok(built)

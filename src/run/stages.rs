@@ -20,6 +20,8 @@ pub struct Built {
     pub scene: Rc<Scene>,
     /// The discrete problem.
     pub discrete: Discrete,
+    /// A line for each group of the mesh that is split into bodies.
+    pub splits: Vec<String>,
     /// SHA-256 of the file of its mesh, on the rank that has read the file; none on other ranks.
     pub mesh: Option<String>,
     /// The solver of linear steps.

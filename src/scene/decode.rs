@@ -19,7 +19,7 @@ use crate::output::vtu::Encoding;
 use crate::problem::{Own, Plane, Preset, SolverSpec, Units};
 use crate::scene::{AdaptSpec, OutputSpec, Scene};
 use crate::solver::options;
-use decoder::{Decoder, choose, file, pattern};
+use decoder::{Decoder, body_name, choose, file, pattern};
 use std::path::Path;
 
 /// Return the shape of a whole scene.

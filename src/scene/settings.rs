@@ -103,9 +103,10 @@ fn of_data(data: &DataSpec) -> Value {
 }
 
 fn of_body(body: &BodySpec, dimension: usize) -> Value {
-    let BodySpec { name, elasticity, regions, order, fix, load, spring, force, force_factor: _, exact } = body;
+    let BodySpec { name, split, elasticity, regions, order, fix, load, spring, force, force_factor: _, exact } = body;
     let mut map = of_elasticity(elasticity);
     map["name"] = json!(name.value);
+    map["split"] = json!(split.then_some(true));
     map["region"] = if regions.is_empty() { Value::Null } else { regions.iter().map(of_region).collect() };
     map["order"] = json!(order.degree());
     map["fix"] = fix.iter().map(of_support).collect();

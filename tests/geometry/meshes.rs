@@ -521,3 +521,158 @@ fn without_a_home_meshes_are_kept_among_temporary_files() {
     assert_eq!(made.file_name().to_string_lossy(), format!("winkler-{}", data.uid()));
     assert_eq!(data.permissions().mode() & 0o022, 0);
 }
+
+/// A bar of two squares in format 2.2, with these names, and with the tags of its six elements.
+fn bar(names: &str, tags: [&str; 6]) -> String {
+    let nodes = ["1 4", "3 6", "1 2 5", "1 5 4", "2 3 6", "2 6 5"];
+    let of = |k: usize| format!("{} {} {} {}\n", k + 1, if k < 2 { 1 } else { 2 }, tags[k], nodes[k]);
+    let elements: String = (0..6).map(of).collect();
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{names}$Nodes\n6\n1 0 0 0\n2 1 0 0\n3 2 0 0\n4 0 1 0\n5 1 1 0\n6 2 1 0\n$EndNodes\n\
+         $Elements\n6\n{elements}$EndElements\n"
+    )
+}
+
+/// Names of the bar's ends and of its cells.
+const BAR: &str = "$PhysicalNames\n3\n1 1 \"left\"\n1 2 \"right\"\n2 3 \"Bar 1\"\n$EndPhysicalNames\n";
+
+/// Return the names of all groups, each with the number of its elements, sorted.
+fn groups<const D: usize>(bytes: &[u8]) -> Vec<(String, usize)> {
+    let mesh: Mesh<D> = parse(Path::new("a.msh"), bytes, Maker::User).unwrap_or_else(|error| panic!("{error}"));
+    let mut groups: Vec<_> = mesh.groups.iter().map(|group| (group.name.clone(), group.len())).collect();
+    groups.sort();
+    groups
+}
+
+/// Groups of formats 1 and 2 are those of the physical tags, whatever entities the elements name.
+#[test]
+fn old_formats_have_groups_by_physical_tag() {
+    let sizes = |list: &[(&str, usize)]| list.iter().map(|(name, size)| (name.to_string(), *size)).collect::<Vec<_>>();
+    let all = sizes(&[("bar_1", 4), ("left", 1), ("right", 1)]);
+    for entity in [0, 1, 7] {
+        let tags = ["2 1", "2 2", "2 3", "2 3", "2 3", "2 3"].map(|tags| format!("{tags} {entity}"));
+        assert_eq!(groups::<2>(bar(BAR, tags.each_ref().map(String::as_str)).as_bytes()), all);
+        let unnamed = sizes(&[("curve_1", 1), ("curve_2", 1), ("surface_3", 4)]);
+        assert_eq!(groups::<2>(bar("", tags.each_ref().map(String::as_str)).as_bytes()), unnamed);
+    }
+    // bodies of one entity, one of them without a name, an end without a group, and the sign of an orientation
+    let tags = ["2 -1 1", "2 0 1", "2 3 1", "2 3 1", "2 4 1", "2 4 1"];
+    assert_eq!(groups::<2>(bar(BAR, tags).as_bytes()), sizes(&[("bar_1", 2), ("left", 1), ("surface_4", 2)]));
+    // no physical group of cells: entities become groups
+    let tags = ["2 1 0", "2 2 0", "2 0 5", "2 0 5", "2 0 6", "2 0 6"];
+    let entities = sizes(&[("curve_1", 1), ("curve_2", 1), ("surface_5", 2), ("surface_6", 2)]);
+    assert_eq!(groups::<2>(bar("", tags).as_bytes()), entities);
+    let first = "$NOD\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$ENDNOD\n$ELM\n3\n1 2 4 0 3 1 2 3\n2 1 7 0 2 1 2\n3 1 8 0 2 1 2\n$ENDELM\n";
+    assert_eq!(groups::<2>(first.as_bytes()), sizes(&[("curve_7", 1), ("curve_8", 1), ("surface_4", 1)]));
+    // a set is a set: an element that stands twice in a group
+    let text = bar(BAR, ["2 1 0", "2 2 0", "2 3 0", "2 3 0", "2 3 0", "2 3 0"]);
+    let twice = text.replace("$Elements\n6", "$Elements\n7").replace("$EndE", "7 2 2 3 0 5 2 1\n$EndE");
+    assert_eq!(groups::<2>(twice.as_bytes()), all);
+    // what is cut short or of another kind is refused with its line
+    for (bad, words) in [
+        (text.replace("6\n1 1 2", "7\n1 1 2"), "a.msh:27"),
+        (text.replace("3 2 2 3 0", "3 92 2 3 0"), "a.msh:23: elements of Gmsh's type 92"),
+        (text.replace("$EndElements\n", ""), "`$EndElements` should stand here"),
+        (text.replace("4 0 1 0", "4 0 nan 0"), "a.msh:15: a coordinate is NaN"),
+        (first.replace("4 0 3 1", "4 0 4 1"), "has 4 nodes, and its type 3"),
+    ] {
+        let error = parse::<2>(Path::new("a.msh"), bad.as_bytes(), Maker::User).expect_err(words).to_string();
+        assert!(error.contains(words), "{error}");
+    }
+}
+
+/// An element of several groups stands in an old file once for each; text, binary, both orders, plane and space.
+#[test]
+fn elements_of_several_groups_belong_to_each() {
+    let plane = script() + "Physical Surface(\"all\") = {1, 2};\nPhysical Curve(\"loaded\") = {13, 12};\n";
+    let space = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0,0,0,1,1,1}; Box(2) = {0,0,1,1,1,1};\n\
+                 Transfinite Curve{:} = 3; Transfinite Surface{:}; Transfinite Volume{:};\n\
+                 Physical Volume(\"lower\") = {1}; Physical Volume(\"all\") = {1, 2}; Physical Surface(\"lid\") = {12};\n\
+                 Physical Surface(\"sides\") = {7, 12};\nPhysical Point(\"pin\") = {1}; Physical Point(\"foot\") = {1, 2};\n";
+    for order in ["1", "2"] {
+        for format in [&["-format", "msh22"][..], &["-format", "msh22", "-bin"]] {
+            let made = |script: &str, format: &[&str], dimension| {
+                gmsh(script, &[format, &["-order", order, dimension]].concat())
+            };
+            let new = made(&plane, &[], "-2");
+            assert_eq!(groups::<2>(&made(&plane, format, "-2")), groups::<2>(&new));
+            let new = made(space, &[], "-3");
+            assert_eq!(groups::<3>(&made(space, format, "-3")), groups::<3>(&new));
+        }
+    }
+}
+
+/// Blocks in the order of `heights`, each a hexahedron from there one unit upwards, in one set of an `.inp` file.
+fn blocks(heights: &[f64]) -> String {
+    let mut text = "*NODE\n".to_owned();
+    for (k, low) in heights.iter().enumerate() {
+        for (n, [x, y, z]) in
+            [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]].iter().enumerate()
+        {
+            text += &format!("{}, {x}., {y}., {:?}\n", 8 * k + n + 1, low + f64::from(*z));
+        }
+    }
+    text += "*ELEMENT, TYPE=C3D8, ELSET=All Blocks\n";
+    for k in 0..heights.len() {
+        let nodes: Vec<String> = (1..=8).map(|n| (8 * k + n).to_string()).collect();
+        text += &format!("{}, {}\n", k + 1, nodes.join(", "));
+    }
+    let named = |name: &str, block: usize, side: &str| format!("*SURFACE, NAME={name}\n{}, {side}\n", block + 1);
+    let [first, last] = [0.0, heights.len() as f64 - 1.0].map(|z| {
+        let is_it = |low: &f64| (low - z).abs() < 0.5;
+        heights.iter().position(is_it).expect("a block")
+    });
+    text + &named("FLOOR", first, "S1") + &named("Lid", last, "S2") + &named("low top", first, "S2")
+}
+
+/// The connected parts of a group are bodies, in the order of their places, with contact found and with named surfaces.
+#[test]
+fn parts_of_a_group_are_bodies() {
+    let scene = |contact: &str, heights: &[f64]| {
+        let scene = Scene::new(format!(
+            "dimension = 3\nmesh = \"a.inp\"\n[[body]]\nname = \"All Blocks\"\nsplit = true\nyoung = 1e5\npoisson = 0\n\
+             fix = [{{ on = \"floor\", x = 0, y = 0, z = 0 }}, {{ on = \"LID\", x = 0, y = 0 }}]\n\
+             load = [{{ on = \"LID\", pressure = 10 }}]\n{contact}layer = {{ linear = {{ stiffness = 1e6 }} }}\n"
+        ));
+        std::fs::write(scene.path.with_file_name("a.inp"), blocks(heights)).expect("a file");
+        scene
+    };
+    let auto = "[[contact]]\nbetween = \"auto\"\ndistance = 0.1\nof = [\"All Blocks_*\", \"all_blocks_*\"]\n";
+    let named = "[[contact]]\nbetween = [\"low top\", \"UP\"]\n";
+    for (heights, lines) in [(&[0.0, 1.0][..], auto), (&[1.0, 0.0], auto), (&[0.0, 1.01], auto), (&[0.0, 1.0], named)] {
+        let scene = scene(lines, heights);
+        let file = scene.path.with_file_name("a.inp");
+        let upper = heights.iter().position(|low| *low > 0.5).expect("a block");
+        let text = std::fs::read_to_string(&file).expect("a file");
+        std::fs::write(&file, format!("{text}*SURFACE, NAME=up\n{}, S1\n", upper + 1)).expect("a file");
+        for run in [solve(&scene, &[]), solve_on(2, &scene, &[])] {
+            let run = run.converged();
+            assert_eq!([run.text("bodies/0/name"), run.text("bodies/1/name")], ["all_blocks_1", "all_blocks_2"]);
+            // the lower block is the first, whatever the order of the file
+            assert!((run.number("bodies/0/balance/contacts/force/2") + 10.0).abs() < 1e-9, "{}", run.said());
+            assert!((run.number("pairs/0/peak_pressure") - 10.0).abs() < 1e-9);
+        }
+        for command in ["mesh", "check"] {
+            let listed = crate::common::winkler(&[command, scene.path.to_str().expect("a path")]).stdout;
+            let line = "`all_blocks` is split into 2 connected parts: all_blocks_1, all_blocks_2";
+            assert!(listed.contains(line), "{listed}");
+        }
+    }
+    // one part of another material, by its own name; and a pattern for the parts
+    let other = "[[body]]\nname = \"all_blocks_2\"\nyoung = 2e5\npoisson = 0\n";
+    let other = other.to_owned() + "fix = [{ on = \"lid\", x = 0, y = 0 }]\nload = [{ on = \"lid\", pressure = 10 }]\n";
+    let text = std::fs::read_to_string(&scene(auto, &[0.0, 1.0]).path).expect("a scene");
+    let text =
+        text.replace(", { on = \"LID\", x = 0, y = 0 }", "").replace("load = [{ on = \"LID\", pressure = 10 }]\n", "");
+    let scene = Scene::new(text.replace("[[contact]]", &(other + "[[contact]]")));
+    std::fs::write(scene.path.with_file_name("a.inp"), blocks(&[0.0, 1.0])).expect("a file");
+    let run = solve(&scene, &[]).converged();
+    assert!((run.number("pairs/0/peak_pressure") - 10.0).abs() < 1e-9);
+    // a name that is taken
+    let text = std::fs::read_to_string(&scene.path).expect("a scene");
+    let taken = blocks(&[0.0, 1.0]) + "*ELSET, ELSET=all_blocks_1\n1\n";
+    std::fs::write(scene.path.with_file_name("a.inp"), taken).expect("a file");
+    std::fs::write(&scene.path, text).expect("a scene");
+    let run = solve(&scene, &[]);
+    assert!(run.code == 3 && run.stderr.contains("`all_blocks_1` is a connected part"), "{}", run.said());
+}

@@ -92,7 +92,7 @@ impl<const D: usize> Faces<D> {
     }
 
     /// Return the faces in groups with the same corners.
-    fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
+    pub fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
         let of_least = self.first.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
         of_least.flat_map(|ends| self.list[ends].chunk_by(|a, b| a.rest == b.rest))
     }
@@ -154,4 +154,5 @@ impl<const D: usize> Faces<D> {
 }
 
 /// The advice about cells that are wrong in themselves.
-const AGAIN: &str = "such a file is damaged or was put together from several: mesh the geometry again";
+const AGAIN: &str =
+    "cells of a body lie beside each other: remove those that lie there twice, or mesh the geometry again";

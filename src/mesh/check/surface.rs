@@ -145,7 +145,8 @@ impl<'a, const D: usize> Surface<'a, D> {
         if let Some(node) = twin {
             let what = "cells touch each other with nodes of their own, which leaves a crack";
             return self.cells.refuse(what, &cells, self.cells.at(node)).help(
-                "let them share the nodes (in the script: `Coherence;`), draw the crack open, or make two bodies of them",
+                "let them share the nodes (in the script: `Coherence;`), draw the crack open, or make bodies of the connected parts: \
+                 `split = true` in the table of the body",
             );
         }
         let on = |node: u32, j: usize| {

@@ -35,8 +35,7 @@ fn damaged_files_are_meshes_or_errors() {
 fn bad_meshes_are_refused_by_name_and_line() {
     let square = |more: &str, arguments: &[&str]| gmsh(&format!("{SQUARE}{more}"), arguments);
     for (bytes, expected) in [
-        (square("", &["-2", "-format", "msh22"]), "a.msh:2: this is version 2.2 of the mesh format"),
-        (square("", &["-2", "-format", "msh22", "-bin"]), "this is version 2.2 of the mesh format"),
+        (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
         (
             square("Recombine Surface{1};", &["-2", "-order", "2"]),
             "group `soft rock` has quadrangle elements of 9 nodes",

@@ -102,6 +102,19 @@ fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
 }
 
+/// A mesh that Gmsh converts depends on Gmsh, and one that is read directly does not.
+#[test]
+fn converted_meshes_are_made_by_gmsh() {
+    let folder = tempfile::tempdir().unwrap();
+    let made_from = |name: &str| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, "$MeshFormat\n4.1 0 8\n").unwrap();
+        load::made_from(&MeshSource::Msh { file: located(file) }, 2, Order::P1).unwrap()
+    };
+    let [direct, rewritten, converted] = ["a.msh", "a.inp", "a.unv"].map(made_from);
+    assert!(direct == rewritten && direct != converted);
+}
+
 #[test]
 fn loads_at_the_same_time_do_not_meet() {
     let folder = tempfile::tempdir().unwrap();

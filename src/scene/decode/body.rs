@@ -1,6 +1,6 @@
 //! `[[body]]`, with its supports, springs and loads.
 
-use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, elasticity, pattern};
+use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, body_name, elasticity, pattern};
 use crate::error::{Error, Result};
 use crate::expression::Field;
 use crate::problem::{BodySpec, Load, LoadKind, Order, SpringKind, SpringSpec, Support};
@@ -15,12 +15,13 @@ fn one_or_components() -> ValueKind {
 
 /// Return the shape of `[[body]]`.
 pub(super) fn shape() -> TableShape {
-    use ValueKind::{Field, OneOf, Text};
+    use ValueKind::{Field, Flag, OneOf, Text};
     elasticity::with_constants(TableShape::new("[[body]]").required(
         "name",
         Text,
         "group of cells, or a pattern such as \"brick_*\" for many bodies",
     ))
+    .optional("split", Flag, "whether each connected part of the group is a body, NAME_1, NAME_2, ...; false")
     .optional("order", OneOf(&[1, 2]), "linear or quadratic elements; 1")
     .optional("fix", support_shape().list(), "supports: fix = [{ on = \"base\", x = 0, y = 0 }]")
     .optional("load", load_shape().list(), "loads: load = [{ on = \"top\", pressure = 10 }]")
@@ -74,7 +75,8 @@ impl Decoder<'_> {
     fn body(&self, node: &Node) -> Result<BodySpec> {
         let keys = Keys::open(node, &shape())?;
         Ok(BodySpec {
-            name: pattern(keys.require("name")?)?,
+            name: body_name(keys.require("name")?)?,
+            split: keys.flag("split", false)?,
             elasticity: self.elasticity(&keys)?,
             regions: keys.items("region")?.iter().map(|item| self.region(item)).collect::<Result<_>>()?,
             order: if keys.read("order", Node::count)? == Some(2) { Order::P2 } else { Order::P1 },

@@ -1,6 +1,6 @@
 //! `[[contact]]`: two surfaces, or a rule that finds pairs of surfaces, with the gap and the layer between them.
 
-use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, choose, layer, pattern, word};
+use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, body_name, choose, layer, word};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
 use crate::problem::contact::{ANGLE, AutoContact, ContactSpec, Overlap};
@@ -91,5 +91,5 @@ fn of(node: &Node) -> Result<[Located<String>; 2]> {
     let [a, b] = node.list()? else {
         return Err(node.refuse("pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"));
     };
-    Ok([pattern(a)?, pattern(b)?])
+    Ok([body_name(a)?, body_name(b)?])
 }

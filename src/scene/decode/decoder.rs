@@ -3,6 +3,7 @@
 use crate::data::Library;
 use crate::error::{Error, Located, Result};
 use crate::expression::{Expression, Field, Scope};
+use crate::problem::body::plain_pattern;
 use crate::problem::pattern::Pattern;
 use crate::scene::read::{Node, Value};
 use std::path::{Path, PathBuf};
@@ -109,6 +110,11 @@ pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Resul
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
     let otherwise = || format!("it is one of {}", names.join(", "));
     Err(node.refuse(format!("unknown {what} `{word}`")).suggest(word, names.iter().copied(), otherwise))
+}
+
+/// Return the name of a body, or a pattern of names, in the form of bodies.
+pub fn body_name(node: &Node) -> Result<Located<String>> {
+    pattern(node).map(|name| Located { value: plain_pattern(&name.value), ..name })
 }
 
 /// Return the name of a group, or a pattern of names.
