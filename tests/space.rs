@@ -413,8 +413,8 @@ fn contacts_that_cannot_be_found_are_refused() {
     refused(&Scene::new(text), &["distance", "face each other"]);
     let text = far.text.replace("\"auto\"", "\"automatic\"");
     refused(&Scene::new(text), &["between `automatic` alone", "between = \"auto\""]);
-    let text = far.text.replace("\"auto\"", "[\"lower_top\", \"upper_bottom\"]");
-    refused(&Scene::new(text), &["`distance` for surfaces with names"]);
+    let text = far.text.replace("\"auto\"", "[\"lower_top\", \"upper_bottom\"]\nof = [\"lower\", \"upper\"]");
+    refused(&Scene::new(text), &["`of` for surfaces with names"]);
     let apart = automatic("rings", 0.01);
     let text = apart.text.replace("set = { ni = 6, no = 8 }", "set = { gap = 0.1 }");
     refused(&Scene::new(text), &["no facets of different bodies face each other within 0.01", "larger distance"]);
