@@ -424,7 +424,7 @@ fn surfaces_are_split_at_sharp_edges() {
         assert_eq!(run.report["pairs"].as_array().map(Vec::len), Some(2), "{case}");
         // the wall comes first, since its middle has the smaller x
         for (pair, pressure) in [(0, 4.0), (1, 10.0)] {
-            assert!(off(&run, pair, pressure) < 1e-9, "{case}");
+            assert!(off(&run, pair, pressure) < 1e-7, "{case}");
             let of_face = names.map(|name| format!("{name}.{}", pair + 1));
             assert_eq!(run.report["pairs"][pair]["surfaces"], serde_json::json!(of_face), "{case}");
             assert_eq!(run.count(&format!("pairs/{pair}/contact")), 0);
@@ -465,9 +465,9 @@ fn named_surfaces_are_found_at_any_distance() {
     }
     for (contact, reason) in [
         ("between = [\"top\", \"tip\"]\ndistance = 0.3", &["the gap is 0.500000", "`distance` = 0.3"][..]),
-        ("between = [\"top\", \"back\"]", &["outer normals point the same way"]),
+        ("between = [\"top\", \"back\"]", &["outer normals nowhere point at each other"]),
         ("between = [\"floor\", \"back\"]", &["look away from each other"]),
-        ("between = [\"top\", \"side\"]", &["no facet of one lies before a facet of the other"]),
+        ("between = [\"top\", \"side\"]", &["outer normals nowhere point at each other"]),
     ] {
         let run = solve(scene(contact), &[]);
         assert_eq!(run.code, 3, "{}", run.said());

@@ -10,6 +10,9 @@ use crate::problem::contact::ContactSpec;
 /// Largest angle, in degrees, between the normals of facets that can have common pieces at all.
 const RIGHT: f64 = 90.0;
 
+/// Rounding of an angle near a right one, in degrees.
+const ROUNDING: f64 = 1e-9;
+
 /// Return why two surfaces do not face each other within the limits of their contact, and what to do.
 pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &ContactSpec) -> [String; 2] {
     let ContactSpec { angle, distance, .. } = *spec;
@@ -38,9 +41,9 @@ pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &Contact
             "give a larger angle, up to 90 degrees, or name other surfaces".to_owned(),
         ];
     }
-    if least >= RIGHT {
+    if least >= RIGHT - ROUNDING {
         return [
-            "their outer normals point the same way, and nowhere at each other".to_owned(),
+            "their outer normals nowhere point at each other".to_owned(),
             "name the sides of the bodies that look at each other; `winkler mesh` has their places".to_owned(),
         ];
     }
