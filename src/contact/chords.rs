@@ -51,7 +51,11 @@ impl Chords {
         let area: f64 = pair.weight.iter().sum();
         let mean = -pair.weight.iter().zip(&pair.gap).map(|(w, gap)| w * gap).sum::<f64>() / area;
         let is_drawn = deepest > TOUCHING * sagitta;
-        (is_drawn && 2.0 * sagitta > deepest).then_some(Self { sagitta, deepest, mean: Some(mean).filter(|&mean| mean > 0.0) })
+        (is_drawn && 2.0 * sagitta > deepest).then_some(Self {
+            sagitta,
+            deepest,
+            mean: Some(mean).filter(|&mean| mean > 0.0),
+        })
     }
 }
 

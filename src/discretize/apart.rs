@@ -6,6 +6,7 @@ use crate::contact::{Side, unit};
 use crate::fem::{assemble, element};
 use crate::linalg::dot;
 use crate::problem::contact::ContactSpec;
+use std::collections::BTreeMap;
 
 /// Largest angle, in degrees, between the normals of facets that can have common pieces at all.
 const RIGHT: f64 = 90.0;
@@ -34,14 +35,13 @@ pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &Contact
             ],
         };
     }
-    let least = least_angle(a, b);
     if Nearest::of(a, &anywhere(RIGHT)).is_some() {
         return [
             format!("where they lie before each other their normals stand at more than {angle} degrees (key `angle`)"),
             "give a larger angle, up to 90 degrees, or name other surfaces".to_owned(),
         ];
     }
-    if least >= RIGHT - ROUNDING {
+    if least_angle(a, b) >= RIGHT - ROUNDING {
         return [
             "their outer normals nowhere point at each other".to_owned(),
             "name the sides of the bodies that look at each other; `winkler mesh` has their places".to_owned(),
@@ -77,9 +77,16 @@ impl Nearest {
 }
 
 /// Return the least angle, in degrees, between the normal of a facet of one side and minus that of a facet of the other.
+///
+/// One normal stands for all that differ from it by less than a twentieth in each component, since large curved surfaces have too many
+/// to compare each two. On plane facets the angle is exact.
 fn least_angle<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
-    let normals = |side: &Side<D>| (0..side.facets.count()).map(|i| unit(side.area(i))).collect::<Vec<_>>();
-    let others = normals(b);
-    let cosines = normals(a).into_iter().flat_map(|n| others.iter().map(move |m| -dot(&n, m)).collect::<Vec<_>>());
-    cosines.fold(-1.0, f64::max).clamp(-1.0, 1.0).acos().to_degrees()
+    let normals = |side: &Side<D>| -> Vec<[f64; D]> {
+        let all = (0..side.facets.count()).map(|i| unit(side.area(i)));
+        let rounded = all.map(|normal| (normal.map(|n| (20.0 * n).round() as i64), normal));
+        rounded.collect::<BTreeMap<_, _>>().into_values().collect()
+    };
+    let (ours, others) = (normals(a), normals(b));
+    let facing = |n: &[f64; D]| others.iter().map(|m| -dot(n, m)).fold(-1.0, f64::max);
+    ours.iter().map(facing).fold(-1.0, f64::max).clamp(-1.0, 1.0).acos().to_degrees()
 }
