@@ -105,7 +105,7 @@ fn pair_on<const D: usize>(
         Side::new(groups[k], &spaces[k], facets, &free, &frame)
     };
     let (a, b) = (side(0), side(1));
-    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0));
+    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
     let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
     let pair =
         assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at)).expect("a pair");
