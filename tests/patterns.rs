@@ -465,9 +465,9 @@ fn named_surfaces_are_found_at_any_distance() {
     }
     for (contact, reason) in [
         ("between = [\"top\", \"tip\"]\ndistance = 0.3", &["the gap is 0.500000", "`distance` = 0.3"][..]),
-        ("between = [\"top\", \"back\"]", &["outer normals nowhere point at each other"]),
-        ("between = [\"floor\", \"back\"]", &["look away from each other"]),
-        ("between = [\"top\", \"side\"]", &["outer normals nowhere point at each other"]),
+        ("between = [\"top\", \"back\"]", &["outer normals nowhere point at each other"][..]),
+        ("between = [\"floor\", \"back\"]", &["look away from each other"][..]),
+        ("between = [\"top\", \"side\"]", &["outer normals nowhere point at each other"][..]),
     ] {
         let run = solve(scene(contact), &[]);
         assert_eq!(run.code, 3, "{}", run.said());

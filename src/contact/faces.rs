@@ -1,6 +1,6 @@
 //! Smooth faces of a surface: the parts between its edges.
 
-use super::side::{Side, unit};
+use super::side::{Side, length, unit};
 use crate::fem::{area_vector, element};
 use crate::linalg::dot;
 use std::collections::HashMap;
@@ -52,7 +52,7 @@ impl Faces {
     pub fn middle<const D: usize>(&self, side: &Side<D>, face: usize) -> [f64; D] {
         let (mut sum, mut total) = ([0.0; D], 0.0);
         for i in (0..self.of_facet.len()).filter(|&i| self.of_facet[i] == face) {
-            let (x, size) = (side.facets.coordinates(i, side.space), super::length(side.area(i)));
+            let (x, size) = (side.facets.coordinates(i, side.space), length(side.area(i)));
             (0..D).for_each(|c| sum[c] += size * x[..D].iter().map(|x| x[c]).sum::<f64>() / D as f64);
             total += size;
         }
