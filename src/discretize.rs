@@ -1,5 +1,6 @@
 //! The step from a scene and its mesh to a [`Model`]. Geometry ends here: nothing below knows the space dimension.
 
+mod apart;
 mod approach;
 mod assembler;
 mod auto;
@@ -28,6 +29,7 @@ mod prepare;
 pub mod resolution;
 mod roster;
 mod round;
+mod split;
 mod springs;
 mod supports;
 mod surface;

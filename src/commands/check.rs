@@ -197,13 +197,18 @@ fn each_pair(built: &Built) -> Vec<String> {
     lines
 }
 
+/// Number of sweeps beyond which a method is of no use, so that the order of the number does not matter. A sweep of the smallest problems
+/// takes some tens of microseconds, so that this many take a minute.
+const MOST_SWEEPS: f64 = 1e6;
+
 /// Return theta and the expected number of sweeps of a pair as a text.
 ///
 /// Each side has theta = kappa/(k + kappa), with the stiffness k of its body and the tangent kappa of the layer.
 fn expected(coupling: &Coupling) -> String {
-    let sweeps = coupling.sweeps.iter().map(|(method, count)| match count.is_finite() {
-        true => format!("{method} {count:.0}"),
-        false => format!("{method} does not converge"),
+    let sweeps = coupling.sweeps.iter().map(|(method, count)| match *count {
+        ..=MOST_SWEEPS => format!("{method} {count:.0}"),
+        count if count.is_finite() => format!("{method} more than {MOST_SWEEPS}"),
+        _ => format!("{method} does not converge"),
     });
     let [a, b] = coupling.theta;
     let sweeps = sweeps.collect::<Vec<_>>().join(", ");

@@ -4,7 +4,9 @@
 //! (areas, rows B_a and B_b, gaps), which does not depend on the dimension. The laws of layers are in [`law`].
 
 mod basis;
+mod chords;
 mod cover;
+mod faces;
 pub mod fine;
 pub mod law;
 mod near;
@@ -15,7 +17,9 @@ pub mod side;
 
 pub use crate::fem::{cross, pad};
 pub use basis::Carriers;
+pub use chords::Chords;
 pub use cover::{Coverage, Left};
+pub use faces::Faces;
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, LostPieces, OwnSurface, add, assemble, moment_in_scene};

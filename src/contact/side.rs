@@ -57,6 +57,11 @@ impl<'a, const D: usize> Side<'a, D> {
         Self { name, space, facets, prescribed, frame, normals }
     }
 
+    /// Return the surface of the facets that `keep` marks, with their own normals.
+    pub fn only(&self, keep: &[bool]) -> Self {
+        Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame)
+    }
+
     /// Return the uncertainty of the normal near each node: the largest difference between the unit normals of facets and
     /// nodes, over all nodes that share a facet with it. Edges do not count. Where the surface is flat, the result is the
     /// rounding of the normals.

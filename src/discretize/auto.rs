@@ -2,7 +2,7 @@
 
 use super::part::Part;
 use super::roster::{pattern, tie};
-use super::surface::Surface;
+use super::split::{Piece, Split};
 use crate::contact::pieces::{Cut, Reach, Search};
 use crate::contact::{Side, unit};
 use crate::error::{Error, Place, Result, few};
@@ -11,8 +11,15 @@ use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
 use std::collections::HashSet;
 
-/// A found pair: the index of its rule and its two surfaces, which are named after the bodies.
-pub type Found<'a, const D: usize> = (usize, [Surface<'a, D>; 2]);
+/// Two bodies that form pairs, or parts of a body's surface that do.
+pub struct Found<const D: usize> {
+    /// Index of the rule.
+    pub rule: usize,
+    /// Indices of the bodies, the smaller one first.
+    pub bodies: [usize; 2],
+    /// The pairs: one, or several where surfaces have edges.
+    pub pieces: Vec<Piece<D>>,
+}
 
 /// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
 /// one first. The narrowest rule for two bodies decides alone whether they are a pair.
@@ -22,29 +29,21 @@ pub type Found<'a, const D: usize> = (usize, [Surface<'a, D>; 2]);
 ///
 /// # Errors
 /// A rule finds nothing, a pattern matches no body, or two rules match a pair equally well.
-pub fn find<'a, const D: usize>(
+pub fn find<const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
-    parts: &'a [Part<D>],
+    parts: &[Part<D>],
     named: &HashSet<[usize; 2]>,
-) -> Result<Vec<Found<'a, D>>> {
+) -> Result<Vec<Found<D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
     }
-    let of_part = |part: &'a Part<D>| {
-        let (name, facets) = (&part.spec.name.value, part.space.boundary());
-        Side::new(name, &part.space, facets, &part.held.prescribed, &part.held.frame)
-    };
-    let whole: Vec<Side<D>> = parts.iter().map(of_part).collect();
-    let possible = possible(rules, parts, &whole, named)?;
-    let meeting = meeting(rules, cut, &whole, &possible);
-    let mut found = Vec::new();
-    for (index, possible) in possible.into_iter().enumerate() {
-        let mut used = possible.near.each_ref().map(|facets| vec![false; facets.count()]);
-        for &facets in &meeting[index] {
-            used.iter_mut().zip(facets).for_each(|(used, facet)| used[facet as usize] = true);
-        }
-        if !used[0].contains(&true) {
+    let whole: Vec<Side<D>> =
+        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary())).collect();
+    let mut all = Vec::new();
+    for possible in possible(rules, parts, &whole, named)? {
+        let found = meeting(rules, cut, &whole, &possible);
+        if found.pieces.is_empty() {
             continue;
         }
         if let Some(other) = possible.other {
@@ -52,14 +51,10 @@ pub fn find<'a, const D: usize>(
             let [(own, _), (other, place)] = [possible.rule, other].map(|number| title(&rules[number]));
             return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
         }
-        let surface = |side: usize| {
-            let body = possible.bodies[side];
-            Surface { body, name: parts[body].spec.name.value.as_str(), facets: possible.near[side].only(&used[side]) }
-        };
-        found.push((possible.rule, [surface(0), surface(1)]));
+        all.push(found);
     }
-    all_find_some(rules, &found)?;
-    Ok(found)
+    all_find_some(rules, &all)?;
+    Ok(all)
 }
 
 /// Two bodies to which a rule applies, with the facets that could have a partner.
@@ -81,7 +76,7 @@ fn possible<const D: usize>(
     named: &HashSet<[usize; 2]>,
 ) -> Result<Vec<Possible<D>>> {
     let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
-    let farthest = rules.iter().map(|rule| rule.distance).fold(0.0, f64::max);
+    let farthest = rules.iter().map(distance).fold(0.0, f64::max);
     let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
     let bodies = Search::of_boxes(whole.iter().map(Side::extent));
     let mut all = Vec::new();
@@ -91,7 +86,8 @@ fn possible<const D: usize>(
         others.sort_unstable();
         for b in others {
             let Some((rule, other)) = narrowest(&matches, a, b) else { continue };
-            let reach = within(&whole[a], &whole[b], rules[rule].distance, rules[rule].contact.angle);
+            let spec = &rules[rule].contact;
+            let reach = Reach::between(&whole[a], &whole[b], spec.angle, spec.distance);
             let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
             if near.iter().all(|facets| facets.count() > 0) {
                 all.push(Possible { bodies: [a, b], near, rule, other });
@@ -101,31 +97,17 @@ fn possible<const D: usize>(
     Ok(all)
 }
 
-/// Pairs of facets with a common piece, each as indices into the near facets of both sides.
-type Meeting = Vec<[u32; 2]>;
-
-/// Return the pairs of facets with a common piece, for each two possible bodies.
-fn meeting<const D: usize>(
-    rules: &[AutoContact],
-    cut: Cut<D>,
-    whole: &[Side<D>],
-    possible: &[Possible<D>],
-) -> Vec<Meeting> {
-    let mut all = Vec::new();
-    for possible in possible {
-        let side = |k: usize| {
-            let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
-            Side::new(name, space, possible.near[k].clone(), prescribed, frame)
-        };
-        let (rule, side_a, side_b) = (&rules[possible.rule], side(0), side(1));
-        let reach = within(&side_a, &side_b, rule.distance, rule.contact.angle);
-        let pieces = cut(&side_a, &side_b, &reach).points;
-        let mut facets: Meeting = pieces.iter().map(|point| [point.facet_a as u32, point.facet_b as u32]).collect();
-        facets.sort_unstable();
-        facets.dedup();
-        all.push(facets);
-    }
-    all
+/// Return the pairs that two possible bodies form, which are none if their facets have no common piece.
+fn meeting<const D: usize>(rules: &[AutoContact], cut: Cut<D>, whole: &[Side<D>], possible: &Possible<D>) -> Found<D> {
+    let near = |k: usize| {
+        let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
+        Side::new(name, space, possible.near[k].clone(), prescribed, frame)
+    };
+    let (spec, a, b) = (&rules[possible.rule].contact, near(0), near(1));
+    let reach = Reach::between(&a, &b, spec.angle, spec.distance);
+    let mut pieces = Split::new([&a, &b], spec.edge, cut, &reach).into_pieces();
+    pieces.sort_by_key(|piece| piece.face);
+    Found { rule: possible.rule, bodies: possible.bodies, pieces }
 }
 
 /// Check that every rule found a pair.
@@ -133,10 +115,10 @@ fn meeting<const D: usize>(
 /// # Errors
 /// A rule found no pair; the first such rule is reported.
 fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> Result<()> {
-    let is_fruitless = |rule: &usize| found.iter().all(|(number, _)| number != rule);
+    let is_fruitless = |rule: &usize| found.iter().all(|found| found.rule != *rule);
     let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };
     let (bodies, place) = title(&rules[rule]);
-    let message = format!("no facets of {bodies} face each other within {}", rules[rule].distance);
+    let message = format!("no facets of {bodies} face each other within {}", distance(&rules[rule]));
     let help = match rules.len() {
         1 => "a larger distance may find some",
         _ => "a larger distance may find some, unless narrower rules or contacts with names have all these pairs",
@@ -185,10 +167,9 @@ fn title(rule: &AutoContact) -> (String, &Place) {
     }
 }
 
-/// Return how far the surfaces of a found pair may be apart, and how inclined, with `angle` in degrees.
-pub fn within<const D: usize>(a: &Side<D>, b: &Side<D>, distance: f64, angle: f64) -> Reach {
-    let reach = Reach::between(a, b, angle);
-    Reach { gap: distance, overlap: distance.min(reach.overlap), ..reach }
+/// Return how far apart the facets of a pair may be.
+fn distance(rule: &AutoContact) -> f64 {
+    rule.contact.distance.unwrap_or(f64::INFINITY)
 }
 
 /// Return the facets of two bodies with opposed normals and with boxes within the distance.

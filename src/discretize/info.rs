@@ -2,6 +2,7 @@
 
 use super::post::Post;
 use super::surface::ContactSurface;
+use crate::contact::Chords;
 use crate::mesh::Checked;
 use crate::problem::ContactSpec;
 use serde::{Deserialize, Serialize};
@@ -57,7 +58,7 @@ pub struct BodyInfo {
     /// (volume) over the length (area) of its contact surfaces. It is zero if supports leave the body a motion that contact
     /// resists.
     pub stiffness: f64,
-    /// Sum of the loads. In a body of revolution radial forces are added as if they had one direction.
+    /// Sum of the loads, zero where it is rounding. In a body of revolution radial forces are added as if they had one direction.
     pub load: [f64; 3],
     /// Rank that owns the body or, if it is distributed, most of it.
     pub rank: usize,
@@ -88,6 +89,12 @@ impl BodyInfo {
 pub struct ContactInfo {
     /// Description in the scene. `between` names the bodies if the pair was found.
     pub spec: ContactSpec,
+    /// Whether the pair is one of several into which edges split two surfaces.
+    pub is_split: bool,
+    /// Number of facets of side a that belong to no pair, on faces beyond edges. One pair of two surfaces counts them.
+    pub idle: usize,
+    /// The overlap of the meshes, if facets make most of it.
+    pub chords: Option<Chords>,
     /// Whether side a, which carries the points, is the second of `spec.between`.
     pub swapped: bool,
     /// Mesh of side a, for output.

@@ -1,12 +1,14 @@
 //! Contacts of the scene on the mesh: the body that each surface bounds, and the side that carries the points.
 
-use super::auto;
+use super::apart;
+use super::auto::{self, Found};
 use super::find::{find_group, point};
 use super::part::Part;
+use super::split::{Piece, Split};
 use super::surface::{ContactSurface, Surface};
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Reach};
-use crate::contact::{self, ContactPair, Fault, Fine, Side};
+use crate::contact::{self, Chords, ContactPair, Faces, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
@@ -25,30 +27,52 @@ pub struct Contact<const D: usize> {
     pub fine: Option<Fine<D>>,
     /// Whether side a, which carries the points, is the second of the two surfaces that the scene names.
     pub swapped: bool,
+    /// Number of facets of side a, on other faces of its surface, that belong to no pair.
+    pub idle: usize,
+    /// The overlap of the meshes, if facets make most of it.
+    pub chords: Option<Chords>,
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
 }
 
 /// The entry of the scene that a pair comes from.
 #[derive(Clone, Serialize, Deserialize)]
-pub enum Origin {
+pub struct Origin {
+    entry: Entry,
+    /// Names of the two surfaces, which are those of the bodies if the pair was found. A face of a split surface has its number behind
+    /// the name.
+    names: [String; 2],
+    /// Whether the pair is one of several into which edges split two surfaces.
+    pub is_split: bool,
+}
+
+/// A table of the scene.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+enum Entry {
     /// Index of a contact that names its surfaces.
     Named(usize),
-    /// Index of the rule by which the pair was found, and the names of the two bodies.
-    Found(usize, [String; 2]),
+    /// Index of the rule by which the pair was found.
+    Found(usize),
 }
 
 impl Origin {
-    /// Return the scene's description of the pair. `between` names the bodies if the pair was found.
+    /// Describe a pair of faces of two surfaces with these names.
+    fn new(entry: Entry, names: [&str; 2], face: [Option<usize>; 2]) -> Self {
+        let name = |side: usize| match face[side] {
+            Some(number) => format!("{}.{number}", names[side]),
+            None => names[side].to_owned(),
+        };
+        Self { entry, names: [name(0), name(1)], is_split: face != [None; 2] }
+    }
+
+    /// Return the scene's description of the pair. `between` has the names of the pair.
     pub fn spec(&self, scene: &Scene) -> ContactSpec {
-        match self {
-            Self::Named(number) => scene.contacts[*number].clone(),
-            Self::Found(rule, names) => {
-                let mut spec = scene.auto[*rule].contact.clone();
-                spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value.clone_from(own));
-                spec
-            }
-        }
+        let mut spec = match self.entry {
+            Entry::Named(number) => scene.contacts[number].clone(),
+            Entry::Found(rule) => scene.auto[rule].contact.clone(),
+        };
+        spec.between.iter_mut().zip(&self.names).for_each(|(name, own)| name.value.clone_from(own));
+        spec
     }
 }
 
@@ -68,30 +92,88 @@ pub fn all<const D: usize>(
     let mut named = HashSet::new();
     let owners = if scene.contacts.is_empty() { Owners::default() } else { Owners::new(parts) };
     for (number, spec) in scene.contacts.iter().enumerate() {
-        let surface = |k: usize| {
-            let name = &spec.between[k];
-            let group = find_group(mesh, name, &[D - 1], "contact surface")?;
-            let (body, facets) = owners.of(name, group, parts)?;
-            Ok(Surface { body, name: &name.value, facets })
-        };
-        let surfaces = [surface(0)?, surface(1)?];
+        let surfaces = named_surfaces(spec, mesh, &owners, parts)?;
         let [a, b] = surfaces.each_ref().map(|surface| surface.body);
-        if a == b {
-            return Err(Error::scene(
-                &spec.between[1].place,
-                format!("both surfaces belong to body `{}`", parts[a].spec.name.value),
-            )
-            .help("contact of a body with itself is out of scope; make two bodies of it"));
-        }
         named.insert([a.min(b), a.max(b)]);
-        opposite.push(Opposite::new(Origin::Named(number), spec.clone(), None, parts, surfaces));
+        let names = surfaces.each_ref().map(|surface| surface.name);
+        for piece in named_pieces(spec, cut, parts, surfaces) {
+            let origin = Origin::new(Entry::Named(number), names, piece.face);
+            opposite.push(Opposite::new(origin, scene, parts, [a, b], names, piece));
+        }
     }
-    for (rule, surfaces) in auto::find(&scene.auto, cut, parts, &named)? {
-        let origin = Origin::Found(rule, surfaces.each_ref().map(|surface| surface.name.to_owned()));
-        let spec = origin.spec(scene);
-        opposite.push(Opposite::new(origin, spec, Some(scene.auto[rule].distance), parts, surfaces));
+    for Found { rule, bodies, pieces } in auto::find(&scene.auto, cut, parts, &named)? {
+        let names = bodies.map(|body| parts[body].spec.name.value.as_str());
+        for piece in pieces {
+            let origin = Origin::new(Entry::Found(rule), names, piece.face);
+            opposite.push(Opposite::new(origin, scene, parts, bodies, names, piece));
+        }
     }
     opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
+}
+
+/// Return the two surfaces that a contact names.
+///
+/// # Errors
+/// A surface is missing, or bounds no body or several. Both belong to one body.
+fn named_surfaces<'a, const D: usize>(
+    spec: &'a ContactSpec,
+    mesh: &Mesh<D>,
+    owners: &Owners,
+    parts: &[Part<D>],
+) -> Result<[Surface<'a, D>; 2]> {
+    let surface = |k: usize| {
+        let name = &spec.between[k];
+        let group = find_group(mesh, name, &[D - 1], "contact surface")?;
+        let (body, facets) = owners.of(name, group, parts)?;
+        Ok(Surface { body, name: &name.value, facets })
+    };
+    let surfaces = [surface(0)?, surface(1)?];
+    if surfaces[0].body == surfaces[1].body {
+        let body = &parts[surfaces[0].body].spec.name.value;
+        let message = format!("both surfaces belong to body `{body}`");
+        return Err(Error::scene(&spec.between[1].place, message)
+            .help("contact of a body with itself is out of scope; make two bodies of it"));
+    }
+    Ok(surfaces)
+}
+
+/// Return the pairs of two named surfaces: one, or several where they have edges.
+fn named_pieces<const D: usize>(
+    spec: &ContactSpec,
+    cut: Cut<D>,
+    parts: &[Part<D>],
+    surfaces: [Surface<D>; 2],
+) -> Vec<Piece<D>> {
+    let sides = surfaces.map(|Surface { body, name, facets }| parts[body].side(name, facets));
+    let is_smooth = |side: &Side<D>| {
+        let all = vec![true; side.facets.count()];
+        !Faces::new(side, spec.edge).meet(side, &all)
+    };
+    let mut pieces = Vec::new();
+    if !sides.iter().all(is_smooth) {
+        // The finer side is projected onto the other, so that the order of the names changes nothing.
+        let swapped = second_carries([&sides[0], &sides[1]]);
+        let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
+        let reach = Reach::between(a, b, spec.angle, spec.distance);
+        pieces = Split::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
+        if swapped {
+            pieces.iter_mut().for_each(Piece::swap);
+        }
+        pieces.sort_by_key(|piece| piece.face);
+    }
+    // Surfaces without edges stay as they are, and so do those that do not face each other, which are refused later.
+    if pieces.is_empty() {
+        pieces.push(Piece { facets: sides.map(|side| side.facets), face: [None; 2], idle: [0; 2] });
+    }
+    pieces
+}
+
+/// Return whether the second of two surfaces carries the contact points of their pair: the finer one does, whatever the order in the
+/// scene, and the first by name if both are equally fine.
+fn second_carries<const D: usize>([first, second]: [&Side<D>; 2]) -> bool {
+    let (fine_a, fine_b) = (first.mean_measure(), second.mean_measure());
+    let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
+    if equal { first.name >= second.name } else { fine_a >= fine_b }
 }
 
 /// Two surfaces that are to be a pair.
@@ -103,30 +185,32 @@ struct Opposite<'a, const D: usize> {
     b: Side<'a, D>,
     /// Whether side a is the second of `spec.between`.
     swapped: bool,
+    /// Number of facets of side a that belong to no pair, counted in one pair of two surfaces.
+    idle: usize,
     reach: Reach,
 }
 
 impl<'a, const D: usize> Opposite<'a, D> {
-    /// Make the sides of a pair from two surfaces. They may be no farther apart than `distance`, if it is given.
+    /// Make the sides of a pair from a piece of two surfaces with these bodies and names.
     fn new(
         origin: Origin,
-        spec: ContactSpec,
-        distance: Option<f64>,
+        scene: &Scene,
         parts: &'a [Part<D>],
-        surfaces: [Surface<'a, D>; 2],
+        bodies: [usize; 2],
+        names: [&'a str; 2],
+        piece: Piece<D>,
     ) -> Self {
-        let [first, second] = surfaces.map(|Surface { body, name, facets }| {
-            let held = &parts[body].held;
-            (body, Side::new(name, &parts[body].space, facets, &held.prescribed, &held.frame))
-        });
-        // The finer side carries the points, whatever the order in the scene.
-        let (fine_a, fine_b) = (first.1.mean_measure(), second.1.mean_measure());
-        let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
-        let swapped = if equal { first.1.name >= second.1.name } else { fine_a >= fine_b };
-        let ((body_a, a), (body_b, b)) = if swapped { (second, first) } else { (first, second) };
-        let reach = distance
-            .map_or_else(|| Reach::between(&a, &b, spec.angle), |distance| auto::within(&a, &b, distance, spec.angle));
-        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, reach }
+        let spec = origin.spec(scene);
+        let [on_first, on_second] = piece.facets;
+        let first = parts[bodies[0]].side(names[0], on_first);
+        let second = parts[bodies[1]].side(names[1], on_second);
+        let swapped = second_carries([&first, &second]);
+        let ((body_a, a), (body_b, b)) = match swapped {
+            true => ((bodies[1], second), (bodies[0], first)),
+            false => ((bodies[0], first), (bodies[1], second)),
+        };
+        let reach = Reach::between(&a, &b, spec.angle, spec.distance);
+        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, idle: piece.idle[usize::from(swapped)], reach }
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them.
@@ -135,14 +219,19 @@ impl<'a, const D: usize> Opposite<'a, D> {
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
-        let Self { origin, spec, bodies, a, b, swapped, .. } = self;
+        let Self { origin, spec, bodies, a, b, swapped, idle, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
-        let pair = contact::assemble(&a, &b, bodies, &common, &gap, &law).map_err(|fault| refuse(&spec, fault))?;
+        let refuse = |fault| refuse(&spec, fault, || apart::why(&a, &b, cut, &spec));
+        let mut pair = contact::assemble(&a, &b, bodies, &common, &gap, &law).map_err(refuse)?;
+        pair.surfaces = spec.between.each_ref().map(|name| name.value.clone());
+        if swapped {
+            pair.surfaces.swap(0, 1);
+        }
         let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
         if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
             let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
-            let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", a.name, b.name);
+            let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", pair.surfaces[0], pair.surfaces[1]);
             return Err(Error::scene(&spec.between[0].place, message)
                 .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
         }
@@ -152,7 +241,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
         }
         let surface = ContactSurface::new(&a, &pair);
         let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
-        Ok(Contact { origin, pair, fine, swapped, surface })
+        let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
+        Ok(Contact { origin, pair, fine, swapped, idle, chords, surface })
     }
 }
 
@@ -162,16 +252,15 @@ fn of_pair(spec: &ContactSpec) -> String {
     format!("it is for the contact of `{a}` and `{b}`")
 }
 
-fn refuse(spec: &ContactSpec, fault: Fault) -> Error {
+/// Return the error of a pair. `why` says why its surfaces do not face each other, and what to do.
+fn refuse(spec: &ContactSpec, fault: Fault, why: impl Fn() -> [String; 2]) -> Error {
     match fault {
         Fault::Law(error) => error.because(of_pair(spec)),
         Fault::NoPartner => {
-            let names = [&spec.between[0].value, &spec.between[1].value];
-            Error::scene(
-                &spec.between[0].place,
-                format!("`{}` and `{}` do not face each other anywhere", names[0], names[1]),
-            )
-            .help("a pair needs surfaces that lie opposite each other, with outer normals that point at each other; `winkler mesh` has their places")
+            let [a, b] = spec.between.each_ref().map(|name| &name.value);
+            let [reason, help] = why();
+            let message = format!("`{a}` and `{b}` do not face each other anywhere");
+            Error::scene(&spec.between[0].place, message).because(reason).help(help)
         }
         Fault::Gap(x) => {
             spec.gap.eval_finite("the gap", x).err().map(|error| error.because(of_pair(spec))).unwrap_or_else(|| {

@@ -4,13 +4,13 @@ use super::facts::BodyFacts;
 use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::supports::Constraints;
 use super::{elastic, springs};
-use crate::contact;
+use crate::contact::{self, Side};
 use crate::error::{Error, Result};
 use crate::expression::Field;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion, Space, assemble,
-    rigid, support, surface,
+    ElasticBody, Elasticity, Facets, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion, Space,
+    assemble, rigid, support, surface,
 };
 use crate::linalg::{axpy, countable, dot};
 use crate::mesh::Mesh;
@@ -79,6 +79,11 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Return the displacement of a dof in a rigid motion.
     pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
         self.held.frame.dof(dof, |node| self.at(motion, node))
+    }
+
+    /// Return a contact surface of the body.
+    pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>) -> Side<'s, D> {
+        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame)
     }
 
     /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each

@@ -8,7 +8,7 @@ use super::factory::Factory;
 use super::info::{Balanced, ContactInfo};
 use super::interface::{self, Interface};
 use super::mechanism::{self, Fixed};
-use super::pairs::{self, Origin};
+use super::pairs::{self, Contact, Origin};
 use super::part::Part;
 use super::parts::parts;
 use super::plan::{partitions, plan};
@@ -16,7 +16,7 @@ use super::surface::ContactSurface;
 use super::unassembled::{LocalBody, OnDofs, SharedBody, Unassembled};
 use super::verify::Verified;
 use crate::contact::pieces::Cut;
-use crate::contact::{self, ContactPair};
+use crate::contact::{self, Chords, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::NodeGraph;
@@ -51,13 +51,16 @@ pub struct Shared<const D: usize, P> {
 pub struct SharedContact {
     origin: Origin,
     swapped: bool,
+    idle: usize,
+    chords: Option<Chords>,
     surface: ContactSurface,
 }
 
 impl SharedContact {
     /// Return the facts of the pair, including its description in the scene.
     pub fn info(self, scene: &Scene) -> ContactInfo {
-        ContactInfo { spec: self.origin.spec(scene), swapped: self.swapped, surface: self.surface }
+        let Self { origin, swapped, idle, chords, surface } = self;
+        ContactInfo { spec: origin.spec(scene), is_split: origin.is_split, swapped, idle, chords, surface }
     }
 }
 
@@ -180,10 +183,10 @@ fn pair_surfaces<const D: usize>(
 ) -> Result<Paired<D>> {
     let mut paired = Paired { pairs: Vec::new(), contacts: Vec::new(), fine: Vec::new() };
     for found in pairs::all(scene, mesh, cut, parts, keep)? {
-        paired.pairs.push(found.pair);
-        paired.fine.extend(found.fine);
-        let (origin, swapped, surface) = (found.origin, found.swapped, found.surface);
-        paired.contacts.push(SharedContact { origin, swapped, surface });
+        let Contact { origin, pair, fine, swapped, idle, chords, surface } = found;
+        paired.pairs.push(pair);
+        paired.fine.extend(fine);
+        paired.contacts.push(SharedContact { origin, swapped, idle, chords, surface });
     }
     Ok(paired)
 }

@@ -4,7 +4,7 @@ use super::carried::Supported;
 use super::distribute::{Partition, Share};
 use super::facts::BodyFacts;
 use super::info::{BodyInfo, Gauged};
-use super::interface::{Interface, Unconstrained};
+use super::interface::{Interface, NO_WORK, Unconstrained};
 use super::part::Part;
 use super::supports::Constraints;
 use crate::contact::{self, ContactPair};
@@ -225,7 +225,12 @@ impl<const D: usize> Unassembled<'_, D> {
         let Self { part, unconstrained, .. } = self;
         let spec = part.spec;
         let is_held = unconstrained.motions.len() == unconstrained.unresisted.len() && depth.is_finite();
+        // Loads that balance, as a pressure in a closed ring does, leave rounding, which counts as zero.
         let mut load = self.load;
+        for (c, sum) in load.iter_mut().enumerate().take(D) {
+            let [work, largest] = self.interface.nodal_load.works(|_| std::array::from_fn(|k| f64::from(k == c)));
+            *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
+        }
         part.rigid_forces().for_each(|(_, total)| contact::add(&mut load, total));
         BodyInfo {
             name: spec.name.value.clone(),

@@ -9,6 +9,10 @@ use crate::expression::Field;
 /// grows to a right one.
 pub const ANGLE: f64 = 60.0;
 
+/// The default of the angle, in degrees, beyond which two facets meet at an edge. Twelve chords of a circle, the coarsest mesh of a round
+/// part, turn by 30 degrees each. A chamfer turns by 45 degrees. This angle is in between.
+pub const EDGE: f64 = 40.0;
+
 /// A pair of contact surfaces and the layer between them.
 #[derive(Debug, Clone)]
 pub struct ContactSpec {
@@ -18,6 +22,11 @@ pub struct ContactSpec {
     pub gap: Field,
     /// Largest angle between the normal of one facet and minus that of the other, in degrees, > 0 and at most 90.
     pub angle: f64,
+    /// Largest angle in degrees by which facets turn within a face of a surface, > 0 and at most 180. Surfaces that turn by more are split
+    /// at this edge, and their faces form pairs of their own.
+    pub edge: f64,
+    /// Largest distance (a length, > 0) of facets that face each other; any distance if `None`.
+    pub distance: Option<f64>,
     /// Law of the layer.
     pub layer: LayerSpec,
     /// Whether the surfaces are assumed to touch wherever they face each other. Then only [`ContactSpec::gap`] counts, not the distance
@@ -39,6 +48,8 @@ impl ContactSpec {
             between: [Located::here(first), Located::here(second)],
             gap: Field::Constant(0.0),
             angle: ANGLE,
+            edge: EDGE,
+            distance: None,
             layer,
             touching: false,
             overlap: Overlap::Compress,
@@ -57,8 +68,6 @@ impl ContactSpec {
 /// narrower rule, take precedence.
 #[derive(Debug, Clone)]
 pub struct AutoContact {
-    /// Largest distance (a length, > 0) of facets that form a pair.
-    pub distance: f64,
     /// Names or patterns of bodies. A body that matches the first and one that matches the second form a pair. All bodies if `None`.
     pub of: Option<[Located<String>; 2]>,
     /// The settings of each pair. Its `between` is a stand-in for the names of the two bodies.

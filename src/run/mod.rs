@@ -22,6 +22,7 @@ pub mod requests;
 pub mod results;
 pub mod stages;
 pub mod steps;
+mod surfaces;
 mod swapped;
 pub mod verdict;
 pub mod words;

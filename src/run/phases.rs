@@ -5,12 +5,12 @@ use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
 use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Done, Prepared};
+use super::surfaces;
 use super::words::in_words;
 use super::{method, steps, swapped};
 use crate::contact::pieces::{self, Cut};
-use crate::contact::{ContactPair, Left, LostPieces};
 use crate::ddm::{self, Outcome, Start, Status};
-use crate::discretize::{self, Balanced, ContactInfo, Discrete, Verified, point};
+use crate::discretize::{self, Balanced, Discrete, Verified, point};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
@@ -235,17 +235,7 @@ fn warnings(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<Str
     warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    for (pair, contact) in discrete.model.pairs.iter().zip(&discrete.contacts) {
-        warnings.extend(left_out(pair, contact));
-        warnings.extend(lost(pair, contact));
-        let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
-        if overlap < 0.0 {
-            warnings.push(format!(
-                "{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
-                pair.surfaces[0], pair.surfaces[1], -overlap
-            ));
-        }
-    }
+    warnings.extend(surfaces::warnings(&discrete.model.pairs, &discrete.contacts));
     warnings
 }
 
@@ -259,38 +249,6 @@ pub fn in_parts(split: usize) -> Option<String> {
 pub fn made_straight(cells: usize) -> Option<String> {
     let why = "were folded by the curved boundary and have straight edges now, so that gaps there are those of chords: a finer mesh follows the boundary";
     (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
-}
-
-/// Return the warning of facets that a pair excludes, if any.
-fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
-    let without: Vec<Left> =
-        pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
-    if without.is_empty() {
-        return None;
-    }
-    let names = contact.spec.between.each_ref().map(|name| &name.value);
-    let all = pair.cover.len();
-    let mut text = format!("{} - {}: {} of {all} facets have no partner", names[0], names[1], without.len());
-    let steep = format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle);
-    for (reason, why) in [(Left::Steep, steep), (Left::Far, "are too far away from it".to_owned())] {
-        let count = without.iter().filter(|&&left| left == reason).count();
-        if count > 0 {
-            text += &format!("; {count} of `{}` {why}", pair.surfaces[0]);
-        }
-    }
-    Some(text)
-}
-
-/// Return the warning of pieces of a pair that the search for common points has lost, if any.
-fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
-    let names = contact.spec.between.each_ref().map(|name| &name.value);
-    pair.lost.map(|LostPieces { pieces, share, at: [x, y, z] }| {
-        format!(
-            "{} - {}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near ({x}, {y}, {z}): they \
-             carry no pressure; look at the mesh there, and refine what is strongly curved",
-            names[0], names[1], pair.surfaces[0], share, pair.measure
-        )
-    })
 }
 
 /// Return the warning of loads that were balanced.

@@ -9,6 +9,7 @@
 
 use super::stages::Built;
 use crate::contact::ContactPair;
+use crate::linalg::dot;
 use crate::problem::method::Gamma;
 
 /// The estimates for a pair.
@@ -30,17 +31,9 @@ const DIGITS: f64 = 18.42;
 pub fn coupling(built: &Built, i: usize) -> Coupling {
     let Built { scene, discrete, .. } = built;
     let pair = &discrete.model.pairs[i];
-    let length: f64 = pair.weight.iter().sum();
-    let pushed = |body: usize| {
-        let load = discrete.bodies[body].load;
-        let normal: [f64; 3] =
-            std::array::from_fn(|c| (0..pair.len()).map(|q| pair.weight[q] * pair.normal[q][c]).sum());
-        let size = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
-        let along = (0..3).map(|c| load[c] * normal[c]).sum::<f64>().abs() / size.max(f64::MIN_POSITIVE);
-        // A load across the normal leaves rounding along it, which is treated as zero.
-        if along > f64::EPSILON.sqrt() * load.iter().map(|f| f.abs()).sum::<f64>() { along } else { 0.0 }
-    };
-    let pressure = pair.bodies.map(pushed).into_iter().fold(0.0, f64::max) / length;
+    let area: f64 = pair.weight.iter().sum();
+    let pressure =
+        pair.bodies.map(|body| pressing(pair, discrete.bodies[body].load)).into_iter().fold(0.0, f64::max) / area;
     let tangent = tangent_at(pair, pressure);
     let theta = pair.bodies.map(|body| {
         let stiffness = discrete.bodies[body].stiffness;
@@ -57,6 +50,26 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
     let gradients = if both < 1.0 { (0.5 * condition.sqrt() * (DIGITS + 0.7)).max(2.0) } else { f64::INFINITY };
     let sweeps = vec![("robin", relaxed), ("ncg", gradients), ("newton-robin", 1.5 * gradients + 5.0), ("newton", 6.0)];
     Coupling { pressure, theta, sweeps }
+}
+
+/// Return the part of a load that presses the surface of a pair: along the mean normal where the surface faces one way, and the whole
+/// load where its normals turn around, as those of a pin in a hole do.
+///
+/// On a flat surface the load along the mean normal is the mean of |n.F|. Where it is less than half of that mean, the normals cancel.
+fn pressing(pair: &ContactPair, load: [f64; 3]) -> f64 {
+    let mean = |value: &dyn Fn(&[f64; 3]) -> f64| {
+        pair.weight.iter().zip(&pair.normal).map(|(weight, normal)| weight * value(normal)).sum::<f64>()
+            / pair.weight.iter().sum::<f64>()
+    };
+    let along_each = mean(&|normal| dot(&load, normal).abs());
+    let size = dot(&load, &load).sqrt();
+    // A load across all normals leaves rounding along them, which is treated as zero.
+    if along_each <= f64::EPSILON.sqrt() * size {
+        return 0.0;
+    }
+    let normal: [f64; 3] = std::array::from_fn(|c| mean(&|normal| normal[c]));
+    let along_mean = dot(&load, &normal).abs() / dot(&normal, &normal).sqrt().max(f64::MIN_POSITIVE);
+    if along_mean < 0.5 * along_each { size } else { along_mean }
 }
 
 /// Return the tangent p' of the layer at the pair's first point where it carries `pressure`. The result is zero for a pressure

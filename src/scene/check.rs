@@ -288,9 +288,8 @@ fn check_pairs(contacts: &[ContactSpec]) -> Checked {
 /// Check rules that find pairs: no two are for the same names of bodies.
 fn check_rules(rules: &[AutoContact]) -> Checked {
     let mut known = HashSet::new();
-    for AutoContact { distance, of, contact } in rules {
+    for AutoContact { of, contact } in rules {
         let at = at_contact(contact);
-        at.positive_in("distance", "the distance", *distance)?;
         let names = of.as_ref().map(|of| of.each_ref().map(|name| &name.value));
         for (side, name) in names.iter().flatten().enumerate() {
             at.below(format_args!("of.{side}")).name(name)?;
@@ -318,6 +317,14 @@ fn check_contact(at: &At, contact: &ContactSpec) -> Checked {
     if contact.angle > 90.0 {
         let message = format!("the angle is {} degrees", shown(contact.angle));
         return at.below("angle").refuse(message, "must be at most 90", "");
+    }
+    at.positive_in("edge", "the angle of edges", contact.edge)?;
+    if contact.edge > 180.0 {
+        let message = format!("the angle of edges is {} degrees", shown(contact.edge));
+        return at.below("edge").refuse(message, "must be at most 180", "at 180 no surface is split");
+    }
+    if let Some(distance) = contact.distance {
+        at.positive_in("distance", "the distance", distance)?;
     }
     check_layer(&at.below("layer"), &contact.layer)
 }

@@ -185,23 +185,24 @@ fn of_contacts(contacts: &[ContactSpec], rules: &[AutoContact]) -> Value {
 }
 
 fn of_contact(contact: &ContactSpec) -> Value {
-    let ContactSpec { between, gap, angle, layer, touching, overlap, reference, table: _ } = contact;
+    let ContactSpec { between, gap, angle, edge, distance, layer, touching, overlap, reference, table: _ } = contact;
     without_null(json!({
         "between": between.each_ref().map(|name| &name.value),
         "gap": of_field(gap),
         "touching": touching,
         "overlap": name_of(&Overlap::ALL, overlap),
         "angle": angle,
+        "edge": edge,
+        "distance": distance,
         "layer": of_layer(layer),
         "reference": reference.as_ref().map(of_field),
     }))
 }
 
 fn of_rule(rule: &AutoContact) -> Value {
-    let AutoContact { distance, of, contact } = rule;
+    let AutoContact { of, contact } = rule;
     let mut map = of_contact(contact);
     map["between"] = json!("auto");
-    map["distance"] = json!(distance);
     map["of"] = json!(of.as_ref().map(|of| of.each_ref().map(|name| &name.value)));
     without_null(map)
 }

@@ -103,7 +103,7 @@ fn pair_on<const D: usize>(
         Side::new(groups[k], &spaces[k], facets, &free, &frame)
     };
     let (a, b) = (side(0), side(1));
-    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0));
+    let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
     let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
     let pair =
         assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at)).expect("a pair");
@@ -411,8 +411,8 @@ fn contacts_that_cannot_be_found_are_refused() {
     refused(&Scene::new(text), &["distance", "face each other"]);
     let text = far.text.replace("\"auto\"", "\"automatic\"");
     refused(&Scene::new(text), &["between `automatic` alone", "between = \"auto\""]);
-    let text = far.text.replace("\"auto\"", "[\"lower_top\", \"upper_bottom\"]");
-    refused(&Scene::new(text), &["`distance` for surfaces with names"]);
+    let text = far.text.replace("\"auto\"", "[\"lower_top\", \"upper_bottom\"]\nof = [\"lower\", \"upper\"]");
+    refused(&Scene::new(text), &["`of` for surfaces with names"]);
     let apart = automatic("rings", 0.01);
     let text = apart.text.replace("set = { ni = 6, no = 8 }", "set = { gap = 0.1 }");
     refused(&Scene::new(text), &["no facets of different bodies face each other within 0.01", "larger distance"]);

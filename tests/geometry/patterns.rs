@@ -1,6 +1,6 @@
 //! Scenes whose tables and rules stand for many bodies: they are those of single bodies, and what does not fit is refused.
 
-use crate::common::{Run, Scene, root, solve, text_of};
+use crate::common::{Run, Scene, root, solve, solve_on, text_of};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -358,4 +358,188 @@ fn refused(scene: &Scene, line: usize, words: &[&str]) {
     for word in words.iter().chain(&[place.as_str(), "^"]) {
         assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
     }
+}
+
+/// A block in the corner of a bracket: in the plane, or in space with the thickness `t`.
+const CORNER: &str = "SetFactory(\"OpenCASCADE\"); e = 1e-3;
+DefineConstant[ t = 0 ];
+Rectangle(1) = {-1, -1, 0, 3, 1}; Rectangle(2) = {-1, 0, 0, 1, 2};
+BooleanUnion(3) = { Surface{1}; Delete; }{ Surface{2}; Delete; };
+Rectangle(4) = {0, 0, 0, 2, 2};
+If(t > 0)
+  Extrude{0, 0, t} { Surface{3}; } Extrude{0, 0, t} { Surface{4}; }
+  Physical Volume(\"bracket\") = {1}; Physical Volume(\"block\") = {2};
+  Physical Surface(\"seat\") = Abs(Boundary{ Volume{1}; }); Physical Surface(\"skin\") = Abs(Boundary{ Volume{2}; });
+  Physical Surface(\"top\") = {Surface In BoundingBox{-e, 2-e, -e, 2+e, 2+e, t+e}}; Physical Surface(\"right\") = {Surface In BoundingBox{2-e, -e, -e, 2+e, 2+e, t+e}};
+Else
+  Physical Surface(\"bracket\") = {3}; Physical Surface(\"block\") = {4};
+  Physical Curve(\"seat\") = Abs(Boundary{ Surface{3}; }); Physical Curve(\"skin\") = Abs(Boundary{ Surface{4}; });
+  Physical Curve(\"top\") = {Curve In BoundingBox{-e, 2-e, -e, 2+e, 2+e, e}}; Physical Curve(\"right\") = {Curve In BoundingBox{2-e, -e, -e, 2+e, 2+e, e}};
+EndIf
+MeshSize{:} = 0.7;
+";
+
+/// A scene beside its script.
+fn beside(script: &str, text: &str) -> Scene {
+    let scene = Scene::new(text);
+    std::fs::write(scene.path.with_file_name("part.geo"), script).expect("a script");
+    scene
+}
+
+/// The block in the corner, with `contact` in the table of the contact.
+fn in_corner(dimension: usize, order: usize, contact: &str) -> Scene {
+    let (t, z) = if dimension == 3 { (1, ", z = 0") } else { (0, "") };
+    let fixed = if dimension == 3 { "fix = [{ on = \"block\", z = 0 }]" } else { "" };
+    let text = format!(
+        "dimension = {dimension}\nmesh = {{ geo = \"part.geo\", set = {{ t = {t} }} }}
+[[body]]\nname = \"bracket\"\norder = {order}\nyoung = 1e5\npoisson = 0\nfix = [{{ on = \"bracket\", x = 0, y = 0{z} }}]
+[[body]]\nname = \"block\"\norder = {order}\nyoung = 1e5\npoisson = 0\n{fixed}
+load = [{{ on = \"top\", pressure = 10 }}, {{ on = \"right\", pressure = 4 }}]
+[[contact]]\n{contact}\nlayer = {{ linear = {{ stiffness = 1e4 }} }}\n"
+    );
+    beside(CORNER, &text)
+}
+
+/// Largest difference of the pressures of a pair from `exact`.
+fn off(run: &Run, pair: usize, exact: f64) -> f64 {
+    run.contact_of(pair)["pressure"].iter().map(|p| (p - exact).abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn surfaces_are_split_at_sharp_edges() {
+    let named = |a: &str, b: &str| format!("between = [\"{a}\", \"{b}\"]");
+    let auto = "between = \"auto\"\ndistance = 0.1".to_owned();
+    for (dimension, order, ranks, contact, names) in [
+        (2, 1, 1, auto.clone(), ["bracket", "block"]),
+        (2, 2, 2, auto.clone(), ["bracket", "block"]),
+        (2, 1, 2, named("seat", "skin"), ["seat", "skin"]),
+        (2, 2, 1, named("skin", "seat"), ["skin", "seat"]),
+        (3, 1, 1, auto, ["bracket", "block"]),
+        (3, 2, 2, named("skin", "seat"), ["skin", "seat"]),
+    ] {
+        let run = solve_on(ranks, in_corner(dimension, order, &contact), &["--method", "newton"]).converged();
+        let case = format!("{dimension} {order} {contact}\n{}", run.said());
+        assert_eq!(run.report["pairs"].as_array().map(Vec::len), Some(2), "{case}");
+        // the wall comes first, since its middle has the smaller x
+        for (pair, pressure) in [(0, 4.0), (1, 10.0)] {
+            assert!(off(&run, pair, pressure) < 1e-7, "{case}");
+            let of_face = names.map(|name| format!("{name}.{}", pair + 1));
+            assert_eq!(run.report["pairs"][pair]["surfaces"], serde_json::json!(of_face), "{case}");
+            assert_eq!(run.count(&format!("pairs/{pair}/contact")), 0);
+        }
+        assert!(run.warnings().contains("edges of more than 40 degrees"), "{case}");
+    }
+    // with a normal over the edge there is one pair, and its pressures are wrong
+    let whole = solve(in_corner(2, 1, "between = [\"seat\", \"skin\"]\nedge = 180"), &[]).converged();
+    assert_eq!(whole.report["pairs"].as_array().map(Vec::len), Some(1));
+    assert!(off(&whole, 0, 10.0) > 1.0);
+}
+
+/// A stamp of radius 0.2 that begins 0.5 above a plate, as a body of revolution.
+const FAR: &str = "Point(1) = {0,0,0,.1}; Point(2) = {3,0,0,.5}; Point(3) = {3,-3,0,.5}; Point(4) = {0,-3,0,.5};
+Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1}; Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
+Point(11) = {0,.5,0,.1}; Point(12) = {.2,.5,0,.1}; Point(13) = {.2,1.5,0,.2}; Point(14) = {0,1.5,0,.2};
+Line(11) = {11,12}; Line(12) = {12,13}; Line(13) = {13,14}; Line(14) = {14,11}; Curve Loop(2) = {11:14}; Plane Surface(2) = {2};
+Physical Surface(\"plate\") = {1}; Physical Surface(\"stamp\") = {2};
+Physical Curve(\"top\") = {1}; Physical Curve(\"floor\") = {3}; Physical Curve(\"tip\") = {11}; Physical Curve(\"side\") = {12}; Physical Curve(\"back\") = {13};
+";
+
+#[test]
+fn named_surfaces_are_found_at_any_distance() {
+    let scene = |contact: &str| {
+        let text = format!(
+            "dimension = 2\nplane = \"axisymmetric\"\nmesh = \"part.geo\"
+[[body]]\nname = \"plate\"\nyoung = 1e5\npoisson = 0.3\nfix = [{{ on = \"floor\", y = 0 }}]
+[[body]]\nname = \"stamp\"\nyoung = 1e5\npoisson = 0.3\nfix = [{{ on = \"back\", x = 0, y = -0.501 }}]
+[[contact]]\n{contact}\nlayer = {{ linear = {{ stiffness = 1e7 }} }}\n"
+        );
+        beside(FAR, &text)
+    };
+    let found = solve(scene("between = \"auto\"\ndistance = 0.8"), &[]).converged();
+    for names in ["between = [\"top\", \"tip\"]", "between = [\"tip\", \"top\"]"] {
+        let run = solve(scene(names), &[]).converged();
+        let [ours, theirs] = [&run, &found].map(|run| run.forces(0)[0][1].abs());
+        assert!((ours - theirs).abs() < 1e-6 * theirs && theirs > 1.0, "{ours} {theirs}");
+    }
+    for (contact, reason) in [
+        ("between = [\"top\", \"tip\"]\ndistance = 0.3", &["the gap is 0.500000", "`distance` = 0.3"][..]),
+        ("between = [\"top\", \"back\"]", &["outer normals nowhere point at each other"][..]),
+        ("between = [\"floor\", \"back\"]", &["look away from each other"][..]),
+        ("between = [\"top\", \"side\"]", &["outer normals nowhere point at each other"][..]),
+    ] {
+        let run = solve(scene(contact), &[]);
+        assert_eq!(run.code, 3, "{}", run.said());
+        reason.iter().for_each(|word| assert!(run.stderr.contains(word), "{contact}: no `{word}`\n{}", run.said()));
+    }
+}
+
+/// A shaft of radius 1.002 in the bore of radius 1 of a ring, with `n` and `m` chords around.
+const FIT: &str = "DefineConstant[ n = 16, m = 24 ];
+Macro Ring
+  Point(k) = {0,0,0}; Point(k+1) = {r,0,0}; Point(k+2) = {0,r,0}; Point(k+3) = {-r,0,0}; Point(k+4) = {0,-r,0};
+  Circle(k) = {k+1,k,k+2}; Circle(k+1) = {k+2,k,k+3}; Circle(k+2) = {k+3,k,k+4}; Circle(k+3) = {k+4,k,k+1};
+  Transfinite Curve{k:k+3} = c/4 + 1; Curve Loop(k) = {k:k+3};
+Return
+k = 100; r = 0.5; c = n; Call Ring;
+k = 200; r = 1.002; c = n; Call Ring;
+k = 300; r = 1; c = m; Call Ring;
+k = 400; r = 2; c = m; Call Ring;
+Plane Surface(1) = {200, 100}; Plane Surface(2) = {400, 300};
+Physical Surface(\"shaft\") = {1}; Physical Surface(\"ring\") = {2};
+Physical Curve(\"skin\") = {200:203}; Physical Curve(\"bore\") = {300:303}; Physical Curve(\"rim\") = {400:403};
+";
+
+/// Chords of 16 leave their circle by 1 - cos(pi/16) = 0.0192, ten times the overlap.
+#[test]
+fn an_overlap_of_facets_is_told() {
+    let warned = |order: usize, set: &str, contact: &str| {
+        let text = format!(
+            "dimension = 2\nmesh = {{ geo = \"part.geo\", set = {set} }}
+[[body]]\nname = \"shaft\"\norder = {order}\nyoung = 2e5\npoisson = 0.3
+[[body]]\nname = \"ring\"\norder = {order}\nyoung = 2e5\npoisson = 0.3\nfix = [{{ on = \"rim\", x = 0, y = 0 }}]
+[[contact]]\nbetween = [\"skin\", \"bore\"]\n{contact}\nlayer = {{ linear = {{ stiffness = 1e7 }} }}\n"
+        );
+        let warnings = solve(beside(FIT, &text), &["--method", "newton"]).converged().warnings();
+        warnings.lines().find(|line| line.contains("straight facets leave")).map(str::to_owned)
+    };
+    let line = warned(1, "{}", "").expect("a warning");
+    assert!(
+        line.contains("by up to 1.9") && line.contains("e-02, and the overlap is ") && line.contains("touching = true"),
+        "{line}"
+    );
+    // the number in `touching`, quadratic facets, and facets that match make pressures that are those of the circle
+    assert_eq!(warned(1, "{}", "touching = true\ngap = -0.002"), None);
+    assert_eq!(warned(2, "{}", ""), None);
+    assert_eq!(warned(1, "{ n = 16, m = 16 }", ""), None);
+}
+
+/// A pin of radius 1 in a hole, half of both, under a load of 1000 across the axis; and the whole, under a pressure that balances.
+#[test]
+fn the_mean_pressure_has_a_meaning_where_normals_turn() {
+    let half = "Point(1) = {0,0,0}; Point(2) = {0,-1,0}; Point(3) = {1,0,0}; Point(4) = {0,1,0};
+Circle(1) = {2,1,3}; Circle(2) = {3,1,4}; Line(3) = {4,2}; Curve Loop(1) = {1:3}; Plane Surface(1) = {1};
+Point(12) = {0,-1,0}; Point(13) = {1,0,0}; Point(14) = {0,1,0}; Point(15) = {0,5,0}; Point(16) = {5,5,0}; Point(17) = {5,-5,0}; Point(18) = {0,-5,0};
+Circle(11) = {12,1,13}; Circle(12) = {13,1,14}; Line(13) = {14,15}; Line(14) = {15,16}; Line(15) = {16,17}; Line(16) = {17,18}; Line(17) = {18,12};
+Curve Loop(2) = {11:17}; Plane Surface(2) = {2}; Mesh.MeshSizeMax = 0.5;
+Physical Surface(\"pin\") = {1}; Physical Surface(\"plate\") = {2};
+Physical Curve(\"axis\") = {3}; Physical Curve(\"plate_axis\") = {13,17}; Physical Curve(\"skin\") = {1,2}; Physical Curve(\"hole\") = {11,12}; Physical Curve(\"far\") = {14:16};
+";
+    let half_text = "dimension = 2\nmesh = \"part.geo\"
+[[body]]\nname = \"pin\"\nyoung = 2e5\npoisson = 0.3\nfix = [{ on = \"axis\", x = 0 }]\nforce = [0, \"-2000/pi\"]
+[[body]]\nname = \"plate\"\nyoung = 2e5\npoisson = 0.3\nfix = [{ on = \"plate_axis\", x = 0 }, { on = \"far\", x = 0, y = 0 }]
+[[contact]]\nbetween = [\"skin\", \"hole\"]\ntouching = true\nlayer = { linear = { stiffness = 1e9 } }\n";
+    let rings = "dimension = 2\nmesh = \"part.geo\"
+[[body]]\nname = \"shaft\"\nyoung = 2e5\npoisson = 0.3
+[[body]]\nname = \"ring\"\nyoung = 2e5\npoisson = 0.3\nload = [{ on = \"rim\", pressure = 7 }]
+[[contact]]\nbetween = [\"skin\", \"bore\"]\ntouching = true\nlayer = { linear = { stiffness = 1e7 } }\n";
+    let forecast = |script: &str, text: &str| {
+        let scene = beside(script, text);
+        let run = common::winkler(&["check", "--json", scene.path.to_str().expect("a path")]);
+        let value: serde_json::Value = serde_json::from_str(&run.stdout).unwrap_or_else(|_| panic!("{}", run.said()));
+        value["pairs"][0]["mean_pressure"].clone()
+    };
+    // the load over the length of the half circle
+    let pressure = forecast(half, half_text).as_f64().expect("a number");
+    assert!((pressure / (1000.0 / std::f64::consts::PI) - 1.0).abs() < 0.05, "{pressure}");
+    assert_eq!(forecast(FIT, rings), serde_json::Value::Null);
 }

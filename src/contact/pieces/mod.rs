@@ -53,7 +53,7 @@ struct Lost;
 
 /// Largest number of Newton steps for a point on a facet. The start is within a facet's size of the point, and from there each step
 /// doubles the number of correct digits: six steps are enough for a double, and twice as many make up for a bad start.
-const MOST_STEPS: usize = 30;
+const MOST_STEPS: usize = 12;
 
 /// Rounding of a sum that is zero, as a share of the sizes of its terms. A coordinate of a point on a facet adds six products, whose
 /// factors have three roundings each, to a point that was found in the same way: less than 32 roundings of half an epsilon.

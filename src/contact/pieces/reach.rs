@@ -1,6 +1,6 @@
 //! Which facets may be partners: limits of their distance and their angle.
 
-use crate::contact::side::Side;
+use crate::contact::side::{Side, length};
 use crate::linalg::dot;
 
 /// The limits of distance and inclination within which two facets face each other.
@@ -26,16 +26,26 @@ pub struct Refused {
 }
 
 impl Reach {
-    /// Return the limits for two surfaces whose facets may be inclined by `angle` degrees.
+    /// Return the limits for two surfaces whose facets may be inclined by `angle` degrees and, if it is given, be apart by `distance`.
     ///
-    /// The gap is at most the size of the smaller surface. The overlap is at most the thickness of a body behind its surface,
-    /// its volume over the area: a larger overlap would reach the far side of a thin body.
-    pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64) -> Self {
+    /// The overlap is at most the size of the smaller surface, and at most the thickness of a body behind its surface, its volume
+    /// over the area: a larger overlap would reach the far side of a thin body.
+    pub fn between<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64, distance: Option<f64>) -> Self {
         let area = |side: &Side<D>| side.mean_measure() * side.facets.count() as f64;
         let extent = |side: &Side<D>| area(side).powf(1.0 / (D - 1) as f64);
         let thickness = |side: &Side<D>| side.space.measure() / area(side);
-        let gap = extent(a).min(extent(b));
-        Self { gap, overlap: gap.min(thickness(a)).min(thickness(b)), facing: angle.to_radians().cos() }
+        let anywhere = Self::anywhere(a, b, angle);
+        let overlap = extent(a).min(extent(b)).min(thickness(a)).min(thickness(b));
+        let gap = distance.unwrap_or(anywhere.gap);
+        Self { gap, overlap: gap.min(overlap), ..anywhere }
+    }
+
+    /// Return the limits that end at the angle alone. The distance is the diagonal of the box around both surfaces.
+    pub fn anywhere<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64) -> Self {
+        let ((low, high), (from, to)) = (a.extent(), b.extent());
+        let diagonal: [f64; D] = std::array::from_fn(|c| high[c].max(to[c]) - low[c].min(from[c]));
+        let gap = length(diagonal);
+        Self { gap, overlap: gap, facing: angle.to_radians().cos() }
     }
 
     /// Return whether a signed distance is within the limits.

@@ -40,7 +40,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let pieces = facing(&facet, &facets_b, &search.around(a, i, reach), reach, refused);
-        for Piece { polygon, index, .. } in without_overlaps(pieces) {
+        for Piece { polygon, index, .. } in pieces {
             let other = &facets_b[index];
             let offset = minus(facet.from, other.from);
             for triangle in polygon::fan(&polygon) {
@@ -80,12 +80,12 @@ fn without_overlaps(pieces: Vec<Piece>) -> Vec<Piece> {
     free
 }
 
-/// Return the pieces of a facet of side a that face these facets of side b, the nearest first. Note in `refused` why others are none.
+/// Return the pieces of a facet of side a that face these facets of side b, without what nearer ones cover. Note in `refused` why others are none.
 fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for parts in PARTS {
         let before = *refused;
-        pieces.clear();
+        let mut found = Vec::new();
         let mut without_image = 0;
         for &index in near {
             let other = &b[index];
@@ -95,15 +95,16 @@ fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &m
                 refused.lost += clipped.lost;
             }
             let admitted = |p: &Piece| refused.admits(reach, p.gap, facet.direction, other.direction);
-            pieces.extend(clipped.pieces.into_iter().filter(admitted));
+            found.extend(clipped.pieces.into_iter().filter(admitted));
         }
+        found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
+        pieces = without_overlaps(found);
         let covered: f64 = pieces.iter().map(|piece| polygon::area(&piece.polygon)).sum();
         if without_image == 0 || covered >= 0.5 * WHOLE || parts == PARTS[PARTS.len() - 1] {
             break;
         }
         *refused = before;
     }
-    pieces.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
     pieces
 }
 

@@ -3,7 +3,7 @@
 use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, body_name, choose, layer, word};
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
-use crate::problem::contact::{ANGLE, AutoContact, ContactSpec, Overlap};
+use crate::problem::contact::{ANGLE, AutoContact, ContactSpec, EDGE, Overlap};
 
 /// Return the shape of `[[contact]]`.
 pub(super) fn shape() -> TableShape {
@@ -11,9 +11,10 @@ pub(super) fn shape() -> TableShape {
     TableShape::new("[[contact]]")
         .required("between", Either(vec![Text, Text.list()]), EXAMPLE)
         .optional("of", Text.list(), "bodies of pairs found by \"auto\", or patterns: of = [\"one_*\", \"other_*\"]")
-        .optional("distance", Number, "how far apart facets of a pair found by \"auto\" may be")
+        .optional("distance", Number, "how far apart facets of a pair may be; required with \"auto\"")
         .optional("gap", Field, "gap besides the distance of the meshes; 0")
         .optional("angle", Number, "largest angle in degrees between normals that face each other; 60")
+        .optional("edge", Number, "angle in degrees beyond which facets meet at an edge that splits a surface; 40")
         .optional("touching", Flag, "whether the distance of the meshes counts as zero; false")
         .optional("overlap", word(&Overlap::ALL), "what to do where bodies overlap before loading; \"compress\"")
         .required("layer", layer::shape(), layer::EXAMPLE)
@@ -28,7 +29,7 @@ impl Decoder<'_> {
         let (mut contacts, mut auto) = (Vec::new(), Vec::new());
         for (table, item) in keys.items("contact")?.iter().enumerate() {
             match self.contact(item, table)? {
-                (contact, Some(Rule { distance, of })) => auto.push(AutoContact { distance, of, contact }),
+                (contact, Some(Rule { of })) => auto.push(AutoContact { of, contact }),
                 (contact, None) => contacts.push(contact),
             }
         }
@@ -44,6 +45,8 @@ impl Decoder<'_> {
             gap: keys.read("gap", |node| self.field(node))?.unwrap_or(Field::Constant(0.0)),
             layer: self.layer(keys.require("layer")?)?,
             angle: keys.read("angle", Node::number)?.unwrap_or(ANGLE),
+            edge: keys.read("edge", Node::number)?.unwrap_or(EDGE),
+            distance: keys.read("distance", Node::number)?,
             touching: keys.flag("touching", false)?,
             overlap: keys.read("overlap", |node| choose(node, "overlap", &Overlap::ALL))?.unwrap_or(Overlap::Compress),
             reference: keys.read("reference", |node| self.field(node))?,
@@ -55,8 +58,6 @@ impl Decoder<'_> {
 
 /// A rule that finds pairs.
 struct Rule {
-    /// Largest distance of facets that form a pair.
-    distance: f64,
     /// The bodies of the pairs; all bodies if `None`.
     of: Option<[Located<String>; 2]>,
 }
@@ -68,17 +69,15 @@ fn between(keys: &Keys) -> Result<([Located<String>; 2], Option<Rule>)> {
         if word != "auto" {
             return Err(between.refuse(format!("a contact between `{word}` alone")).help(EXAMPLE));
         }
-        let distance = keys.require("distance").map_err(|error| {
+        keys.require("distance").map_err(|error| {
             error.help("facets of different bodies that face each other at most that far apart form pairs")
         })?;
         let names = [between.name()?, between.name()?];
-        return Ok((names, Some(Rule { distance: distance.number()?, of: keys.read("of", of)? })));
+        return Ok((names, Some(Rule { of: keys.read("of", of)? })));
     }
-    for (key, what) in [("distance", "how far to look"), ("of", "which bodies form pairs")] {
-        if let Some(entry) = keys.entry(key) {
-            return Err(Error::scene(&entry.key_place, format!("`{key}` for surfaces with names"))
-                .help(format!("it says {what} with between = \"auto\"")));
-        }
+    if let Some(entry) = keys.entry("of") {
+        return Err(Error::scene(&entry.key_place, "`of` for surfaces with names")
+            .help("it says which bodies form pairs with between = \"auto\""));
     }
     let [a, b] = between.list()? else {
         return Err(between.refuse("a contact is between two surfaces").help(EXAMPLE));
