@@ -29,10 +29,10 @@ pub(super) fn facets_at_rim<const D: usize>(
     for point in &common.points {
         above_rim_of_b[point.facet_a] |= edges_b.is_at_rim(b, point.facet_b);
     }
-    let is_open = |i: usize| cover[i].share <= 0.0;
+    let ends_on = |i: usize| cover[i].share < WHOLE;
+    let ends_beside = |i: usize| edges_a.beside(a, i).any(|k| ends_on(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
     let at_rim = |i: usize| {
-        let partial = cover[i].share < WHOLE || edges_a.beside(a, i).any(is_open);
-        !is_open(i) && (edges_a.is_at_rim(a, i) || partial && above_rim_of_b[i])
+        cover[i].share > 0.0 && (edges_a.is_at_rim(a, i) || ends_on(i) && above_rim_of_b[i] || ends_beside(i))
     };
     (0..a.facets.count()).map(at_rim).collect()
 }

@@ -4,6 +4,7 @@ use super::supports::Constraints;
 use crate::contact::Fine;
 use crate::fem::{Elasticity, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
+use crate::problem::order::Order;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -66,6 +67,8 @@ pub struct FinePoints<'a> {
     pub nearest: &'a [usize],
     /// Whether the contact points around each integration point are at mid-edges.
     pub at_edges: &'a [bool],
+    /// Order of the elements of side a.
+    pub order: Order,
     /// Facet of side a under each integration point; those of a facet follow each other.
     pub facet: &'a [usize],
     /// Whether this facet lies at a rim, see [`Fine::at_rim`].
@@ -185,6 +188,7 @@ impl<const D: usize> Meshes for Kept<D> {
             compliance,
             nearest,
             at_edges,
+            order: sides[0].facets.order,
             facet: &sides[0].facet,
             at_rim,
             along: sides[0].at.iter().map(|l| l[0]).collect(),

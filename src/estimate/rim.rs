@@ -3,18 +3,30 @@
 //! Without a layer, the pressure at the distance r from a rim is K r^(lambda - 1). Recovered polynomials are no nearer to it than the
 //! discrete pressure. A facet of size h at the rim misses the order h^(lambda - 1/2) of it in the mean square, whatever the degree of its
 //! polynomials. So the part of the highest degree, that is, p_h less its projection p_- on polynomials of one degree less, has the order of the
-//! error. [`MISSED`] is the ratio of the error to this part.
+//! error. [`missed`] is the ratio of the error to this part.
 //!
 //! A layer limits the pressure. A pressure that is missed by q changes the deflection of the bodies by s q, with their compliance s to a
 //! pressure that varies within the facet, and the law with the tangent stiffness kappa then changes the pressure by s kappa/(1 + s kappa) q.
 
 use crate::discretize::meshes::{FinePoints, Meshes};
 use crate::model::{Layer, Model};
+use crate::problem::order::Order;
 use std::ops::Range;
 
-/// Ratio of the error of the nearest polynomial of degree 1 and 2 to its part of the highest degree, for r^(lambda - 1) with lambda = 0.774: the
-/// rim of a punch with right angles on a block of the same material. With lambda near 1 it is 0.58 and 0.89.
-const MISSED: [f64; 2] = [0.97, 1.36];
+/// Return the ratio of the error to the part of the highest degree of a pressure on a facet of side a.
+///
+/// Stresses of elements of degree 2 have the degree 1. Let lambda be 0.774, the rim of a punch with right angles on a block of the same material.
+/// By its coefficients in Legendre polynomials, r^(lambda - 1) less the nearest line is 1.69 times its part of degree 2, which pressures of degree 2
+/// show, and 0.97 times its part of degree 1, which linear pressures show. For linear elements the ratio would be 1.39 by the same rule. Their
+/// nodal pressures are means over two facets, which flattens the rise: on such a punch with 3, 6 and 12 elements a unit of length under a layer of 1e6
+/// the measured ratio is 2.8, 2.5 and 2.2.
+fn missed(points: &FinePoints, g: usize) -> f64 {
+    match points.order {
+        Order::P1 => 2.8,
+        Order::P2 if points.is_quadratic[g] => 1.69,
+        Order::P2 => 0.97,
+    }
+}
 
 /// What the pressures of a pair may lack at its rims.
 #[derive(Debug, Default, Clone, Copy)]
@@ -36,7 +48,7 @@ impl RimError {
             if !points.at_rim[on_facet.start] {
                 continue;
             }
-            let missed = MISSED[usize::from(points.is_quadratic[on_facet.start])];
+            let missed = missed(points, on_facet.start);
             for (g, q) in on_facet.clone().zip(highest_part(points, on_facet, pressure)) {
                 let stiffness = points.interpolation.row(g).map(|(q, _)| tangent[q]).fold(0.0, f64::max);
                 let unresolved = points.compliance[g] * stiffness / (1.0 + points.compliance[g] * stiffness);
