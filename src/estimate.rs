@@ -7,22 +7,27 @@
 mod field;
 mod held;
 mod layer;
+mod rim;
+mod sides;
 pub mod sizes;
 
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::{Meshes, Recovered};
 use crate::error::{Error, Kind, Result};
+use crate::linalg::axpy;
 use crate::model::field::residual;
 use crate::model::surface::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
 use held::HoldingSprings;
 use layer::LayerError;
+use rim::RimError;
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
 #[derive(Debug, Clone, Default)]
 pub struct Estimate {
-    /// Squared energy error of each cell of each body; empty for a body of another rank.
+    /// Part of each cell of each body in the error of displacements at the loads: its squared energy error, and the energy of the strip at its
+    /// straight facets. Empty for a body of another rank.
     pub cells: Vec<Vec<f64>>,
     /// Squared energy error of each body.
     pub bodies: Vec<f64>,
@@ -36,6 +41,10 @@ pub struct Estimate {
     pub pressure_error: Vec<f64>,
     /// Relative error of the pressures of each pair at its points: root mean square over the surface, with the factor `SAFETY`.
     pub pressure: Vec<f64>,
+    /// For each pair whose error of the pressures is a guess, since most of it is at a rim of the contact: the place of the largest part.
+    pub guesses: Vec<Option<[f64; 3]>>,
+    /// Relative change of the pressures of each pair if the other side gave the normals.
+    pub sides: Vec<f64>,
     /// Relative error of the normal displacements of all contact surfaces, measured likewise; at least [`Estimate::energy`] squared.
     pub displacement: f64,
 }
@@ -69,9 +78,10 @@ pub fn estimate(
     drop(recovered);
     let mut bodies: Vec<f64> = local.cells.iter().map(|cells| cells.iter().sum()).collect();
     model.exchange.sum(&mut bodies);
+    local.cells.iter_mut().zip(&local.strips).for_each(|(cells, strips)| axpy(1.0, strips, cells));
     let held = HoldingSprings::of(model, layer);
     held.balance(meshes, model, &mut local.loads);
-    let LocalErrors { cells, mut loads, layers, mean_error } = local;
+    let LocalErrors { cells, mut loads, layers, sides, mean_error, .. } = local;
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
@@ -82,6 +92,7 @@ pub fn estimate(
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
     let pressure_error = pressure_errors(model, layer, &closing);
+    let rims = rim::of_pairs(meshes, model, layer);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
     let at = |i: usize| (model.weight[i % model.points()], field.trace[i], trace[i]);
@@ -89,13 +100,15 @@ pub fn estimate(
     Ok(Estimate {
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
-        pressure: relative_errors(model, layer, &pressure_error),
+        pressure: relative_errors(model, layer, &pressure_error, &rims),
+        guesses: guesses(model, layer, &pressure_error, &rims),
         pressure_error,
         // the displacements at the loads lack at least this share: the work of the loads f on the error e is f'e = a(u, e) = a(e, e), since a(u_h, e) = 0
         displacement: SAFETY * displacement.max(energy * energy),
         cells,
         bodies,
         layers,
+        sides,
     })
 }
 
@@ -161,10 +174,14 @@ type RecoveredBodies<'a> = [Option<Box<dyn Recovered + 'a>>];
 struct LocalErrors {
     /// Squared energy error of each cell of each body that this rank owns.
     cells: Vec<Vec<f64>>,
+    /// Energy of the strip at the straight facets of each of these cells.
+    strips: Vec<Vec<f64>>,
     /// The load on the discrete problem, at the nodes of each body that this rank owns.
     loads: Vec<Vec<f64>>,
     /// Squared energy error of each layer.
     layers: Vec<f64>,
+    /// Relative change of the pressures of each pair if side b gave the normals.
+    sides: Vec<f64>,
     /// Difference of the compression at each contact point, n, from its mean around the point, which the discrete problem takes in its place.
     mean_error: Vec<f64>,
 }
@@ -173,11 +190,13 @@ impl LocalErrors {
     /// Return the errors of the bodies, without those of the layers.
     fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies) -> Self {
         let count = recovered.len();
-        let (cells, loads) = (vec![Vec::new(); count], vec![Vec::new(); count]);
-        let mut local = Self { cells, loads, layers: Vec::new(), mean_error: Vec::new() };
+        let none = || vec![Vec::new(); count];
+        let (cells, strips, loads) = (none(), none(), none());
+        let mut local = Self { cells, strips, loads, layers: Vec::new(), sides: Vec::new(), mean_error: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
                 local.cells[body] = recovered.energy_errors();
+                local.strips[body] = recovered.strip_energies();
                 local.loads[body] = recovered.interpolation_residual();
                 local.loads[body].iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
             }
@@ -196,13 +215,18 @@ impl LocalErrors {
     ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
         let mut compression = vec![0.0; points.weight.len()];
+        let mut change = vec![0.0; points.weight.len()];
         for side in 0..2 {
             if let Some(recovered) = &recovered[pair.bodies[side]] {
                 let normal = recovered.normal_displacement(index, side);
                 compression.iter_mut().zip(normal).for_each(|(sum, u)| *sum += u);
+                let tilted = recovered.tilted_displacement(index, side);
+                axpy([-1.0, 1.0][side], &tilted, &mut change);
             }
         }
         model.exchange.sum(&mut compression);
+        model.exchange.sum(&mut change);
+        self.sides.push(sides::dependence(pair, &points, layer, range.clone(), &change));
         let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);
@@ -280,10 +304,32 @@ fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
     resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect()
 }
 
+/// Relative error of the pressures below which nothing is called a guess: a hundred times the default tolerance of the iteration, at
+/// which differences within a facet are those of an unfinished iteration.
+const UNFINISHED: f64 = 1e-6;
+
+/// Return, for each pair with most of its error at rims, the place where it is largest.
+fn guesses(model: &Model, layer: &Layer, error: &[f64], rims: &[RimError]) -> Vec<Option<[f64; 3]>> {
+    let of_pair = |(pair, rim): (usize, &RimError)| {
+        let least = UNFINISHED.powi(2) * square(model, pair, &layer.pressure);
+        let is_guess = rim.squared > square(model, pair, error).max(least);
+        is_guess.then(|| model.pairs[pair].position[rim.worst])
+    };
+    rims.iter().enumerate().map(of_pair).collect()
+}
+
 /// Return the relative error of the pressures of each pair.
-fn relative_errors(model: &Model, layer: &Layer, error: &[f64]) -> Vec<f64> {
-    let at = |q: usize| (model.weight[q], error[q], layer.pressure[q]);
-    (0..model.pairs.len()).map(|pair| SAFETY * relative_error(model.range(pair).map(at))).collect()
+fn relative_errors(model: &Model, layer: &Layer, error: &[f64], rims: &[RimError]) -> Vec<f64> {
+    let of_pair = |(pair, rim): (usize, &RimError)| {
+        let errors = square(model, pair, error) + rim.squared;
+        if errors == 0.0 { 0.0 } else { SAFETY * f64::sqrt(errors / square(model, pair, &layer.pressure)) }
+    };
+    rims.iter().enumerate().map(of_pair).collect()
+}
+
+/// Return the integral of the squares of values at all contact points over the surface of a pair.
+fn square(model: &Model, pair: usize, values: &[f64]) -> f64 {
+    model.range(pair).map(|q| model.weight[q] * values[q] * values[q]).sum()
 }
 
 /// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.

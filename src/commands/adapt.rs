@@ -1,5 +1,9 @@
 //! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own.
 
+mod sized;
+#[cfg(test)]
+mod tests;
+
 use super::adapted;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use super::transfer::{self, EstimatedSolution};
@@ -10,7 +14,6 @@ use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
 use crate::exchange::broadcast;
 use crate::interrupt::Interrupt;
-use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -19,6 +22,7 @@ use crate::problem::{MeshSource, MethodName, method};
 use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
+use sized::{follow, sized, view};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -105,7 +109,28 @@ impl Plan {
         interrupt: &Interrupt,
         clock: &mut Clock,
     ) -> Result<Self> {
-        let mut plan = Self {
+        let mut plan = Self::of(scene, resumed);
+        let is_nested = matches!(plan.scene.method.start, method::Start::Nested);
+        if plan.adapts() || is_nested {
+            collectively(session, plan.refuse_finished_mesh())?;
+        }
+        if plan.adapts() {
+            Rc::make_mut(&mut plan.scene).estimate = true;
+        }
+        if let Some(head) = plan.resumed.as_ref().map(|checkpoint| checkpoint.head.clone()) {
+            plan.resume(&head);
+        } else if plan.adapts() {
+            plan.defer_steps();
+            plan.begin_coarse(session, interrupt, clock)?;
+        } else if is_nested {
+            plan.begin_nested(session, interrupt, clock)?;
+        }
+        Ok(plan)
+    }
+
+    /// Return the plan of a scene that has made no mesh yet, or none since the checkpoint.
+    fn of(scene: Rc<Scene>, resumed: Option<Checkpoint>) -> Self {
+        Self {
             purpose: adapted::purpose(&scene),
             goal: scene.adapt.clone(),
             requested: scene.clone(),
@@ -121,33 +146,17 @@ impl Plan {
             repeats_best: false,
             predicted_cells: None,
             later_steps: None,
-        };
-        let is_nested = matches!(plan.scene.method.start, method::Start::Nested);
-        if plan.adapts() || is_nested {
-            collectively(session, plan.refuse_finished_mesh())?;
         }
-        if plan.adapts() {
-            Rc::make_mut(&mut plan.scene).estimate = true;
-        }
-        if plan.resumed.is_some() {
-            plan.resume();
-        } else if plan.adapts() {
-            plan.defer_steps();
-            plan.begin_coarse(session, interrupt, clock)?;
-        } else if is_nested {
-            plan.begin_nested(session, interrupt, clock)?;
-        }
-        Ok(plan)
     }
 
-    /// Go on where the checkpoint ended: on its mesh, and after its load steps.
-    fn resume(&mut self) {
-        let Some(Checkpoint { head, .. }) = &self.resumed else { return };
+    /// Go on where the checkpoint with this head ended: on its mesh, and after its load steps or as the best mesh once more.
+    fn resume(&mut self, head: &Head) {
         let scene = Rc::make_mut(&mut self.scene);
         follow(scene, head.sizes.clone());
         if self.goal.is_none() || head.on_last_mesh {
             scene.method.steps.begun = head.steps.len();
             self.limit.clone_from(&head.limit);
+            self.repeats_best = self.goal.is_some() && scene.method.steps.is_empty();
         } else {
             self.defer_steps();
         }
@@ -259,7 +268,7 @@ impl Plan {
             settings: settings_digest(&self.requested),
             rounds: self.rounds.clone(),
             sizes: self.sizes().map(|view| view.to_string()),
-            on_last_mesh: self.is_stepping(),
+            on_last_mesh: self.is_stepping() || self.repeats_best,
             limit: self.limit.clone(),
             ..Head::default()
         })
@@ -418,30 +427,4 @@ impl Plan {
 /// Return the solution on the contact surfaces, one table for each pair.
 fn contact_tables(done: &Done) -> Vec<ContactTable> {
     (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
-}
-
-/// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
-fn sized(
-    session: &Session,
-    scene: &Scene,
-    sizing: fn(&dyn Meshes, usize) -> Sizes,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Option<String>> {
-    let built = run::build(session, scene.clone(), interrupt, clock)?;
-    let bodies = built.discrete.bodies.len();
-    let sizes = built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies)));
-    options::withdraw(session).map(|()| sizes)
-}
-
-/// Return sizes as a view of Gmsh.
-fn view(sizes: &Sizes) -> String {
-    mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
-}
-
-/// Let the mesh of a scene follow a view of sizes.
-fn follow(scene: &mut Scene, view: Option<String>) {
-    if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
-        *sizes = view.map(Into::into);
-    }
 }

@@ -44,7 +44,7 @@ pub struct Head {
     pub sizes: Option<String>,
     /// Reports of the load steps before this one.
     pub steps: Vec<StepReport>,
-    /// Whether the run makes all load steps on the last mesh of an adaptation, not the largest step alone.
+    /// Whether the run ends with this mesh of an adaptation: it makes all load steps on it, or it is the best mesh once more.
     pub on_last_mesh: bool,
     /// Why the error was not reached on the last mesh, if it was not.
     pub limit: Option<String>,

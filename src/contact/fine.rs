@@ -3,13 +3,16 @@
 //! At these points the compression of the layer and the gap are those of the points themselves, not means around the nodes.
 
 use super::basis::{Carriers, PressureBasis};
+use super::cover::Left;
 use super::near::Projections;
 use super::pair::ContactPair;
 use super::pieces::{Common, Shared};
+use super::rim::facets_at_rim;
 use super::side::{Side, length, unit};
 use crate::exchange::Plain;
 use crate::fem::{Facets, assemble, element};
 use crate::linalg::Csr;
+use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -27,10 +30,17 @@ pub struct Fine<const D: usize> {
     pub size: Vec<f64>,
     /// Unit normal from side a to side b at each point.
     pub normal: Vec<[f64; D]>,
+    /// Sum of the outer unit normals of both sides at each point, zero where they are opposite.
+    pub tilt: Vec<[f64; D]>,
     /// Contact point nearest to each point, for laws that differ from point to point.
     pub nearest: Vec<usize>,
     /// Whether the contact points of the facet under each point are at mid-edges.
     pub at_edges: Vec<bool>,
+    /// Whether the facet of side a under each point lies at a rim, where the pressure may be singular.
+    pub at_rim: Vec<bool>,
+    /// Whether the pressure on the facet under each point is a polynomial of second degree. It is on quadratic elements in the plane where facets
+    /// are fully covered; on a part of a facet three values do not show more than a mean.
+    pub is_quadratic: Vec<bool>,
     /// Matrix from values at the contact points to values at the integration points, by the shape functions of side a.
     pub interpolation: Csr,
     /// Matrix from the pressures of the contact points to the pressures that the discrete problem has at the integration
@@ -75,14 +85,20 @@ impl<const D: usize> Fine<D> {
             at: points.iter().map(at).collect(),
         };
         let rounding = a.rounding_along_normals();
+        let at_rim = facets_at_rim(a, b, common, &pair.cover);
+        let is_quadratic =
+            |facet: usize| D == 2 && a.facets.order == Order::P2 && pair.cover[facet].left == Left::Nothing;
         let mut fine = Self {
             bodies: pair.bodies,
             weight: points.iter().map(|point| point.weight).collect(),
             gap: points.iter().map(|point| gap_at(a, point, rounding, gap)).collect(),
             size: points.iter().map(|point| size_under(a, point)).collect(),
-            normal: points.iter().map(|point| normal_at(a, point)).collect(),
+            normal: points.iter().map(|point| normal_at(a, point.facet_a, &point.at_a)).collect(),
+            tilt: points.iter().map(|point| tilt_at(a, b, point)).collect(),
             nearest: Vec::new(),
             at_edges: Vec::new(),
+            at_rim: points.iter().map(|point| at_rim[point.facet_a]).collect(),
+            is_quadratic: points.iter().map(|point| is_quadratic(point.facet_a)).collect(),
             interpolation: Csr::new(pair.len()),
             pressing: Csr::new(pair.len()),
             near: Projections::new(a, b, common, pair, (!touching).then_some(gap)),
@@ -134,8 +150,14 @@ fn size_under<const D: usize>(a: &Side<D>, point: &Shared<D>) -> f64 {
     (sides * length(a.area(point.facet_a))).powf(1.0 / sides)
 }
 
-/// Return the unit normal of side a at an integration point, interpolated between the vertices of its facet.
-fn normal_at<const D: usize>(a: &Side<D>, point: &Shared<D>) -> [f64; D] {
-    let nodes = a.facets.facet(point.facet_a);
-    unit(std::array::from_fn(|c| (0..D).map(|k| point.at_a[k] * a.normals[&nodes[k]][c]).sum()))
+/// Return the unit normal of a side at barycentric coordinates `l` of a facet, interpolated between the vertices of the facet.
+fn normal_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D]) -> [f64; D] {
+    let nodes = side.facets.facet(facet);
+    unit(std::array::from_fn(|c| (0..D).map(|k| l[k] * side.normals[&nodes[k]][c]).sum()))
+}
+
+/// Return the sum of the unit normals of both sides at an integration point.
+fn tilt_at<const D: usize>(a: &Side<D>, b: &Side<D>, point: &Shared<D>) -> [f64; D] {
+    let (n_a, n_b) = (normal_at(a, point.facet_a, &point.at_a), normal_at(b, point.facet_b, &point.at_b));
+    std::array::from_fn(|c| n_a[c] + n_b[c])
 }

@@ -13,6 +13,7 @@ mod near;
 pub mod order;
 mod pair;
 pub mod pieces;
+mod rim;
 pub mod side;
 
 pub use crate::fem::{cross, pad};

@@ -4,6 +4,7 @@ use super::supports::Constraints;
 use crate::contact::Fine;
 use crate::fem::{Elasticity, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
+use crate::problem::order::Order;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -57,6 +58,8 @@ pub struct FinePoints<'a> {
     pub weight: &'a [f64],
     /// Gap at each point.
     pub gap: &'a [f64],
+    /// Size of the facet of side a under each point.
+    pub size: &'a [f64],
     /// Deflection of the two bodies per pressure, for a pressure that changes its sign within a facet. It is the compliance of
     /// the springs of two half-spaces in series, for a wave as long as the facet.
     pub compliance: Vec<f64>,
@@ -64,6 +67,16 @@ pub struct FinePoints<'a> {
     pub nearest: &'a [usize],
     /// Whether the contact points around each integration point are at mid-edges.
     pub at_edges: &'a [bool],
+    /// Order of the elements of side a.
+    pub order: Order,
+    /// Facet of side a under each integration point; those of a facet follow each other.
+    pub facet: &'a [usize],
+    /// Whether this facet lies at a rim, see [`Fine::at_rim`].
+    pub at_rim: &'a [bool],
+    /// First barycentric coordinate of each integration point in this facet.
+    pub along: Vec<f64>,
+    /// Whether the pressure on this facet is a polynomial of second degree, see [`Fine::is_quadratic`].
+    pub is_quadratic: &'a [bool],
     /// Matrix from values at the contact points to values at the integration points.
     pub interpolation: &'a Csr,
     /// Matrix from pressures at the contact points to the pressures of the discrete problem at the integration points.
@@ -75,12 +88,18 @@ pub trait Recovered {
     /// Return the squared energy norm of the recovered minus the discrete stress, for each cell.
     fn energy_errors(&self) -> Vec<f64>;
 
+    /// Return the energy of the strip between straight facets and a curved boundary at each cell, see [`Recovery::strip_energies`].
+    fn strip_energies(&self) -> Vec<f64>;
+
     /// Return the residual of the interpolation error at all nodes, see [`Recovery::interpolation_residual`]. It includes the
     /// strip between straight facets and a curved boundary, see [`Recovery::add_strip`].
     fn interpolation_residual(&self) -> Vec<f64>;
 
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
+
+    /// Return the displacement at the integration points of a side of a pair, times [`Fine::tilt`].
+    fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
     /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is replaced by the
     /// value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its nodal displacements.
@@ -146,10 +165,37 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn points(&self, pair: usize) -> FinePoints<'_> {
-        let Fine { weight, gap, size, bodies, nearest, at_edges, interpolation, pressing, .. } = &self.fine[pair];
+        let Fine {
+            weight,
+            gap,
+            size,
+            bodies,
+            nearest,
+            at_edges,
+            at_rim,
+            is_quadratic,
+            interpolation,
+            pressing,
+            sides,
+            ..
+        } = &self.fine[pair];
         let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
         let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
-        FinePoints { weight, gap, compliance, nearest, at_edges, interpolation, pressing }
+        FinePoints {
+            weight,
+            gap,
+            size,
+            compliance,
+            nearest,
+            at_edges,
+            order: sides[0].facets.order,
+            facet: &sides[0].facet,
+            at_rim,
+            along: sides[0].at.iter().map(|l| l[0]).collect(),
+            is_quadratic,
+            interpolation,
+            pressing,
+        }
     }
 
     fn cells(&self, body: usize) -> Cells {
@@ -220,6 +266,10 @@ impl<const D: usize> Recovered for OnBody<'_, D> {
         self.recovery.energy_errors(&|cell, x, strain| self.stress(cell, x, strain))
     }
 
+    fn strip_energies(&self) -> Vec<f64> {
+        self.recovery.strip_energies(&|cell, x, strain| self.stress(cell, x, strain))
+    }
+
     fn interpolation_residual(&self) -> Vec<f64> {
         let law = |cell, x, strain: &[f64; 6]| self.stress(cell, x, strain);
         let mut residual = self.recovery.interpolation_residual(&law);
@@ -233,6 +283,13 @@ impl<const D: usize> Recovered for OnBody<'_, D> {
             let u = self.displacement(nodes, l);
             values[g] = (0..D).map(|c| normal[c] * u[c]).sum();
         });
+        values
+    }
+
+    fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
+        let tilt = &self.kept.fine[pair].tilt;
+        let mut values = vec![0.0; tilt.len()];
+        self.visit(pair, side, |g, _, nodes, l| values[g] = dot(&tilt[g], &self.displacement(nodes, l)));
         values
     }
 

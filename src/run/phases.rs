@@ -16,7 +16,7 @@ use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
-use crate::model::{BodySlot, Mechanism};
+use crate::model::{BodySlot, Mechanism, Model};
 use crate::output::sci;
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::{Schur, Session, has_metis, keep_apart, keep_at_hand};
@@ -376,8 +376,37 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
              cells smaller there, or less flat"
         ));
     }
+    let warnings = of_pressures(&discrete.model, &estimate);
+    done.warnings.extend(warnings);
     clock.phase("estimate");
     Ok(Some(estimate))
+}
+
+/// Least change of the pressures with the side of the normals that is worth a warning: one per cent.
+const ONE_SIDED: f64 = 0.01;
+
+/// Return warnings of pressures whose estimated error is a guess, or that depend on the side that gives the normals by more than that error.
+fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (i, pair) in model.pairs.iter().enumerate() {
+        let [a, b] = &pair.surfaces;
+        if let Some(place) = estimate.guesses[i] {
+            warnings.push(format!(
+                "the estimated error of the pressures between `{a}` and `{b}` is a guess: most of it is at the edge of the contact, at {}, \
+                 where pressures may be singular",
+                point(place)
+            ));
+        }
+        let change = estimate.sides[i];
+        if change > estimate.pressure[i].max(ONE_SIDED) {
+            warnings.push(format!(
+                "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
+                 than by their estimated error: the surfaces slide or tilt too far for small displacements",
+                100.0 * change
+            ));
+        }
+    }
+    warnings
 }
 
 /// Return the stopping rules in words.

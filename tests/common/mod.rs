@@ -153,6 +153,16 @@ pub fn solve_on(ranks: usize, scene: impl AsRef<Path>, args: &[&str]) -> Run {
     finish(command, scratch, folder)
 }
 
+/// Solves a scene with variables of the environment.
+pub fn solve_where(variables: &[(&str, &str)], scene: impl AsRef<Path>, args: &[&str]) -> Run {
+    let scratch = TempDir::new().expect("a temporary folder");
+    let folder = scratch.path().join("results");
+    let mut command = program(1);
+    command.envs(variables.iter().copied());
+    command.arg("solve").arg(scene.as_ref()).arg("-o").arg(&folder).args(args);
+    finish(command, scratch, folder)
+}
+
 /// Runs the program with these words, in an empty folder.
 pub fn winkler(args: &[&str]) -> Run {
     winkler_on(1, args)

@@ -484,3 +484,115 @@ fn an_estimate_as_large_as_the_solution_is_a_guess() {
     let fine = solve(&scene, &["--set", "mesh.set.n=24"]).converged();
     assert!(!fine.warnings().contains("guess"), "{}", fine.warnings());
 }
+
+/// Solves `groove-held` on adapted meshes with a Gmsh that makes no mesh of sizes when the shell finds `fails` true. `$n` is the number of the mesh
+/// of sizes. The cache is new, so that Gmsh makes all meshes.
+fn adapted_where(fails: &str) -> Run {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().expect("a folder");
+    let (count, path) = (folder.path().join("count"), std::env::var("PATH").expect("a path"));
+    let real = std::env::split_paths(&path).map(|folder| folder.join("gmsh")).find(|file| file.is_file());
+    let script = format!(
+        "#!/bin/sh\ncase \"$*\" in *sized.geo*)\n  n=$(cat {0} 2>/dev/null || echo 0); n=$((n + 1)); echo $n > {0}\n  \
+         if [ {fails} ]; then echo 'Error   : no mesh of these sizes'; exit 1; fi;;\nesac\nexec {1} \"$@\"\n",
+        count.display(),
+        real.expect("Gmsh").display()
+    );
+    let program = folder.path().join("gmsh");
+    std::fs::write(&program, script).expect("a script");
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("a program");
+    let cache = folder.path().join("cache");
+    std::fs::create_dir(&cache).expect("a cache");
+    std::fs::set_permissions(&cache, std::fs::Permissions::from_mode(0o700)).expect("a cache");
+    let path = format!("{}:{path}", folder.path().display());
+    let variables = [("PATH", path.as_str()), ("WINKLER_CACHE", cache.to_str().expect("a path"))];
+    common::solve_where(&variables, case("groove-held"), &["--tolerance", "5e-3", "--set", "method={}"])
+}
+
+/// Where Gmsh makes no mesh of the sizes that a mesh leads to, sizes for half of the cells are taken, and halved again. Without any mesh the run ends
+/// with the one that it has, and says why.
+#[test]
+fn sizes_without_a_mesh_become_coarser() {
+    let cells = |run: &Run| -> Vec<f64> {
+        let rounds = run.report["rounds"].as_array().expect("rounds");
+        rounds.iter().map(|round| round["cells"].as_f64().expect("cells")).collect()
+    };
+    let (all, once) = (adapted_where("0 = 1").converged(), adapted_where("$n = 2").converged());
+    let (all, once) = (cells(&all), cells(&once));
+    assert!(all.len() >= 2 && all[0] == once[0], "{all:?} {once:?}");
+    assert!((0.35..0.7).contains(&(once[1] / all[1])), "{all:?} {once:?}");
+    let never = adapted_where("$n -ge 2");
+    assert_eq!((never.code, never.text("status")), (1, "mesh-limit"), "{}", never.said());
+    assert!(never.stdout.contains("no mesh comes of the sizes after mesh 1"), "{}", never.said());
+    let rounds = cells(&never);
+    assert_eq!(rounds, [all[0], all[0]], "the best mesh once more");
+}
+
+/// A punch on a wider block, both of quadratic elements.
+const PUNCH: &str = "DefineConstant[ n = {4, Name \"n\"} ]; h = 1/n;\n\
+    Point(1) = {-2, -2, 0, h}; Point(2) = {2, -2, 0, h}; Point(3) = {2, 0, 0, h}; Point(4) = {1, 0, 0, h}; Point(5) = {-1, 0, 0, h};\n\
+    Point(6) = {-2, 0, 0, h}; Point(7) = {-1, 0, 0, h}; Point(8) = {1, 0, 0, h}; Point(9) = {1, 1, 0, h}; Point(10) = {-1, 1, 0, h};\n\
+    Line(1) = {1, 2}; Line(2) = {2, 3}; Line(3) = {3, 4}; Line(4) = {4, 5}; Line(5) = {5, 6}; Line(6) = {6, 1};\n\
+    Line(7) = {7, 8}; Line(8) = {8, 9}; Line(9) = {9, 10}; Line(10) = {10, 7}; Transfinite Curve {4, 7} = 2*n + 1;\n\
+    Curve Loop(1) = {1:6}; Plane Surface(1) = {1}; Curve Loop(2) = {7:10}; Plane Surface(2) = {2};\n\
+    Physical Surface(\"base\") = {1}; Physical Surface(\"punch\") = {2}; Physical Curve(\"bottom\") = {1};\n\
+    Physical Curve(\"base_top\") = {3, 4, 5}; Physical Curve(\"punch_bottom\") = {7}; Physical Curve(\"punch_top\") = {9};\n\
+    Physical Curve(\"punch_sides\") = {8, 10};\n";
+
+/// Return the scene of the punch on the block, with the script and the displacement of the top of the punch.
+fn punch(script: &str, pressed: &str) -> Scene {
+    let body = |name: &str, on: &str, fixed: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nyoung = 2.1e5\npoisson = 0.3\norder = 2\nfix = [{{ on = \"{on}\", {fixed} }}]\n"
+        )
+    };
+    let scene = Scene::new(format!(
+        "dimension = 2\nestimate = true\nmesh = {{ geo = \"punch.geo\" }}\n{}{}[[contact]]\n\
+         between = [\"base_top\", \"punch_bottom\"]\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n",
+        body("base", "bottom", "x = 0, y = 0"),
+        body("punch", "punch_top", pressed)
+    ));
+    std::fs::write(scene.path.with_file_name("punch.geo"), script).expect("a script");
+    scene
+}
+
+/// Pressures at the rim of a flat punch are singular: their error is said to be a guess, with the pair and a place at the rim, and is not below the
+/// truth. (At planes of symmetry nothing is added: see `pressure_of_a_wave`.)
+#[test]
+fn pressures_at_a_rim_are_a_guess() {
+    let scene = punch(PUNCH, "x = 0, y = -1e-3");
+    let fine = solve(&scene, &["--set", "mesh.set.n=24"]).converged().contact();
+    for n in [3, 6] {
+        let run = solve(&scene, &["--set", &format!("mesh.set.n={n}")]).converged();
+        let table = run.contact();
+        let nearest = |x: f64| {
+            let far = |q: &usize| (fine["x"][*q] - x).abs();
+            (0..fine.rows()).min_by(|p, q| far(p).total_cmp(&far(q))).expect("points")
+        };
+        let exact = weighted_error(&table, 0..table.rows(), |q| fine["pressure"][nearest(table["x"][q])]);
+        let reported = run.number("discretization_error/pressure/0");
+        assert!((1.0..2.0).contains(&(reported / exact)), "n = {n}: {reported} {exact}");
+        let said = run.warnings();
+        assert!(said.contains("is a guess") && said.contains("`punch_bottom`"), "{said}");
+    }
+}
+
+/// A round punch that slides far has other pressures by the normals of the block than by its own, and a warning says so; one that is pressed straight
+/// down has not.
+#[test]
+fn pressures_that_depend_on_the_side_of_the_normals() {
+    let round = PUNCH
+        .replace(
+            "{-1, 0, 0, h}; Point(8) = {1, 0, 0, h}",
+            "{-1, 0.0501256, 0, h}; Point(8) = {1, 0.0501256, 0, h}; Point(11) = {0, 10, 0, h}",
+        )
+        .replace("Line(7) = {7, 8}", "Circle(7) = {7, 11, 8}");
+    assert!(round.contains("Point(11)") && round.contains("Circle(7)"));
+    let warnings = |pressed: &str| {
+        let run = solve(punch(&round, pressed), &["--set", "mesh.set.n=8"]).converged();
+        run.warnings()
+    };
+    let (slid, straight) = (warnings("x = 0.05, y = -5e-3"), warnings("x = 0, y = -5e-3"));
+    assert!(slid.contains("with the normals of `"), "{slid}");
+    assert!(!straight.contains("with the normals of `"), "{straight}");
+}
