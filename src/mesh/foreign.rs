@@ -1,7 +1,7 @@
 //! Files of other programs: shapes that Gmsh meshes, and meshes that it converts.
 
 use super::trust::is_kind;
-use super::{abaqus, unv};
+use super::{nastran, unv};
 use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
 
@@ -60,17 +60,17 @@ pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, wo
     write(&made, text.as_bytes()).map(|()| made)
 }
 
+/// Return whether a file is one of Abaqus or CalculiX, which [`super::abaqus`] reads without Gmsh.
+pub fn is_input_file(path: &Path) -> bool {
+    is_kind(path, &["inp"])
+}
+
 /// Write a mesh of another program into the folder `work` in a form that Gmsh reads, and return its path.
 ///
 /// # Errors
 /// The file is not such a mesh, or the folder cannot be written.
 pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBuf> {
     let path = &file.value;
-    if is_kind(path, &["inp"]) {
-        let text = abaqus::convert(path, &String::from_utf8_lossy(bytes)).map_err(|error| error.at(&file.place))?;
-        let made = work.join("mesh.msh");
-        return write(&made, text.as_bytes()).map(|()| made);
-    }
     // A file that begins like a mesh of Gmsh must not be read as a script, whatever its name.
     let kind = match is_kind(path, &MESHES) {
         true => path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase(),
@@ -79,6 +79,10 @@ pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBu
     let made = work.join(format!("mesh.{kind}"));
     let written = match kind.as_str() {
         "unv" => write(&made, unv::readable(&String::from_utf8_lossy(bytes)).as_bytes()),
+        "bdf" | "nas" => {
+            let text = nastran::in_basic_system(path, &String::from_utf8_lossy(bytes));
+            write(&made, text.map_err(|error| error.at(&file.place))?.as_bytes())
+        }
         _ => write(&made, bytes),
     };
     written.map(|()| made)

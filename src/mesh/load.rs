@@ -4,7 +4,7 @@ use super::cache::{self, Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::Script;
-use super::{Mesh, foreign, msh};
+use super::{Mesh, abaqus, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
 use crate::file::{Digested, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
@@ -26,6 +26,8 @@ pub struct Loaded<const D: usize> {
     pub digest: String,
     /// The reason, in words, why the mesh cannot be taken from the cache, if there is one.
     pub unkept: Option<String>,
+    /// What of the file was left out, or is not as the user may think.
+    pub notes: Vec<String>,
 }
 
 /// The origin of a mesh.
@@ -59,7 +61,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => {
             let mesh = super::arrays::mesh(arrays, order)?;
-            Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None })
+            Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None, notes: Vec::new() })
         }
     }?;
     loaded.mesh.straighten();
@@ -79,12 +81,16 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     let mut loaded = match foreign::is_mesh(path, &start) {
         true => {
             let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-            converted(file, &with_unix_lines(bytes), interrupt)?
+            let bytes = with_unix_lines(bytes);
+            match foreign::is_input_file(path) {
+                true => input_file(path, &bytes).map_err(|error| error.at(&file.place))?,
+                false => converted(file, &bytes, interrupt)?,
+            }
         }
         false => {
             let mut source = Digested::new(source);
             let mesh = msh::read(path, Box::new(&mut source), Maker::User)?;
-            Loaded { mesh, origin: Origin::File, file: path.clone(), digest: source.digest(), unkept: None }
+            Loaded { mesh, origin: Origin::File, file: path.clone(), digest: source.digest(), unkept: None, notes: Vec::new() }
         }
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -111,6 +117,17 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
             .help(format!("give them the ends of today: tr '\\r' '\\n' < {} > new.msh", path.display()))),
         false => Ok(()),
     }
+}
+
+/// Return the mesh of an input file of Abaqus or CalculiX. The cache keeps it as a mesh file.
+fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
+    let abaqus::Converted { text, notes } = abaqus::convert(path, bytes, D)?;
+    let name = file_name(("input file", digest_of_bytes(text.as_bytes())), path);
+    let parse = |file: &mut Digested<File>| msh::read(path, Box::new(file), Maker::Other);
+    let make = |_: &Path, made: &Path| {
+        std::fs::write(made, text.as_bytes()).map_err(|cause| Error::file(made, "write", &cause))
+    };
+    Ok(Loaded { origin: Origin::File, notes, ..kept(&name, None, &folders(), parse, make)? })
 }
 
 /// Return a mesh of another program, or of another version of Gmsh's format, as Gmsh converts it.
@@ -155,7 +172,7 @@ fn kept<const D: usize>(
     for folder in folders.iter().filter(|_| unkept.is_none()) {
         let cached = folder.join(name);
         if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| parse(file).ok()) {
-            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept });
+            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept, notes: Vec::new() });
         }
     }
     let workshop = Workshop::open(folders)?;
@@ -164,7 +181,8 @@ fn kept<const D: usize>(
     let mesh = make(workshop.path(), &made).and_then(|()| parse(open()?));
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, name)?, digest, unkept })
+    let file = workshop.publish(&made, name)?;
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file, digest, unkept, notes: Vec::new() })
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
@@ -176,7 +194,17 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
             let known = script.inputs.unknown.is_none();
             known.then(|| key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard)).ok())?
         }
-        MeshSource::Msh { file } => crate::file::read(&file.value).ok().map(|bytes| digest_of_bytes(&bytes)),
+        MeshSource::Msh { file } => {
+            let bytes = crate::file::read(&file.value).ok()?;
+            // Other files may be included.
+            match foreign::is_input_file(&file.value) {
+                true => {
+                    let converted = abaqus::convert(&file.value, &with_unix_lines(bytes), dimension).ok()?;
+                    Some(digest_of_bytes(converted.text.as_bytes()))
+                }
+                false => Some(digest_of_bytes(&bytes)),
+            }
+        }
         MeshSource::Arrays(_) => None,
     }
 }
