@@ -130,7 +130,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
             Origin::Gmsh => "made by Gmsh",
         },
         "unkept": unkept,
-        "notes": notes,
+        "notes": notes.iter().chain(&verified.notes).collect::<Vec<_>>(),
         "seconds": seconds,
         "dimension": D,
         "order": mesh.order.degree(),

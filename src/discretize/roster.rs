@@ -36,7 +36,7 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
                 None => &all,
             },
         )?;
-        let load = lines.deal(&table.load, |line| &mut line.on, "load", |_| &[D - 1])?;
+        let load = lines.deal(&table.load, |line| &mut line.on, "load", |line| load_dimensions::<D>(&line.kind))?;
         let spring = lines.deal(&table.spring, |line| &mut line.on, "spring", |_| &[D - 1, 0])?;
         for line in &table.load {
             let places = load.iter().flatten().filter(|load| load.on.place == line.on.place).count();
@@ -58,6 +58,14 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
     Ok(bodies)
 }
 
+/// Return the dimensions of groups on which a load can act. A total force acts on points, too.
+pub fn load_dimensions<const D: usize>(kind: &LoadKind) -> &'static [usize] {
+    match kind {
+        LoadKind::Force { rigid: false, .. } => const { &[D - 1, 0] },
+        _ => const { &[D - 1] },
+    }
+}
+
 /// Return whether a table stands for several bodies, or has lines for several groups.
 fn is_plural(table: &BodySpec) -> bool {
     let lines = table.fix.iter().map(|line| &line.on).chain(table.load.iter().map(|line| &line.on));
@@ -76,7 +84,7 @@ pub fn pattern(name: &Located<String>) -> Result<Pattern<'_>> {
 }
 
 /// Return the names of the bodies of each table.
-fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
+pub fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
     let patterns = scene.bodies.iter().map(|table| pattern(&table.name)).collect::<Result<Vec<_>>>()?;
     let single = (0..patterns.len()).filter(|&table| !patterns[table].is_plural());
     let named: HashMap<&str, usize> = single.map(|table| (scene.bodies[table].name.value.as_str(), table)).collect();

@@ -61,7 +61,14 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => {
             let mesh = super::arrays::mesh(arrays, order)?;
-            Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None, notes: Vec::new() })
+            Ok(Loaded {
+                mesh,
+                origin: Origin::File,
+                file: PathBuf::new(),
+                digest: String::new(),
+                unkept: None,
+                notes: Vec::new(),
+            })
         }
     }?;
     loaded.mesh.straighten();
@@ -90,7 +97,14 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
         false => {
             let mut source = Digested::new(source);
             let mesh = msh::read(path, Box::new(&mut source), Maker::User)?;
-            Loaded { mesh, origin: Origin::File, file: path.clone(), digest: source.digest(), unkept: None, notes: Vec::new() }
+            Loaded {
+                mesh,
+                origin: Origin::File,
+                file: path.clone(),
+                digest: source.digest(),
+                unkept: None,
+                notes: Vec::new(),
+            }
         }
     };
     loaded.mesh = match (loaded.mesh.order, order) {

@@ -19,6 +19,23 @@ struct Card {
 
 type TextResult<T> = std::result::Result<T, String>;
 
+/// What is wrong with a system of coordinates, with its line if it has one.
+struct Flaw {
+    line: Option<usize>,
+    message: String,
+}
+
+impl Flaw {
+    fn new(line: Option<usize>, message: String) -> Self {
+        Self { line, message }
+    }
+
+    /// Return the flaw with this line if it has none.
+    fn or_in(self, line: usize) -> Self {
+        Self { line: self.line.or(Some(line)), ..self }
+    }
+}
+
 impl Card {
     fn field(&self, index: usize) -> &str {
         self.fields.get(index).map_or("", String::as_str)
@@ -102,7 +119,7 @@ pub fn in_basic_system(path: &Path, text: &str) -> Result<String> {
     let local: Vec<u64> = model.grids.iter().filter(|(_, grid)| grid.system != 0).map(|(tag, _)| *tag).collect();
     for tag in &local {
         let (x, lines) = (model.place(*tag), model.grids[tag].lines.clone());
-        let x = x.map_err(|(line, message)| refuse(line.unwrap_or(lines.start), message))?;
+        let x = x.map_err(|flaw| refuse(flaw.line.unwrap_or(lines.start), flaw.message))?;
         made[lines.clone()].iter_mut().for_each(|line| *line = "$".to_owned());
         made[lines.start] = large(*tag, x);
     }
@@ -119,8 +136,8 @@ fn large(tag: u64, x: [f64; 3]) -> String {
 
 /// Return a number in at most 16 characters.
 fn sixteen(x: f64) -> String {
-    let forms = std::iter::once(format!("{x:?}")).chain((0..=14).rev().map(|digits| format!("{x:.digits$e}")));
-    forms.into_iter().find(|text| text.len() <= 16).unwrap_or_default()
+    let shorter = (0..=14).rev().map(|digits: usize| format!("{x:.digits$e}"));
+    std::iter::once(format!("{x:?}")).chain(shorter).find(|text| text.len() <= 16).unwrap_or_default()
 }
 
 /// Return the entries of the bulk data that define points or systems.
@@ -211,7 +228,10 @@ impl Model {
                 self.add(card.tag(0)?, System { kind, definition, line })?;
             }
             name if name.starts_with("CORD") => {
-                self.add(card.tag(0).unwrap_or(None), System { kind, definition: Definition::Unknown(name.to_owned()), line })?;
+                self.add(
+                    card.tag(0).unwrap_or(None),
+                    System { kind, definition: Definition::Unknown(name.to_owned()), line },
+                )?;
             }
             _ => {}
         }
@@ -227,18 +247,15 @@ impl Model {
     }
 
     /// Return the basic coordinates of a grid point.
-    ///
-    /// # Errors
-    /// What is wrong with its system, with the line of that system if there is one.
-    fn place(&mut self, tag: u64) -> std::result::Result<[f64; 3], (Option<usize>, String)> {
-        let grid = self.grids.get(&tag).ok_or_else(|| (None, format!("the grid point {tag} is not there")))?;
+    fn place(&mut self, tag: u64) -> std::result::Result<[f64; 3], Flaw> {
+        let grid = self.grids.get(&tag).ok_or_else(|| Flaw::new(None, format!("the grid point {tag} is not there")))?;
         let (system, x) = (grid.system, grid.x);
         let (kind, frame) = self.frame(system)?;
         Ok(frame.place(kind.rectangular(x)))
     }
 
     /// Return the kind and the axes of a system.
-    fn frame(&mut self, tag: u64) -> std::result::Result<(Coordinates, Frame), (Option<usize>, String)> {
+    fn frame(&mut self, tag: u64) -> std::result::Result<(Coordinates, Frame), Flaw> {
         if tag == 0 {
             return Ok((Coordinates::Rectangular, Frame::default()));
         }
@@ -246,21 +263,21 @@ impl Model {
             return Ok(*known);
         }
         let system = self.systems.get(&tag);
-        let system = system.ok_or_else(|| (None, format!("the system of coordinates {tag} is not there")))?;
+        let system = system.ok_or_else(|| Flaw::new(None, format!("the system of coordinates {tag} is not there")))?;
         let (kind, line) = (system.kind, system.line);
-        let refuse = |message: String| (Some(line), message);
+        let refuse = |message: String| Flaw::new(Some(line), message);
         if !self.open.insert(tag) {
             return Err(refuse(format!("the system of coordinates {tag} depends on itself")));
         }
         let points = match system.definition {
             Definition::Points { reference, points } => {
-                let (kind, frame) = self.frame(reference).map_err(|(at, message)| (at.or(Some(line)), message))?;
+                let (kind, frame) = self.frame(reference).map_err(|flaw| flaw.or_in(line))?;
                 points.map(|x| frame.place(kind.rectangular(x)))
             }
             Definition::Grids(grids) => {
                 let mut points = [[0.0; 3]; 3];
                 for (point, grid) in points.iter_mut().zip(grids) {
-                    *point = self.place(grid).map_err(|(at, message)| (at.or(Some(line)), message))?;
+                    *point = self.place(grid).map_err(|flaw| flaw.or_in(line))?;
                 }
                 points
             }

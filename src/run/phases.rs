@@ -139,6 +139,7 @@ where
         warnings.extend(in_parts(verified.mesh.split));
         warnings.extend(made_straight(verified.mesh.straightened));
         warnings.extend(read.iter().flat_map(|read| read.warnings.clone()));
+        warnings.extend(verified.notes.iter().cloned());
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());

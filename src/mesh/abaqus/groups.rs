@@ -49,7 +49,9 @@ impl<'a> Groups<'a> {
     /// # Errors
     /// A set or surface has a member that does not exist.
     pub fn new(model: &'a Model, lines: &'a Lines, dimension: usize) -> Result<Self> {
-        let lower = || model.elements.values().filter_map(|element| element.kind).filter(|kind| kind.shape.dimension < dimension);
+        let lower = || {
+            model.elements.values().filter_map(|element| element.kind).filter(|kind| kind.shape.dimension < dimension)
+        };
         let is_free = |surface: &super::model::Surface| {
             surface.faces.iter().any(|(_, face)| *face == Face::Free)
                 || surface.of_sets.iter().any(|(_, face)| *face == Face::Free)
@@ -134,16 +136,20 @@ impl<'a> Groups<'a> {
                 let spelling = &surface.label.spelling;
                 let refuse = |message: String| self.lines.refuse(surface.label.at, message);
                 let element = self.model.elements.get(&tag);
-                let element =
-                    element.ok_or_else(|| refuse(format!("`{spelling}` has a face of element {tag}, which is not there")))?;
+                let element = element
+                    .ok_or_else(|| refuse(format!("`{spelling}` has a face of element {tag}, which is not there")))?;
                 let pieces = match (self.cell(element), face) {
                     (Some(_), Face::Free) => self.faces.free(tag),
                     (Some(kind), Face::Number(number)) => {
                         let piece = kind.face(&element.nodes, number);
-                        vec![piece.ok_or_else(|| refuse(format!("element {tag} in `{spelling}` has no face S{}", number + 1)))?]
+                        vec![piece.ok_or_else(|| {
+                            refuse(format!("element {tag} in `{spelling}` has no face S{}", number + 1))
+                        })?]
                     }
                     (Some(_), Face::Itself) => {
-                        return Err(refuse(format!("element {tag} in `{spelling}` is no shell with sides SPOS and SNEG")));
+                        return Err(refuse(format!(
+                            "element {tag} in `{spelling}` is no shell with sides SPOS and SNEG"
+                        )));
                     }
                     (None, _) => self.under(element).into_iter().collect(),
                 };

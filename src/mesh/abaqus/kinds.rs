@@ -69,12 +69,8 @@ const HEXAHEDRON: Shape = Shape {
     dimension: 3,
     corners: 8,
     faces: &[&[0, 1, 2, 3], &[4, 7, 6, 5], &[0, 4, 5, 1], &[1, 5, 6, 2], &[2, 6, 7, 3], &[3, 7, 4, 0]],
-    edges: &[
-        [0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7],
-    ],
-    gmsh_edges: &[
-        [0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7],
-    ],
+    edges: &[[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]],
+    gmsh_edges: &[[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]],
     numbers: [5, 17],
 };
 
@@ -187,9 +183,8 @@ impl Role {
     /// Return what the elements of a type are.
     pub fn of(name: &str) -> Role {
         let name = name.to_ascii_uppercase();
-        let begins = |family: &str| {
-            name.strip_prefix(family).filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
-        };
+        let begins =
+            |family: &str| name.strip_prefix(family).filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
         let matching = FAMILIES.iter().filter_map(|&(family, dimension)| Some((family, dimension, begins(family)?)));
         let Some((family, dimension, rest)) = matching.max_by_key(|(family, ..)| family.len()) else {
             return Role::LeftOut;

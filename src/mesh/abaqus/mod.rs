@@ -10,6 +10,7 @@ mod kinds;
 mod lines;
 mod model;
 mod read;
+mod words;
 mod write;
 
 use crate::error::{Error, Result};
@@ -68,6 +69,12 @@ fn notes(path: &Path, reader: &Reader, left_out: &LeftOut) -> Vec<String> {
              and {new}",
             reader.twice.len(),
             first.tag
+        ));
+    }
+    if reader.longer > 0 {
+        notes.push(format!(
+            "{file}: {} elements have more nodes than their type, and the first ones count, as in CalculiX",
+            reader.longer
         ));
     }
     if !left_out.renamed.is_empty() {

@@ -152,8 +152,7 @@ impl Model {
     pub fn add(&mut self, part: &Model, prefix: &str, shift: u64) {
         let moved = |tag: &u64| tag.saturating_add(shift);
         let name = |name: &String| format!("{}{name}", normal(prefix));
-        let label =
-            |label: &Label| Label { spelling: format!("{prefix}{}", label.spelling), at: label.at };
+        let label = |label: &Label| Label { spelling: format!("{prefix}{}", label.spelling), at: label.at };
         let set = |set: &Set| Set {
             label: label(&set.label),
             members: set.members.iter().map(moved).collect(),

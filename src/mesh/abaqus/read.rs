@@ -3,8 +3,8 @@
 use super::kinds::{Kind, Role};
 use super::lines::{At, Line, Lines};
 use super::model::{Element, Face, Label, Model, Node, Rotation, Set, Surface, members, normal};
+use super::words::{Keyword, TextResult, coordinates, count, generated, reals, spelled};
 use crate::error::Result;
-use crate::mesh::fortran::real;
 use crate::mesh::frame::{Coordinates, Frame};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -47,6 +47,8 @@ pub struct Reader {
     pub twice: Vec<Twice>,
     /// Number of `*TRANSFORM` keywords, which only turn dofs.
     pub transforms: usize,
+    /// Number of elements with more nodes than their type has.
+    pub longer: usize,
     scope: Scope,
     /// The rest of the file while a part is read, and the name of the part.
     outer: Option<(String, Model)>,
@@ -55,50 +57,6 @@ pub struct Reader {
     instances: BTreeMap<String, u64>,
     /// Lines behind `*INSTANCE` that place it.
     moves: Vec<Vec<f64>>,
-}
-
-/// A keyword with its parameters.
-struct Keyword {
-    name: String,
-    parameters: Vec<(String, String)>,
-    at: At,
-}
-
-impl Keyword {
-    fn new(line: &str, at: At) -> Self {
-        let mut words = line.split(',').map(str::trim);
-        let name = words.next().unwrap_or_default().to_ascii_uppercase();
-        let name = name.split_whitespace().collect::<Vec<_>>().join(" ");
-        let pair = |word: &str| {
-            let (key, value) = word.split_once('=').unwrap_or((word, ""));
-            (key.trim().to_ascii_uppercase(), value.trim().to_owned())
-        };
-        Self { name, parameters: words.map(pair).collect(), at }
-    }
-
-    fn get(&self, key: &str) -> Option<&str> {
-        self.parameters.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
-    }
-}
-
-type TextResult<T> = std::result::Result<T, String>;
-
-/// Return a name of the file in small letters.
-fn spelled(word: &str) -> String {
-    word.trim().trim_matches('"').to_ascii_lowercase()
-}
-
-fn count(word: &str) -> TextResult<u64> {
-    word.trim().parse().map_err(|_| format!("`{}` is no number", word.trim()))
-}
-
-/// Return the numbers of a data line. Empty ones are zero.
-fn reals(words: &[&str]) -> TextResult<Vec<f64>> {
-    let number = |word: &&str| match word.is_empty() {
-        true => Ok(0.0),
-        false => real(word).ok_or_else(|| format!("`{word}` is no number")),
-    };
-    words.iter().map(number).collect()
 }
 
 /// Return the set of a name, which is made if it is new.
@@ -134,6 +92,7 @@ impl Reader {
             model: Model::default(),
             twice: Vec::new(),
             transforms: 0,
+            longer: 0,
             scope,
             outer: None,
             parts: BTreeMap::new(),
@@ -149,7 +108,11 @@ impl Reader {
             };
         }
         reader.end(data).map_err(|message| reader.lines.refuse(last, message))?;
-        Ok(reader)
+        match (reader.outer.is_some(), reader.scope.prefix.is_empty()) {
+            (true, _) => Err(reader.lines.refuse(last, "*END PART is missing")),
+            (_, false) => Err(reader.lines.refuse(last, "*END INSTANCE is missing")),
+            _ => Ok(reader),
+        }
     }
 
     /// End the data of a keyword and begin those of another one. An included file continues the data before it.
@@ -200,7 +163,7 @@ impl Reader {
                 Data::Other
             }
             "PART" | "END PART" | "INSTANCE" | "END INSTANCE" | "END ASSEMBLY" => return self.assembly(keyword),
-            "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SUBSTRUCTURE GENERATE" | "SUBMODEL" => {
+            "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" => {
                 return Err(format!(
                     "*{} is not read: write a file that has every node under *NODE and every element under *ELEMENT",
                     keyword.name
@@ -327,7 +290,9 @@ impl Reader {
                 self.members(name, nodes, generate, shift, &words).map(|()| data)
             }
             Data::Surface(ref name) => self.face(name, &words, line).map(|()| data),
-            Data::NodeSurface(ref name) => self.members(name, true, false, self.scope.shift, &words[..1]).map(|()| data),
+            Data::NodeSurface(ref name) => {
+                self.members(name, true, false, self.scope.shift, &words[..1]).map(|()| data)
+            }
             Data::Union(ref name) => self.unite(name, &words).map(|()| data),
             Data::System(points) => self.system(points, &reals(&words)?),
             Data::Instance(mut moves) => {
@@ -368,7 +333,8 @@ impl Reader {
         }
         if let Some(kind) = kind {
             // A beam may have a node more, for its direction.
-            open.truncate(if kind.shape.dimension == 1 { kind.nodes() + 1 } else { usize::MAX });
+            self.longer += usize::from(kind.shape.dimension > 1 && open.len() > kind.nodes() + 1);
+            open.truncate(kind.nodes() + 1);
             check_count(kind, &open)?;
         }
         let [tag, nodes @ ..] = open.as_slice() else { return Err("an element has no number".into()) };
@@ -458,17 +424,6 @@ impl Reader {
     }
 }
 
-/// Return the kind of coordinates of `*NODE`.
-fn coordinates(keyword: &Keyword) -> TextResult<Coordinates> {
-    match keyword.get("SYSTEM").unwrap_or("R").to_ascii_uppercase().as_str() {
-        "R" => Ok(Coordinates::Rectangular),
-        "C" => Ok(Coordinates::Cylindrical),
-        other => Err(format!(
-            "nodes with SYSTEM={other} are not read: give rectangular (R) or cylindrical (C) coordinates"
-        )),
-    }
-}
-
 /// Return the name of a set that a line refers to, within its part or instance or outside.
 fn known(sets: &BTreeMap<String, Set>, prefix: &str, word: &str) -> TextResult<String> {
     let [own, outside] = [prefix, ""].map(|prefix| normal(&format!("{prefix}{}", spelled(word))));
@@ -481,15 +436,5 @@ fn check_count(kind: Kind, open: &[u64]) -> TextResult<()> {
     match open.len() == kind.nodes() + 1 {
         true => Ok(()),
         false => Err(format!("an element has {} nodes here, not {}", kind.nodes(), open.len() - 1)),
-    }
-}
-
-/// Return first and last number and step of a data line that generates a set. A file of so many `bytes` has no more of them.
-fn generated(set: &str, words: &[&str], bytes: usize) -> TextResult<[u64; 3]> {
-    let [first, last] = [count(words[0])?, count(words.get(1).copied().unwrap_or(words[0]))?];
-    let step = words.get(2).filter(|word| !word.is_empty()).map_or(Ok(1), |word| count(word))?.max(1);
-    match last.saturating_sub(first) / step >= bytes as u64 {
-        true => Err(format!("the set `{set}` has more members, from {first} to {last}, than the file has bytes")),
-        false => Ok([first, last, step]),
     }
 }

@@ -66,7 +66,8 @@ fn write_elements(groups: &[Group], text: &mut String) {
         blocks.extend(of_type.into_iter().map(|(number, block)| (group.dimension, tag, number, block)));
     }
     let numbers = || blocks.iter().flat_map(|(.., block)| block).map(|(number, _)| *number);
-    let (count, [least, largest]) = (numbers().count(), [numbers().min(), numbers().max()].map(Option::unwrap_or_default));
+    let (count, [least, largest]) =
+        (numbers().count(), [numbers().min(), numbers().max()].map(Option::unwrap_or_default));
     let _ = writeln!(text, "$Elements\n{} {count} {least} {largest}", blocks.len());
     for (dimension, tag, number, block) in blocks {
         let _ = writeln!(text, "{dimension} {tag} {number} {}", block.len());
