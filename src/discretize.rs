@@ -19,6 +19,7 @@ mod mechanism;
 pub mod meshes;
 mod missed;
 mod moving;
+mod node_sets;
 mod owned;
 mod pairs;
 mod part;

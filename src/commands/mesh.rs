@@ -116,7 +116,7 @@ fn show<const D: usize>(
 
 /// Return all that is printed about a mesh, as JSON.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
-    let Loaded { mesh, origin, file, unkept, .. } = loaded;
+    let Loaded { mesh, origin, file, unkept, notes, .. } = loaded;
     let verified = verify(scene, &Serial, || Ok(mesh))?;
     let mesh = &verified.mesh;
     let bodies = bodies(&verified)?;
@@ -130,6 +130,7 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
             Origin::Gmsh => "made by Gmsh",
         },
         "unkept": unkept,
+        "notes": notes.iter().chain(&verified.notes).collect::<Vec<_>>(),
         "seconds": seconds,
         "dimension": D,
         "order": mesh.order.degree(),
@@ -203,8 +204,8 @@ fn print(facts: &Value) -> Result<()> {
             number(&body["quality"]["mean"])
         ))?;
     }
-    if let Some(why) = facts["unkept"].as_str() {
-        say(format_args!("  warning: {why}"))?;
+    for note in list("notes").iter().chain(Some(&facts["unkept"])).filter_map(Value::as_str) {
+        say(format_args!("  warning: {note}"))?;
     }
     if facts["reached"] == json!(false) {
         say("  warning: the run that adapted this mesh did not reach its error: it is the best one of that run")?;

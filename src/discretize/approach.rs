@@ -1,6 +1,7 @@
 //! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
 
 use super::find::find_group;
+use super::roster::load_dimensions;
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};
@@ -90,7 +91,7 @@ impl Outer {
     ) -> Result<Self> {
         let mut outer = Self { nodes: space.nodes.len(), ..Self::default() };
         for load in &spec.load {
-            let group = find_group(mesh, &load.on, &[D - 1], "load")?;
+            let group = find_group(mesh, &load.on, load_dimensions::<D>(&load.kind), "load")?;
             let force = match load.kind {
                 LoadKind::Force { total, .. } => total,
                 _ => resultant(load)?,

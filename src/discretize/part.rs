@@ -2,6 +2,7 @@
 
 use super::facts::BodyFacts;
 use super::find::{Values, find_group, not_on_body, point, without_area};
+use super::roster::load_dimensions;
 use super::supports::Constraints;
 use super::{elastic, springs};
 use crate::contact::{self, Side};
@@ -13,7 +14,7 @@ use crate::fem::{
     assemble, rigid, support, surface,
 };
 use crate::linalg::{axpy, countable, dot};
-use crate::mesh::Mesh;
+use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
 use std::rc::Rc;
@@ -218,7 +219,10 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
     fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
-        let group = find_group(mesh, &spec.on, &[D - 1], "load")?;
+        let group = find_group(mesh, &spec.on, load_dimensions::<D>(&spec.kind), "load")?;
+        if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
+            return self.at_nodes(spec, group, total.map(|total| factor * total));
+        }
         let facets = self.space.facets(group);
         if facets.count() == 0 {
             return Err(not_on_body(&spec.on, &name.value));
@@ -246,6 +250,16 @@ impl<'a, const D: usize> Part<'a, D> {
                 .label("its forces are beyond the range of numbers"));
         }
         Ok(load)
+    }
+
+    /// Return a total force as equal forces at the nodes of a group of points.
+    fn at_nodes(&self, spec: &Load, group: &Group, total: [f64; 3]) -> Result<NodalForces<D>> {
+        let nodes = self.space.nodes_on(group);
+        if nodes.is_empty() {
+            return Err(not_on_body(&spec.on, &self.spec.name.value));
+        }
+        let each = std::array::from_fn(|c| total[c] / nodes.len() as f64);
+        Ok(nodes.into_iter().map(|node| (node, each)).collect())
     }
 
     /// Return the sum of the nodal forces of a load of the scene at its full value. It is zero if the surface is rigid.

@@ -36,7 +36,7 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
                 None => &all,
             },
         )?;
-        let load = lines.deal(&table.load, |line| &mut line.on, "load", |_| &[D - 1])?;
+        let load = lines.deal(&table.load, |line| &mut line.on, "load", |line| load_dimensions::<D>(&line.kind))?;
         let spring = lines.deal(&table.spring, |line| &mut line.on, "spring", |_| &[D - 1, 0])?;
         for line in &table.load {
             let places = load.iter().flatten().filter(|load| load.on.place == line.on.place).count();
@@ -61,6 +61,14 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
 /// Return whether a table stands for many bodies: its name is a pattern, or it splits groups into their connected parts.
 fn is_for_many(table: &BodySpec) -> bool {
     is_pattern(&table.name.value) || table.split
+}
+
+/// Return the dimensions of groups on which a load can act. A total force acts on points, too.
+pub fn load_dimensions<const D: usize>(kind: &LoadKind) -> &'static [usize] {
+    match kind {
+        LoadKind::Force { rigid: false, .. } => const { &[D - 1, 0] },
+        _ => const { &[D - 1] },
+    }
 }
 
 /// Return whether a table stands for many bodies, or has lines for many groups.
@@ -118,7 +126,7 @@ pub fn split<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<()> {
 }
 
 /// Return the names of the bodies of each table.
-fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
+pub fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
     let patterns = scene.bodies.iter().map(|table| pattern(&table.name)).collect::<Result<Vec<_>>>()?;
     let single = (0..patterns.len()).filter(|&table| !is_for_many(&scene.bodies[table]));
     let named: HashMap<&str, usize> = single.map(|table| (scene.bodies[table].name.value.as_str(), table)).collect();

@@ -1,6 +1,7 @@
 //! Checks of the mesh against the scene before anything is assembled.
 
 use super::find::point;
+use super::node_sets;
 use super::part::Part;
 use super::roster::{self, Lying};
 use crate::error::{Error, Result, few};
@@ -24,6 +25,8 @@ pub struct Verified<const D: usize> {
     pub bodies: Vec<BodySpec>,
     /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
     pub checked: Rc<[Checked]>,
+    /// What is to be said of surfaces that are sets of nodes, on the first rank.
+    pub notes: Vec<String>,
 }
 
 /// What all ranks have of a mesh.
@@ -70,12 +73,13 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     // The radius of a body of revolution is measured from its axis.
     mesh.measure_nearby(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
     roster::split(scene, &mut mesh)?;
+    let notes = node_sets::to_surfaces(scene, &mut mesh)?;
     let lying = roster::lying(scene, &mesh)?;
     let bodies = roster::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
-    Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into() }, lying))
+    Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into(), notes }, lying))
 }
 
 impl<const D: usize> Verified<D> {
@@ -120,7 +124,7 @@ impl Head {
         let Self { path, order, groups, split, straightened, points, lying } = self;
         let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
         let bodies = roster::bodies(scene, &mesh, &lying)?;
-        Ok(Verified { mesh, points, bodies, checked: Rc::new([]) })
+        Ok(Verified { mesh, points, bodies, checked: Rc::new([]), notes: Vec::new() })
     }
 }
 

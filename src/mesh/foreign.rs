@@ -1,7 +1,7 @@
 //! Files of other programs: shapes that Gmsh meshes, and meshes that it converts.
 
 use super::trust::is_kind;
-use super::{abaqus, nastran, unv};
+use super::{nastran, unv};
 use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
 
@@ -21,22 +21,6 @@ pub fn is_mesh(path: &Path, bytes: &[u8]) -> bool {
     let version = bytes.strip_prefix(b"$MeshFormat").map(|rest| rest.trim_ascii_start());
     is_kind(path, &MESHES)
         || version.is_some_and(|version| ["4 ", "4.0 "].iter().any(|old| version.starts_with(old.as_bytes())))
-}
-
-/// Return whether Gmsh converts the mesh in a file first.
-pub fn is_converted(path: &Path, bytes: &[u8]) -> bool {
-    is_mesh(path, bytes) && !is_kind(path, &["inp"])
-}
-
-/// Return the text of a file of Abaqus or CalculiX in Gmsh's format 2.2, or `None` for other files.
-///
-/// # Errors
-/// The file is not a mesh.
-pub fn read_abaqus(file: &Located<PathBuf>, bytes: &[u8]) -> Result<Option<String>> {
-    if !is_kind(&file.value, &["inp"]) {
-        return Ok(None);
-    }
-    abaqus::convert(&file.value, &String::from_utf8_lossy(bytes)).map(Some).map_err(|error| error.at(&file.place))
 }
 
 /// Write a script into the folder `work` that loads the shape in a file and names its groups, and return its path.
@@ -74,11 +58,17 @@ pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, wo
     write(&made, text.as_bytes()).map(|()| made)
 }
 
+/// Return whether a file is one of Abaqus or CalculiX, which [`super::abaqus`] reads without Gmsh.
+pub fn is_input_file(path: &Path) -> bool {
+    is_kind(path, &["inp"])
+}
+
 /// Write a mesh of another program into the folder `work` in a form that Gmsh reads, and return its path.
 ///
 /// # Errors
-/// The folder cannot be written.
-pub fn mesh(path: &Path, bytes: &[u8], work: &Path) -> Result<PathBuf> {
+/// The file is not such a mesh, or the folder cannot be written.
+pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBuf> {
+    let path = &file.value;
     // A file that begins like a mesh of Gmsh must not be read as a script, whatever its name.
     let kind = match is_kind(path, &MESHES) {
         true => path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase(),

@@ -4,7 +4,7 @@ use super::cache::{self, Workshop, file_name, folders};
 use super::gmsh::{Gmsh, Task};
 use super::msh::Maker;
 use super::script::{Script, quoted};
-use super::{Mesh, foreign, msh};
+use super::{Mesh, abaqus, foreign, msh};
 use crate::error::{Error, Located, Place, Result};
 use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
@@ -26,6 +26,8 @@ pub struct Loaded<const D: usize> {
     pub digest: String,
     /// The reason, in words, why the mesh cannot be taken from the cache, if there is one.
     pub unkept: Option<String>,
+    /// What of the file was left out, or is not as the user may think.
+    pub notes: Vec<String>,
 }
 
 /// The origin of a mesh.
@@ -59,7 +61,14 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => {
             let mesh = super::arrays::mesh(arrays, order)?;
-            Ok(Loaded { mesh, origin: Origin::File, file: PathBuf::new(), digest: String::new(), unkept: None })
+            Ok(Loaded {
+                mesh,
+                origin: Origin::File,
+                file: PathBuf::new(),
+                digest: String::new(),
+                unkept: None,
+                notes: Vec::new(),
+            })
         }
     }?;
     loaded.mesh.straighten();
@@ -78,16 +87,24 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     refuse_old_lines(path, &start)?;
     let mut loaded = match foreign::is_mesh(path, &start) {
         true => {
-            let bytes = with_unix_lines(crate::file::read(path).map_err(|error| error.at(&file.place))?);
-            match foreign::read_abaqus(file, &bytes)? {
-                Some(text) => rewritten(path, &text).map_err(|error| error.at(&file.place))?,
-                None => converted(file, &bytes, interrupt)?,
+            let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
+            let bytes = with_unix_lines(bytes);
+            match foreign::is_input_file(path) {
+                true => input_file(path, &bytes).map_err(|error| error.at(&file.place))?,
+                false => converted(file, &bytes, interrupt)?,
             }
         }
         false => {
             let mut source = Digested::new(source);
             let mesh = msh::read(path, Box::new(&mut source), Maker::User)?;
-            Loaded { mesh, origin: Origin::File, file: path.clone(), digest: source.digest(), unkept: None }
+            Loaded {
+                mesh,
+                origin: Origin::File,
+                file: path.clone(),
+                digest: source.digest(),
+                unkept: None,
+                notes: Vec::new(),
+            }
         }
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -116,14 +133,15 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
     }
 }
 
-/// Return the mesh of a file that was rewritten as `text` in Gmsh's format. The cache keeps the text for `winkler mesh -o`, and it
-/// is made anew in each run.
-fn rewritten<const D: usize>(path: &Path, text: &str) -> Result<Loaded<D>> {
-    let name = file_name(("rewritten", digest_of_bytes(text.as_bytes())), path);
-    let make = |_: &Path, made: &Path| std::fs::write(made, text).map_err(|cause| Error::file(made, "write", &cause));
+/// Return the mesh of an input file of Abaqus or CalculiX. The cache keeps it as a mesh file for `winkler mesh -o`; it is made anew
+/// in each run.
+fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
+    let abaqus::Converted { text, notes } = abaqus::convert(path, bytes, D)?;
+    let name = file_name(("input file", digest_of_bytes(text.as_bytes())), path);
+    let make = |_: &Path, made: &Path| std::fs::write(made, &text).map_err(|cause| Error::file(made, "write", &cause));
     let place = |cache: &Path| cache.join(&name);
     let loaded = made_anew(&name, &folders(), |file| read_converted(path, file), make, place)?;
-    Ok(Loaded { origin: Origin::File, ..loaded })
+    Ok(Loaded { origin: Origin::File, notes, ..loaded })
 }
 
 /// Return a mesh of another program, or of Gmsh's format 4.0, as Gmsh converts it.
@@ -170,7 +188,7 @@ fn kept<const D: usize>(
     // A file of the cache that cannot be read or is damaged counts as absent.
     for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
         if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| digested(file, &mut parse).ok()) {
-            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept });
+            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept, notes: Vec::new() });
         }
     }
     let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
@@ -203,7 +221,8 @@ fn made_anew<const D: usize>(
     let mesh = make(workshop.path(), &made).and_then(|()| digested(open()?, &mut parse));
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file: workshop.publish(&made, place)?, digest, unkept: None })
+    let file = workshop.publish(&made, place)?;
+    Ok(Loaded { mesh, origin: Origin::Gmsh, file, digest, unkept: None, notes: Vec::new() })
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
@@ -219,7 +238,12 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
         }
         MeshSource::Msh { file } => {
             let bytes = crate::file::read(&file.value).ok()?;
-            match foreign::is_converted(&file.value, &bytes) {
+            if foreign::is_input_file(&file.value) {
+                // Other files may be included.
+                let converted = abaqus::convert(&file.value, &with_unix_lines(bytes), dimension).ok()?;
+                return Some(digest_of_bytes(converted.text.as_bytes()));
+            }
+            match foreign::is_mesh(&file.value, &bytes) {
                 true => Some(digest(&(Gmsh::find()?.identity(), digest_of_bytes(&bytes)))),
                 false => Some(digest_of_bytes(&bytes)),
             }

@@ -13,6 +13,8 @@ mod cursor;
 pub mod datum;
 mod elements;
 mod foreign;
+mod fortran;
+mod frame;
 mod gmsh;
 mod groups;
 mod guard;
@@ -121,14 +123,30 @@ impl<const D: usize> Mesh<D> {
         self.groups.iter_mut().for_each(|group| group.tags = Vec::new());
     }
 
-    /// Return the mesh of the same simplices without mid-edge points. Without such points the result is a copy.
+    /// Return the mesh of the same simplices without mid-edge points, also in groups of points. Without such points the result
+    /// is a copy.
     pub fn lower_order(&self) -> Mesh<D> {
-        let mut groups = self.groups.clone();
+        let mut groups = self.groups.to_vec();
         for group in groups.iter_mut() {
             let vertices = group.dimension + 1;
             group.connectivity = group.simplices().flat_map(|simplex| &simplex[..vertices]).copied().collect();
             group.stride = vertices;
         }
+        let [before, after] = [&self.groups[..], &groups[..]].map(|groups| {
+            let mut used = vec![false; self.points.len()];
+            let simplices = groups.iter().filter(|group| group.dimension > 0);
+            simplices.flat_map(|group| &group.connectivity).for_each(|&point| used[point as usize] = true);
+            used
+        });
+        for group in groups.iter_mut().filter(|group| group.dimension == 0) {
+            let count = group.len();
+            group.connectivity.retain(|&point| after[point as usize] || !before[point as usize]);
+            if group.len() < count {
+                group.tags = Vec::new();
+            }
+        }
+        groups.retain(|group| !group.is_empty());
+        let mut groups: Groups = groups.into();
         let used = groups::used(&groups, self.points.len());
         let points = groups::renumber(&mut groups, used).map(|old| self.points[old]).collect();
         Mesh { points, order: Order::P1, groups, path: self.path.clone(), ..*self }

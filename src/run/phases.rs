@@ -93,8 +93,8 @@ where
 /// The facts of the file of a mesh, on the rank that has read it.
 struct FileRead {
     digest: String,
-    /// Warning that the mesh is made anew in each run, with the reason, if it is.
-    unkept: Option<String>,
+    /// What is to be said about the file, and why the mesh is made anew in each run, if it is.
+    warnings: Vec<String>,
 }
 
 /// A scene with its mesh, from which discrete problems are built.
@@ -138,7 +138,8 @@ where
         let mut warnings = warnings(session, &discrete, D);
         warnings.extend(in_parts(verified.mesh.split));
         warnings.extend(made_straight(verified.mesh.straightened));
-        warnings.extend(read.iter().filter_map(|read| read.unkept.clone()));
+        warnings.extend(read.iter().flat_map(|read| read.warnings.clone()));
+        warnings.extend(verified.notes.iter().cloned());
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
@@ -174,8 +175,8 @@ fn verified<const D: usize>(
     interrupt.hold();
     let mut file = None;
     let read = || {
-        let Loaded { mesh, digest, unkept, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        file = Some(FileRead { digest, unkept });
+        let Loaded { mesh, digest, unkept, notes, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        file = Some(FileRead { digest, warnings: notes.into_iter().chain(unkept).collect() });
         interrupt.release()?;
         Ok(mesh)
     };

@@ -137,7 +137,7 @@ fn files_of_abaqus_and_calculix() {
         let run = solved("a.inp", INP.replace(from, to).as_bytes(), "\"a.inp\"", &names);
         assert!(run.code == 4 && words.iter().all(|word| run.stderr.contains(word)), "{words:?} {}", run.said());
     };
-    refused("*HEADING", "*PART, NAME=A", &["*PART is not read", "a.inp:1"]);
+    refused("*HEADING", "*PART, NAME=A", &["*END PART is missing", "a.inp:"]);
     refused("type=C3D8R", "type=C3D27", &["elements of type `C3D27` cannot be used", "a.inp:21"]);
     refused("Upper, LOWER", "Upper, LOWR", &["there is no set `LOWR`"]);
     refused("2, 11, 12, 13, 15, 16, 17", "2, 11, 12, 13, 15, 16", &["an element has 6 nodes here, not 5"]);
@@ -223,4 +223,280 @@ fn what_is_no_mesh_and_no_shape_is_refused() {
     refused("a.msh", &text.replace("\"lower\"", "\"lowr\""), "\"a.msh\"", 3, &["`lower`"]);
     // names that differ by what becomes the same
     refused("a.msh", &text.replace("\"upper\"", "\"LOWER\""), "\"a.msh\"", 4, &["two groups", "`lower`", "rename"]);
+}
+
+/// Two blocks with nodes, elements and surfaces as they may stand in an input file, and a scene that presses them together.
+/// Without Poisson's ratio the pressure is that of the load, whatever the cells.
+const BLOCKS: &str = "*NODE, NSET=NALL\n1, 0., 0., 0.\n2, 1., 0., 0.\n3, 1., 1., 0.\n4, 0., 1., 0.\n5, 0., 0., 1.\n6, 1., 0., 1.\n\
+7, 1., 1., 1.\n8, 0., 1., 1.\n11, 0., 0., 1.\n12, 1., 0., 1.\n13, 1., 1., 1.\n14, 0., 1., 1.\n15, 0., 0., 2.\n16, 1., 0., 2.\n\
+17, 1., 1., 2.\n18, 0., 1., 2.\n*ELEMENT, TYPE=C3D8, ELSET=LOWER\n1, 1,2,3,4,5,6,7,8\n*ELEMENT, TYPE=C3D8, ELSET=UPPER\n\
+2, 11,12,13,14,15,16,17,18\n*SURFACE, NAME=FLOOR\n1, S1\n*SURFACE, NAME=LTOP\n1, S2\n*SURFACE, NAME=UBOT\n2, S1\n\
+*SURFACE, NAME=LID\n2, S2\n";
+
+fn blocks(mesh: &str, load: &str, [floor, ltop, ubot, lid]: [&str; 4]) -> Scene {
+    Scene::new(format!(
+        "dimension = 3\nmesh = \"{mesh}\"\n[[body]]\nname = \"lower\"\nyoung = 1e5\npoisson = 0\n\
+         fix = [{{ on = \"{floor}\", x = 0, y = 0, z = 0 }}]\n[[body]]\nname = \"upper\"\nyoung = 1e5\npoisson = 0\n\
+         fix = [{{ on = \"{lid}\", x = 0, y = 0 }}]\nload = [{{ on = \"{lid}\", {load} }}]\n[[contact]]\n\
+         between = [\"{ltop}\", \"{ubot}\"]\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n"
+    ))
+}
+
+const SURFACES: [&str; 4] = ["floor", "ltop", "ubot", "lid"];
+
+/// Solves the two blocks in a file, which may have others beside it.
+fn pressed(files: &[(&str, &str)], load: &str, surfaces: [&str; 4]) -> Run {
+    let scene = blocks(files[0].0, load, surfaces);
+    for (file, text) in files {
+        fs::write(scene.path.with_file_name(file), text).expect("a file");
+    }
+    solve(&scene, &[])
+}
+
+/// Checks that the pressure is 10 everywhere, and which words are warned of.
+fn is_ten(run: Run, warned: &[&str], what: &str) {
+    let run = run.converged();
+    let far = |p: &f64| (p - 10.0).abs() > 1e-9;
+    assert!(!run.contact()["pressure"].iter().any(far), "{what}: {:?}", run.contact()["pressure"]);
+    assert!(warned.iter().all(|word| run.warnings().contains(word)), "{what} {warned:?}: {}", run.warnings());
+}
+
+fn changed(text: &str, from: &str, to: &str) -> String {
+    assert!(text.contains(from), "{from}");
+    text.replace(from, to)
+}
+
+#[test]
+fn input_files_in_all_their_forms() {
+    let load = "pressure = 10";
+    let same = |text: String, warned: &[&str], what: &str| {
+        is_ten(pressed(&[("a.inp", &text)], load, SURFACES), warned, what);
+    };
+    let nodes = &BLOCKS[..BLOCKS.find("*ELEMENT").expect("elements")];
+    let rest = &BLOCKS[nodes.len()..];
+    same(BLOCKS.to_owned() + "*ELSET, ELSET=LOWER\n1\n*SURFACE, NAME=LID\n2, S2\nUPPER, S2\n", &[], "members twice");
+    same(changed(BLOCKS, "\n2, 1., 0., 0.", "\n2, 1.0D0, 0.+1, -0.d-3"), &[], "Fortran");
+    same("\u{feff}".to_owned() + BLOCKS, &[], "byte-order mark");
+    same(
+        changed(BLOCKS, "*ELEMENT, TYPE=C3D8, ELSET=LOWER", "*element,\n type=c3d8 ,\nelset = Lower"),
+        &[],
+        "parameters",
+    );
+    same(BLOCKS.to_owned() + "*ELSET, ELSET=OTHER, GENERATE\n1, 9\n", &[], "generated, with gaps");
+    // what is no solid
+    let others = "*ELEMENT, TYPE=B31, ELSET=BEAMS\n21, 1, 17\n22, 2, 18\n*ELEMENT, TYPE=SPRINGA, ELSET=S\n23, 1, 2\n\
+                  *ELEMENT, TYPE=MASS, ELSET=M\n24, 1\n*ELEMENT, TYPE=C3D8, ELSET=NONE\n";
+    let text =
+        changed(BLOCKS, "*ELEMENT, TYPE=C3D8, ELSET=LOWER", &format!("{others}*ELEMENT, TYPE=C3D8, ELSET=LOWER"));
+    same(text + "*ELSET, ELSET=EALL\nBEAMS, S, LOWER\n", &["left out: 2 B31, 1 MASS, 1 SPRINGA"], "beams and springs");
+    // shells and membranes mark the surface
+    let shells = BLOCKS.replace("*SURFACE, NAME=LID\n2, S2\n", "*ELEMENT, TYPE=S3, ELSET=LID\n31, 15, 17, 18\n");
+    let shells = changed(&shells, "*SURFACE, NAME=LTOP\n1, S2\n", "*ELEMENT, TYPE=M3D4, ELSET=LTOP\n33, 6, 5, 8, 7\n");
+    let run = pressed(&[("a.inp", &shells)], load, SURFACES);
+    assert!(run.code == 3 && run.stderr.contains("`lid`"), "a triangle is no face of a hexahedron: {}", run.said());
+    let shells = changed(&shells, "TYPE=S3, ELSET=LID\n31, 15, 17, 18", "TYPE=S4, ELSET=LID\n31, 18, 15, 16, 17");
+    is_ten(pressed(&[("a.inp", &shells)], load, SURFACES), &["left out: 1 M3D4, 1 S4"], "shells");
+    // included files
+    let including = "*INCLUDE, INPUT=sub/nodes.txt\n".to_owned() + rest;
+    let scene = blocks("a.inp", load, SURFACES);
+    fs::create_dir(scene.path.with_file_name("sub")).expect("a folder");
+    fs::write(scene.path.with_file_name("a.inp"), &including).expect("a file");
+    fs::write(scene.path.with_file_name("sub/nodes.txt"), "*NODE\n*INCLUDE, INPUT=more.txt\n").expect("a file");
+    let (first, more) = nodes.split_once('\n').expect("a line");
+    fs::write(scene.path.with_file_name("sub/more.txt"), more).expect("a file");
+    is_ten(solve(&scene, &[]), &[], first);
+    // another included file is another mesh
+    fs::write(scene.path.with_file_name("sub/more.txt"), more.replace("1.,", "2.,")).expect("a file");
+    assert!(solve(&scene, &[]).converged().number("pairs/0/contact_area") > 3.9);
+    // the later of two nodes counts
+    let twice = nodes.replace("2, 1., 0., 0.", "2, 3., 0., 0.") + "2, 1., 0., 0.\n" + rest;
+    same(twice, &["1 nodes stand twice", "node 2 in line 3 and line 18"], "node twice");
+    same(nodes.to_owned() + "2, 1., 0., 0.\n" + rest, &[], "the same node twice");
+    // sections instead of sets
+    let one = changed(BLOCKS, "TYPE=C3D8, ELSET=LOWER", "TYPE=C3D8") + "*SOLID SECTION, ELSET=lower, MATERIAL=m\n";
+    same(one, &[], "a section without a set");
+}
+
+#[test]
+fn local_coordinates_of_input_files() {
+    let load = "pressure = 10";
+    // a quarter of a ring between radii 1 and 2, of height 1, in two parts one on the other
+    let ring = |z: [f64; 2], first: usize| {
+        let corner =
+            |(at, [r, t]): (usize, &[f64; 2])| [0, 1].map(|k| format!("{}, {r}, {t}, {}\n", first + at + 4 * k, z[k]));
+        let lines: Vec<[String; 2]> =
+            [[1.0, 0.0], [2.0, 0.0], [2.0, 90.0], [1.0, 90.0]].iter().enumerate().map(corner).collect();
+        lines.iter().flatten().cloned().collect::<String>()
+    };
+    let rest = &BLOCKS[BLOCKS.find("*ELEMENT").expect("elements")..];
+    let polar = ring([0.0, 1.0], 1) + &ring([1.0, 2.0], 11);
+    let text = format!("*NODE, SYSTEM=C\n{polar}{rest}");
+    let run = pressed(&[("a.inp", &text)], load, SURFACES);
+    // the corners are (1, 0), (2, 0), (0, 2), (0, 1): a trapezium of area 1.5
+    assert!((run.number("pairs/0/contact_area") - 1.5).abs() < 1e-12, "{}", run.said());
+    is_ten(run, &[], "cylindrical");
+    let text = format!(
+        "*SYSTEM\n5., 0., 0., 5., 1., 0.\n4., 0., 0.\n*NODE, SYSTEM=C\n{polar}*SYSTEM\n*NODE\n99, 1., 2., 3.\n{rest}"
+    );
+    let scene = blocks("a.inp", load, SURFACES);
+    fs::write(scene.path.with_file_name("a.inp"), &text).expect("a file");
+    let list = winkler(&["mesh", scene.path.to_str().expect("a path")]);
+    assert!(
+        list.stdout.contains("group floor: 2 triangles, (3.0000, 0.0000, 0.0000) to (5.0000, 2.0000, 0.0000)"),
+        "{}",
+        list.said()
+    );
+    let run = pressed(&[("a.inp", &format!("*NODE, SYSTEM=S\n{polar}{rest}"))], load, SURFACES);
+    assert!(run.code == 4 && run.stderr.contains("a.inp:1: nodes with SYSTEM=S are not read"), "{}", run.said());
+    let run = pressed(&[("a.inp", &format!("*SYSTEM\n0., 0., 0., 1., 0., 0.\n2., 0., 0.\n{BLOCKS}"))], load, SURFACES);
+    assert!(run.code == 4 && run.stderr.contains("a.inp:3: the points of *SYSTEM lie on a line"), "{}", run.said());
+    let run = pressed(
+        &[("a.inp", &format!("{BLOCKS}*TRANSFORM, NSET=NALL, TYPE=C\n0., 0., 0., 0., 0., 1.\n"))],
+        load,
+        SURFACES,
+    );
+    is_ten(run, &["1 *TRANSFORM are skipped"], "transform");
+}
+
+/// Surfaces, loads and supports that are sets of nodes.
+#[test]
+fn node_sets_are_surfaces() {
+    let sets = "*NSET, NSET=N1\n1, 2, 3, 4\n*NSET, NSET=N2, GENERATE\n5, 8\n*SURFACE, NAME=N3, TYPE=NODE\n11,\n12, 1.\n13\n14\n\
+                *NSET, NSET=N4, ELSET=UPPER\n*NSET, NSET=N5\n15, 16\n17, 18, 17\n*NSET, NSET=N6\n15, 16, 17, 18, 1\n*NSET, NSET=ENDS\n15, 17\n";
+    let text = BLOCKS.to_owned() + sets;
+    let of = |lid: &str, load: &str| pressed(&[("a.inp", &text)], load, ["n1", "n2", "n3", lid]);
+    is_ten(of("n5", "pressure = 10"), &[], "pressure");
+    is_ten(of("n5", "force = [0, 0, -10]"), &[], "force on a face");
+    is_ten(of("n5", "force = [0, 0, -10], rigid = true"), &[], "rigid");
+    // two nodes bear the whole force
+    let run = of("ends", "force = [0, 0, -10]").converged();
+    assert!((run.number("pairs/0/force/0/2") + 10.0).abs() < 1e-9, "{}", run.said());
+    let run = of("ends", "pressure = 10");
+    assert!(run.code == 3 && run.stderr.contains("group of points"), "{}", run.said());
+    // node 1 is another body's, and a support would lose it
+    let run = of("n6", "pressure = 10");
+    assert!(run.code == 3 && run.stderr.contains("two sets"), "{}", run.said());
+    let lost = changed(&text, "NSET=N2, GENERATE\n5, 8", "NSET=N2\n5, 6, 7, 8, 15");
+    let run = pressed(&[("a.inp", &lost)], "pressure = 10", ["n1", "n2", "n3", "n5"]);
+    is_ten(run, &["node set `n2`", "1 of its 5 nodes"], "a node too many");
+}
+
+/// Gmsh writes the groups of surfaces as plane triangles, and those of curves as trusses.
+#[test]
+fn input_files_of_gmsh() {
+    for order in ["1", "2"] {
+        let text = made(&patch(), &["-3", "-order", order, "-format", "inp"], "a.inp");
+        // The nodes of a set include those in the middle of edges, of which a scene of order 1 has none.
+        let text = String::from_utf8(text).expect("text") + "*NSET, NSET=HELD, ELSET=LOWER_BOTTOM\n";
+        let names = Names { surfaces: ["held", "lower_top", "upper_bottom", "upper_top"], ..NAMED };
+        let run = solved("a.inp", text.as_bytes(), "\"a.inp\"", &names).converged();
+        assert!((run.number("pairs/0/force/0/2") + 10.0).abs() < 1e-9, "{order}: {}", run.said());
+        assert!(run.warnings().is_empty(), "{order}: {}", run.warnings());
+    }
+}
+
+/// Parts and instances as Abaqus/CAE writes them.
+#[test]
+fn parts_and_instances() {
+    let part = "*Part, name=Block\n*Node\n1, 0., 0., 0.\n2, 1., 0., 0.\n3, 1., 1., 0.\n4, 0., 1., 0.\n5, 0., 0., 1.\n6, 1., 0., 1.\n\
+                7, 1., 1., 1.\n8, 0., 1., 1.\n*Element, type=C3D8R\n1, 1, 2, 3, 4, 5, 6, 7, 8\n*Elset, elset=Set-1\n1,\n\
+                *Surface, type=ELEMENT, name=Top\nSet-1, S2\n*End Part\n";
+    let text = format!(
+        "*Heading\n{part}*Assembly, name=A\n*Instance, name=lower, part=Block\n*End Instance\n*Instance, name=upper, part=Block\n\
+         0., 0., 2.\n0., 0., 2., 1., 1., 2., 180.\n*End Instance\n*Node\n1, 9., 9., 9.\n*Nset, nset=floor, instance=lower, generate\n1, 4, 1\n\
+         *Elset, elset=_lid_S1, internal, instance=upper\n1,\n*Surface, type=ELEMENT, name=lid\n_lid_S1, S1\n\
+         *Nset, nset=reference\n1,\n*End Assembly\n"
+    );
+    // the upper block is turned about a diagonal, so that its top is below
+    let run = pressed(&[("a.inp", &text)], "pressure = 10", ["floor", "lower_top", "upper_top", "lid"]);
+    is_ten(run, &["1 nodes that belong to no solid"], "instances");
+    let run = pressed(&[("a.inp", &changed(&text, "part=Block\n0.", "part=Blok\n0."))], "pressure = 10", SURFACES);
+    assert!(run.code == 4 && run.stderr.contains("there is no part `blok`"), "{}", run.said());
+}
+
+#[test]
+fn input_files_are_refused_with_their_line() {
+    let refused = |text: &str, code: i32, words: &[&str]| {
+        let run = pressed(&[("a.inp", text)], "pressure = 10", SURFACES);
+        assert!(run.code == code && words.iter().all(|word| run.stderr.contains(word)), "{words:?}\n{}", run.said());
+    };
+    let end = BLOCKS.lines().count();
+    let line = |text: &str, number: usize, words: &[&str]| {
+        let place = format!("a.inp:{}", end + number);
+        refused(&(BLOCKS.to_owned() + text), 4, &[words, &[place.as_str()]].concat());
+    };
+    line("*ELSET, ELSET=x-y\n1\n*ELSET, ELSET=x_y\n2\n", 3, &["`x_y` and `x-y`", "rename"]);
+    line("*INCLUDE, INPUT=none.txt\n", 1, &["`none.txt`", "cannot be read"]);
+    refused(&(BLOCKS.to_owned() + "*INCLUDE, INPUT=a.inp\n"), 4, &["a.inp:19", "element 1 stands twice"]);
+    line("*ELSET, ELSET=x\n1, 7\n", 1, &["`x` has an element 7"]);
+    line("*NSET, NSET=x\n1, 77\n", 1, &["`x` has a node 77"]);
+    line("*SURFACE, NAME=x, COMBINE=DIFFERENCE\nLID\n", 1, &["COMBINE=DIFFERENCE"]);
+    line("*SURFACE, NAME=x, TYPE=CUTTING SURFACE\nLID\n", 1, &["TYPE=CUTTING SURFACE"]);
+    line("*ELEMENT, TYPE=C3D8\n3, 1, 2\n", 2, &["8 nodes here, not 2"]);
+    line("*ELEMENT, TYPE=C3D8\n3, 1,2,3,4,5,6,7,99\n", 2, &["node 99"]);
+    line("*ELEMENT, TYPE=C3D8\n1, 1,2,3,4,5,6,7,8\n", 2, &["element 1 stands twice", "line 19"]);
+    line("*NGEN\n1, 8\n", 1, &["*NGEN is not read"]);
+    line("*NODE\n9, 1e999, 0, 0\n", 2, &["`1e999` is no number"]);
+    // an element set and a surface of one name, both in use
+    let both = changed(BLOCKS, "NAME=LTOP", "NAME=LOWER");
+    let run = pressed(&[("a.inp", &both)], "pressure = 10", ["floor", "lower_surface", "ubot", "lid"]);
+    is_ten(run, &["the surface `lower` is `lower_surface` here"], "one name");
+}
+
+/// Grid points in local systems, in free, small and large fields.
+#[test]
+fn local_coordinates_of_bulk_data() {
+    let head = "SOL 101\nCEND\nBEGIN BULK\n";
+    let cells = "CHEXA,1,10,1,2,3,4,5,6\n+,7,8\nPSOLID,10,1\nENDDATA\n";
+    // the corners of a quarter of a ring, as in the test of input files
+    let corners = [[1.0, 0.0], [2.0, 0.0], [2.0, 90.0], [1.0, 90.0]];
+    let grids = |format: &dyn Fn(usize, [f64; 3]) -> String| -> String {
+        let points = (0..8).map(|at| (at + 1, [corners[at % 4][0], corners[at % 4][1], (at / 4) as f64]));
+        points.map(|(tag, x)| format(tag, x)).collect()
+    };
+    let small = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID    {tag:<8}7       {r:<8.1}{t:<8.1}{z:<8.1}\n");
+    let free = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID,{tag},7,{r:.1},{t:.1},{z:.1}\n");
+    let large = |tag: usize, [r, t, z]: [f64; 3]| {
+        format!("GRID*   {tag:<16}{:<16}{r:<16.1}{t:<16.1}*G\n*G      {z:<16.1}\n", 7)
+    };
+    let set = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID,{tag},,{r:.1},{t:.1},{z:.1}\n");
+    let system = "CORD2C,7,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n";
+    let list = |text: &str| {
+        let scene = Scene::new("dimension = 3\nmesh = \"a.bdf\"\n[[body]]\nname = \"*\"\nyoung = 1\npoisson = 0.3\n");
+        fs::write(scene.path.with_file_name("a.bdf"), text).expect("a file");
+        winkler(&["mesh", scene.path.to_str().expect("a path"), "--json"])
+    };
+    let is = |text: &str, low: [f64; 3], high: [f64; 3]| {
+        let run = list(&(head.to_owned() + text + cells));
+        assert!(run.code == 0, "{text}\n{}", run.said());
+        let facts: serde_json::Value = serde_json::from_str(&run.stdout).expect("JSON");
+        let corner = |key: &str| {
+            facts["groups"][0][key].as_array().expect("a corner").iter().map(|x| x.as_f64().expect("a number"))
+        };
+        let far =
+            corner("low").chain(corner("high")).zip(low.into_iter().chain(high)).any(|(x, y)| (x - y).abs() > 1e-9);
+        assert!(!far, "{text}\n{}", run.said());
+    };
+    for grid in [&small as &dyn Fn(usize, [f64; 3]) -> String, &free, &large] {
+        is(&(system.to_owned() + &grids(grid)), [0.0; 3], [2.0, 2.0, 1.0]);
+    }
+    is(&("GRDSET,,7\n".to_owned() + system + &grids(&set)), [0.0; 3], [2.0, 2.0, 1.0]);
+    // the axis of the ring is x, the angle begins at y, and the origin is a grid point
+    let points = "GRID,101,,1.,0.,0.\nGRID,102,,2.,0.,0.\nGRID,103,,1.,1.,0.\nCORD1C,7,101,102,103\n";
+    is(&(points.to_owned() + &grids(&free)), [1.0, 0.0, 0.0], [2.0, 2.0, 2.0]);
+    // the same by a system within another one, in which x is y, y is z and z is x
+    let nested = "CORD2R,5,,1.,0.,0.,2.,0.,0.\n,1.,1.,0.\nCORD2C,7,5,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n";
+    is(&(nested.to_owned() + &grids(&free)), [1.0, 0.0, 0.0], [2.0, 2.0, 2.0]);
+    // spherical: an eighth of a shell has the polar angle in the place of z
+    let ball = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID,{tag},7,{r:.1},{:.1},{:.1}\n", 45.0 + t / 2.0, 90.0 * z);
+    is(&(system.replace("2C", "2S") + &grids(&ball)), [0.0, 0.0, 0.0], [2.0, 2.0, 2f64.sqrt()]);
+    let refused = |text: &str, words: &[&str]| {
+        let run = list(&(head.to_owned() + text + cells));
+        assert!(run.code == 4 && words.iter().all(|word| run.stderr.contains(word)), "{words:?}\n{}", run.said());
+    };
+    refused(&grids(&free), &["a.bdf:4", "system of coordinates 7 is not there"]);
+    refused(&("CORD3G,7,1,2,3\n".to_owned() + &grids(&free)), &["a.bdf:4", "CORD3G is not read"]);
+    refused(&("CORD1R,7,1,2,3\n".to_owned() + &grids(&free)), &["a.bdf:4", "depends on itself"]);
+    refused(&("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\n".to_owned() + &grids(&free)), &["a.bdf:4", "lie on a line"]);
+    refused(&("INCLUDE 'b.bdf'\n".to_owned() + &grids(&free)), &["a.bdf:4", "include others"]);
 }

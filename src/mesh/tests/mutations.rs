@@ -88,10 +88,13 @@ fn read_any(name: &str, bytes: &[u8]) {
     match name.split_once('.').expect("an ending").1 {
         "msh" => [read_as::<2>, read_as::<3>].iter().for_each(|read| read(bytes)),
         "inp" => {
-            if let Ok(text) = abaqus::convert(Path::new(name), &String::from_utf8_lossy(bytes)) {
-                [read_as::<2>, read_as::<3>].iter().for_each(|read| read(text.as_bytes()));
+            for (dimension, read) in [(2, read_as::<2> as fn(&[u8])), (3, read_as::<3>)] {
+                if let Ok(converted) = abaqus::convert(Path::new(name), bytes, dimension) {
+                    read(converted.text.as_bytes());
+                }
             }
         }
+        "bdf" => drop(nastran::readable(Path::new(name), &String::from_utf8_lossy(bytes))),
         _ => drop(unv::readable(&String::from_utf8_lossy(bytes))),
     }
 }

@@ -1,0 +1,133 @@
+//! The lines of an input file and of the files that it includes.
+
+use crate::error::{Error, Result};
+use crate::file::{read, with_unix_lines};
+use std::path::{Path, PathBuf};
+
+/// Files that may stand in each other by `*INCLUDE`. More are taken for a file that includes itself.
+const DEEPEST: usize = 32;
+
+/// A line: the index of its file, and its number, counted from 1.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct At {
+    file: usize,
+    line: usize,
+}
+
+/// A file that is being read.
+struct Open {
+    file: usize,
+    line: usize,
+    text: String,
+    /// Position of the next line in bytes.
+    next: usize,
+}
+
+/// A keyword or a data line, without blanks at its ends.
+pub enum Line {
+    /// A keyword with its parameters, without the star.
+    Keyword(String),
+    /// Data.
+    Data(String),
+}
+
+/// The lines of a file, and of those that it includes, in turn.
+pub struct Lines {
+    files: Vec<PathBuf>,
+    open: Vec<Open>,
+    /// A line that was read too early.
+    early: Option<(At, String)>,
+    /// Bytes of all files so far.
+    pub bytes: usize,
+}
+
+impl Lines {
+    /// Start with the first line of a file.
+    pub fn new(path: &Path, bytes: &[u8]) -> Self {
+        let mut lines = Self { files: Vec::new(), open: Vec::new(), early: None, bytes: 0 };
+        lines.push(path.to_owned(), bytes);
+        lines
+    }
+
+    fn push(&mut self, path: PathBuf, bytes: &[u8]) {
+        let text = String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)).into_owned();
+        self.bytes += text.len();
+        self.open.push(Open { file: self.files.len(), line: 0, text, next: 0 });
+        self.files.push(path);
+    }
+
+    /// Continue with the lines of another file, whose name is relative to the folder of the file that names it.
+    ///
+    /// # Errors
+    /// The file cannot be read, or it includes itself.
+    pub fn include(&mut self, name: &str, at: At) -> Result<()> {
+        let name = name.trim().trim_matches(['"', '\'']);
+        if self.open.len() >= DEEPEST {
+            return Err(self.refuse(at, format!("`{name}` is included within itself")));
+        }
+        let folder = self.files[at.file].parent().unwrap_or(Path::new(""));
+        let path = folder.join(name);
+        let bytes = read(&path).map_err(|error| {
+            self.refuse(at, format!("`{name}` stands here to be included, but cannot be read"))
+                .because(error.message().to_owned())
+                .help("names of files are relative to the folder of the file that includes them")
+        })?;
+        self.push(path, &with_unix_lines(bytes));
+        Ok(())
+    }
+
+    /// Return an error at a line.
+    pub fn refuse(&self, at: At, message: impl Into<String>) -> Error {
+        Error::mesh(&self.files[at.file], Some(at.line), message)
+    }
+
+    /// Return a line in words.
+    pub fn show(&self, at: At) -> String {
+        match at.file {
+            0 => format!("line {}", at.line),
+            file => format!("line {} of {}", at.line, self.files[file].display()),
+        }
+    }
+
+    /// Return the next line that is not empty and no comment.
+    fn line(&mut self) -> Option<(At, String)> {
+        if let Some(early) = self.early.take() {
+            return Some(early);
+        }
+        while let Some(open) = self.open.last_mut() {
+            let Some(rest) = open.text.get(open.next..).filter(|rest| !rest.is_empty()) else {
+                self.open.pop();
+                continue;
+            };
+            let line = rest.split('\n').next().unwrap_or_default();
+            (open.next, open.line) = (open.next + line.len() + 1, open.line + 1);
+            let line = line.trim();
+            if !line.is_empty() && !line.starts_with("**") {
+                return Some((At { file: open.file, line: open.line }, line.to_owned()));
+            }
+        }
+        None
+    }
+
+    /// Return the next keyword or data line. A keyword that ends with a comma goes on in the next line, if that has parameters.
+    pub fn next(&mut self) -> Option<(At, Line)> {
+        let (at, line) = self.line()?;
+        let Some(keyword) = line.strip_prefix('*') else { return Some((at, Line::Data(line))) };
+        let mut keyword = keyword.to_owned();
+        while keyword.ends_with(',') {
+            match self.line() {
+                Some((_, more)) if !more.starts_with('*') && is_parameters(&more) => keyword += &more,
+                other => {
+                    self.early = other;
+                    break;
+                }
+            }
+        }
+        Some((at, Line::Keyword(keyword)))
+    }
+}
+
+/// Return whether a line has parameters of a keyword, and no data.
+fn is_parameters(line: &str) -> bool {
+    line.contains('=') || line.trim_end_matches(',').trim().eq_ignore_ascii_case("GENERATE")
+}

@@ -1,0 +1,440 @@
+//! From the lines of a file to its contents.
+
+use super::kinds::{Kind, Role};
+use super::lines::{At, Line, Lines};
+use super::model::{Element, Face, Label, Model, Node, Rotation, Set, Surface, members, normal};
+use super::words::{Keyword, TextResult, coordinates, count, generated, reals, spelled};
+use crate::error::Result;
+use crate::mesh::frame::{Coordinates, Frame};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::rc::Rc;
+
+/// The kind of data lines that follow a keyword.
+enum Data {
+    Nodes { set: Option<String>, coordinates: Coordinates },
+    Elements { name: Rc<str>, role: Role, set: Option<String>, open: Vec<u64> },
+    Set { name: String, nodes: bool, generate: bool, shift: u64 },
+    Surface(String),
+    NodeSurface(String),
+    Union(String),
+    System(Vec<[f64; 3]>),
+    Instance(Vec<Vec<f64>>),
+    Other,
+}
+
+/// A part or instance that is being read, and what surrounds it.
+struct Scope {
+    /// Beginning of the names of its sets.
+    prefix: String,
+    /// Number that is added to those of nodes and elements.
+    shift: u64,
+    /// Axes of `*SYSTEM`.
+    frame: Frame,
+}
+
+/// A node whose number stands twice with different coordinates.
+pub struct Twice {
+    pub tag: u64,
+    pub lines: [At; 2],
+}
+
+/// A reader of a file, with what it has read so far.
+pub struct Reader {
+    pub lines: Lines,
+    pub model: Model,
+    /// Nodes that stand twice.
+    pub twice: Vec<Twice>,
+    /// Number of `*TRANSFORM` keywords, which only turn dofs.
+    pub transforms: usize,
+    /// Number of elements with more nodes than their type has.
+    pub longer: usize,
+    scope: Scope,
+    /// The rest of the file while a part is read, and the name of the part.
+    outer: Option<(String, Model)>,
+    parts: BTreeMap<String, Model>,
+    /// Shifts of the instances by name.
+    instances: BTreeMap<String, u64>,
+    /// Lines behind `*INSTANCE` that place it.
+    moves: Vec<Vec<f64>>,
+}
+
+/// Return the set of a name, which is made if it is new.
+///
+/// # Errors
+/// Another name becomes the same.
+fn entry<'a>(sets: &'a mut BTreeMap<String, Set>, spelling: &str, at: At) -> TextResult<&'a mut Set> {
+    let new = || Set::new(Label { spelling: spelling.to_owned(), at });
+    let set = sets.entry(normal(spelling)).or_insert_with(new);
+    same(&set.label, spelling)?;
+    Ok(set)
+}
+
+/// Check that a name is spelled like an earlier one that is the same for the program.
+fn same(known: &Label, spelling: &str) -> TextResult<()> {
+    if known.spelling == spelling {
+        return Ok(());
+    }
+    let (first, name) = (&known.spelling, normal(spelling));
+    Err(format!("`{spelling}` and `{first}` would both be called `{name}` here: rename one of them"))
+}
+
+impl Reader {
+    /// Read a file and all that it includes.
+    ///
+    /// # Errors
+    /// A line is not one of Abaqus or CalculiX, or it is one that the program does not know and that changes the mesh. The
+    /// error names the file and the line.
+    pub fn read(path: &Path, bytes: &[u8]) -> Result<Reader> {
+        let scope = Scope { prefix: String::new(), shift: 0, frame: Frame::default() };
+        let mut reader = Reader {
+            lines: Lines::new(path, bytes),
+            model: Model::default(),
+            twice: Vec::new(),
+            transforms: 0,
+            longer: 0,
+            scope,
+            outer: None,
+            parts: BTreeMap::new(),
+            instances: BTreeMap::new(),
+            moves: Vec::new(),
+        };
+        let (mut data, mut last) = (Data::Other, At::default());
+        while let Some((at, line)) = reader.lines.next() {
+            last = at;
+            data = match line {
+                Line::Data(line) => reader.data(data, &line, at).map_err(|message| reader.lines.refuse(at, message))?,
+                Line::Keyword(line) => reader.keyword(data, &line, at)?,
+            };
+        }
+        reader.end(data).map_err(|message| reader.lines.refuse(last, message))?;
+        match (reader.outer.is_some(), reader.scope.prefix.is_empty()) {
+            (true, _) => Err(reader.lines.refuse(last, "*END PART is missing")),
+            (_, false) => Err(reader.lines.refuse(last, "*END INSTANCE is missing")),
+            _ => Ok(reader),
+        }
+    }
+
+    /// End the data of a keyword and begin those of another one. An included file continues the data before it.
+    fn keyword(&mut self, data: Data, line: &str, at: At) -> Result<Data> {
+        let keyword = Keyword::new(line, at);
+        if keyword.name == "INCLUDE" {
+            let input = keyword.get("INPUT").ok_or_else(|| self.lines.refuse(at, "*INCLUDE has no INPUT"))?;
+            return self.lines.include(input, at).map(|()| data);
+        }
+        let refuse = |reader: &Self, message: String| reader.lines.refuse(at, message);
+        self.end(data).map_err(|message| refuse(self, message))?;
+        let data = self.begin(&keyword).map_err(|message| refuse(self, message))?;
+        match keyword.get("INPUT").filter(|_| !matches!(data, Data::Other)) {
+            Some(input) => self.lines.include(input, at).map(|()| data),
+            None => Ok(data),
+        }
+    }
+
+    /// Start a keyword: return the kind of its data lines.
+    fn begin(&mut self, keyword: &Keyword) -> TextResult<Data> {
+        let spelling = |key: &str| keyword.get(key).map(|word| format!("{}{}", self.scope.prefix, spelled(word)));
+        let named = |key: &str| spelling(key).ok_or_else(|| format!("*{} has no {key}", keyword.name));
+        Ok(match keyword.name.as_str() {
+            "NODE" => Data::Nodes { set: spelling("NSET"), coordinates: coordinates(keyword)? },
+            "ELEMENT" => {
+                let name: Rc<str> = keyword.get("TYPE").unwrap_or_default().to_ascii_uppercase().into();
+                let role = Role::of(&name);
+                if role == Role::Refused {
+                    return Err(format!(
+                        "elements of type `{name}` cannot be used: triangles, quadrangles, tetrahedra, pyramids, prisms and \
+                         hexahedra of order 1 or 2 can, of the families CPS, CPE, CAX and C3D"
+                    ));
+                }
+                Data::Elements { name, role, set: spelling("ELSET"), open: Vec::new() }
+            }
+            "NSET" | "ELSET" => self.set(keyword, named(&keyword.name)?)?,
+            "SURFACE" => self.surface(keyword, named("NAME")?)?,
+            "SOLID SECTION" => {
+                self.model.sections.extend(spelling("ELSET").map(|spelling| normal(&spelling)));
+                Data::Other
+            }
+            "SYSTEM" => {
+                self.scope.frame = Frame::default();
+                Data::System(Vec::new())
+            }
+            "TRANSFORM" => {
+                self.transforms += 1;
+                Data::Other
+            }
+            "PART" | "END PART" | "INSTANCE" | "END INSTANCE" | "END ASSEMBLY" => return self.assembly(keyword),
+            "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" => {
+                return Err(format!(
+                    "*{} is not read: write a file that has every node under *NODE and every element under *ELEMENT",
+                    keyword.name
+                ));
+            }
+            _ => Data::Other,
+        })
+    }
+
+    /// Start a set.
+    fn set(&mut self, keyword: &Keyword, spelling: String) -> TextResult<Data> {
+        let shift = match keyword.get("INSTANCE").map(spelled) {
+            Some(name) => *self.instances.get(&name).ok_or_else(|| format!("there is no instance `{name}`"))?,
+            None => self.scope.shift,
+        };
+        let nodes = keyword.name == "NSET";
+        let Model { elements, element_sets, node_sets, .. } = &mut self.model;
+        match keyword.get("ELSET").filter(|_| nodes) {
+            Some(word) => {
+                let name = known(element_sets, &self.scope.prefix, word)?;
+                let tags = members(element_sets, &name, elements);
+                let tags = tags.map_err(|missing| format!("element {} is not there", missing.tag))?;
+                let set = entry(node_sets, &spelling, keyword.at)?;
+                tags.iter().flat_map(|tag| &elements[tag].nodes).for_each(|&node| set.add(node));
+            }
+            None => {
+                entry(if nodes { node_sets } else { element_sets }, &spelling, keyword.at)?;
+            }
+        }
+        let generate = keyword.get("GENERATE").is_some();
+        Ok(Data::Set { name: normal(&spelling), nodes, generate, shift })
+    }
+
+    /// Start a surface.
+    fn surface(&mut self, keyword: &Keyword, spelling: String) -> TextResult<Data> {
+        let name = normal(&spelling);
+        let kind = keyword.get("TYPE").unwrap_or("ELEMENT").to_ascii_uppercase();
+        let combine = keyword.get("COMBINE").map(str::to_ascii_uppercase);
+        if kind == "NODE" {
+            entry(&mut self.model.node_sets, &spelling, keyword.at)?;
+            return Ok(Data::NodeSurface(name));
+        }
+        if kind != "ELEMENT" || combine.as_deref().is_some_and(|combine| combine != "UNION") {
+            let what = combine.map_or(format!("TYPE={kind}"), |combine| format!("COMBINE={combine}"));
+            return Err(format!("a surface with {what} is not read: name its faces, as in `12, S1`"));
+        }
+        let label = Label { spelling: spelling.clone(), at: keyword.at };
+        let surface = self.model.surfaces.entry(name.clone());
+        let surface = surface.or_insert_with(|| Surface { label, ..Surface::default() });
+        same(&surface.label, &spelling)?;
+        Ok(if combine.is_some() { Data::Union(name) } else { Data::Surface(name) })
+    }
+
+    /// Begin or end a part, an instance or an assembly.
+    fn assembly(&mut self, keyword: &Keyword) -> TextResult<Data> {
+        let name = keyword.get("NAME").map(spelled);
+        let named = || name.clone().ok_or_else(|| format!("*{} has no NAME", keyword.name));
+        self.scope.frame = Frame::default();
+        match keyword.name.as_str() {
+            "PART" if self.outer.is_some() => return Err("a part stands in another one: *END PART is missing".into()),
+            "PART" => self.outer = Some((named()?, std::mem::take(&mut self.model))),
+            "END PART" => {
+                let (name, outer) = self.outer.take().ok_or("there is no *PART before this line")?;
+                self.parts.insert(name, std::mem::replace(&mut self.model, outer));
+            }
+            "INSTANCE" => {
+                let (name, part) = (named()?, keyword.get("PART").map(spelled).ok_or("*INSTANCE has no PART")?);
+                let part = self.parts.get(&part).ok_or_else(|| format!("there is no part `{part}`"))?;
+                self.scope.shift = self.model.largest();
+                self.scope.prefix = format!("{name}.");
+                self.model.add(part, &self.scope.prefix, self.scope.shift);
+                if self.instances.insert(name, self.scope.shift).is_some() {
+                    return Err("this instance stands twice".into());
+                }
+                self.moves.clear();
+                return Ok(Data::Instance(Vec::new()));
+            }
+            "END INSTANCE" => self.end_instance(keyword.at)?,
+            _ => {}
+        }
+        Ok(Data::Other)
+    }
+
+    /// Place an instance. All its elements become a set with its name.
+    fn end_instance(&mut self, at: At) -> TextResult<()> {
+        let (shift, moves) = (self.scope.shift, std::mem::take(&mut self.moves));
+        let vector = |line: &[f64], from: usize| std::array::from_fn(|c| line.get(from + c).copied().unwrap_or(0.0));
+        let translation = moves.first().map_or([0.0; 3], |line| vector(line, 0));
+        let rotation = match moves.get(1) {
+            Some(line) if line.len() == 7 => Some(
+                Rotation::new(vector(line, 0), vector(line, 3), line[6]).ok_or("the axis of a rotation is a point")?,
+            ),
+            Some(_) => return Err("a rotation has two points of its axis and an angle, seven numbers".into()),
+            None => None,
+        };
+        self.model.place(shift, translation, rotation);
+        let name = self.scope.prefix.trim_end_matches('.').to_owned();
+        let elements: Vec<u64> = self.model.elements.range(shift.saturating_add(1)..).map(|(tag, _)| *tag).collect();
+        let set = entry(&mut self.model.element_sets, &name, at)?;
+        elements.into_iter().for_each(|tag| set.add(tag));
+        self.scope = Scope { prefix: String::new(), shift: self.model.largest(), frame: Frame::default() };
+        Ok(())
+    }
+
+    /// End the data lines of a keyword.
+    fn end(&mut self, data: Data) -> TextResult<()> {
+        match data {
+            Data::Elements { role: Role::Mesh(kind), open, .. } if !open.is_empty() => check_count(kind, &open),
+            Data::Instance(moves) => {
+                self.moves = moves;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Read a data line.
+    fn data(&mut self, data: Data, line: &str, at: At) -> TextResult<Data> {
+        let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
+        match data {
+            Data::Nodes { ref set, coordinates } => self.node(&words, set.as_deref(), coordinates, at).map(|()| data),
+            Data::Elements { .. } => self.element(data, &words, line.ends_with(','), at),
+            Data::Set { ref name, nodes, generate, shift } => {
+                self.members(name, nodes, generate, shift, &words).map(|()| data)
+            }
+            Data::Surface(ref name) => self.face(name, &words, line).map(|()| data),
+            Data::NodeSurface(ref name) => {
+                self.members(name, true, false, self.scope.shift, &words[..1]).map(|()| data)
+            }
+            Data::Union(ref name) => self.unite(name, &words).map(|()| data),
+            Data::System(points) => self.system(points, &reals(&words)?),
+            Data::Instance(mut moves) => {
+                moves.push(reals(&words)?);
+                Ok(Data::Instance(moves))
+            }
+            Data::Other => Ok(data),
+        }
+    }
+
+    /// Read a node.
+    fn node(&mut self, words: &[&str], set: Option<&str>, coordinates: Coordinates, at: At) -> TextResult<()> {
+        let tag = count(words[0])?.saturating_add(self.scope.shift);
+        let given = reals(&words[1..words.len().min(4)])?;
+        let given = std::array::from_fn(|c| given.get(c).copied().unwrap_or(0.0));
+        let x = self.scope.frame.place(coordinates.rectangular(given));
+        if let Some(old) = self.model.nodes.insert(tag, Node { x, at }).filter(|old| old.x != x) {
+            self.twice.push(Twice { tag, lines: [old.at, at] });
+        }
+        match set {
+            Some(set) => entry(&mut self.model.node_sets, set, at).map(|set| set.add(tag)),
+            None => Ok(()),
+        }
+    }
+
+    /// Read an element, or a part of it.
+    fn element(&mut self, data: Data, words: &[&str], continues: bool, at: At) -> TextResult<Data> {
+        let Data::Elements { name, role, set, mut open } = data else { return Ok(data) };
+        let kind = if let Role::Mesh(kind) = role { Some(kind) } else { None };
+        if kind.is_none() {
+            // The number of nodes is unknown, so that the element ends where its line does not go on.
+            open.extend(count(words[0]).ok().filter(|_| open.is_empty()));
+        } else {
+            open.extend(words.iter().map(|word| count(word)).collect::<TextResult<Vec<u64>>>()?);
+        }
+        if continues && kind.is_none_or(|kind| open.len() <= kind.nodes()) {
+            return Ok(Data::Elements { name, role, set, open });
+        }
+        if let Some(kind) = kind {
+            // A beam may have a node more, for its direction.
+            self.longer += usize::from(kind.shape.dimension > 1 && open.len() > kind.nodes() + 1);
+            open.truncate(kind.nodes() + 1);
+            check_count(kind, &open)?;
+        }
+        let [tag, nodes @ ..] = open.as_slice() else { return Err("an element has no number".into()) };
+        let shifted = |tag: &u64| tag.saturating_add(self.scope.shift);
+        let (tag, nodes) = (shifted(tag), nodes.iter().map(shifted).collect());
+        if let Some(set) = &set {
+            entry(&mut self.model.element_sets, set, at)?.add(tag);
+        }
+        let element = Element { name: name.clone(), kind, nodes, at };
+        if let Some(old) = self.model.elements.insert(tag, element) {
+            return Err(format!("the element {tag} stands twice, also in {}", self.lines.show(old.at)));
+        }
+        Ok(Data::Elements { name, role, set, open: Vec::new() })
+    }
+
+    /// Read members of a set.
+    fn members(&mut self, name: &str, nodes: bool, generate: bool, shift: u64, words: &[&str]) -> TextResult<()> {
+        let sets = if nodes { &mut self.model.node_sets } else { &mut self.model.element_sets };
+        let mut others = Vec::new();
+        for word in words.iter().filter(|word| !word.is_empty() && !generate) {
+            match word.parse::<u64>() {
+                Ok(tag) => {
+                    let set = sets.get_mut(name).ok_or("there is no such set")?;
+                    set.add(tag.saturating_add(shift));
+                }
+                Err(_) => others.push(known(sets, &self.scope.prefix, word)?),
+            }
+        }
+        let set = sets.get_mut(name).ok_or("there is no such set")?;
+        others.into_iter().for_each(|other| set.add_set(other));
+        if generate {
+            let [first, last, step] = generated(name, words, self.lines.bytes)?;
+            set.add_range(first.saturating_add(shift), last.saturating_add(shift), step);
+        }
+        Ok(())
+    }
+
+    /// Read faces of a surface.
+    fn face(&mut self, name: &str, words: &[&str], line: &str) -> TextResult<()> {
+        let label = words.get(1).map(|word| word.to_ascii_uppercase()).unwrap_or_default();
+        let number = label.strip_prefix('S').and_then(|digits| digits.parse::<usize>().ok());
+        let face = match (label.as_str(), number) {
+            ("", _) => Face::Free,
+            ("SPOS" | "SNEG", _) => Face::Itself,
+            (_, Some(number @ 1..=6)) => Face::Number(number - 1),
+            _ => return Err(format!("`{line}` is no face of elements such as `12, S1`")),
+        };
+        let one = words[0].parse::<u64>().map(|tag| tag.saturating_add(self.scope.shift));
+        let of_set = match one {
+            Ok(_) => None,
+            Err(_) => Some(known(&self.model.element_sets, &self.scope.prefix, words[0])?),
+        };
+        let surface = self.model.surfaces.get_mut(name).ok_or("there is no such surface")?;
+        surface.faces.extend(one.ok().map(|tag| (tag, face)));
+        surface.of_sets.extend(of_set.map(|set| (set, face)));
+        Ok(())
+    }
+
+    /// Add other surfaces to a surface.
+    fn unite(&mut self, name: &str, words: &[&str]) -> TextResult<()> {
+        for word in words.iter().filter(|word| !word.is_empty()) {
+            let other = normal(&format!("{}{}", self.scope.prefix, spelled(word)));
+            let other = self.model.surfaces.get(&other).or_else(|| self.model.surfaces.get(&normal(&spelled(word))));
+            let other = other.cloned().ok_or_else(|| format!("there is no surface `{word}`"))?;
+            let surface = self.model.surfaces.get_mut(name).ok_or("there is no such surface")?;
+            surface.faces.extend(other.faces);
+            surface.of_sets.extend(other.of_sets);
+        }
+        Ok(())
+    }
+
+    /// Read a line of `*SYSTEM`: the origin and a point on the first axis; then a point in the plane of the first two axes.
+    fn system(&mut self, mut points: Vec<[f64; 3]>, numbers: &[f64]) -> TextResult<Data> {
+        if !matches!(numbers.len(), 3 | 6) {
+            return Err("*SYSTEM has three numbers of each point: origin, first axis; then the second axis".into());
+        }
+        points.extend(numbers.chunks_exact(3).map(|point| [point[0], point[1], point[2]]));
+        let frame = match points[..] {
+            [origin] => Some(Frame::at(origin)),
+            // The third axis stays where it is.
+            [[x, y, z], first] => Frame::by_third_axis([x, y, z], [x, y, z + 1.0], first),
+            [origin, first, second] => Frame::by_first_axis(origin, first, second),
+            _ => return Err("*SYSTEM has three points at most".into()),
+        };
+        self.scope.frame = frame.ok_or("the points of *SYSTEM lie on a line")?;
+        Ok(Data::System(points))
+    }
+}
+
+/// Return the name of a set that a line refers to, within its part or instance or outside.
+fn known(sets: &BTreeMap<String, Set>, prefix: &str, word: &str) -> TextResult<String> {
+    let [own, outside] = [prefix, ""].map(|prefix| normal(&format!("{prefix}{}", spelled(word))));
+    let found = [own, outside].into_iter().find(|name| sets.contains_key(name));
+    found.ok_or_else(|| format!("there is no set `{word}`"))
+}
+
+/// Check the number of nodes behind the number of an element.
+fn check_count(kind: Kind, open: &[u64]) -> TextResult<()> {
+    match open.len() == kind.nodes() + 1 {
+        true => Ok(()),
+        false => Err(format!("an element has {} nodes here, not {}", kind.nodes(), open.len() - 1)),
+    }
+}

@@ -1,0 +1,109 @@
+//! Local systems of coordinates in files of other programs.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// The kind of local coordinates. Angles are in degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coordinates {
+    /// x, y, z.
+    Rectangular,
+    /// Radius, angle from x to y, z.
+    Cylindrical,
+    /// Radius, angle from the z axis, angle from x to y, as in Nastran.
+    Spherical,
+}
+
+impl Coordinates {
+    /// Return the rectangular coordinates (x, y, z) in the local axes.
+    pub fn rectangular(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Coordinates::Rectangular => [a, b, c],
+            Coordinates::Cylindrical => [a * cos(b), a * sin(b), c],
+            Coordinates::Spherical => [a * sin(b) * cos(c), a * sin(b) * sin(c), a * cos(b)],
+        }
+    }
+}
+
+/// Return the cosine of an angle in degrees. It is exact at multiples of 90 degrees, where planes of symmetry are.
+fn cos(degrees: f64) -> f64 {
+    match degrees.rem_euclid(360.0) {
+        0.0 => 1.0,
+        90.0 | 270.0 => 0.0,
+        180.0 => -1.0,
+        angle => angle.to_radians().cos(),
+    }
+}
+
+/// Return the sine of an angle in degrees, exact at multiples of 90 degrees.
+fn sin(degrees: f64) -> f64 {
+    match degrees.rem_euclid(360.0) {
+        0.0 | 180.0 => 0.0,
+        90.0 => 1.0,
+        270.0 => -1.0,
+        angle => angle.to_radians().sin(),
+    }
+}
+
+/// Local axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    origin: Vector3<f64>,
+    axes: Matrix3<f64>,
+}
+
+impl Default for Frame {
+    fn default() -> Self {
+        Self { origin: Vector3::zeros(), axes: Matrix3::identity() }
+    }
+}
+
+impl Frame {
+    /// Return the global axes at another origin.
+    pub fn at(origin: [f64; 3]) -> Self {
+        Self { origin: origin.into(), ..Self::default() }
+    }
+
+    /// Return the axes with the third one from the origin to `axis`, and `plane` in the half plane of the first one. None if
+    /// the points lie on a line.
+    pub fn by_third_axis(origin: [f64; 3], axis: [f64; 3], plane: [f64; 3]) -> Option<Self> {
+        let [z, x] = [axis, plane].map(|point| Vector3::from(point) - Vector3::from(origin));
+        let (z, y) = (unit(z)?, unit(z.cross(&x))?);
+        Some(Self { origin: origin.into(), axes: Matrix3::from_columns(&[y.cross(&z), y, z]) })
+    }
+
+    /// Return the axes with the first one from the origin to `axis`, and `plane` in the half plane of the second one. None if
+    /// the points lie on a line.
+    pub fn by_first_axis(origin: [f64; 3], axis: [f64; 3], plane: [f64; 3]) -> Option<Self> {
+        let [x, y] = [axis, plane].map(|point| Vector3::from(point) - Vector3::from(origin));
+        let (x, z) = (unit(x)?, unit(x.cross(&y))?);
+        Some(Self { origin: origin.into(), axes: Matrix3::from_columns(&[x, z.cross(&x), z]) })
+    }
+
+    /// Return the global coordinates of a point with these rectangular local ones.
+    pub fn place(&self, local: [f64; 3]) -> [f64; 3] {
+        (self.origin + self.axes * Vector3::from(local)).into()
+    }
+}
+
+/// Return the unit vector along a vector, or none if it is zero to rounding or not finite.
+fn unit(v: Vector3<f64>) -> Option<Vector3<f64>> {
+    v.try_normalize(1e-300).filter(|unit| unit.iter().all(|c| c.is_finite()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn local_coordinates_become_global_ones() {
+        assert_eq!(Coordinates::Cylindrical.rectangular([2.0, 90.0, 5.0]), [0.0, 2.0, 5.0]);
+        assert_eq!(Coordinates::Spherical.rectangular([2.0, 90.0, 180.0]), [-2.0, 0.0, 0.0]);
+        assert_eq!(Coordinates::Spherical.rectangular([2.0, 0.0, 45.0]), [0.0, 0.0, 2.0]);
+        // The third axis is x, and the first one y, so that the second one is z.
+        let frame = Frame::by_third_axis([1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.0, 2.0, 1.0]).unwrap();
+        assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
+        let frame = Frame::by_first_axis([1.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 0.0, 5.0]).unwrap();
+        assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
+        assert_eq!(Frame::by_third_axis([0.0; 3], [1.0; 3], [2.0; 3]), None);
+    }
+}
