@@ -13,12 +13,10 @@ use std::ptr::null_mut;
 /// Space beyond the estimate of the analysis, in per cent; the values are tried one after the other.
 pub(super) const EXTRA_SPACE: [i32; 4] = [20, 60, 200, 1000];
 
-/// Values of ICNTL(7): the elimination order by MUMPS' approximate minimum degree, a given one, and that of PORD, which every MUMPS has.
-///
-/// `groove3d` with n = 40 (237 636 dofs) takes 1226 MB and 11.6 CPU s with PORD, and 1032 MB and 11.8 CPU s with METIS.
+/// Values of ICNTL(7): the elimination order by MUMPS' approximate minimum degree, and a given one. With a Schur complement MUMPS replaces PORD by
+/// minimum degree. `groove3d` with n = 40 (237 636 dofs) takes 1226 MB with it, and 1032 MB with METIS.
 const MINIMUM_DEGREE: MumpsInt = 0;
 const GIVEN: MumpsInt = 1;
-const PORD: MumpsInt = 4;
 
 /// Largest number of dofs of a plane body that is ordered by minimum degree.
 ///
@@ -85,8 +83,8 @@ impl Schur {
     /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong to one node. Options
     /// `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
     ///
-    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1), or by PORD (4) where METIS is missing. Small plane bodies take
-    /// MUMPS' own approximate minimum degree (0).
+    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1). Small plane bodies, and all without METIS, take MUMPS' own
+    /// approximate minimum degree (0).
     ///
     /// MUMPS treats pivots below an absolute size (about 1e-20) as zeros, and does not scale a matrix with a Schur complement. It gets D K D
     /// with powers of two D, which round nothing. What counts as small then depends neither on units nor on other regions.
@@ -122,11 +120,8 @@ impl Schur {
             _session: session.clone(),
         };
         schur.start()?;
-        schur.mumps.head.icntl[6] = match (Self::is_large(block_size, rows), metis::has_metis()) {
-            (false, _) => MINIMUM_DEGREE,
-            (true, true) => GIVEN,
-            (true, false) => PORD,
-        };
+        let is_given = Self::is_large(block_size, rows) && metis::has_metis();
+        schur.mumps.head.icntl[6] = if is_given { GIVEN } else { MINIMUM_DEGREE };
         schur.read_options(session, body)?;
         let mumps = &mut schur.mumps.head;
         if mumps.icntl[6] == GIVEN {

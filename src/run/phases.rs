@@ -202,7 +202,7 @@ fn warnings(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<Str
     }
     if discrete.bodies.iter().any(|body| Schur::is_large(dimension, body.dofs)) && !has_metis() {
         warnings.push(
-            "METIS was not found: large bodies are factored in the order of PORD, with a fifth more memory; \
+            "METIS was not found: large bodies are factored in the order of minimum degree, with a fifth more memory or more; \
              `apt-get install libmetis5`, or a PETSc with METIS"
                 .to_owned(),
         );

@@ -192,7 +192,8 @@ fn options_come_from_line_file_and_environment() {
 fn a_missing_options_file_is_told_in_petscs_words() {
     expect_success(alone("petsc::a_missing_options_file_is_told_in_petscs_words", 0, &[], || {
         let error = Session::start(&words("-options_file nosuch.opt")).err().expect("no such file");
-        assert!(error.to_string().contains("Unable to open options file nosuch.opt"), "{error}");
+        // the sentence around the name differs between versions
+        assert!(error.render(false).contains("nosuch.opt"), "{error}");
         assert_eq!(error.kind().exit_code(), 5);
         Ok(())
     }));
@@ -345,10 +346,10 @@ fn grids(side: usize) -> Vec<(usize, usize, f64)> {
 #[test]
 fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
     let output = alone("petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
-        let options = ["-asked_mat_mumps_icntl_7", "1", "-pord_mat_mumps_icntl_7", "4"];
+        let options = ["-asked_mat_mumps_icntl_7", "1", "-own_mat_mumps_icntl_7", "0"];
         let session = Session::start(&options.map(String::from))?;
-        // METIS is 1, and 4 is PORD, which serves without METIS; 20 000 dofs are the last without either
-        for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1), ("pord", 101, 4)] {
+        // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
+        for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1), ("own", 101, 0)] {
             let dofs = 2 * side * side;
             let retained: Vec<usize> = (dofs - 2 * side..dofs).collect();
             let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &retained)?;
