@@ -9,5 +9,6 @@ mod gmsh;
 mod meshes;
 mod patterns;
 mod pieces;
+mod quadratic;
 mod round;
 mod surfaces;

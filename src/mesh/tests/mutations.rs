@@ -2,7 +2,7 @@
 //! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed; `scripts/fuzz`
 //! runs this test, too.
 
-use super::super::{Asked, Duty, Maker, Mesh, abaqus, parse, unv};
+use super::super::{Asked, Duty, Maker, Mesh, abaqus, nastran, parse, unv};
 use std::path::Path;
 
 /// Valid files: their names tell which reader they are for.

@@ -1,9 +1,7 @@
 //! Quadratic quadrangles, hexahedra, prisms and pyramids in every format that has them: constant pressure is exact, and curved
 //! bodies have Lamé's pressure.
 
-mod common;
-
-use common::{Run, Scene, solve, solve_on};
+use crate::common::{Run, Scene, solve, solve_on};
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::fmt::Write;
