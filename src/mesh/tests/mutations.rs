@@ -1,5 +1,5 @@
 //! Readers on damaged files: bytes of small valid files of each format are changed at random. A reader gives a mesh that keeps its
-//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed; `scripts/fuzz`
+//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed, none by default; `scripts/fuzz`
 //! runs this test, too.
 
 use super::super::{Asked, Duty, Maker, Mesh, abaqus, nastran, parse, unv};
@@ -130,7 +130,7 @@ fn read_as<const D: usize>(bytes: &[u8]) {
 
 #[test]
 fn damaged_files_never_end_the_program() {
-    let most = std::env::var("WINKLER_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(60);
+    let most = std::env::var("WINKLER_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(0);
     for (place, (name, seed)) in SEEDS.iter().enumerate() {
         read_any(name, seed);
         for number in 0..most {
