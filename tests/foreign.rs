@@ -140,7 +140,7 @@ fn files_of_abaqus_and_calculix() {
         assert!(run.code == 4 && words.iter().all(|word| run.stderr.contains(word)), "{words:?} {}", run.said());
     };
     refused("*HEADING", "*PART, NAME=A", &["*PART is not read", "a.inp:1"]);
-    refused("type=C3D8R", "type=C3D20", &["elements of type `C3D20` cannot be used", "a.inp:21"]);
+    refused("type=C3D8R", "type=C3D27", &["elements of type `C3D27` cannot be used", "a.inp:21"]);
     refused("Upper, LOWER", "Upper, LOWR", &["there is no set `LOWR`"]);
     refused("2, 11, 12, 13, 15, 16, 17", "2, 11, 12, 13, 15, 16", &["an element has 6 nodes here, not 5"]);
     refused("17, 18\n*ELSET", "17,\n*ELSET", &["an element has 6 nodes here, not 5"]);
@@ -215,13 +215,13 @@ fn what_is_no_mesh_and_no_shape_is_refused() {
     refused("a.step", "hello\n", "{ geo = \"a.step\", size = -1 }", 3, &["must be greater than 0"]);
     refused("a.geo", "n = 1;\n", "{ geo = \"a.geo\", size = 1 }", 3, &["`size` for a script"]);
     let text = String::from_utf8(made(&patch(), &["-3", "-format", "msh22"], "a.msh")).expect("text");
-    // quadratic hexahedra
+    // cubic tetrahedra
     let is_cell = |line: &&str| line.split_whitespace().count() == 9 && line.split_whitespace().nth(1) == Some("4");
     let line = text.lines().find(is_cell).expect("a tetrahedron");
     let words: Vec<&str> = line.split_whitespace().collect();
     let nodes: String = (1..=20).map(|node| format!(" {node}")).collect();
-    let quadratic = format!("{} 17 2 {} {}{nodes}", words[0], words[3], words[4]);
-    refused("a.msh", &text.replace(line, &quadratic), "\"a.msh\"", 4, &["hexahedron elements of 20 nodes", "order 1"]);
+    let cubic = format!("{} 29 2 {} {}{nodes}", words[0], words[3], words[4]);
+    refused("a.msh", &text.replace(line, &cubic), "\"a.msh\"", 4, &["tetrahedron elements of 20 nodes", "order 2"]);
     refused("a.msh", &text.replace("\"lower\"", "\"lowr\""), "\"a.msh\"", 3, &["`lower`"]);
     // names that differ by what becomes the same
     refused("a.msh", &text.replace("\"upper\"", "\"LOWER\""), "\"a.msh\"", 4, &["two groups", "`lower`", "rename"]);

@@ -23,9 +23,37 @@ const QUADRANGLE: &[&[usize]] = &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
 const TETRAHEDRON: &[&[usize]] = &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]];
 const TETRAHEDRON_2: &[&[usize]] =
     &[&[0, 1, 2, 4, 5, 6], &[0, 3, 1, 7, 8, 4], &[1, 3, 2, 8, 9, 5], &[2, 3, 0, 9, 7, 6]];
+const QUADRANGLE_2: &[&[usize]] = &[&[0, 1, 4], &[1, 2, 5], &[2, 3, 6], &[3, 0, 7]];
 const PRISM: &[&[usize]] = &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]];
 const HEXAHEDRON: &[&[usize]] =
     &[&[0, 1, 2, 3], &[4, 7, 6, 5], &[0, 4, 5, 1], &[1, 5, 6, 2], &[2, 6, 7, 3], &[3, 7, 4, 0]];
+const PRISM_2: &[&[usize]] = &[
+    &[0, 1, 2, 6, 7, 8],
+    &[3, 5, 4, 11, 10, 9],
+    &[0, 3, 4, 1, 12, 9, 13, 6],
+    &[1, 4, 5, 2, 13, 10, 14, 7],
+    &[2, 5, 3, 0, 14, 11, 12, 8],
+];
+const HEXAHEDRON_2: &[&[usize]] = &[
+    &[0, 1, 2, 3, 8, 9, 10, 11],
+    &[4, 7, 6, 5, 15, 14, 13, 12],
+    &[0, 4, 5, 1, 16, 12, 17, 8],
+    &[1, 5, 6, 2, 17, 13, 18, 9],
+    &[2, 6, 7, 3, 18, 14, 19, 10],
+    &[3, 7, 4, 0, 19, 15, 16, 11],
+];
+
+/// Return the nodes of an element in the order of Gmsh. `number` is Gmsh's number of its kind.
+fn in_gmsh_order(number: u8, nodes: &[u64]) -> Vec<u64> {
+    let middles: &[usize] = match number {
+        11 => &[4, 5, 6, 7, 9, 8],
+        17 => &[8, 11, 16, 9, 17, 10, 18, 19, 12, 15, 13, 14],
+        18 => &[6, 8, 12, 7, 13, 14, 9, 11, 10],
+        _ => return nodes.to_vec(),
+    };
+    let vertices = &nodes[..nodes.len() - middles.len()];
+    vertices.iter().copied().chain(middles.iter().map(|&at| nodes[at])).collect()
+}
 
 impl Kind {
     /// Return the kind that a TYPE names, if it can be used.
@@ -45,9 +73,12 @@ impl Kind {
             ("C3D", "10") => kind(11, 10, 3, TETRAHEDRON_2),
             ("C3D", "6") => kind(6, 6, 3, PRISM),
             ("C3D", "8") => kind(5, 8, 3, HEXAHEDRON),
+            ("C3D", "15") => kind(18, 15, 3, PRISM_2),
+            ("C3D", "20") => kind(17, 20, 3, HEXAHEDRON_2),
             ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D" | "STRI", "3") => kind(2, 3, 2, TRIANGLE),
             ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D", "6") | ("STRI", "65") => kind(9, 6, 2, TRIANGLE_2),
             ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D", "4") => kind(3, 4, 2, QUADRANGLE),
+            ("CPS" | "CPE" | "CAX" | "S" | "M3D" | "SFM3D", "8") => kind(16, 8, 2, QUADRANGLE_2),
             _ => None,
         }
     }
@@ -59,7 +90,8 @@ impl Kind {
             (2, _) => 8,
             (_, 3) => 2,
             (_, 4) => 3,
-            _ => 9,
+            (_, 6) => 9,
+            _ => 16,
         }
     }
 }
@@ -149,8 +181,7 @@ impl Model {
                 let kind = option("TYPE").unwrap_or_default().to_ascii_uppercase();
                 let known = Kind::of(&kind).ok_or_else(|| {
                     format!(
-                        "elements of type `{kind}` cannot be used: solids of order 1, and triangles and tetrahedra of order 2, \
-                         of CPS, CPE, CAX and C3D can"
+                        "elements of type `{kind}` cannot be used: solids of order 1 and 2 of CPS, CPE, CAX and C3D can"
                     )
                 })?;
                 self.kinds.push(known);
@@ -285,10 +316,7 @@ impl Model {
                     .get(tag)
                     .ok_or_else(|| format!("`{set}` has an element {tag}, which is not there"))?;
                 let kind = &self.kinds[*kind];
-                let mut nodes = nodes.clone();
-                if kind.number == 11 {
-                    nodes.swap(8, 9);
-                }
+                let nodes = in_gmsh_order(kind.number, nodes);
                 of_dimension.entry(kind.dimension).or_default().push((kind.number, nodes));
             }
             if of_dimension.len() > 1 {

@@ -16,7 +16,7 @@ use std::time::Duration;
 pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // A prefix of 128 bits is long enough.
-    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 3", made_from)))
+    format!("{stem}-{:.32}.msh", digest(&("winkler mesh 4", made_from)))
 }
 
 /// Return the folders that may hold the cache, best first. $WINKLER_CACHE stands alone if it is set. Otherwise they are

@@ -1,26 +1,28 @@
 //! The `$Elements` section: the simplices of all physical groups.
 
 use super::cursor::Cursor;
+use super::middles::Middles;
 use super::nodes::Nodes;
+use super::orders::{self, Orders};
 use super::physical::Physical;
 use super::simplex::{self, Kind, THINGS};
 use super::split::Split;
 use crate::error::Result;
 use crate::problem::order::Order;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
 /// Number of elements that are read before they go to their groups, so that a large block is not in memory twice.
 const SLICE: usize = 1 << 10;
 
-/// Read the contents of the section into the groups. Return the order of the elements, which is `None` if there are only
-/// points, and the number of elements that were split.
+/// Read the contents of the section into the groups. Return the order of the cells, which is `None` if there are none, and the
+/// number of elements that were split. Points in the middle of diagonals are appended to those of `nodes`.
 ///
 /// # Errors
-/// The text is malformed. Elements in a group are not simplices of order 1 or 2, or mix both orders. A node does not exist, or
+/// The text is malformed. Elements in a group are not of order 1 or 2, or cells or facets mix both orders. A node does not exist, or
 /// it lies off the plane if `D` is 2. A simplex is degenerate.
 pub fn read<const D: usize>(
     cursor: &mut Cursor,
-    nodes: &Nodes,
+    nodes: &mut Nodes,
     physical: &mut Physical,
 ) -> Result<(Option<Order>, usize)> {
     cursor.begin();
@@ -31,7 +33,7 @@ pub fn read<const D: usize>(
     cursor.size()?;
     cursor.end()?;
     let mut seen: usize = 0;
-    let (mut common_order, mut in_parts) = (None, 0);
+    let (mut orders, mut in_parts, mut known) = (Orders::default(), 0, HashMap::new());
     let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
         let head = Head::read(cursor)?;
@@ -50,15 +52,13 @@ pub fn read<const D: usize>(
         };
         let name = physical.groups[*first].name.clone();
         let (kind, split) = head.kind(cursor, &name)?;
-        if kind.order.is_some_and(|order| *common_order.get_or_insert(order) != order) {
-            let message = format!("group `{name}` is of another order than the elements before it");
-            let help = "save all elements with one order: gmsh -order 1 or 2";
-            return Err(cursor.error_at(position, message).help(help));
+        if let Some(order) = kind.order {
+            orders.add(cursor, dimension, order, position, &name)?;
         }
         let mut rest = count;
         while rest > 0 {
             let slice = Block { kind, split, count: rest.min(SLICE), name: &name };
-            let (connectivity, tags) = slice.read::<D>(cursor, nodes)?;
+            let (connectivity, tags) = slice.read::<D>(cursor, nodes, &mut known)?;
             physical.extend((dimension, tag), kind.stride, &connectivity, &tags);
             rest -= slice.count;
         }
@@ -71,7 +71,11 @@ pub fn read<const D: usize>(
     if let Some((head, dimension, tag)) = again {
         refuse_another_number(cursor, physical, heads, head, (dimension, tag))?;
     }
-    Ok((common_order, in_parts))
+    let order = orders.of_cells(cursor, D)?;
+    if order == Some(Order::P2) {
+        orders::raise(&mut physical.groups, &mut nodes.points, D);
+    }
+    Ok((order, in_parts))
 }
 
 /// Refuse two blocks of one entity, the second at `position`, if another entity has no block: then one block has the number of
@@ -115,7 +119,7 @@ impl Head {
         };
         let Some((shape, stride)) = simplex::type_name(number) else {
             let message = format!("elements of Gmsh's type {number} cannot be used");
-            return Err(cursor.error_at(position, message).help(SIMPLICES));
+            return Err(cursor.error_at(position, message).help(ORDERS));
         };
         // This is checked even in blocks that nobody needs. The block may be one of another dimension whose head is damaged.
         if simplex::dimension(shape) != dimension {
@@ -133,10 +137,10 @@ impl Head {
     fn kind(&self, cursor: &Cursor, name: &str) -> Result<(Kind, Option<Split>)> {
         let split = Split::of_type(self.number).filter(|split| split.dimension == self.dimension);
         let whole = Kind::of_type(self.number).filter(|kind| kind.dimension == self.dimension);
-        let Some(kind) = whole.or(split.map(|split| Kind::linear(split.dimension))) else {
+        let Some(kind) = whole.or(split.map(|split| Kind::simplex(split.dimension, split.order()))) else {
             let Self { shape, stride, number, .. } = self;
             let message = format!("group `{name}` has {shape} elements of {stride} nodes (Gmsh's type {number})");
-            return Err(cursor.error_at(self.position, message).help(SIMPLICES));
+            return Err(cursor.error_at(self.position, message).help(ORDERS));
         };
         Ok((kind, split))
     }
@@ -147,8 +151,8 @@ fn thing(dimension: usize) -> String {
     THINGS[dimension].to_lowercase()
 }
 
-/// The advice about elements that are not simplices of order 1 or 2.
-const SIMPLICES: &str = "use triangles and tetrahedra of order 1 or 2, or quadrangles, hexahedra, prisms and pyramids of order 1: `gmsh -order 1`";
+/// The advice about elements of higher orders.
+const ORDERS: &str = "use elements of order 1 or 2: `gmsh -order 2`";
 
 /// Elements of one entity, all of one kind.
 struct Block<'a> {
@@ -163,8 +167,13 @@ struct Block<'a> {
 
 impl Block<'_> {
     /// Read the elements. Return the connectivity, `stride` point numbers per simplex in our local order, and the tag of each
-    /// simplex. Cells are turned to positive volume.
-    fn read<const D: usize>(&self, cursor: &mut Cursor, nodes: &Nodes) -> Result<(Vec<u32>, Vec<u64>)> {
+    /// simplex. Cells are turned to positive volume. `known` has the nodes in the middle of divided faces and hexahedra.
+    fn read<const D: usize>(
+        &self,
+        cursor: &mut Cursor,
+        nodes: &mut Nodes,
+        known: &mut HashMap<[u32; 4], u32>,
+    ) -> Result<(Vec<u32>, Vec<u64>)> {
         let Kind { dimension, stride, .. } = self.kind;
         let mut connectivity = Vec::with_capacity(self.count * stride);
         let mut tags = Vec::with_capacity(self.count);
@@ -188,7 +197,7 @@ impl Block<'_> {
             let mut parts;
             let simplices = match self.split {
                 Some(split) => {
-                    parts = split.simplices(&points);
+                    parts = Middles { points: &mut nodes.points, known }.simplices(&split, &points);
                     &mut parts[..]
                 }
                 None => {

@@ -1,7 +1,7 @@
 //! Files of other programs: shapes that Gmsh meshes, and meshes that it converts.
 
 use super::trust::is_kind;
-use super::{abaqus, unv};
+use super::{abaqus, nastran, unv};
 use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
 
@@ -79,6 +79,10 @@ pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBu
     let made = work.join(format!("mesh.{kind}"));
     let written = match kind.as_str() {
         "unv" => write(&made, unv::readable(&String::from_utf8_lossy(bytes)).as_bytes()),
+        "bdf" | "nas" => {
+            let text = nastran::readable(path, &String::from_utf8_lossy(bytes));
+            write(&made, text.map_err(|error| error.at(&file.place))?.as_bytes())
+        }
         _ => write(&made, bytes),
     };
     written.map(|()| made)

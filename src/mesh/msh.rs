@@ -49,7 +49,7 @@ pub fn read<const D: usize>(path: &Path, source: Box<dyn Source + '_>, maker: Ma
             cursor.skip_section()?;
             continue;
         };
-        match (section, &nodes) {
+        match (section, &mut nodes) {
             ("PhysicalNames", _) => physical.read_names(cursor, D)?,
             ("Entities", _) => physical.read_entities(cursor)?,
             ("Nodes", _) => nodes = Some(Nodes::read(cursor)?),

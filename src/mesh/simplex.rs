@@ -33,9 +33,10 @@ impl Kind {
         Some(Kind { dimension, order, stride })
     }
 
-    /// Return the linear simplex of a dimension from 1 on.
-    pub fn linear(dimension: usize) -> Kind {
-        Kind { dimension, order: Some(Order::P1), stride: dimension + 1 }
+    /// Return the simplex of a dimension from 1 on and an order.
+    pub fn simplex(dimension: usize, order: Order) -> Kind {
+        let middles = if order == Order::P1 { 0 } else { dimension * (dimension + 1) / 2 };
+        Kind { dimension, order: Some(order), stride: dimension + 1 + middles }
     }
 }
 

@@ -3,6 +3,11 @@
 //! Every cell is the cone from its vertex with the smallest number over the faces without that vertex. A quadrangle is the cone
 //! from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the numbers of its
 //! vertices alone, so that cells of any kind agree on common faces.
+//!
+//! Only vertices are divided here. [`middles`](super::middles) adds the mid-edge nodes of quadratic cells.
+
+use super::simplex;
+use crate::problem::order::Order;
 
 /// The vertices of a face, or of an edge of a quadrangle.
 type Face = &'static [usize];
@@ -13,37 +18,68 @@ pub struct Split {
     /// Dimension, 2 or 3.
     pub dimension: usize,
     /// Number of vertices.
+    pub vertices: usize,
+    /// Number of nodes: vertices, then those of `edges`, then those of quadrangular faces, then that of the cell.
     pub stride: usize,
+    /// The vertices of each edge, in Gmsh's order of mid-edge nodes. Linear cells have none here.
+    pub edges: &'static [[usize; 2]],
+    /// The faces, with quadrangles in Gmsh's order of the nodes in their middle.
     faces: &'static [Face],
 }
 
 const EDGES: [Face; 4] = [&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
 
 const HEXAHEDRON: [Face; 6] =
-    [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
+    [&[0, 3, 2, 1], &[0, 1, 5, 4], &[0, 4, 7, 3], &[1, 2, 6, 5], &[2, 3, 7, 6], &[4, 5, 6, 7]];
 
-const PRISM: [Face; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]];
+const PRISM: [Face; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[0, 3, 5, 2], &[1, 2, 5, 4]];
 
 const PYRAMID: [Face; 5] = [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
 
+/// The quadrangle as a face of itself.
+const WHOLE: [Face; 1] = [&[0, 1, 2, 3]];
+
+const EDGES_OF_QUADRANGLE: [[usize; 2]; 4] = [[0, 1], [1, 2], [2, 3], [3, 0]];
+
+const EDGES_OF_HEXAHEDRON: [[usize; 2]; 12] =
+    [[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]];
+
+const EDGES_OF_PRISM: [[usize; 2]; 9] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]];
+
+const EDGES_OF_PYRAMID: [[usize; 2]; 8] = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]];
+
 impl Split {
-    /// Return the kind of cell that an element type number of Gmsh stands for, if it is linear and not a simplex.
+    /// Return the kind of cell that an element type number of Gmsh stands for, if it is of order 1 or 2 and not a simplex.
     pub fn of_type(number: i32) -> Option<Split> {
-        let (dimension, stride, faces): (_, _, &[Face]) = match number {
-            3 => (2, 4, &EDGES),
-            5 => (3, 8, &HEXAHEDRON),
-            6 => (3, 6, &PRISM),
-            7 => (3, 5, &PYRAMID),
+        let (dimension, vertices, faces, edges): (_, _, &[Face], &'static [[usize; 2]]) = match number {
+            3 | 10 | 16 => (2, 4, &EDGES, &EDGES_OF_QUADRANGLE),
+            5 | 12 | 17 => (3, 8, &HEXAHEDRON, &EDGES_OF_HEXAHEDRON),
+            6 | 13 | 18 => (3, 6, &PRISM, &EDGES_OF_PRISM),
+            7 | 14 | 19 => (3, 5, &PYRAMID, &EDGES_OF_PYRAMID),
             _ => return None,
         };
-        Some(Split { dimension, stride, faces })
+        let stride = simplex::type_name(number)?.1;
+        let edges = if stride == vertices { &[] } else { edges };
+        Some(Split { dimension, vertices, stride, edges, faces })
     }
 
-    /// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. Simplices in which a vertex occurs
-    /// twice, since an edge was drawn into a point, are omitted.
+    /// Return the order of the cells.
+    pub fn order(&self) -> Order {
+        if self.edges.is_empty() { Order::P1 } else { Order::P2 }
+    }
+
+    /// Return the quadrangular faces. A quadrangle has one, itself.
+    pub fn quadrangles(&self) -> impl Iterator<Item = &'static [usize]> {
+        let faces: &[Face] = if self.dimension == 2 { &WHOLE } else { self.faces };
+        faces.iter().copied().filter(|face| face.len() == 4)
+    }
+
+    /// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. The vertices are the first nodes of
+    /// `cell`. Simplices in which a vertex occurs twice, since an edge was drawn into a point, are omitted.
     pub fn simplices(&self, cell: &[u32]) -> Vec<u32> {
         let corners: Vec<Vec<u32>> = self.faces.iter().map(|face| face.iter().map(|&at| cell[at]).collect()).collect();
-        cone(cell, &corners).into_iter().filter(|simplex| all_differ(simplex)).flatten().collect()
+        let simplices = cone(&cell[..self.vertices], &corners);
+        simplices.into_iter().filter(|simplex| all_differ(simplex)).flatten().collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Universal files (`.unv`) in a form that Gmsh 4.8 can read. This Gmsh ignores groups of dataset 2467, which most programs
-//! write. It crashes on members of groups that are not elements of the file.
+//! write. It crashes on members of groups that are not elements of the file. It takes the material of an element for a group,
+//! which then hides the group of the same number.
 
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -13,18 +14,18 @@ const BEAMS: [&str; 5] = ["11", "21", "22", "23", "24"];
 /// Code of members that are elements.
 const ELEMENT: &str = "8";
 
-/// Return the file with groups that contain only elements of the file.
+/// Number of the dataset of elements.
+const ELEMENTS: &str = "2412";
+
+/// Return the file with groups that contain only elements of the file, and with elements of no material if there are groups.
 pub fn readable(text: &str) -> String {
     let lines: Vec<&str> = text.lines().collect();
+    let number = |dataset: &[&str]| dataset.first().map_or("", |line| line.trim()).to_owned();
+    let has_groups = datasets(&lines).any(|dataset| GROUPS.contains(&number(dataset).as_str()));
     let mut elements = HashSet::new();
-    for dataset in datasets(&lines).filter(|dataset| dataset.first().map(|line| line.trim()) == Some("2412")) {
-        let mut at = 1;
-        while let Some(words) = dataset.get(at).map(|line| line.split_whitespace().collect::<Vec<_>>()) {
-            let (Some(label), Some(kind)) = (words.first(), words.get(1)) else { break };
-            let nodes: usize = words.get(5).and_then(|word| word.parse().ok()).unwrap_or(0);
-            elements.insert((*label).to_owned());
-            at += 1 + usize::from(BEAMS.contains(kind)) + nodes.div_ceil(8);
-        }
+    for dataset in datasets(&lines).filter(|dataset| number(dataset) == ELEMENTS) {
+        elements
+            .extend(records(&dataset[1..]).filter_map(|record| record[0].split_whitespace().next()).map(str::to_owned));
     }
     let mut made = String::with_capacity(text.len());
     for dataset in datasets(&lines) {
@@ -33,6 +34,10 @@ pub fn readable(text: &str) -> String {
             Some((number, groups)) if GROUPS.contains(&number.trim()) => {
                 made += "  2477\n";
                 write_groups(groups, &elements, &mut made);
+            }
+            Some((number, lines)) if has_groups && number.trim() == ELEMENTS => {
+                let _ = writeln!(made, "  {ELEMENTS}");
+                records(lines).for_each(|record| write_element(record, &mut made));
             }
             _ => dataset.iter().for_each(|line| {
                 made += line;
@@ -47,6 +52,28 @@ pub fn readable(text: &str) -> String {
 /// Return the lines between each two lines of `-1`.
 fn datasets<'a>(lines: &'a [&'a str]) -> impl Iterator<Item = &'a [&'a str]> {
     lines.split(|line| line.trim() == "-1").filter(|dataset| dataset.iter().any(|line| !line.trim().is_empty()))
+}
+
+/// Return the lines of each element of a dataset.
+fn records<'a>(mut lines: &'a [&'a str]) -> impl Iterator<Item = &'a [&'a str]> {
+    std::iter::from_fn(move || {
+        let words: Vec<&str> = lines.first()?.split_whitespace().collect();
+        let nodes: usize = words.get(5).and_then(|word| word.parse().ok()).unwrap_or(0);
+        let count = 1 + usize::from(BEAMS.contains(words.get(1)?)) + nodes.div_ceil(8);
+        let (record, rest) = lines.split_at(count.min(lines.len()));
+        lines = rest;
+        Some(record)
+    })
+}
+
+/// Write an element without its material, which is the fourth number.
+fn write_element(record: &[&str], made: &mut String) {
+    let words = record[0].split_whitespace().enumerate();
+    let words = words.map(|(at, word)| format!("{:>10}", if at == 3 { "0" } else { word }));
+    let _ = writeln!(made, "{}", words.collect::<String>());
+    record[1..].iter().for_each(|line| {
+        let _ = writeln!(made, "{line}");
+    });
 }
 
 /// Write the groups without members that are not elements of the file. Groups that become empty are omitted.
@@ -90,6 +117,7 @@ mod tests {
                     \x201 0 0 0 0 0 0 3\nLow\n 8 2 0 0 7 1 0 0\n 8 9 0 0\n 2 0 0 0 0 0 0 1\nNodes\n 7 1 0 0\n\
                     \x203 0 0 0 0 0 0 1\nBeam\n 8 1 0 0\n    -1\n";
         let made = readable(text);
+        assert!(made.contains("         2        41         2         0         7         3\n 1 2 3\n"), "{made}");
         assert!(made.contains("  2477\n") && !made.contains("2467") && !made.contains("Nodes"), "{made}");
         let groups: Vec<&str> = made.lines().skip_while(|line| line.trim() != "2477").skip(1).collect();
         assert_eq!(groups.len(), 7, "{made}");
