@@ -112,7 +112,7 @@ fn separate(ptr: &[i32], col: &[i32], half: &mut [i32]) {
 
 #[cfg(test)]
 mod tests {
-    use super::{SEPARATOR, of_graph, separate};
+    use super::{Graph, SEPARATOR, of_graph, separate};
 
     /// A strip of 60 by 10 nodes is cut by about one row of ten into halves of the same size, which are not coupled.
     #[test]

@@ -89,7 +89,8 @@ fn map(title: &str, points: &[[f64; 3]], pressures: &[f64], axes: [usize; 2], al
     let radius = (width.max(1.0) * height.max(1.0) / points.len() as f64).sqrt().clamp(1.0, 12.0) * 0.62;
     let levels: Vec<f64> = (0..=BANDS).map(|band| most * band as f64 / BANDS as f64).collect();
     let is_open = points.iter().any(|&(_, _, band)| band < 0);
-    let context = context! { title, alone, points, is_open, radius, width, height, levels, colors => colors().to_vec() };
+    let context =
+        context! { title, alone, points, is_open, radius, width, height, levels, colors => colors().to_vec() };
     let svg = super::words::environment()
         .render_named_str("map.svg.html", include_str!("map.svg"), context)
         .map_err(failed)?;

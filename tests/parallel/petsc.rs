@@ -345,23 +345,24 @@ fn grids(side: usize) -> Vec<(usize, usize, f64)> {
 /// side of a grid opposite to the held one, moved as a whole, feels `side` springs in a row for each of its nodes.
 #[test]
 fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
-    let output = alone("petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
-        let options = ["-asked_mat_mumps_icntl_7", "1", "-own_mat_mumps_icntl_7", "0"];
-        let session = Session::start(&options.map(String::from))?;
-        // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
-        for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1), ("own", 101, 0)] {
-            let dofs = 2 * side * side;
-            let retained: Vec<usize> = (dofs - 2 * side..dofs).collect();
-            let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &retained)?;
-            assert_eq!(schur.ordering(), order, "{body}");
-            schur.factor()?;
-            for row in schur.take_complement().chunks_exact(retained.len()) {
-                let force: f64 = row.iter().sum();
-                assert!((force * side as f64 - 1.0).abs() < 1e-10, "{body}: {force}");
+    let output =
+        alone("petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
+            let options = ["-asked_mat_mumps_icntl_7", "1", "-own_mat_mumps_icntl_7", "0"];
+            let session = Session::start(&options.map(String::from))?;
+            // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
+            for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1), ("own", 101, 0)] {
+                let dofs = 2 * side * side;
+                let retained: Vec<usize> = (dofs - 2 * side..dofs).collect();
+                let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &retained)?;
+                assert_eq!(schur.ordering(), order, "{body}");
+                schur.factor()?;
+                for row in schur.take_complement().chunks_exact(retained.len()) {
+                    let force: f64 = row.iter().sum();
+                    assert!((force * side as f64 - 1.0).abs() < 1e-10, "{body}: {force}");
+                }
             }
-        }
-        Ok(())
-    });
+            Ok(())
+        });
     expect_success(output);
 }
 
