@@ -506,7 +506,7 @@ fn adapted_where(fails: &str) -> Run {
     std::fs::set_permissions(&cache, std::fs::Permissions::from_mode(0o700)).expect("a cache");
     let path = format!("{}:{path}", folder.path().display());
     let variables = [("PATH", path.as_str()), ("WINKLER_CACHE", cache.to_str().expect("a path"))];
-    common::solve_where(&variables, case("groove-held"), &["--tolerance", "5e-3", "--set", "method={}"])
+    crate::common::solve_where(&variables, case("groove-held"), &["--tolerance", "5e-3", "--set", "method={}"])
 }
 
 /// Where Gmsh makes no mesh of the sizes that a mesh leads to, sizes for half of the cells are taken, and halved again. Without any mesh the run ends

@@ -257,7 +257,7 @@ fn pressed(files: &[(&str, &str)], load: &str, surfaces: [&str; 4]) -> Run {
 fn is_ten(run: Run, warned: &[&str], what: &str) {
     let run = run.converged();
     let far = |p: &f64| (p - 10.0).abs() > 1e-9;
-    assert!(!run.contact()["pressure"].iter().any(far), "{what}: {:?}", run.contact()["pressure"]);
+    assert!(!run.contact()["pressure"].iter().any(far), "{what}: {:?}", &run.contact()["pressure"]);
     assert!(warned.iter().all(|word| run.warnings().contains(word)), "{what} {warned:?}: {}", run.warnings());
 }
 

@@ -534,7 +534,7 @@ Physical Curve(\"axis\") = {3}; Physical Curve(\"plate_axis\") = {13,17}; Physic
 [[contact]]\nbetween = [\"skin\", \"bore\"]\ntouching = true\nlayer = { linear = { stiffness = 1e7 } }\n";
     let forecast = |script: &str, text: &str| {
         let scene = beside(script, text);
-        let run = common::winkler(&["check", "--json", scene.path.to_str().expect("a path")]);
+        let run = crate::common::winkler(&["check", "--json", scene.path.to_str().expect("a path")]);
         let value: serde_json::Value = serde_json::from_str(&run.stdout).unwrap_or_else(|_| panic!("{}", run.said()));
         value["pairs"][0]["mean_pressure"].clone()
     };

@@ -147,8 +147,8 @@ impl Block {
         Self { cells: cells.collect(), counts: counts.to_vec() }
     }
 
-    /// The faces on each side: name, and for each face its cell, its number and itself.
-    fn sides(&self) -> Vec<(String, Vec<(usize, usize, Cell)>)> {
+    /// The faces on each side, with its name.
+    fn sides(&self) -> Vec<(String, Vec<Face>)> {
         let mut sides = Vec::new();
         for (axis, count) in self.counts.iter().enumerate() {
             for end in 0..2 {
@@ -163,6 +163,9 @@ impl Block {
         sides
     }
 }
+
+/// A face: the number of its cell, its number in the cell, and its nodes.
+type Face = (usize, usize, Cell);
 
 /// Two blocks with their place in space, by body and by parameters between 0 and 1.
 struct Two<'a> {

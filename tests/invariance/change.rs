@@ -90,7 +90,6 @@ impl Change {
             self.contact(contact, D)?;
         }
         for rule in &mut scene.auto {
-            rule.distance *= self.length;
             self.contact(&mut rule.contact, D)?;
         }
         if let Start::Normal(field) = &mut scene.method.start {
@@ -175,6 +174,7 @@ impl Change {
     }
 
     fn contact(&self, contact: &mut ContactSpec, dimension: usize) -> Result<()> {
+        contact.distance = contact.distance.map(|distance| distance * self.length);
         let (l, s) = (self.length, self.stress);
         contact.gap = self.field(&contact.gap, l);
         contact.reference = None;

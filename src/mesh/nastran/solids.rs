@@ -125,7 +125,7 @@ mod tests {
     use std::path::Path;
 
     fn made(text: &str) -> String {
-        readable(Path::new("a.bdf"), text).map_or_else(|error| error.to_string(), |made| made)
+        readable(Path::new("a.bdf"), text).unwrap_or_else(|error| error.to_string())
     }
 
     /// The fields of a quadratic prism in each of the three forms, with and without marks.
