@@ -15,7 +15,7 @@ impl Report {
             lines.extend(self.steps.iter().enumerate().map(|(index, step)| step_line(index + 1, step)));
         }
         lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
-        lines.extend(busiest(&self.pairs, LISTED).into_iter().map(|i| pair_line(&self.pairs[i])));
+        lines.extend(busiest(&self.pairs, LISTED).into_iter().map(|i| self.pair_line(&self.pairs[i])));
         lines.extend(self.balance_lines());
         lines.extend(warning_lines(&self.warnings, "report.json"));
         lines.join("\n")
@@ -69,6 +69,24 @@ impl Report {
             sci(error.displacement, 1),
             sci(error.energy, 1)
         ))
+    }
+
+    /// Return the line of a pair. Where two bodies have several pairs, their surfaces name it.
+    fn pair_line(&self, pair: &PairReport) -> String {
+        let is_only = self.pairs.iter().filter(|other| other.bodies == pair.bodies).count() == 1;
+        let [a, b] = if is_only { &pair.bodies } else { &pair.surfaces };
+        let names = format!("  {a} - {b}");
+        if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
+            return format!("{names}: no contact");
+        }
+        format!(
+            "{names}: force {}, peak pressure {} at {}, contact {}, open {}",
+            vector(pair.force[0]),
+            readable(pair.peak_pressure, 6),
+            point(pair.peak_at),
+            readable(pair.extent.contact(), 6),
+            readable(pair.extent.open(), 6)
+        )
     }
 
     /// Return the words on the largest displacement and von Mises stress of all bodies, empty where none is known.
@@ -125,22 +143,6 @@ fn step_line(number: usize, step: &StepReport) -> String {
     let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
     let factors = factors.collect::<Vec<_>>().join(", ");
     format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
-}
-
-/// Return the line of a pair.
-fn pair_line(pair: &PairReport) -> String {
-    let names = format!("  {} - {}", pair.bodies[0], pair.bodies[1]);
-    if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
-        return format!("{names}: no contact");
-    }
-    format!(
-        "{names}: force {}, peak pressure {} at {}, contact {}, open {}",
-        vector(pair.force[0]),
-        readable(pair.peak_pressure, 6),
-        point(pair.peak_at),
-        readable(pair.extent.contact(), 6),
-        readable(pair.extent.open(), 6)
-    )
 }
 
 /// Return the line of a body with its reactions and imbalances.

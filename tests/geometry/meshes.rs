@@ -267,7 +267,9 @@ fn one_facet(found: &Used, known: &Used) -> bool {
 /// Reads a mesh as the patch asks for it.
 fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
     let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, Maker::User) else { return Kind::Refused };
-    if good.groups.iter().any(|group| mesh.group(&group.name).is_none()) {
+    // a group is also found by another name with the same letters
+    let is_there = |name: &str| mesh.groups.iter().any(|group| group.name == name);
+    if good.groups.iter().any(|group| !is_there(&group.name)) {
         return Kind::Named;
     }
     let body = |name, groups: &[(&'static str, Duty)]| Asked { name, order: mesh.order, groups: groups.to_vec() };

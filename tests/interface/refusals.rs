@@ -83,7 +83,6 @@ fn names_of_bodies_that_are_words_of_petsc() {
         let name = format!("name = \"{word}\"");
         groove_refused("name = \"lower\"", &name, &name, &[&format!("`{word}`"), "PETSc"]);
     }
-    groove_refused("name = \"lower\"", "name = \"Lower\"", "Lower", &["`Lower`", "small letter"]);
 }
 
 #[test]

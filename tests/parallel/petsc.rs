@@ -244,7 +244,7 @@ fn an_option_read_on_one_rank_is_read() {
 
 #[test]
 fn a_panic_on_one_rank_ends_the_others() {
-    let test = "a_panic_on_one_rank_ends_the_others";
+    let test = "petsc::a_panic_on_one_rank_ends_the_others";
     let start = Instant::now();
     let output = alone(test, 2, &[], || {
         use mpi::traits::CommunicatorCollectives;
@@ -442,7 +442,7 @@ fn sheet(side: usize, dofs: std::ops::Range<usize>) -> (Vec<Int>, Vec<Int>, Vec<
 #[test]
 fn a_renewed_smoother_keeps_nothing_of_the_old_matrix() {
     let options = "-ksp_type cg -ksp_rtol 1e-10 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi -mg_coarse_pc_type cholesky";
-    expect_success(alone("a_renewed_smoother_keeps_nothing_of_the_old_matrix", 0, &[], || {
+    expect_success(alone("petsc::a_renewed_smoother_keeps_nothing_of_the_old_matrix", 0, &[], || {
         let session = Session::start(&words(options))?;
         let n = 120;
         // springs to the ground and to the neighbours; those of the last half become stiffer, unevenly

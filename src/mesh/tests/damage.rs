@@ -36,10 +36,6 @@ fn bad_meshes_are_refused_by_name_and_line() {
     let square = |more: &str, arguments: &[&str]| gmsh(&format!("{SQUARE}{more}"), arguments);
     for (bytes, expected) in [
         (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
-        (
-            square("Recombine Surface{1};", &["-2", "-order", "2"]),
-            "group `soft rock` has quadrangle elements of 9 nodes",
-        ),
         (square("", &["-2", "-order", "3"]), "elements of 4 nodes (Gmsh's type 26)"),
         (square("Physical Curve(77) = {3};", &["-2"]), "physical curve 77 has no name"),
         (square("Physical Curve(\"gone\") = {99};", &["-2"]), "the physical curve `gone` has no elements"),

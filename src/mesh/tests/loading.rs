@@ -77,11 +77,8 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let message = refuse(&format!("{SQUARE}Mesh.ElementOrder = 1;"), &[], Order::P2);
     assert!(message.contains("remove `Mesh.ElementOrder`"), "{message}");
     // Lines and bytes of the mesh mean nothing to someone who wrote a script.
-    let message = refuse(&format!("{SQUARE}Recombine Surface{{1}};"), &[], Order::P2);
-    assert!(
-        message.contains("a.geo: group `soft rock` has quadrangle elements") && !message.contains("byte"),
-        "{message}"
-    );
+    let message = refuse(&format!("{SQUARE}Physical Curve(\"gone\") = {{99}};"), &[], Order::P1);
+    assert!(message.contains("a.geo: ") && message.contains("`gone`") && !message.contains("byte"), "{message}");
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 0);
 }
 
@@ -111,8 +108,8 @@ fn converted_meshes_are_made_by_gmsh() {
         std::fs::write(&file, "$MeshFormat\n4.1 0 8\n").unwrap();
         load::made_from(&MeshSource::Msh { file: located(file) }, 2, Order::P1).unwrap()
     };
-    let [direct, rewritten, converted] = ["a.msh", "a.inp", "a.unv"].map(made_from);
-    assert!(direct == rewritten && direct != converted);
+    let [direct, converted] = ["a.msh", "a.unv"].map(made_from);
+    assert_ne!(direct, converted);
 }
 
 #[test]
