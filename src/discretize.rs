@@ -18,6 +18,7 @@ mod interface;
 mod mechanism;
 pub mod meshes;
 mod missed;
+mod moment;
 mod moving;
 mod node_sets;
 mod owned;

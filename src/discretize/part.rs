@@ -4,7 +4,7 @@ use super::facts::BodyFacts;
 use super::find::{Values, find_group, not_on_body, point, without_area};
 use super::roster::load_dimensions;
 use super::supports::Constraints;
-use super::{elastic, springs};
+use super::{elastic, moment, springs};
 use crate::contact::{self, Side};
 use crate::error::{Error, Result};
 use crate::expression::Field;
@@ -182,7 +182,7 @@ impl<'a, const D: usize> Part<'a, D> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
             LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
-            LoadKind::Force { .. } => true,
+            LoadKind::Force { .. } | LoadKind::Moment(_) => true,
         };
         let force = self.spec.force.iter().flatten();
         if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
@@ -231,6 +231,10 @@ impl<'a, const D: usize> Part<'a, D> {
         if area == 0.0 {
             return Err(without_area(&spec.on, self.spec));
         }
+        if let LoadKind::Moment(moment) = spec.kind {
+            let load = moment::load(&self.space, &facets, parts, moment.map(|component| factor * component));
+            return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
+        }
         let values = Values::of("this load", &name.value);
         let load = surface::surface_load(&self.space, &facets, parts, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
@@ -241,7 +245,7 @@ impl<'a, const D: usize> Part<'a, D> {
                 let x = self.space.in_scene(x);
                 std::array::from_fn(|c| factor * values.at(&fields[c], x))
             }
-            LoadKind::Force { rigid: true, .. } => [0.0; D],
+            LoadKind::Force { rigid: true, .. } | LoadKind::Moment(_) => [0.0; D],
             LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
         });
         values.refused()?;

@@ -41,9 +41,11 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
         for line in &table.load {
             let places = load.iter().flatten().filter(|load| load.on.place == line.on.place).count();
             let own = line.on.value.contains(BODY) && !is_pattern(&line.on.value);
-            if matches!(line.kind, LoadKind::Force { .. }) && places > 1 && !own {
-                let message =
-                    format!("a total force on {places} surfaces: `{}` of `{}`", line.on.value, table.name.value);
+            if matches!(line.kind, LoadKind::Force { .. } | LoadKind::Moment(_)) && places > 1 && !own {
+                let message = format!(
+                    "a total force or moment on {places} surfaces: `{}` of `{}`",
+                    line.on.value, table.name.value
+                );
                 return Err(Error::scene(&line.on.place, message).help(format!(
                     "give a pressure or a traction; or, for a force on each body, the group of each: on = \"{BODY}_top\""
                 )));

@@ -165,6 +165,9 @@ pub enum LoadKind {
         /// Whether all nodes of the boundary have one displacement. Otherwise the force is spread evenly.
         rigid: bool,
     },
+    /// Moment about the centre of the boundary (x, y, z; force times length), by tractions that are linear in the place. In the plane the
+    /// first two components are zero.
+    Moment([f64; 3]),
 }
 
 /// Label and help for a name that is not spelt like the name of a body.

@@ -121,7 +121,7 @@ pub fn has_common(body: &BodySpec) -> bool {
     let acts = |kind: &LoadKind| match kind {
         LoadKind::Pressure(pressure) => !pressure.is_zero(),
         LoadKind::Traction(traction) => !traction.iter().all(Field::is_zero),
-        LoadKind::Force { total, .. } => total.iter().any(|force| *force != 0.0),
+        LoadKind::Force { total, .. } | LoadKind::Moment(total) => total.iter().any(|force| *force != 0.0),
     };
     let moves = |field: &Field| !field.is_zero();
     body.force.as_ref().is_some_and(|force| !force.iter().all(Field::is_zero))

@@ -176,12 +176,15 @@ impl Scene {
 
     fn check_load(&self, at: &At, load: &Load) -> Checked {
         let acts_along_z = match &load.kind {
-            LoadKind::Pressure(_) => false,
+            LoadKind::Pressure(_) | LoadKind::Moment(_) => false,
             LoadKind::Traction(traction) => !traction[2].is_zero(),
             LoadKind::Force { total, .. } => total[2] != 0.0,
         };
         if self.is_plane() && acts_along_z {
             return at.refuse("a load in z in a plane problem", "", "");
+        }
+        if let LoadKind::Moment(moment) = load.kind {
+            return self.check_moment(&at.below("moment"), moment);
         }
         let LoadKind::Force { total, .. } = load.kind else { return Ok(()) };
         if total.iter().any(|force| !force.is_finite()) {
@@ -193,6 +196,20 @@ impl Scene {
                 "radial forces cancel all around: the first component must be 0",
                 "for a radial load give pressure = p or traction = [tr, ta]",
             );
+        }
+        Ok(())
+    }
+
+    fn check_moment(&self, at: &At, moment: [f64; 3]) -> Checked {
+        if moment.iter().any(|component| !component.is_finite()) {
+            return at.refuse(format!("the moment is {moment:?}"), "", "");
+        }
+        if self.is_plane() && [moment[0], moment[1]] != [0.0; 2] {
+            return at.refuse("a moment about an axis in the plane", "bodies in the plane turn about z", "");
+        }
+        if self.plane == Plane::Axisymmetric {
+            let help = "bodies of revolution do not bend; give a traction along the axis that depends on the radius";
+            return at.refuse("a moment in an axisymmetric scene", "", help);
         }
         Ok(())
     }

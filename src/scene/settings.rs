@@ -136,6 +136,8 @@ fn of_load(load: &Load, dimension: usize) -> Value {
     let mut map = match kind {
         LoadKind::Pressure(pressure) => json!({ "pressure": of_field(pressure) }),
         LoadKind::Traction(traction) => json!({ "traction": of_vector(traction, dimension) }),
+        LoadKind::Moment(moment) if dimension == 2 => json!({ "moment": moment[2] }),
+        LoadKind::Moment(moment) => json!({ "moment": moment }),
         LoadKind::Force { total, rigid } => json!({ "force": total[..dimension], "rigid": rigid }),
     };
     map["on"] = json!(on.value);

@@ -355,3 +355,49 @@ fn planes_of_symmetry_in_space() {
         assert!((0..3).all(|c| (reaction[c] - 10.0 * z[c]).abs() < 1e-8), "{reaction:?}, {z:?}");
     }
 }
+
+/// A bar of length 10 with a square section of side 1 and no Poisson's ratio under moments at its end: quadratic elements have the
+/// solution of a beam, u = kappa x^2 / 2 across and M h / (2 I) = 6 M at the edges.
+#[test]
+fn moments_bend_a_bar() {
+    let young = 1e5;
+    for (dimension, shape, moment, total) in [
+        (
+            2,
+            "Rectangle(1) = {0, -0.5, 0, 10, 1}; Physical Curve(\"left\") = {4}; Physical Curve(\"right\") = {2};",
+            "2",
+            [0.0, 2.0],
+        ),
+        (
+            3,
+            "Box(1) = {0, -0.5, -0.5, 10, 1, 1}; Physical Surface(\"left\") = {1}; Physical Surface(\"right\") = {2};",
+            "[0, 3, -4]",
+            [3.0, -4.0],
+        ),
+    ] {
+        let thing = if dimension == 2 { "Surface" } else { "Volume" };
+        let zeros = if dimension == 2 { "" } else { ", z = 0" };
+        let scene = Scene::new(format!(
+            "dimension = {dimension}\nmesh = {{ geo = \"bar.geo\" }}\n[[body]]\nname = \"bar\"\norder = 2\nyoung = {young:?}\npoisson = 0\n\
+             fix = [{{ on = \"left\", x = 0, y = 0{zeros} }}]\nload = [{{ on = \"right\", moment = {moment} }}]\n"
+        ));
+        let script = format!(
+            "SetFactory(\"OpenCASCADE\");\n{shape}\nPhysical {thing}(\"bar\") = {{1}};\nMesh.MeshSizeMax = 1;\n"
+        );
+        std::fs::write(scene.path.with_file_name("bar.geo"), script).expect("a script");
+        let run = solve(&scene, &[]).converged();
+        let size = f64::hypot(total[0], total[1]);
+        let kappa = total.map(|m| 12.0 * m / young);
+        // at a corner of the end, where the section has turned about both axes
+        let along = 5.0 * (kappa[0].abs() + kappa[1].abs());
+        let most = f64::hypot(50.0 * f64::hypot(kappa[0], kappa[1]), along);
+        let relative = |path: &str, exact: f64| (run.number(path) / exact - 1.0).abs();
+        assert!(relative("bodies/0/max_displacement", most) < 1e-9, "{most} {}", run.said());
+        assert!(relative("bodies/0/max_von_mises", 6.0 * (total[0].abs() + total[1].abs())) < 1e-7, "{}", run.said());
+        for (c, exact) in [0.0, total[0], total[1]].into_iter().enumerate() {
+            let held = run.number(&format!("bodies/0/balance/supports/0/moment/{c}"));
+            assert!((held + exact).abs() < 1e-9 * size, "{c}: {held} {}", run.said());
+            assert!(run.number(&format!("bodies/0/balance/loads/force/{c}")).abs() < 1e-9 * size);
+        }
+    }
+}

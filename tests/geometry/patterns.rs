@@ -324,7 +324,7 @@ fn what_does_not_fit_is_refused() {
         ("_righ?\"", "_nowhere\"", "", &["spring matches `{body}_nowhere` on `brick_*`", "brick_even_4_bottom"]),
         ("on = \"bottom\"", "on = \"botom\"", "", &["the mesh has no ", "`botom`", "did you mean `bottom`?"]),
         ("on = \"bottom\"", "on = \"brick_even_4_top\"", "", &["lies on no body of `brick_odd_*`", "bottom"]),
-        ("traction = [0, -0.5]", "force = [0, -0.5]", "", &["a total force on 2 surfaces", "{body}_top"]),
+        ("traction = [0, -0.5]", "force = [0, -0.5]", "", &["a total force or moment on 2 surfaces", "{body}_top"]),
         ("of = [\"brick_odd_9\"", "of = [\"brick_odd_x*\"", "", &["no body matches `brick_odd_x*`", "brick_even_4, "]),
         (
             "of = [\"brick_odd_9\"",

@@ -121,6 +121,12 @@ impl Change {
             match &mut load.kind {
                 LoadKind::Pressure(field) => *field = self.field(field, s),
                 LoadKind::Traction(fields) => *fields = self.fields(fields, s),
+                // the sense of a turn changes in a mirror
+                LoadKind::Moment(moment) => {
+                    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| self.vector(axis));
+                    let sense: f64 = cross(x, y).iter().zip(z).map(|(a, b)| a * b).sum();
+                    *moment = self.vector(*moment).map(|m| sense * force * self.length * m);
+                }
                 LoadKind::Force { total, .. } => *total = self.vector(*total).map(|f| force * f),
             }
         }

@@ -61,9 +61,14 @@ fn load_shape() -> TableShape {
         .optional("pressure", Field, "pressure against the outer normal")
         .optional("traction", Field.list(), "force per area, one for each component")
         .optional("force", Field.list(), "total force on the whole boundary, numbers: [FX, FY], in space [FX, FY, FZ]")
+        .optional(
+            "moment",
+            one_or_components(),
+            "moment about the centre of the boundary, a number: M, in space [MX, MY, MZ]",
+        )
         .optional("rigid", Flag, "whether the boundary moves as one under the force; false")
         .optional("path", Text, "column of the table of load steps with its factor")
-        .at_most_one(&["pressure", "traction", "force"])
+        .at_most_one(&["pressure", "traction", "force", "moment"])
 }
 
 impl Decoder<'_> {
@@ -131,14 +136,18 @@ impl Decoder<'_> {
             return Err(Error::scene(&entry.key_place, "`rigid` without a force")
                 .help("a rigid surface moves as one under a total force: force = [0, -10], rigid = true"));
         }
-        let kind = match (keys.get("pressure"), keys.get("traction"), keys.get("force")) {
-            (Some(pressure), ..) => LoadKind::Pressure(self.field(pressure)?),
-            (_, Some(traction), _) => LoadKind::Traction(self.vector(traction)?),
-            (.., Some(force)) => LoadKind::Force { total: self.numbers(force)?, rigid },
-            (None, None, None) => {
+        let kind = match ["pressure", "traction", "force", "moment"].map(|key| keys.get(key)) {
+            [Some(pressure), ..] => LoadKind::Pressure(self.field(pressure)?),
+            [_, Some(traction), ..] => LoadKind::Traction(self.vector(traction)?),
+            [.., Some(force), _] => LoadKind::Force { total: self.numbers(force)?, rigid },
+            [.., Some(moment)] if self.dimension == 2 => LoadKind::Moment([0.0, 0.0, moment.number()?]),
+            [.., Some(moment)] => LoadKind::Moment(self.numbers(moment)?),
+            [None, None, None, None] => {
                 let components = &["tx", "ty", "tz"][..self.dimension];
-                let advice =
-                    format!("give pressure = p, traction = [{}], or a total force = [...]", components.join(", "));
+                let advice = format!(
+                    "give pressure = p, traction = [{}], or a total force = [...] or moment",
+                    components.join(", ")
+                );
                 return Err(node.refuse(format!("the load on `{}` has no component", on.value)).help(advice));
             }
         };
@@ -153,7 +162,7 @@ impl Decoder<'_> {
                 Field::Constant(value) => *number = value,
                 field => {
                     let place = field.place().unwrap_or(&node.place);
-                    return Err(Error::scene(place, "a total force does not depend on the place")
+                    return Err(Error::scene(place, "a total force or moment does not depend on the place")
                         .help("give numbers, or a traction with expressions"));
                 }
             }

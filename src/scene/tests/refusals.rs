@@ -92,7 +92,7 @@ const CASES: &[Case] = &[
     ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", x = \"2*u\" }", "u", "unknown variable `u`", ""),
     ("pressure = 10", "pressure = 10, force = [0, 0]", "force", "a load has both `pressure` and `force`", ""),
     ("pressure = 10", "pressure = 10, rigid = true", "rigid", "`rigid` without a force", "force = [0, -10]"),
-    ("pressure = 10", "force = [0, \"2*x\"]", "\"2*x\"", "a total force does not depend on the place", "traction"),
+    ("pressure = 10", "force = [0, \"2*x\"]", "\"2*x\"", "a total force or moment does not depend on the place", "traction"),
     ("order = 1", "spring = [{ on = \"lower_face\" }]", "{ on = \"lower_face\" }", "the spring on `lower_face` has no stiffness", "normal = k"),
     ("order = 1", "spring = [{ on = \"lower_face\", normal = 0 }]", "0", "the stiffness is 0", ""),
     ("order = 1", "spring = [{ on = \"lower_face\", stiffness = [0, 0] }]", "[0, 0]", "the spring has no stiffness", ""),
