@@ -1,12 +1,12 @@
 //! Readers on damaged files: bytes of small valid files of each format are changed at random. A reader gives a mesh that keeps its
-//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed, none by default; `scripts/fuzz`
-//! runs this test, too.
+//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed. `scripts/fuzz` runs this
+//! test, too, with more of them.
 
 use super::super::{Asked, Duty, Maker, Mesh, abaqus, nastran, parse, unv};
 use std::path::Path;
 
 /// Valid files: their names tell which reader they are for.
-const SEEDS: [(&str, &[u8]); 12] = [
+const SEEDS: [(&str, &[u8]); 13] = [
     ("text2.msh", include_bytes!("../../../fuzz/seeds/msh/text2.msh")),
     ("text2q.msh", include_bytes!("../../../fuzz/seeds/msh/text2q.msh")),
     ("text3.msh", include_bytes!("../../../fuzz/seeds/msh/text3.msh")),
@@ -18,8 +18,12 @@ const SEEDS: [(&str, &[u8]); 12] = [
     ("old3q.msh", include_bytes!("../../../fuzz/seeds/msh/old3q.msh")),
     ("first2.msh", include_bytes!("../../../fuzz/seeds/msh/first2.msh")),
     ("blocks.inp", include_bytes!("../../../fuzz/seeds/inp/blocks.inp")),
+    ("wedge.bdf", include_bytes!("../../../fuzz/seeds/bdf/wedge.bdf")),
     ("boxes.unv", include_bytes!("../../../fuzz/seeds/unv/boxes.unv")),
 ];
+
+/// Number of changed files of each seed: half a second for all.
+const FILES: u64 = 300;
 
 /// Words that stand in the place of another one. They are at the ends of what numbers can be.
 const WORDS: [&str; 14] = [
@@ -130,7 +134,7 @@ fn read_as<const D: usize>(bytes: &[u8]) {
 
 #[test]
 fn damaged_files_never_end_the_program() {
-    let most = std::env::var("WINKLER_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(0);
+    let most = std::env::var("WINKLER_MUTATIONS").ok().and_then(|count| count.parse().ok()).unwrap_or(FILES);
     for (place, (name, seed)) in SEEDS.iter().enumerate() {
         read_any(name, seed);
         for number in 0..most {
