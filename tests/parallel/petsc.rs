@@ -437,52 +437,6 @@ fn sheet(side: usize, dofs: std::ops::Range<usize>) -> (Vec<Int>, Vec<Int>, Vec<
     (row_ptr, columns, values)
 }
 
-/// A smoother that is set up again belongs to the new matrix as a whole, while the coarse level is kept: it takes no more iterations than a solver
-/// that is made for this matrix.
-#[test]
-fn a_renewed_smoother_keeps_nothing_of_the_old_matrix() {
-    let options = "-ksp_type cg -ksp_rtol 1e-10 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi -mg_coarse_pc_type cholesky";
-    expect_success(alone("petsc::a_renewed_smoother_keeps_nothing_of_the_old_matrix", 0, &[], || {
-        let session = Session::start(&words(options))?;
-        let n = 120;
-        // springs to the ground and to the neighbours; those of the last half become stiffer, unevenly
-        let values = |stiff: bool| -> Vec<f64> {
-            let of = |i: usize| if stiff && i >= n / 2 { [1e3, 1.0, 30.0][i % 3] } else { 1.0 };
-            (0..n)
-                .flat_map(|i| {
-                    [-0.25, of(i) + 1.0, -0.25].into_iter().skip(usize::from(i == 0)).take(if i + 1 == n {
-                        2
-                    } else {
-                        3
-                    })
-                })
-                .collect()
-        };
-        let columns = || (0..n).flat_map(|i: usize| i.saturating_sub(1)..(i + 2).min(n)).map(|j| j as Int).collect();
-        let row_ptr = || (0..=n).map(|i| (3 * i).saturating_sub(1).min(3 * n - 2) as Int).collect();
-        let coarse: [Vec<Int>; 2] = [(0..=n as Int).collect(), (0..n as Int).map(|i| i / 2).collect()];
-        let solver = |matrix: &Matrix| -> Result<Ksp> {
-            let mut ksp = Ksp::new(&session, "")?;
-            ksp.set_operator(matrix)?;
-            ksp.set_interpolation(matrix, [&coarse[0], &coarse[1]], &vec![1.0; n], n / 2)?;
-            ksp.set_from_options()?;
-            ksp.set_up()?;
-            Ok(ksp)
-        };
-        let mut matrix = Matrix::from_csr(&session, 1, row_ptr(), columns(), values(false))?;
-        matrix.set_spd()?;
-        let kept = solver(&matrix)?;
-        kept.set_reuse_preconditioner(true)?;
-        matrix.update(|now| now.copy_from_slice(&values(true)))?;
-        kept.renew_smoother(&matrix)?;
-        let (b, mut x) = ((0..n).map(|i| (i % 7) as f64).collect::<Vec<_>>(), vec![0.0; n]);
-        let renewed = kept.solve(&b, &mut x)?.iterations;
-        let new = solver(&matrix)?.solve(&b, &mut x)?.iterations;
-        assert!(renewed <= new + 3, "{renewed} {new}");
-        Ok(())
-    }));
-}
-
 /// Dofs are solved exactly with the same iterations, however many processes have their rows: in two halves, and by MUMPS on all where halves
 /// would be more than a process has. The second of three has no rows.
 #[test]
