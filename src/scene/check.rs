@@ -147,16 +147,7 @@ impl Scene {
         if self.is_plane() && body.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
             return at.below("force").refuse("a body force in z in a plane problem", "", "");
         }
-        for (number, support) in body.fix.iter().enumerate() {
-            self.check_support(&at.item("fix", number, &support.on.place), support)?;
-        }
-        for (number, spring) in body.spring.iter().enumerate() {
-            loads::check_spring(&at.item("spring", number, &spring.on.place), spring)?;
-        }
-        for (number, load) in body.load.iter().enumerate() {
-            self.check_load(&at.item("load", number, &load.on.place), load)?;
-        }
-        Ok(())
+        self.check_lines(at, body)
     }
 
     fn check_adapt(&self, at: &At) -> Checked {

@@ -3,10 +3,24 @@
 use super::super::Scene;
 use super::{At, Checked};
 use crate::expression::Field;
-use crate::problem::{Load, LoadKind, Plane, SpringKind, SpringSpec, Support};
+use crate::problem::{BodySpec, Load, LoadKind, Plane, SpringKind, SpringSpec, Support};
 
 impl Scene {
-    pub(super) fn check_support(&self, at: &At, support: &Support) -> Checked {
+    /// Check all lines of a body with supports, springs and loads.
+    pub(super) fn check_lines(&self, at: &At, body: &BodySpec) -> Checked {
+        for (number, support) in body.fix.iter().enumerate() {
+            self.check_support(&at.item("fix", number, &support.on.place), support)?;
+        }
+        for (number, spring) in body.spring.iter().enumerate() {
+            check_spring(&at.item("spring", number, &spring.on.place), spring)?;
+        }
+        for (number, load) in body.load.iter().enumerate() {
+            self.check_load(&at.item("load", number, &load.on.place), load)?;
+        }
+        Ok(())
+    }
+
+    fn check_support(&self, at: &At, support: &Support) -> Checked {
         let components = support.value.iter().flatten().count();
         if components > 0 && support.normal.is_some() {
             return at.refuse("a support holds some components, or the normal alone", "", "");
@@ -23,7 +37,7 @@ impl Scene {
         Ok(())
     }
 
-    pub(super) fn check_load(&self, at: &At, load: &Load) -> Checked {
+    fn check_load(&self, at: &At, load: &Load) -> Checked {
         let acts_along_z = match &load.kind {
             LoadKind::Pressure(_) | LoadKind::Moment(_) => false,
             LoadKind::Traction(traction) => !traction[2].is_zero(),
@@ -64,7 +78,7 @@ impl Scene {
     }
 }
 
-pub(super) fn check_spring(at: &At, spring: &SpringSpec) -> Checked {
+fn check_spring(at: &At, spring: &SpringSpec) -> Checked {
     // expressions are checked where they are evaluated; here they count as > 0
     let constant = |field: &Field| if let Field::Constant(value) = field { *value } else { f64::MIN_POSITIVE };
     match &spring.kind {
