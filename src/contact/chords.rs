@@ -19,10 +19,6 @@ pub struct Chords {
     pub mean: Option<f64>,
 }
 
-/// Change of the gap between contact points, as a share of the largest overlap, below which facets do no harm. Where the facets of both
-/// surfaces match, the gap is uniform however coarse they are.
-const UNIFORM: f64 = 0.1;
-
 /// Overlap, as a share of the sagitta, below which the surfaces just touch, and facets cross where they are nearest.
 const TOUCHING: f64 = 1e-3;
 
@@ -30,12 +26,13 @@ impl Chords {
     /// Return the overlap of a pair if its facets make most of it, `None` otherwise.
     ///
     /// A chord adds at most its sagitta s to the overlap of the curved surfaces. If the meshes overlap by o at most, the curved surfaces
-    /// overlap by o - s or more, and most of it comes from facets if s > o - s.
+    /// overlap by o - s or more, and most of it comes from facets if s > o - s. What facets add differs from point to point: where those of
+    /// both surfaces match, the gap is uniform however coarse they are. So it must vary by as much, too.
     pub fn of<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>, pair: &ContactPair) -> Option<Self> {
         let least = pair.gap.iter().copied().fold(f64::INFINITY, f64::min);
         let most = pair.gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let deepest = -least;
-        if deepest <= 0.0 || most - least <= UNIFORM * deepest {
+        if deepest <= 0.0 || 2.0 * (most - least) <= deepest {
             return None;
         }
         let overlapping = pair.nodes.iter().zip(&pair.gap).filter(|(_, gap)| **gap < 0.0).map(|(&node, _)| node);

@@ -2,11 +2,12 @@
 
 use super::side::{Side, length, unit};
 use crate::fem::{area_vector, element};
-use crate::linalg::dot;
+use crate::linalg::{Joined, dot};
 use std::collections::HashMap;
 
-/// Rounding of the cosine of an angle that facets may turn by: regular polygons that turn by just this angle are smooth.
-const ROUNDING: f64 = 1e-9;
+/// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of
+/// coordinates over its size; so a regular polygon that turns by just the angle of an edge is smooth.
+pub const ROUNDING: f64 = 1e-9;
 
 /// The smooth faces of a surface. Facets with a common vertex at which they turn by no more than the angle of an edge are of
 /// one face.
@@ -22,22 +23,18 @@ impl Faces {
     /// Find the faces of a surface between edges at which facets turn by more than `edge` degrees.
     pub fn new<const D: usize>(side: &Side<D>, edge: f64) -> Self {
         let least = edge.to_radians().cos() - ROUNDING;
-        let mut parent: Vec<usize> = (0..side.facets.count()).collect();
+        let mut joined = Joined::new(side.facets.count());
         for around in normals_at_vertices(side).values() {
             for (k, (facet, normal)) in around.iter().enumerate() {
                 for (other, other_normal) in &around[..k] {
                     if dot(normal, other_normal) >= least {
-                        join(&mut parent, *facet, *other);
+                        joined.join(*facet as u32, *other as u32);
                     }
                 }
             }
         }
-        let (mut number, mut of_facet) = (HashMap::new(), Vec::new());
-        for i in 0..parent.len() {
-            let next = number.len();
-            of_facet.push(*number.entry(root(&mut parent, i)).or_insert(next));
-        }
-        Self { count: number.len(), of_facet }
+        let (count, of_facet) = joined.classes();
+        Self { count, of_facet: of_facet.into_iter().map(|face| face as usize).collect() }
     }
 
     /// Return whether facets of different faces have a common vertex, and so meet at an edge. Only facets in `used` count.
@@ -71,19 +68,4 @@ fn normals_at_vertices<const D: usize>(side: &Side<D>) -> HashMap<u32, Vec<(usiz
         }
     }
     around
-}
-
-/// Return the facet that stands for all that are joined with facet `i`.
-fn root(parent: &mut [usize], mut i: usize) -> usize {
-    while parent[i] != i {
-        parent[i] = parent[parent[i]];
-        i = parent[i];
-    }
-    i
-}
-
-/// Join two facets.
-fn join(parent: &mut [usize], i: usize, j: usize) {
-    let (i, j) = (root(parent, i), root(parent, j));
-    parent[i.max(j)] = i.min(j);
 }

@@ -20,7 +20,7 @@ pub use crate::fem::{cross, pad};
 pub use basis::Carriers;
 pub use chords::Chords;
 pub use cover::{Coverage, Left};
-pub use faces::Faces;
+pub use faces::{Faces, ROUNDING};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Fault, LostPieces, OwnSurface, add, assemble, moment_in_scene};

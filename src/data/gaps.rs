@@ -57,10 +57,12 @@ struct Suspect {
     others: [f64; 2],
 }
 
-/// Least number of different other heights in a file that is taken as measured. Steps that are written by hand have fewer.
+/// Least number of different other heights in a file that is taken as measured: three bits, fewer than any instrument has. A step that is
+/// written by hand is a table of a few numbers.
 const LEVELS: usize = 8;
 
-/// How far a single height must be from all others, as a multiple of their range. To three digits the surface is then this one spike.
+/// How far a single height must be from all others, as a multiple of their range. A picture of the surface to three digits then shows this
+/// one spike and nothing else.
 const SPIKE: f64 = 1e3;
 
 /// Return a height that probably stands for points without one; none if there is none.

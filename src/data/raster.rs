@@ -8,11 +8,11 @@ use crate::error::{Error, Result};
 use std::io::Read;
 use std::path::Path;
 
-/// What Surfer writes for a point without a height, the limit from which on heights are such points.
+/// What Surfer writes for a point without a height: heights from it on are blank in the format of its grids (1.70141e+38).
 const BLANK: f64 = 1.70141e38;
-/// What an ASCII grid of ESRI has for a point without a height, if its header does not say.
+/// What an ASCII grid of ESRI has for a point without a height if its header has no line NODATA_value, by the definition of the format.
 const NODATA: f64 = -9999.0;
-/// Bytes before the heights of a binary grid of Surfer: name, two counts, and three ranges.
+/// Bytes before the heights of a binary grid of Surfer 6: its name (4), two counts of 16 bits, and three ranges of two doubles.
 const BINARY_HEADER: usize = 4 + 2 * 2 + 6 * 8;
 
 /// Kinds of grids by their first letters.

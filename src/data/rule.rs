@@ -76,8 +76,9 @@ pub struct Missing {
     pub words: Vec<String>,
 }
 
-/// Relative difference up to which a number of a file is the one that the scene names: people copy such numbers with six digits.
-const SAME: f64 = 1e-6;
+/// Relative difference up to which a number of a file is the one that the scene names. People copy such numbers with six digits, which is
+/// half a unit of the sixth digit of a number that begins with one.
+const SAME: f64 = 5e-6;
 
 impl Missing {
     /// Return whether a number stands for no height.

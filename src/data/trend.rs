@@ -1,6 +1,7 @@
 //! The plane or parabola that fits heights best, and its subtraction.
 
 use super::rule::Detrend;
+use crate::linalg::bounds;
 use nalgebra::{DMatrix, DVector};
 
 /// A polynomial that was subtracted, by its derivatives at the middle of the data, in the units of the scene.
@@ -50,13 +51,7 @@ struct Scale {
 
 impl Scale {
     fn new(places: impl Iterator<Item = [f64; 2]>) -> Self {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for place in places {
-            for d in 0..2 {
-                low[d] = low[d].min(place[d]);
-                high[d] = high[d].max(place[d]);
-            }
-        }
+        let [low, high] = bounds(places);
         let half = [0, 1].map(|d| if high[d] > low[d] { 0.5 * (high[d] - low[d]) } else { 1.0 });
         Self { middle: [0, 1].map(|d| 0.5 * (low[d] + high[d])), half }
     }

@@ -2,7 +2,7 @@
 
 use super::find::point;
 use crate::contact::pieces::{Common, Cut, Reach};
-use crate::contact::{Side, unit};
+use crate::contact::{ROUNDING, Side, unit};
 use crate::fem::{assemble, element};
 use crate::linalg::dot;
 use crate::problem::contact::ContactSpec;
@@ -10,9 +10,6 @@ use std::collections::BTreeMap;
 
 /// Largest angle, in degrees, between the normals of facets that can have common pieces at all.
 const RIGHT: f64 = 90.0;
-
-/// Rounding of an angle near a right one, in degrees.
-const ROUNDING: f64 = 1e-9;
 
 /// Return why two surfaces do not face each other within the limits of their contact, and what to do.
 pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &ContactSpec) -> [String; 2] {
@@ -41,7 +38,7 @@ pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &Contact
             "give a larger angle, up to 90 degrees, or name other surfaces".to_owned(),
         ];
     }
-    if least_angle(a, b) >= RIGHT - ROUNDING {
+    if closest(a, b) <= ROUNDING {
         return [
             "their outer normals nowhere point at each other".to_owned(),
             "name the sides of the bodies that look at each other; `winkler mesh` has their places".to_owned(),
@@ -76,11 +73,11 @@ impl Nearest {
     }
 }
 
-/// Return the least angle, in degrees, between the normal of a facet of one side and minus that of a facet of the other.
+/// Return the largest cosine of the angle between the normal of a facet of one side and minus that of a facet of the other.
 ///
 /// One normal stands for all that differ from it by less than a twentieth in each component, since large curved surfaces have too many
-/// to compare each two. On plane facets the angle is exact.
-fn least_angle<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
+/// to compare each two. On plane facets it is exact.
+fn closest<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
     let normals = |side: &Side<D>| -> Vec<[f64; D]> {
         let all = (0..side.facets.count()).map(|i| unit(side.area(i)));
         let rounded = all.map(|normal| (normal.map(|n| (20.0 * n).round() as i64), normal));
@@ -88,5 +85,5 @@ fn least_angle<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
     };
     let (ours, others) = (normals(a), normals(b));
     let facing = |n: &[f64; D]| others.iter().map(|m| -dot(n, m)).fold(-1.0, f64::max);
-    ours.iter().map(facing).fold(-1.0, f64::max).clamp(-1.0, 1.0).acos().to_degrees()
+    ours.iter().map(facing).fold(-1.0, f64::max)
 }

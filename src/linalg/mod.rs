@@ -8,12 +8,14 @@ mod blocks;
 mod blocks_tests;
 mod degree;
 mod factor;
+mod joined;
 pub mod portable;
 mod symbolic;
 mod total;
 
 pub use blocks::Blocks;
 pub use factor::{Factor, PART, TOLERANCE};
+pub use joined::Joined;
 pub use symbolic::{Work, factorisation};
 pub use total::Total;
 

@@ -136,9 +136,9 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
 /// Return the mesh of an input file of Abaqus or CalculiX. The cache keeps it as a mesh file for `winkler mesh -o`; it is made anew
 /// in each run.
 fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
-    let abaqus::Converted { text, notes } = abaqus::convert(path, bytes, D)?;
-    let name = file_name(("input file", digest_of_bytes(text.as_bytes())), path);
-    let make = |_: &Path, made: &Path| std::fs::write(made, &text).map_err(|cause| Error::file(made, "write", &cause));
+    let abaqus::Converted { mesh: bytes, notes } = abaqus::convert(path, bytes, D)?;
+    let name = file_name(("input file", digest_of_bytes(&bytes)), path);
+    let make = |_: &Path, made: &Path| std::fs::write(made, &bytes).map_err(|cause| Error::file(made, "write", &cause));
     let place = |cache: &Path| cache.join(&name);
     let loaded = made_anew(&name, &folders(), |file| read_converted(path, file), make, place)?;
     Ok(Loaded { origin: Origin::File, notes, ..loaded })
@@ -241,7 +241,7 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
             if foreign::is_input_file(&file.value) {
                 // Other files may be included.
                 let converted = abaqus::convert(&file.value, &with_unix_lines(bytes), dimension).ok()?;
-                return Some(digest_of_bytes(converted.text.as_bytes()));
+                return Some(digest_of_bytes(&converted.mesh));
             }
             match foreign::is_mesh(&file.value, &bytes) {
                 true => Some(digest(&(Gmsh::find()?.identity(), digest_of_bytes(&bytes)))),

@@ -82,19 +82,8 @@ impl Middles<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::split::CUBE;
     use nalgebra::{Matrix3, Vector3};
-
-    /// Corners of the unit cube in Gmsh's order.
-    const CUBE: [[f64; 3]; 8] = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [1.0, 0.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [0.0, 1.0, 1.0],
-    ];
 
     fn hexahedron() -> Split {
         Split::of_type(17).expect("a kind")

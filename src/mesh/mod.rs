@@ -9,6 +9,7 @@ mod arrays;
 mod bisect;
 mod cache;
 mod check;
+mod contents;
 mod cursor;
 pub mod datum;
 mod elements;
@@ -42,7 +43,7 @@ mod trust;
 mod unv;
 
 pub use bisect::bisect;
-pub use check::{Asked, Checked, Duty, Joined, Parts};
+pub use check::{Asked, Checked, Duty, Parts};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};

@@ -5,10 +5,11 @@
 //! entities. An element of several groups stands in an old file once for each of them. Elements of one type on the same nodes
 //! are therefore one element, which belongs to all of their groups.
 
+use super::contents::{Contents, Element};
 use super::cursor::{Cursor, Source};
 use super::simplex;
 use crate::error::{Error, Result};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 /// Return whether bytes begin like a file of format 1 or 2.
@@ -54,12 +55,12 @@ pub fn convert(path: &Path, source: Box<dyn Source + '_>, made: bool) -> Result<
         leave(cursor, section)?;
     }
     cursor.intact()?;
-    if file.elements.is_empty() {
+    if file.contents.elements.is_empty() {
         return Err(
             Error::mesh(path, None, "there are no elements").help("the file was cut short, or nothing was meshed")
         );
     }
-    Ok(file.written())
+    Ok(file.contents.written())
 }
 
 /// Leave a section by its closing line. Format 1 has it in capitals.
@@ -111,42 +112,10 @@ fn number(cursor: &mut Cursor) -> Result<u64> {
     u64::try_from(number).map_err(|_| cursor.error_at(start, format!("{number} is no number of a node or an element")))
 }
 
-/// An element.
-struct Element {
-    number: u64,
-    /// Gmsh's number of the type.
-    kind: i32,
-    /// Number of the entity of the geometry.
-    entity: i32,
-    /// Tags of the physical groups, sorted.
-    groups: Vec<i32>,
-    nodes: Vec<u64>,
-}
-
-/// Elements of the same groups and type: the index of their entity, the type, and indices of the elements.
-struct Block {
-    entity: usize,
-    kind: i32,
-    elements: Vec<usize>,
-}
-
-/// An entity of format 4.1.
-#[derive(PartialEq, Eq, PartialOrd, Ord, Clone)]
-struct Entity {
-    dimension: usize,
-    /// Tags of its physical groups, sorted.
-    groups: Vec<i32>,
-    /// Number in the file if it belongs to no group, otherwise 0.
-    number: i32,
-}
-
-/// The contents of a file.
+/// What has been read of a file.
 #[derive(Default)]
 struct File {
-    /// Lines of the names: dimension, tag, quoted name.
-    names: Vec<String>,
-    nodes: Vec<(u64, [f64; 3])>,
-    elements: Vec<Element>,
+    contents: Contents,
     /// Index of the element of a type on these nodes, which are sorted.
     known: HashMap<(i32, Vec<u64>), usize>,
 }
@@ -160,7 +129,7 @@ impl File {
                 return Err(cursor.error_at(start, "dimension, tag and \"name\" of a physical group should stand here"));
             };
             let numbers: Vec<&str> = numbers.split_whitespace().collect();
-            self.names.push(format!("{} \"{name}", numbers.join(" ")));
+            self.contents.names.push(format!("{} \"{name}", numbers.join(" ")));
         }
         Ok(())
     }
@@ -169,7 +138,7 @@ impl File {
         for _ in 0..count(cursor)? {
             cursor.begin();
             let tag = number(cursor)?;
-            self.nodes.push((tag, [cursor.real()?, cursor.real()?, cursor.real()?]));
+            self.contents.nodes.push((tag, [cursor.real()?, cursor.real()?, cursor.real()?]));
             cursor.end()?;
         }
         Ok(())
@@ -239,64 +208,16 @@ impl File {
     fn add(&mut self, number: u64, kind: i32, [physical, entity]: [i32; 2], nodes: Vec<u64>) {
         let mut key = nodes.clone();
         key.sort_unstable();
-        let place = *self.known.entry((kind, key)).or_insert(self.elements.len());
-        if place == self.elements.len() {
-            self.elements.push(Element { number, kind, entity, groups: Vec::new(), nodes });
+        let place = *self.known.entry((kind, key)).or_insert(self.contents.elements.len());
+        if place == self.contents.elements.len() {
+            self.contents.elements.push(Element { number, kind, entity, groups: Vec::new(), nodes });
         }
         // The sign of a physical tag is an orientation.
         let group = i32::try_from(physical.unsigned_abs()).unwrap_or(i32::MAX);
-        let groups = &mut self.elements[place].groups;
+        let groups = &mut self.contents.elements[place].groups;
         if let (true, Err(at)) = (group != 0, groups.binary_search(&group)) {
             groups.insert(at, group);
         }
-    }
-
-    /// Return the entities, sorted, and the blocks of elements.
-    fn blocks(&self) -> (Vec<Entity>, Vec<Block>) {
-        let mut of_entity: BTreeMap<Entity, BTreeMap<i32, Vec<usize>>> = BTreeMap::new();
-        for (index, element) in self.elements.iter().enumerate() {
-            let number = if element.groups.is_empty() { element.entity } else { 0 };
-            let dimension = simplex::type_name(element.kind).map_or(0, |(shape, _)| simplex::dimension(shape));
-            let entity = Entity { dimension, groups: element.groups.clone(), number };
-            of_entity.entry(entity).or_default().entry(element.kind).or_default().push(index);
-        }
-        let entities = of_entity.keys().cloned().collect();
-        let with_entity = of_entity.into_values().enumerate();
-        let blocks = with_entity.flat_map(|(entity, kinds)| {
-            kinds.into_iter().map(move |(kind, elements)| Block { entity, kind, elements })
-        });
-        (entities, blocks.collect())
-    }
-
-    /// Return the bytes of the file in format 4.1.
-    fn written(&self) -> Vec<u8> {
-        let (entities, blocks) = self.blocks();
-        let tags = tags(&entities);
-        let mut to = Bytes(b"$MeshFormat\n4.1 1 8\n".to_vec());
-        to.int(1);
-        to.text("\n$EndMeshFormat\n");
-        if !self.names.is_empty() {
-            to.text(&format!("$PhysicalNames\n{}\n{}\n$EndPhysicalNames\n", self.names.len(), self.names.join("\n")));
-        }
-        write_entities(&mut to, &entities, &tags);
-        to.text("$Nodes\n");
-        [1, self.nodes.len(), 0, 0].iter().for_each(|&size| to.size(size as u64));
-        [0, 1, 0].iter().for_each(|&head| to.int(head));
-        to.size(self.nodes.len() as u64);
-        self.nodes.iter().for_each(|(tag, _)| to.size(*tag));
-        self.nodes.iter().flat_map(|(_, x)| x).for_each(|x| to.0.extend(x.to_le_bytes()));
-        to.text("\n$EndNodes\n$Elements\n");
-        [blocks.len(), self.elements.len(), 0, 0].iter().for_each(|&size| to.size(size as u64));
-        for Block { entity, kind, elements } in &blocks {
-            [entities[*entity].dimension as i32, tags[*entity], *kind].iter().for_each(|&head| to.int(head));
-            to.size(elements.len() as u64);
-            for element in elements.iter().map(|&index| &self.elements[index]) {
-                to.size(element.number);
-                element.nodes.iter().for_each(|&node| to.size(node));
-            }
-        }
-        to.text("\n$EndElements\n");
-        to.0
     }
 }
 
@@ -304,55 +225,4 @@ impl File {
 fn stride(cursor: &Cursor, start: usize, kind: i32) -> Result<usize> {
     let known = simplex::type_name(kind).map(|(_, stride)| stride);
     known.ok_or_else(|| cursor.error_at(start, format!("elements of Gmsh's type {kind} cannot be used")))
-}
-
-/// Return the tag of each entity: its number in the file if it has no group, otherwise the next free one of its dimension.
-fn tags(entities: &[Entity]) -> Vec<i32> {
-    let own = |entity: &Entity| (entity.dimension, entity.number);
-    let taken: BTreeSet<(usize, i32)> = entities.iter().filter(|entity| entity.groups.is_empty()).map(own).collect();
-    let mut next = [0; 4];
-    let mut free = |dimension: usize| {
-        next[dimension] += 1;
-        while taken.contains(&(dimension, next[dimension])) {
-            next[dimension] += 1;
-        }
-        next[dimension]
-    };
-    entities.iter().map(|e| if e.groups.is_empty() { e.number } else { free(e.dimension) }).collect()
-}
-
-fn write_entities(to: &mut Bytes, entities: &[Entity], tags: &[i32]) {
-    to.text("$Entities\n");
-    for dimension in 0..4 {
-        to.size(entities.iter().filter(|entity| entity.dimension == dimension).count() as u64);
-    }
-    for (entity, tag) in entities.iter().zip(tags) {
-        to.int(*tag);
-        // These are the place of a point, or the box around another entity, which nobody reads.
-        let numbers = if entity.dimension == 0 { 3 } else { 6 };
-        to.0.extend(std::iter::repeat_n(0, 8 * numbers));
-        to.size(entity.groups.len() as u64);
-        entity.groups.iter().for_each(|&group| to.int(group));
-        if entity.dimension > 0 {
-            to.size(0);
-        }
-    }
-    to.text("\n$EndEntities\n");
-}
-
-/// Bytes to which numbers are appended.
-struct Bytes(Vec<u8>);
-
-impl Bytes {
-    fn int(&mut self, value: i32) {
-        self.0.extend(value.to_le_bytes());
-    }
-
-    fn size(&mut self, value: u64) {
-        self.0.extend(value.to_le_bytes());
-    }
-
-    fn text(&mut self, text: &str) {
-        self.0.extend(text.as_bytes());
-    }
 }

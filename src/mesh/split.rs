@@ -103,23 +103,24 @@ fn all_differ(simplex: &[u32]) -> bool {
     simplex.iter().enumerate().all(|(at, vertex)| !simplex[..at].contains(vertex))
 }
 
+/// Corners of the unit cube in Gmsh's order, for tests.
+#[cfg(test)]
+pub(super) const CUBE: [[f64; 3]; 8] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [0.0, 1.0, 1.0],
+];
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mesh::simplex::measure;
     use std::collections::BTreeMap;
-
-    /// Corners of the unit cube in Gmsh's order.
-    const CUBE: [[f64; 3]; 8] = [
-        [0.0, 0.0, 0.0],
-        [1.0, 0.0, 0.0],
-        [1.0, 1.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [1.0, 0.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [0.0, 1.0, 1.0],
-    ];
 
     /// Return six times the volume of the pieces of a cell, and the number of pieces that have each triangle as a face.
     fn pieces(kind: i32, cell: &[u32], points: &[[f64; 3]]) -> (f64, BTreeMap<Vec<u32>, usize>) {

@@ -136,10 +136,7 @@ where
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings(session, &discrete, D);
-        warnings.extend(in_parts(verified.mesh.split));
-        warnings.extend(made_straight(verified.mesh.straightened));
-        warnings.extend(read.iter().flat_map(|read| read.warnings.clone()));
-        warnings.extend(verified.notes.iter().cloned());
+        warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
         let (linear, whole) = (inner.linear, inner.whole.clone());
         let (choice, condensed) = (inner.reason(), inner.condensed());
@@ -148,12 +145,30 @@ where
         let (options, again) = (inner.into_options(), None);
         let mesh = read.as_ref().map(|read| read.digest.clone());
         let splits = verified.splits();
-        #[rustfmt::skip]
         let mut built = Built {
-            scene, discrete, splits, mesh, linear, whole, interpolation, choice, condensed, options, warnings, again,
+            scene,
+            discrete,
+            splits,
+            mesh,
+            linear,
+            whole,
+            interpolation,
+            choice,
+            condensed,
+            options,
+            warnings,
+            again,
         };
         built.warnings.extend(swapped::warnings(&built));
         Ok(built)
+    }
+
+    /// Return the warnings about the mesh and its file.
+    fn of_mesh(&self) -> Vec<String> {
+        let Self { verified, read, .. } = self;
+        let changed = in_parts(verified.mesh.split).into_iter().chain(made_straight(verified.mesh.straightened));
+        let of_file = read.iter().flat_map(|read| &read.warnings).chain(&verified.notes);
+        changed.chain(of_file.cloned()).collect()
     }
 }
 

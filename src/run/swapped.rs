@@ -2,6 +2,7 @@
 
 use super::preflight::coupling;
 use super::stages::Built;
+use crate::linalg::bounds;
 use crate::output::sci;
 use crate::problem::LayerSpec;
 
@@ -42,7 +43,6 @@ fn warning(built: &Built, i: usize) -> Option<String> {
 
 /// Return the diagonal of the box around all points.
 fn extent(points: &[[f64; 3]]) -> f64 {
-    let along = |c: usize| points.iter().map(move |x| x[c]);
-    let spread = |c: usize| along(c).fold(f64::NEG_INFINITY, f64::max) - along(c).fold(f64::INFINITY, f64::min);
-    (0..3).map(|c| spread(c).powi(2)).sum::<f64>().sqrt()
+    let [low, high] = bounds(points.iter().copied());
+    (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt()
 }

@@ -20,8 +20,8 @@ use std::path::Path;
 
 /// A converted file.
 pub struct Converted {
-    /// The mesh in Gmsh's format 4.1.
-    pub text: String,
+    /// The bytes of the mesh in Gmsh's format 4.1.
+    pub mesh: Vec<u8>,
     /// What the user should know of it, in sentences without a full stop.
     pub notes: Vec<String>,
 }
@@ -45,7 +45,7 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
         let help = if dimension == 3 { "for plane elements set `dimension = 2`" } else { help };
         return Err(Error::mesh(path, None, message).help(help));
     }
-    Ok(Converted { text: write::mesh(&reader.model, &groups.list), notes: notes(path, &reader, &groups.left_out) })
+    Ok(Converted { mesh: write::mesh(&reader.model, &groups.list), notes: notes(path, &reader, &groups.left_out) })
 }
 
 /// Return what was left out, or is not as the user may think.

@@ -37,7 +37,7 @@ mod surface;
 mod tests;
 
 pub use groups::Duty;
-pub use parts::{Joined, Parts};
+pub use parts::Parts;
 
 pub(super) use cells::EDGES;
 pub(super) use curved::is_folded;

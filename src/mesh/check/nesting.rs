@@ -2,9 +2,9 @@
 
 use super::cells::Cells;
 use super::distance::{Point, cross};
-use super::parts::Joined;
 use super::surface::Surface;
 use crate::error::Result;
+use crate::linalg::Joined;
 
 /// Weights of the corners of a cell for points inside it. These points lie on no line or plane through other nodes.
 const INSIDE: [[f64; 4]; 5] = [

@@ -3,6 +3,8 @@
 //! This Gmsh takes a CHEXA or CPENTA for a linear one if its continuation fields are blank, or if its fields are 16 characters
 //! wide. It knows no CPYRAM with mid-edge nodes. Blank fields move the ones behind them.
 
+use super::cards::Card;
+use super::replace;
 use crate::error::{Error, Result};
 use std::fmt::Write;
 use std::path::Path;
@@ -11,74 +13,41 @@ use std::path::Path;
 const CARDS: [(&str, usize, usize); 6] =
     [("CHEXA", 8, 20), ("CPENTA", 6, 15), ("CPYRAM", 5, 13), ("CTETRA", 4, 10), ("CQUAD8", 4, 8), ("CTRIA6", 3, 6)];
 
-/// Return the bulk data with such cards in small fields, with all continuation fields.
+/// Return whether entries of this name are such cards.
+pub fn is_ours(name: &str) -> bool {
+    CARDS.iter().any(|card| card.0 == name)
+}
+
+/// Write such cards in small fields, with all continuation fields. `made` has the lines of the file at `path`, and `cards` the entries
+/// for which [`is_ours`] holds.
 ///
 /// # Errors
 /// A field of such a card is no number, or an element has some of its mid-edge nodes only. The error names the line.
-pub fn readable(path: &Path, text: &str) -> Result<String> {
-    let lines: Vec<&str> = text.lines().collect();
-    let mut made = String::with_capacity(text.len());
-    let mut at = 0;
-    while let Some(line) = lines.get(at) {
-        let name = name(line);
-        let Some(card) = CARDS.iter().find(|card| card.0 == name) else {
-            made += line;
-            made.push('\n');
-            at += 1;
-            continue;
-        };
-        let next = at + 1 + lines[at + 1..].iter().take_while(|line| is_continuation(line)).count();
-        let element = element(*card, &lines[at..next]);
-        let element = element.map_err(|message| Error::mesh(path, Some(at + 1), format!("{name}: {message}")))?;
-        write_card(&element, &mut made);
-        at = next;
+pub fn to_small_fields(path: &Path, cards: &[&Card], made: &mut [String]) -> Result<()> {
+    for (card, known) in
+        cards.iter().flat_map(|card| CARDS.iter().filter(|known| known.0 == card.name).map(move |known| (card, known)))
+    {
+        let element = element(*known, card);
+        let refuse = |message| Error::mesh(path, Some(card.lines.start + 1), format!("{}: {message}", card.name));
+        replace(made, card.lines.clone(), element.map_err(refuse)?.written());
     }
-    Ok(made)
+    Ok(())
 }
 
-/// The fields of a card as it is written.
-struct Card {
+/// An element as it is written.
+struct Element {
     name: &'static str,
     /// The numbers of the element and of its property, and the nodes.
     fields: Vec<u64>,
 }
 
-/// Return the name of the card that a line begins.
-fn name(line: &str) -> &str {
-    let field = line.split(',').next().unwrap_or_default();
-    let end = field.char_indices().nth(8).map_or(field.len(), |(end, _)| end);
-    field[..end].trim_end().trim_end_matches('*')
-}
-
-/// Return whether a line continues the card before it: its first field is blank or a mark.
-fn is_continuation(line: &str) -> bool {
-    !line.trim().is_empty() && line.starts_with([' ', ',', '+', '*', '\t'])
-}
-
-/// Return the fields of a line between the first one and the mark at its end: eight, or four that are wide.
-fn fields(line: &str) -> Vec<String> {
-    let is_wide = line.split(',').next().is_some_and(|first| first.chars().take(8).any(|c| c == '*'));
-    let count = if is_wide { 4 } else { 8 };
-    let mut fields: Vec<String> = match line.contains(',') {
-        true => line.split(',').skip(1).take(count).map(|field| field.trim().to_owned()).collect(),
-        false => {
-            let all: Vec<char> = line.chars().skip(8).take(64).collect();
-            all.chunks(64 / count).map(|field| field.iter().collect::<String>().trim().to_owned()).collect()
-        }
-    };
-    fields.resize(count, String::new());
-    fields
-}
-
-/// Return the element of a card that these lines hold.
-fn element((name, vertices, all): (&'static str, usize, usize), lines: &[&str]) -> std::result::Result<Card, String> {
-    let words = lines.iter().flat_map(|line| fields(line)).take(2 + all);
-    let number = |word: String| match word.as_str() {
+/// Return the element of a card.
+fn element((name, vertices, all): (&'static str, usize, usize), card: &Card) -> std::result::Result<Element, String> {
+    let number = |at: usize| match card.field(at) {
         "" => Ok(0),
         word => word.parse().map_err(|_| format!("`{word}` is no number of an element or node")),
     };
-    let mut fields = words.map(number).collect::<std::result::Result<Vec<u64>, String>>()?;
-    fields.resize(2 + all, 0);
+    let mut fields = (0..2 + all).map(number).collect::<std::result::Result<Vec<u64>, String>>()?;
     let (middles, absent) = (&fields[2 + vertices..], |node: &u64| *node == 0);
     let name = match name {
         _ if !middles.iter().all(absent) => {
@@ -96,32 +65,35 @@ fn element((name, vertices, all): (&'static str, usize, usize), lines: &[&str]) 
                 .map_or(linear, |(_, other)| other)
         }
     };
-    let card = Card { name, fields };
-    Ok(if card.fields.len() == 15 && name == "CPYRAM" { as_hexahedron(&card.fields) } else { card })
+    let is_pyramid = fields.len() == 15 && name == "CPYRAM";
+    Ok(if is_pyramid { as_hexahedron(&fields) } else { Element { name, fields } })
 }
 
 /// Return a quadratic pyramid as the hexahedron whose upper face was drawn into the apex.
-fn as_hexahedron(pyramid: &[u64]) -> Card {
+fn as_hexahedron(pyramid: &[u64]) -> Element {
     let (apex, middles) = (pyramid[6], &pyramid[7..]);
     let fields = [&pyramid[..6], &[apex; 4], middles, &[apex; 4]].concat();
-    Card { name: "CHEXA", fields }
+    Element { name: "CHEXA", fields }
 }
 
-/// Write a card. A comment follows, since Gmsh takes other lines behind a card without continuation for one.
-fn write_card(card: &Card, made: &mut String) {
-    for (row, fields) in card.fields.chunks(8).enumerate() {
-        let _ = write!(made, "{:<8}", if row == 0 { card.name } else { "+" });
-        fields.iter().for_each(|field| {
-            let _ = write!(made, "{field:<8}");
-        });
-        made.push_str(if (row + 1) * 8 < card.fields.len() { "+\n" } else { "\n" });
+impl Element {
+    /// Return the lines. The last one is a comment, since Gmsh takes other lines behind a card without continuation for one.
+    fn written(&self) -> String {
+        let mut text = String::new();
+        for (row, fields) in self.fields.chunks(8).enumerate() {
+            let _ = write!(text, "{:<8}", if row == 0 { self.name } else { "+" });
+            fields.iter().for_each(|field| {
+                let _ = write!(text, "{field:<8}");
+            });
+            text.push_str(if (row + 1) * 8 < self.fields.len() { "+\n" } else { "\n" });
+        }
+        text + "$"
     }
-    made.push_str("$\n");
 }
 
 #[cfg(test)]
 mod tests {
-    use super::readable;
+    use crate::mesh::nastran::readable;
     use std::path::Path;
 
     fn made(text: &str) -> String {

@@ -1,21 +1,14 @@
-//! Bulk data files (`.bdf`, `.nas`) with all grid points in the basic system of coordinates, which is the only one that Gmsh
-//! knows. Points of other systems are transformed; all other lines are unchanged.
+//! Grid points of bulk data in the basic system of coordinates, which is the only one that Gmsh knows.
 
 use super::super::fortran::real;
 use super::super::frame::{Coordinates, Frame};
+use super::cards::Card;
+use super::replace;
 use crate::error::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
 use std::ops::Range;
 use std::path::Path;
-
-/// An entry: its name, and its fields behind the name.
-struct Card {
-    name: String,
-    fields: Vec<String>,
-    /// Its lines in the file, from 0.
-    lines: Range<usize>,
-}
 
 type TextResult<T> = std::result::Result<T, String>;
 
@@ -37,10 +30,6 @@ impl Flaw {
 }
 
 impl Card {
-    fn field(&self, index: usize) -> &str {
-        self.fields.get(index).map_or("", String::as_str)
-    }
-
     /// Return a number of a point or system; none if the field is blank.
     fn tag(&self, index: usize) -> TextResult<Option<u64>> {
         match self.field(index) {
@@ -93,37 +82,34 @@ struct Model {
     open: BTreeSet<u64>,
 }
 
-/// Return the file with all grid points in the basic system.
+/// Return whether entries of this name define points or systems.
+pub fn is_ours(name: &str) -> bool {
+    matches!(name, "GRID" | "GRDSET") || name.starts_with("CORD")
+}
+
+/// Replace the grid points that are not in the basic system. `made` has the lines of the file at `path`, and `cards` the entries for
+/// which [`is_ours`] holds.
 ///
 /// # Errors
-/// A point is in a system that is not there or not known, or that depends on itself. Another file is to be included. The error
-/// names the line.
-pub fn in_basic_system(path: &Path, text: &str) -> Result<String> {
+/// A point is in a system that is not there or not known, or that depends on itself. The error names the line.
+pub fn to_basic(path: &Path, cards: &[&Card], made: &mut [String]) -> Result<()> {
     let refuse = |line: usize, message: String| Error::mesh(path, Some(line + 1), message);
-    let lines: Vec<&str> = text.lines().collect();
-    let cards = cards(&lines);
-    if let Some(card) = cards.iter().find(|card| card.name == "INCLUDE") {
-        let message = "files that include others are not read".to_owned();
-        return Err(refuse(card.lines.start, message).help("put the files together into one"));
-    }
     let mut model = Model::default();
     let default = cards.iter().find(|card| card.name == "GRDSET");
     let default = match default.map(|card| card.tag(1).map_err(|message| refuse(card.lines.start, message))) {
         Some(system) => system?.unwrap_or(0),
         None => 0,
     };
-    for card in &cards {
+    for card in cards {
         model.read(card, default).map_err(|message| refuse(card.lines.start, message))?;
     }
-    let mut made = Vec::from_iter(lines.iter().map(|line| (*line).to_owned()));
     let local: Vec<u64> = model.grids.iter().filter(|(_, grid)| grid.system != 0).map(|(tag, _)| *tag).collect();
-    for tag in &local {
-        let (x, lines) = (model.place(*tag), model.grids[tag].lines.clone());
+    for tag in local {
+        let (x, lines) = (model.place(tag), model.grids[&tag].lines.clone());
         let x = x.map_err(|flaw| refuse(flaw.line.unwrap_or(lines.start), flaw.message))?;
-        made[lines.clone()].iter_mut().for_each(|line| *line = "$".to_owned());
-        made[lines.start] = large(*tag, x);
+        replace(made, lines, large(tag, x));
     }
-    Ok(if local.is_empty() { text.to_owned() } else { made.join("\n") + "\n" })
+    Ok(())
 }
 
 /// Return a grid point in large fields, with as many digits as these hold.
@@ -138,63 +124,6 @@ fn large(tag: u64, x: [f64; 3]) -> String {
 fn sixteen(x: f64) -> String {
     let shorter = (0..=14).rev().map(|digits: usize| format!("{x:.digits$e}"));
     std::iter::once(format!("{x:?}")).chain(shorter).find(|text| text.len() <= 16).unwrap_or_default()
-}
-
-/// Return the entries of the bulk data that define points or systems.
-fn cards(lines: &[&str]) -> Vec<Card> {
-    let mut cards: Vec<Card> = Vec::new();
-    let mut is_open = false;
-    for (number, line) in lines.iter().enumerate() {
-        let line = line.split('$').next().unwrap_or_default();
-        if line.trim().is_empty() {
-            continue;
-        }
-        let (name, fields) = fields(line);
-        let continues = name.is_empty() || name.starts_with(['+', '*']);
-        match cards.last_mut().filter(|_| continues && is_open) {
-            Some(card) => {
-                card.fields.extend(fields);
-                card.lines.end = number + 1;
-            }
-            None => {
-                let name = name.trim_end_matches('*').to_ascii_uppercase();
-                is_open = !continues && (matches!(name.as_str(), "GRID" | "GRDSET") || name.starts_with("CORD"));
-                if is_open || line.trim().to_ascii_uppercase().starts_with("INCLUDE ") {
-                    let name = if is_open { name } else { "INCLUDE".to_owned() };
-                    cards.push(Card { name, fields, lines: number..number + 1 });
-                }
-            }
-        }
-    }
-    cards
-}
-
-/// Return the name of a line and its fields: eight, or four large ones. Missing ones are blank.
-fn fields(line: &str) -> (String, Vec<String>) {
-    let line = with_blanks(line);
-    let cut = |from: usize, width: usize| line.chars().skip(from).take(width).collect::<String>().trim().to_owned();
-    if line.contains(',') {
-        let mut words = line.split(',').map(|word| word.trim().to_owned());
-        let name = words.next().unwrap_or_default();
-        let count = if name.ends_with('*') { 4 } else { 8 };
-        return (name, words.chain(std::iter::repeat(String::new())).take(count).collect());
-    }
-    let name = cut(0, 8);
-    let width = if name.contains('*') { 16 } else { 8 };
-    let fields = (0..64 / width).map(|index| cut(8 + width * index, width)).collect();
-    (name, fields)
-}
-
-/// Return a line with blanks in place of each tab, up to the next field.
-fn with_blanks(line: &str) -> String {
-    let mut text = String::with_capacity(line.len());
-    for c in line.trim_end().chars() {
-        match c {
-            '\t' => text.extend(std::iter::repeat_n(' ', 8 - text.len() % 8)),
-            c => text.push(c),
-        }
-    }
-    text
 }
 
 impl Model {

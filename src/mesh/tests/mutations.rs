@@ -94,7 +94,7 @@ fn read_any(name: &str, bytes: &[u8]) {
         "inp" => {
             for (dimension, read) in [(2, read_as::<2> as fn(&[u8])), (3, read_as::<3>)] {
                 if let Ok(converted) = abaqus::convert(Path::new(name), bytes, dimension) {
-                    read(converted.text.as_bytes());
+                    read(&converted.mesh);
                 }
             }
         }
