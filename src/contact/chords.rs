@@ -19,7 +19,8 @@ pub struct Chords {
     pub mean: Option<f64>,
 }
 
-/// Overlap, as a share of the sagitta, below which the surfaces just touch, and facets cross where they are nearest.
+/// Overlap, as a share of the sagitta, below which the surfaces just touch, and facets cross where they are nearest. The spheres of the
+/// case `sphere-layer`, which touch at a point, overlap by 1.2e-5 in space and 1.6e-5 in revolution; no other case overlaps like that.
 const TOUCHING: f64 = 1e-3;
 
 impl Chords {

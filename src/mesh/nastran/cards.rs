@@ -74,3 +74,9 @@ fn with_blanks(line: &str) -> String {
     }
     text
 }
+
+/// Put a text in the place of some lines of a file.
+pub fn replace(made: &mut [String], lines: Range<usize>, text: String) {
+    made[lines.clone()].iter_mut().for_each(|line| line.clear());
+    made[lines.start] = text;
+}

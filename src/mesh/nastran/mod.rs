@@ -6,7 +6,6 @@ mod systems;
 
 use crate::error::{Error, Result};
 use cards::{Card, cards};
-use std::ops::Range;
 use std::path::Path;
 
 /// Return the bulk data with all grid points in the basic system, and with cards of solids that Gmsh understands. All other lines are
@@ -29,10 +28,4 @@ pub fn readable(path: &Path, text: &str) -> Result<String> {
     solids::to_small_fields(path, &of(solids::is_ours), &mut made)?;
     made.retain(|line| !line.is_empty());
     Ok(made.join("\n") + "\n")
-}
-
-/// Put a text in the place of some lines.
-fn replace(made: &mut [String], lines: Range<usize>, text: String) {
-    made[lines.clone()].iter_mut().for_each(|line| line.clear());
-    made[lines.start] = text;
 }

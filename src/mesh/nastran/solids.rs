@@ -3,8 +3,7 @@
 //! This Gmsh takes a CHEXA or CPENTA for a linear one if its continuation fields are blank, or if its fields are 16 characters
 //! wide. It knows no CPYRAM with mid-edge nodes. Blank fields move the ones behind them.
 
-use super::cards::Card;
-use super::replace;
+use super::cards::{Card, replace};
 use crate::error::{Error, Result};
 use std::fmt::Write;
 use std::path::Path;

@@ -2,8 +2,7 @@
 
 use super::super::fortran::real;
 use super::super::frame::{Coordinates, Frame};
-use super::cards::Card;
-use super::replace;
+use super::cards::{Card, replace};
 use crate::error::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
