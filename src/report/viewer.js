@@ -58,7 +58,7 @@
   const factor = () => scale.value / 50 * data.scale;
   // the plane of the section: what lies beyond it along x, y or z is not drawn
   const section = () => {
-    const k = "xyz".indexOf(across.value);
+    const k = ["x", "y", "z"].indexOf(across.value);
     const normal = [0, 1, 2].map(axis => axis === k ? 1 : 0);
     return [...normal, k < 0 ? 1 : data.low[k] + depth.value / 100 * (data.high[k] - data.low[k])];
   };
