@@ -1,0 +1,115 @@
+//! Rigid surfaces that turn under a moment.
+
+use crate::common::{Run, Scene, case, solve, solve_on};
+use nalgebra::{DMatrix, DVector};
+use vtkio::Vtk;
+use vtkio::model::{Attribute, DataSet, Piece};
+
+/// A bar of length 10 with a square section of side 1, clamped at x = 0, with the end at x = 10 under a load.
+fn bar(dimension: usize, load: &str) -> Scene {
+    let [shape, thing, zero] = match dimension {
+        2 => [
+            "Rectangle(1) = {0, -0.5, 0, 10, 1}; Physical Curve(\"left\") = {4}; Physical Curve(\"right\") = {2};",
+            "Surface",
+            "",
+        ],
+        _ => [
+            "Box(1) = {0, -0.5, -0.5, 10, 1, 1}; Physical Surface(\"left\") = {1}; Physical Surface(\"right\") = {2};",
+            "Volume",
+            ", z = 0",
+        ],
+    };
+    let scene = Scene::new(format!(
+        "dimension = {dimension}\nmesh = {{ geo = \"bar.geo\" }}\n[[body]]\nname = \"bar\"\norder = 2\nyoung = 1e5\n\
+         poisson = 0.3\nfix = [{{ on = \"left\", x = 0, y = 0{zero} }}]\nload = [{load}]\n"
+    ));
+    let script =
+        format!("SetFactory(\"OpenCASCADE\");\n{shape}\nPhysical {thing}(\"bar\") = {{1}};\nMesh.MeshSizeMax = 1;\n");
+    std::fs::write(scene.path.with_file_name("bar.geo"), script).expect("a script");
+    scene
+}
+
+/// The displacement of the centre of the end and its turn, which move all of its nodes.
+fn motion(run: &Run) -> [f64; 6] {
+    let vtk = Vtk::import(run.folder.join("bar.vtu")).expect("fields");
+    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
+    let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
+    let places = piece.points.cast_into::<f64>().expect("points");
+    let moved = piece.data.point.iter().find_map(|attribute| match attribute {
+        Attribute::DataArray(array) if array.name == "displacement" => array.data.cast_into::<f64>(),
+        _ => None,
+    });
+    let moved = moved.expect("displacements");
+    let nodes: Vec<usize> = (0..places.len() / 3).filter(|node| places[3 * node] > 10.0 - 1e-9).collect();
+    assert!(nodes.len() > 2, "{nodes:?}");
+    // u = U + theta x (x - c)
+    let row = |i: usize, column: usize| {
+        let (node, c) = (nodes[i / 3], i % 3);
+        let arm = [0.0, places[3 * node + 1], places[3 * node + 2]];
+        match column {
+            0..3 => f64::from(u8::from(column == c)),
+            _ if (c + 1) % 3 == column - 3 => arm[(c + 2) % 3],
+            _ if (c + 2) % 3 == column - 3 => -arm[(c + 1) % 3],
+            _ => 0.0,
+        }
+    };
+    let rows = DMatrix::from_fn(3 * nodes.len(), 6, row);
+    let u = DVector::from_fn(rows.nrows(), |i, _| moved[3 * nodes[i / 3] + i % 3]);
+    let motion = rows.clone().svd(true, true).solve(&u, 1e-12).expect("a motion");
+    let apart = (&rows * &motion - &u).amax();
+    assert!(apart < 1e-13 * u.amax().max(1e-3), "the end is bent: {apart:e}\n{}", run.said());
+    std::array::from_fn(|i| motion[i])
+}
+
+/// The force of an item of the balance of a body, and its moment about the origin.
+fn wrench(run: &Run, path: &str) -> [f64; 6] {
+    std::array::from_fn(|i| run.number(&format!("bodies/{path}/{}/{}", ["force", "moment"][i / 3], i % 3)))
+}
+
+fn near(found: [f64; 6], expected: [f64; 6], tolerance: f64) {
+    let size = expected.iter().fold(0.0f64, |size, value| size.max(value.abs()));
+    assert!((0..6).all(|i| (found[i] - expected[i]).abs() < tolerance * size), "{found:?}, not {expected:?}");
+}
+
+/// The load of a turning end with a force and a moment.
+fn turning(dimension: usize, force: [f64; 3], moment: [f64; 3]) -> String {
+    match dimension {
+        2 => format!("{{ on = \"right\", force = {:?}, moment = {}, rigid = true }}", &force[..2], moment[2]),
+        _ => format!("{{ on = \"right\", force = {force:?}, moment = {moment:?}, rigid = true }}"),
+    }
+}
+
+/// Bending, shear, tension and torsion of bars of all orders, by all kinds of solvers and on two ranks: the end moves as a rigid body;
+/// the loads do twice the energy as work on it, arrive at the clamp, and add up.
+#[test]
+fn ends_move_as_rigid_bodies() {
+    for (dimension, force, moment) in
+        [(2, [20.0, -2.0, 0.0], [0.0, 0.0, 15.0]), (3, [20.0, -2.0, 3.0], [4.0, -7.0, 15.0])]
+    {
+        for order in [1, 2] {
+            let order = format!("body.0.order={order}");
+            let end = |force, moment, ranks: usize, sets: &[&str]| {
+                let sets = [&[&order[..]], sets].concat();
+                let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+                let scene = bar(dimension, &turning(dimension, force, moment));
+                solve_on(ranks, &scene, &[&args[..], &["--vtu"]].concat()).converged()
+            };
+            let run = end(force, moment, 1, &[]);
+            let both = motion(&run);
+            let load: [f64; 6] = std::array::from_fn(|i| if i < 3 { force[i] } else { moment[i - 3] });
+            let work: f64 = both.iter().zip(load).map(|(u, f)| u * f).sum();
+            assert!((work / (-2.0 * run.number("F1")) - 1.0).abs() < 1e-9, "{work} {}", run.said());
+            // about the origin
+            let [_, y, z] = force;
+            let whole = [load[0], load[1], load[2], load[3], load[4] - 10.0 * z, load[5] + 10.0 * y];
+            near(wrench(&run, "0/balance/rigid/0"), whole, 1e-9);
+            near(wrench(&run, "0/balance/supports/0"), whole.map(|load| -load), 1e-9);
+            assert_eq!(wrench(&run, "0/balance/loads"), [0.0; 6]);
+            let alone = [end(force, [0.0; 3], 1, &[]), end([0.0; 3], moment, 1, &[])].map(|run| motion(&run));
+            near(std::array::from_fn(|i| alone[0][i] + alone[1][i]), both, 1e-9);
+            for (ranks, set) in [(1, "solver=mumps"), (1, "solver=hypre"), (2, "solver=mumps"), (2, "solver=hypre")] {
+                near(motion(&end(force, moment, ranks, &[set])), both, 1e-7);
+            }
+        }
+    }
+}
