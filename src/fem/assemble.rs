@@ -6,7 +6,8 @@
 use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::forces::NodalForces;
-use super::frame::{Frame, Movers, Rotation};
+use super::frame::{Frame, Movers};
+use super::lever::Rotation;
 use super::quadrature::{self, Parts, Rule};
 use super::space::Space;
 use crate::exchange::Plain;

@@ -113,3 +113,70 @@ fn ends_move_as_rigid_bodies() {
         }
     }
 }
+
+/// A block on a layer with a gap that is not uniform, under a force and a moment on its upper face or on the contact surface itself, which
+/// turns freely: the contact bears both, and a block whose contact surface is rigid has no strain.
+#[test]
+fn contact_bears_force_and_moment() {
+    for (surface, solver, order, ranks) in [
+        ("upper_face", "condensed", 1, 1),
+        ("upper_face", "mumps", 2, 2),
+        ("upper_bottom", "condensed", 2, 1),
+        ("upper_bottom", "mumps", 1, 2),
+        ("upper_bottom", "hypre", 2, 2),
+    ] {
+        let load = format!("body.1.load=[{{on=\"{surface}\",force=[0,-10],moment=0.4,rigid=true}}]");
+        let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+        let solver = format!("solver={solver}");
+        let sets =
+            ["mesh.set={nl=2,nu=3}", "method={stop={residual=1e-12}}", "contact.0.gap=2e-5*x^2", "body.1.fix=[]"];
+        let sets = [&sets[..], &[&load, &orders[0], &orders[1], &solver]].concat();
+        let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        let run = solve_on(ranks, case("patch"), &args).converged();
+        // The centre of both surfaces is at x = 1/2.
+        let whole = [0.0, -10.0, 0.0, 0.0, 0.0, 0.4 - 5.0];
+        near(wrench(&run, "1/balance/contacts"), whole.map(|load| -load), 1e-9);
+        near(wrench(&run, "1/balance/rigid/0"), whole, 1e-9);
+        let table = run.contact();
+        let mean = table["pressure"].iter().sum::<f64>() / table["pressure"].len() as f64;
+        assert!(
+            table["pressure"].iter().any(|pressure| (pressure - mean).abs() > 0.5),
+            "the moment makes no difference"
+        );
+        if surface == "upper_bottom" {
+            assert!(run.number("bodies/1/max_von_mises") < 1e-9, "{}", run.said());
+            let (x, u) = (&table["x"], &table["u_n_upper"]);
+            let slope = (u[u.len() - 1] - u[0]) / (x[x.len() - 1] - x[0]);
+            assert!(slope.abs() > 1e-5, "{slope:e}");
+            let bent = x.iter().zip(u).map(|(x, value)| (value - u[0] - slope * (x - table["x"][0])).abs());
+            assert!(bent.fold(0.0, f64::max) < 1e-14, "not straight: {u:?}");
+        }
+    }
+}
+
+/// Supports of a turning surface, and moments on surfaces of bodies of revolution.
+#[test]
+fn refusals() {
+    let load = "load = [{ on = \"upper_face\", pressure = 10 }]";
+    let turning = "load = [{ on = \"upper_face\", moment = 1, rigid = true }]";
+    let refused = |to: &str, at: &str, words: &[&str]| {
+        let scene = Scene::edited("groove-held", load, to);
+        let run = solve(&scene, &[]);
+        assert_eq!(run.code, 3, "{}", run.said());
+        let place = format!("{}:{}:", scene.path.display(), scene.line_of(at));
+        for word in words.iter().copied().chain([&place[..]]) {
+            assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said());
+        }
+    };
+    let support = "fix = [{ on = \"upper_axis\"";
+    refused(
+        turning,
+        support,
+        &["the support on `upper_axis` holds nodes of the rigid surface `upper_face`, which turns", "without a moment"],
+    );
+    let two = format!("{},\n  {{ on = \"upper_end\", moment = 0, rigid = true }}]", &turning[..turning.len() - 1]);
+    refused(&two, "upper_end\", m", &["the rigid surfaces `upper_face` and `upper_end` meet"]);
+    let scene = Scene::edited("groove-held", load, turning);
+    let run = solve(&scene, &["--set", "plane=axisymmetric"]);
+    assert!(run.code != 0 && run.stderr.contains("a moment in an axisymmetric scene"), "{}", run.said());
+}
