@@ -23,23 +23,39 @@ fn bar(dimension: usize, load: &str) -> Scene {
         "dimension = {dimension}\nmesh = {{ geo = \"bar.geo\" }}\n[[body]]\nname = \"bar\"\norder = 2\nyoung = 1e5\n\
          poisson = 0.3\nfix = [{{ on = \"left\", x = 0, y = 0{zero} }}]\nload = [{load}]\n"
     ));
-    let script =
-        format!("SetFactory(\"OpenCASCADE\");\n{shape}\nPhysical {thing}(\"bar\") = {{1}};\nMesh.MeshSizeMax = 1;\n");
+    let size = if dimension == 2 { 0.5 } else { 1.0 };
+    let script = format!(
+        "SetFactory(\"OpenCASCADE\");\n{shape}\nPhysical {thing}(\"bar\") = {{1}};\nMesh.MeshSizeMax = {size};\n"
+    );
     std::fs::write(scene.path.with_file_name("bar.geo"), script).expect("a script");
     scene
 }
 
+/// Coordinates and displacements of all nodes, from the files of all ranks.
+fn fields(run: &Run) -> [Vec<f64>; 2] {
+    let mut fields = [Vec::new(), Vec::new()];
+    for entry in std::fs::read_dir(&run.folder).expect("results") {
+        let path = entry.expect("a file").path();
+        if path.extension().is_none_or(|extension| extension != "vtu") {
+            continue;
+        }
+        let DataSet::UnstructuredGrid { pieces, .. } = Vtk::import(path).expect("fields").data else {
+            panic!("no grid")
+        };
+        let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
+        fields[0].extend(piece.points.cast_into::<f64>().expect("points"));
+        let moved = piece.data.point.iter().find_map(|attribute| match attribute {
+            Attribute::DataArray(array) if array.name == "displacement" => array.data.cast_into::<f64>(),
+            _ => None,
+        });
+        fields[1].extend(moved.expect("displacements"));
+    }
+    fields
+}
+
 /// The displacement of the centre of the end and its turn, which move all of its nodes.
 fn motion(run: &Run) -> [f64; 6] {
-    let vtk = Vtk::import(run.folder.join("bar.vtu")).expect("fields");
-    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
-    let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
-    let places = piece.points.cast_into::<f64>().expect("points");
-    let moved = piece.data.point.iter().find_map(|attribute| match attribute {
-        Attribute::DataArray(array) if array.name == "displacement" => array.data.cast_into::<f64>(),
-        _ => None,
-    });
-    let moved = moved.expect("displacements");
+    let [places, moved] = fields(run);
     let nodes: Vec<usize> = (0..places.len() / 3).filter(|node| places[3 * node] > 10.0 - 1e-9).collect();
     assert!(nodes.len() > 2, "{nodes:?}");
     // u = U + theta x (x - c)
@@ -87,9 +103,9 @@ fn ends_move_as_rigid_bodies() {
         [(2, [20.0, -2.0, 0.0], [0.0, 0.0, 15.0]), (3, [20.0, -2.0, 3.0], [4.0, -7.0, 15.0])]
     {
         for order in [1, 2] {
-            let order = format!("body.0.order={order}");
+            let set = format!("body.0.order={order}");
             let end = |force, moment, ranks: usize, sets: &[&str]| {
-                let sets = [&[&order[..]], sets].concat();
+                let sets = [&[&set[..]], sets].concat();
                 let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
                 let scene = bar(dimension, &turning(dimension, force, moment));
                 solve_on(ranks, &scene, &[&args[..], &["--vtu"]].concat()).converged()
@@ -107,8 +123,10 @@ fn ends_move_as_rigid_bodies() {
             assert_eq!(wrench(&run, "0/balance/loads"), [0.0; 6]);
             let alone = [end(force, [0.0; 3], 1, &[]), end([0.0; 3], moment, 1, &[])].map(|run| motion(&run));
             near(std::array::from_fn(|i| alone[0][i] + alone[1][i]), both, 1e-9);
-            for (ranks, set) in [(1, "solver=mumps"), (1, "solver=hypre"), (2, "solver=mumps"), (2, "solver=hypre")] {
-                near(motion(&end(force, moment, ranks, &[set])), both, 1e-7);
+            let others = if order == 1 { [(1, "hypre"), (2, "mumps")] } else { [(1, "mumps"), (2, "hypre")] };
+            for (ranks, solver) in others {
+                let run = end(force, moment, ranks, &[&format!("solver={solver}")]);
+                near(motion(&run), both, 1e-7);
             }
         }
     }
@@ -147,7 +165,7 @@ fn contact_bears_force_and_moment() {
             assert!(run.number("bodies/1/max_von_mises") < 1e-9, "{}", run.said());
             let (x, u) = (&table["x"], &table["u_n_upper"]);
             let slope = (u[u.len() - 1] - u[0]) / (x[x.len() - 1] - x[0]);
-            assert!(slope.abs() > 1e-5, "{slope:e}");
+            assert!(slope.abs() > 1e-6, "{slope:e}");
             let bent = x.iter().zip(u).map(|(x, value)| (value - u[0] - slope * (x - table["x"][0])).abs());
             assert!(bent.fold(0.0, f64::max) < 1e-14, "not straight: {u:?}");
         }
