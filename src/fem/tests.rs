@@ -12,17 +12,15 @@ fn turning<const D: usize>(order: Order, centre: [f64; D]) -> (Space<D>, Frame<D
     let at_end = |node: &u32| (places[*node as usize][0] - 0.2 * places[*node as usize][1] - 1.0).abs() < 0.05;
     let nodes: Vec<u32> = (0..places.len() as u32).filter(at_end).collect();
     let levers = Levers::new(&nodes, |node| places[node as usize], centre);
-    let mut frame = Frame::default();
-    frame.master = nodes[1..].iter().map(|&node| (node, nodes[0])).collect();
-    frame.levers.insert(nodes[0], levers);
-    (space, frame)
+    let master = nodes[1..].iter().map(|&node| (node, nodes[0])).collect();
+    (space, Frame { master, levers: [(nodes[0], levers)].into(), ..Frame::default() })
 }
 
 /// Return dofs of all kinds: those of tied nodes are zero, except for the rotation.
 fn some<const D: usize>(space: &Space<D>, frame: &Frame<D>, phase: f64) -> Vec<f64> {
     let pole = frame.levers.values().next().map(|levers| levers.pole).expect("levers");
     let is_free = |dof: usize| match (dof / D) as u32 {
-        node if node == pole => D == 3 || dof % D == 0,
+        node if node == pole => D == 3 || dof.is_multiple_of(D),
         node => !frame.master.contains_key(&node),
     };
     (0..space.dofs()).map(|dof| if is_free(dof) { (dof as f64 * 0.7 + phase).sin() } else { 0.0 }).collect()
