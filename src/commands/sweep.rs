@@ -369,7 +369,7 @@ fn without_values(settings: &mut Value) {
         for key in ["load", "fix"] {
             each(body.get_mut(key), |item| {
                 without(item, &["path"]);
-                for key in ["force", "x", "y", "z", "normal"] {
+                for key in ["force", "moment", "x", "y", "z", "normal"] {
                     item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
                 }
             });

@@ -280,9 +280,10 @@ fn push_rows<const D: usize>(
         nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
         add(&mut resultant, side.space.net_force(entry));
         add(&mut moment, side.space.net_moment(n, entry));
-        let (node, dofs) = side.frame.force(n, entry);
-        for (c, value) in dofs.into_iter().enumerate() {
-            *entries.entry(D * node as usize + c).or_insert(0.0) += value;
+        for (node, dofs) in side.frame.force(n, entry) {
+            for (c, value) in dofs.into_iter().enumerate() {
+                *entries.entry(D * node as usize + c).or_insert(0.0) += value;
+            }
         }
     }
     let mut prescribed = 0.0;

@@ -5,7 +5,7 @@
 
 use super::cover::{Coverage, WHOLE};
 use super::pieces::Common;
-use super::side::{Side, length, unit};
+use super::side::{Side, unit};
 use crate::fem::minus;
 use crate::linalg::dot;
 use std::collections::HashMap;
@@ -95,8 +95,9 @@ fn is_mirrored<const D: usize>(side: &Side<D>, i: usize, edge: [u32; D]) -> bool
 
 /// Return the length of the part of a unit vector along which supports hold a node.
 fn held<const D: usize>(side: &Side<D>, node: u32, direction: [f64; D]) -> f64 {
-    let node = side.frame.node(node);
-    let (_, components) = side.frame.force(node, direction);
-    let held = (0..D).filter(|c| side.prescribed.contains_key(&(D * node as usize + c)));
-    length(std::array::from_fn::<f64, D, _>(|c| if held.clone().any(|held| held == c) { components[c] } else { 0.0 }))
+    let held = side.frame.force(node, direction).flat_map(|(node, components)| {
+        let dofs = (0..D).zip(components);
+        dofs.filter(move |(c, _)| side.prescribed.contains_key(&(D * node as usize + c)))
+    });
+    held.map(|(_, component)| component * component).sum::<f64>().sqrt()
 }

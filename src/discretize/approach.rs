@@ -93,7 +93,7 @@ impl Outer {
         for load in &spec.load {
             let group = find_group(mesh, &load.on, load_dimensions::<D>(&load.kind), "load")?;
             let force = match load.kind {
-                LoadKind::Force { total, .. } => total,
+                LoadKind::Force { total, .. } | LoadKind::Turning { force: total, .. } => total,
                 _ => resultant(load)?,
             };
             outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect()));

@@ -144,7 +144,7 @@ fn tell_displacements<const D: usize>(
     load: &NodalForces<D>,
     own: Vec<bool>,
 ) -> Result<(Rc<Space<D>>, Rc<Constraints<D>>)> {
-    let rigid = part.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c]))).collect();
+    let rigid = part.rigid_forces().collect();
     let (space, held) = (Rc::new(part.space), Rc::new(part.held));
     let is_whole = info.ranks.len() == 1 && !own.contains(&false);
     let here = OwnedPart { space: space.clone(), own };

@@ -49,7 +49,7 @@ pub struct Forces<const D: usize> {
     pub supports: usize,
     /// Nodal forces of the loads.
     pub load: Vec<f64>,
-    /// Forces on rigid surfaces: a node of each, and the force.
+    /// Forces on rigid surfaces, at few nodes of each, all of which have one owner.
     pub rigid: Vec<(u32, [f64; D])>,
     /// Contact rows with displacements of nodes as columns.
     pub rows: Csr,
@@ -110,8 +110,9 @@ impl<const D: usize> Forces<D> {
         let cells: Vec<usize> = cells.map(|(number, _)| number).collect();
         let (around, nodes) = space.part(cells.iter().copied());
         let elasticity = self.elasticity.of_cells(&cells);
-        let graph = NodeGraph::new(&around, &[], &Frame::default());
-        let Ok(stiffness) = assemble::stiffness(&around, &graph, &elasticity) else { return Vec::new() };
+        let frame = Frame::default();
+        let graph = NodeGraph::new(&around, &[], &frame);
+        let Ok(stiffness) = assemble::stiffness(&around, &graph, &frame, &elasticity) else { return Vec::new() };
         let dof = |row: usize| D * nodes[row / D] as usize + row % D;
         let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[dof(j)]).sum::<f64>() - known[dof(row)];
         let at = |place: usize| (nodes[place], std::array::from_fn(|c| force(D * place + c)));

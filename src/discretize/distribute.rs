@@ -72,7 +72,7 @@ impl Numbers {
 }
 
 impl Partition {
-    /// Distribute the nodes of `bodies` by recursive bisection. `couplings` has, for one body after the other, the number of
+    /// Distribute the nodes of `bodies` by recursive bisection. The pole of a rigid surface that turns gets the owner of the master. `couplings` has, for one body after the other, the number of
     /// nodes with which each node is coupled in the matrix; this is the weight of the node. `wants_coarse(body)` returns whether
     /// a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
@@ -85,7 +85,12 @@ impl Partition {
         let places: Vec<[f64; D]> = bodies.iter().flat_map(|&body| parts[body].space.nodes.iter().copied()).collect();
         let mut all = bisect(&places, couplings, ranks).into_iter();
         let of_body = |&body: &usize| all.by_ref().take(parts[body].space.nodes.len()).collect();
-        let owner: Vec<Vec<u32>> = bodies.iter().map(of_body).collect();
+        let mut owner: Vec<Vec<u32>> = bodies.iter().map(of_body).collect();
+        for (owner, &body) in owner.iter_mut().zip(&bodies) {
+            for (&master, levers) in &parts[body].held.frame.levers {
+                owner[levers.pole as usize] = owner[master as usize];
+            }
+        }
         let coarse_nodes = |&body: &usize| if wants_coarse(body) { parts[body].coarse_nodes() } else { Vec::new() };
         let coarse: Vec<Vec<u32>> = bodies.iter().map(coarse_nodes).collect();
         let nodes = Numbers::new(&owner, ranks, |_, _| true);
@@ -124,7 +129,7 @@ impl Partition {
     }
 
     /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its cells and of
-    /// contact rows, and masters of tied nodes.
+    /// contact rows, and those that move tied nodes.
     pub fn nodes<const D: usize>(
         &self,
         number: usize,
@@ -138,8 +143,7 @@ impl Partition {
         let of_cells = space.corners(cells).into_iter();
         let of_rows = [&interface.rows, &interface.nodal_rows].into_iter().flat_map(|rows| &rows.col);
         let of_rows = of_rows.map(|&dof| dof as u32 / D as u32);
-        let masters = held.frame.master.values().copied();
-        Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(masters))
+        Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(held.frame.leaders()))
     }
 
     /// Return the distribution of the dofs of a body for a rank that has these `nodes`. `rows` are the contact rows of the body.

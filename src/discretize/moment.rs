@@ -4,6 +4,14 @@ use crate::fem::{Facets, NodalForces, Parts, Space, cross, surface};
 use crate::linalg::pad;
 use nalgebra::{Matrix3, Vector3};
 
+/// Return the centre of a surface: the mean place over its area.
+pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts) -> [f64; 3] {
+    let sum =
+        |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
+    let area = sum(&|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }))[0];
+    sum(&|x| x).map(|sum| sum / area)
+}
+
 /// Return nodal forces with a moment (x, y, z; force times length) and without a resultant. In the plane the moment has a z component
 /// alone.
 ///
@@ -12,8 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 /// have the moment to rounding on curved facets, too.
 pub fn load<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, moment: [f64; 3]) -> NodalForces<D> {
     let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| traction(x));
-    let area = of(&|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 })).sum()[0];
-    let centre = of(&|x| x).sum().map(|sum| sum / area);
+    let centre = centre(space, facets, parts);
     let from_centre = |x: [f64; D]| {
         let x = pad(x);
         std::array::from_fn(|c| x[c] - centre[c])

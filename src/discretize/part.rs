@@ -182,7 +182,7 @@ impl<'a, const D: usize> Part<'a, D> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
             LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
-            LoadKind::Force { .. } | LoadKind::Moment(_) => true,
+            LoadKind::Force { .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => true,
         };
         let force = self.spec.force.iter().flatten();
         if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
@@ -245,7 +245,7 @@ impl<'a, const D: usize> Part<'a, D> {
                 let x = self.space.in_scene(x);
                 std::array::from_fn(|c| factor * values.at(&fields[c], x))
             }
-            LoadKind::Force { rigid: true, .. } | LoadKind::Moment(_) => [0.0; D],
+            LoadKind::Force { rigid: true, .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => [0.0; D],
             LoadKind::Force { total, .. } => std::array::from_fn(|c| factor * total[c] / area),
         });
         values.refused()?;
@@ -278,21 +278,26 @@ impl<'a, const D: usize> Part<'a, D> {
         Ok(sum)
     }
 
-    /// Return the forces on rigid surfaces: a node of each, and the force (x, y, z).
-    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; 3])> + '_ {
-        self.held.rigid.iter().filter_map(|(index, nodes)| {
-            let load = &self.spec.load[*index];
-            match load.kind {
-                LoadKind::Force { total, .. } => Some((*nodes.first()?, total.map(|f| load.factor * f))),
-                _ => None,
+    /// Return the forces on rigid surfaces, at few nodes of each.
+    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
+        self.held.rigid.iter().flat_map(|(index, nodes)| {
+            let Load { kind, factor, .. } = &self.spec.load[*index];
+            let in_space = |force: &[f64; 3]| std::array::from_fn(|c| factor * force[c]);
+            let master = nodes.first().copied();
+            match (master, kind) {
+                (Some(master), LoadKind::Force { total, .. }) => vec![(master, in_space(total))],
+                (Some(master), LoadKind::Turning { force, moment }) => {
+                    let moment = moment.map(|component| factor * component);
+                    self.held.frame.levers[&master].forces(master, in_space(force), moment)
+                }
+                _ => Vec::new(),
             }
         })
     }
 
     /// Return the nodal forces of [`Part::load`] and those on rigid surfaces as forces at dofs.
     pub fn load_on_dofs(&self, load: &NodalForces<D>) -> NodalForces<D> {
-        let rigid = self.rigid_forces().map(|(node, total)| (node, std::array::from_fn(|c| total[c])));
-        load.iter().chain(rigid).map(|(node, force)| self.held.frame.force(node, force)).collect()
+        load.iter().chain(self.rigid_forces()).flat_map(|(node, force)| self.held.frame.force(node, force)).collect()
     }
 
     /// Return the load vector f at all dofs, from the nodal forces at all nodes.
@@ -327,21 +332,23 @@ impl<'a, const D: usize> Part<'a, D> {
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-        let mut stiffness =
-            assemble::stiffness(&self.space, graph, &self.elasticity).map_err(|defect| match defect {
+        let mut stiffness = assemble::stiffness(&self.space, graph, &self.held.frame, &self.elasticity).map_err(
+            |defect| match defect {
                 assemble::Defect::Inverted(cell) => {
                     let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
                     let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
                     Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
                 }
                 assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
-            })?;
+            },
+        )?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
             return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
         }
-        self.springs.iter().for_each(|springs| assemble::add_blocks(graph, springs, &mut stiffness));
-        self.held.frame.turn_matrix(&mut stiffness);
+        let frame = &self.held.frame;
+        self.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
+        frame.turn_matrix(&mut stiffness);
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
         Ok(support(stiffness, load, prescribed, carried))

@@ -41,7 +41,10 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
         for line in &table.load {
             let places = load.iter().flatten().filter(|load| load.on.place == line.on.place).count();
             let own = line.on.value.contains(BODY) && !is_pattern(&line.on.value);
-            if matches!(line.kind, LoadKind::Force { .. } | LoadKind::Moment(_)) && places > 1 && !own {
+            if matches!(line.kind, LoadKind::Force { .. } | LoadKind::Moment(_) | LoadKind::Turning { .. })
+                && places > 1
+                && !own
+            {
                 let message = format!(
                     "a total force or moment on {places} surfaces: `{}` of `{}`",
                     line.on.value, table.name.value

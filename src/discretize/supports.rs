@@ -1,13 +1,14 @@
 //! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
 
-use super::find::{earlier, find_group, not_on_body, of_body, point};
+use super::find::{earlier, find_group, not_on_body, of_body, point, without_area};
+use super::moment;
 use crate::contact::pad;
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Located, Place, Result};
 use crate::exchange::Plain;
-use crate::fem::{Facets, Frame, Space, place};
+use crate::fem::{Facets, Frame, Levers, Parts, Space, place, surface};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
-use crate::problem::body::{BodySpec, LoadKind};
+use crate::problem::body::{BodySpec, Load, LoadKind};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -63,6 +64,7 @@ impl<const D: usize> Constraints<D> {
             if let Some(field) = &fix.normal {
                 held_here.push((plane(space, group, &fix.on.value, &fix.on.place)?, field));
             }
+            held.refuse_on_turning(&nodes, &fix.on, spec)?;
             for node in nodes {
                 for &(direction, field) in &held_here {
                     let value = field
@@ -105,11 +107,12 @@ impl<const D: usize> Constraints<D> {
         held.map(|node| (self.frame.node(node), vec![radial])).collect()
     }
 
-    /// Tie the nodes of each rigid surface to its first node.
+    /// Tie the nodes of each rigid surface to its first node, and to the rotation where it turns.
     fn tie(&mut self, spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<()> {
         let mut taken: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, load) in spec.load.iter().enumerate() {
-            if !matches!(load.kind, LoadKind::Force { rigid: true, .. }) {
+            let turns = matches!(load.kind, LoadKind::Turning { .. });
+            if !turns && !matches!(load.kind, LoadKind::Force { rigid: true, .. }) {
                 continue;
             }
             let group = find_group(mesh, &load.on, &[D - 1], "load")?;
@@ -133,8 +136,32 @@ impl<const D: usize> Constraints<D> {
                     self.prescribed.extend((0..D).map(|c| (D * node as usize + c, 0.0)));
                 }
             }
+            if turns {
+                self.turn(load, &nodes, &space.facets(group), spec, space)?;
+            }
             self.rigid.push((index, nodes));
         }
+        Ok(())
+    }
+
+    /// Let a rigid surface with these `nodes` turn.
+    fn turn(
+        &mut self,
+        load: &Load,
+        nodes: &[u32],
+        facets: &Facets<D>,
+        spec: &BodySpec,
+        space: &Space<D>,
+    ) -> Result<()> {
+        if surface::measure(space, facets) == 0.0 {
+            return Err(without_area(&load.on, spec));
+        }
+        let centre = moment::centre(space, facets, Parts::Whole);
+        let levers = Levers::new(nodes, |node| space.nodes[node as usize], std::array::from_fn(|c| centre[c]));
+        for component in 0..if D == 2 { 1 } else { D } {
+            self.prescribed.remove(&(D * levers.pole as usize + component));
+        }
+        self.frame.levers.insert(nodes[0], levers);
         Ok(())
     }
 
@@ -187,6 +214,25 @@ impl<const D: usize> Constraints<D> {
         Ok(())
     }
 
+    /// Check that a support on these `nodes` holds none of a rigid surface that turns.
+    ///
+    /// # Errors
+    /// It holds one.
+    fn refuse_on_turning(&self, nodes: &[u32], on: &Located<String>, spec: &BodySpec) -> Result<()> {
+        let turns = |node: u32| self.frame.levers.contains_key(&self.frame.node(node));
+        let Some(node) = nodes.iter().copied().find(|&node| turns(node)) else { return Ok(()) };
+        let surface = self.rigid.iter().find(|(_, nodes)| nodes.binary_search(&node).is_ok());
+        let Some((load, _)) = surface else { return Ok(()) };
+        let surface = &spec.load[*load].on;
+        let message = format!(
+            "body `{}`: the support on `{}` holds nodes of the rigid surface `{}`, which turns",
+            spec.name.value, on.value, surface.value
+        );
+        Err(Error::scene(&on.place, message).because(earlier(surface)).help(
+            "let the two not meet, or leave `moment` away: without a moment the rigid surface does not turn and can have supports",
+        ))
+    }
+
     /// Check that no rigid force pushes along a direction that a support constrains.
     ///
     /// # Errors
@@ -234,7 +280,7 @@ impl<const D: usize> Constraints<D> {
 
     /// Return the number of prescribed dofs without those of tied nodes.
     pub fn supported(&self) -> usize {
-        self.prescribed.len() - D * self.frame.master.len()
+        self.prescribed.keys().filter(|&dof| !self.frame.master.contains_key(&((dof / D) as u32))).count()
     }
 }
 

@@ -231,7 +231,7 @@ impl<const D: usize> Unassembled<'_, D> {
             let [work, largest] = self.interface.nodal_load.works(|_| std::array::from_fn(|k| f64::from(k == c)));
             *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
         }
-        part.rigid_forces().for_each(|(_, total)| contact::add(&mut load, total));
+        part.rigid_forces().for_each(|(_, force)| contact::add(&mut load, contact::pad(force)));
         BodyInfo {
             name: spec.name.value.clone(),
             datum: contact::pad(part.space.datum),

@@ -109,11 +109,7 @@ impl<const D: usize> Forces<D> {
             (0..D).for_each(|c| sum.add(D * *node as usize + c, total[c], D));
         }
         for per_node in [&mut sum.size, &mut diagonal, &mut resisting] {
-            self.held
-                .frame
-                .master
-                .iter()
-                .for_each(|(&node, &master)| per_node[master as usize] += per_node[node as usize]);
+            self.held.frame.sum(per_node);
         }
         let Sum { mut force, size } = sum;
         self.held.frame.forces(&mut force);

@@ -6,7 +6,8 @@
 use super::elasticity::{Elasticity, Flaw};
 use super::element;
 use super::forces::NodalForces;
-use super::frame::Frame;
+use super::frame::{Frame, Movers};
+use super::lever::Rotation;
 use super::quadrature::{self, Parts, Rule};
 use super::space::Space;
 use crate::exchange::Plain;
@@ -21,8 +22,6 @@ pub struct NodeGraph {
     pub ptr: Vec<u32>,
     /// Neighbours of each node, the node itself included, sorted.
     pub col: Vec<u32>,
-    /// Master of each node, whose dofs move it; empty if no nodes are tied.
-    master: Vec<u32>,
 }
 
 impl NodeGraph {
@@ -37,8 +36,8 @@ impl NodeGraph {
     }
 
     /// Build the graph of a space's cells plus `extra` sets of nodes that are coupled among themselves. These are the nodes of
-    /// each contact row, the pattern of B'B. The nodes that `frame` ties are represented by their master. Their own rows have
-    /// the diagonal alone.
+    /// each contact row, the pattern of B'B. The nodes that `frame` ties are represented by their master, and on surfaces that turn
+    /// also by the pole. Their own rows have the diagonal alone.
     pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>], frame: &Frame<D>) -> Self {
         let n = space.nodes.len();
         let merged: Vec<u32> = match frame.master.is_empty() {
@@ -46,9 +45,10 @@ impl NodeGraph {
             false => space.cells.iter().map(|&node| frame.node(node)).collect(),
         };
         let cells = if merged.is_empty() { &space.cells } else { &merged };
-        let tied: Vec<[u32; 1]> = frame.master.keys().map(|&node| [node]).collect();
-        let alone = tied.iter().map(|node| &node[..]);
-        let sets = || cells.chunks_exact(space.stride).chain(extra.iter().map(Vec::as_slice)).chain(alone.clone());
+        let tied = frame.master.keys().map(|&node| vec![node]);
+        let turned: Vec<Vec<u32>> = turned_cells(space, frame).chain(tied).collect();
+        let others: Vec<&[u32]> = extra.iter().chain(&turned).map(Vec::as_slice).collect();
+        let sets = || cells.chunks_exact(space.stride).chain(others.iter().copied());
         let (start, sets_of_nodes) = sets_by_node(n, sets);
         let cell_count = space.cell_count();
         let set = |index: u32| -> &[u32] {
@@ -56,12 +56,11 @@ impl NodeGraph {
             if index < cell_count {
                 &cells[index * space.stride..(index + 1) * space.stride]
             } else {
-                extra.get(index - cell_count).map_or_else(|| &tied[index - cell_count - extra.len()][..], Vec::as_slice)
+                others[index - cell_count]
             }
         };
         let mut last_row = vec![u32::MAX; n];
-        let master = if merged.is_empty() { Vec::new() } else { (0..n as u32).map(|node| frame.node(node)).collect() };
-        let mut graph = NodeGraph { ptr: vec![0], col: Vec::with_capacity(8 * n), master };
+        let mut graph = NodeGraph { ptr: vec![0], col: Vec::with_capacity(8 * n) };
         for i in 0..n {
             let first = graph.col.len();
             for &index in &sets_of_nodes[start[i] as usize..start[i + 1] as usize] {
@@ -80,7 +79,7 @@ impl NodeGraph {
 
     /// Return the graph with the rows of some nodes only; the rows of others are empty.
     pub fn of(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let mut graph = Self { ptr: vec![0], col: Vec::new(), master: self.master.clone() };
+        let mut graph = Self { ptr: vec![0], col: Vec::new() };
         for node in 0..self.ptr.len() - 1 {
             if keep(node) {
                 graph.col.extend(&self.col[self.ptr[node] as usize..self.ptr[node + 1] as usize]);
@@ -90,15 +89,9 @@ impl NodeGraph {
         graph
     }
 
-    /// Return the master of a node, or the node itself if it is not tied.
-    fn master(&self, node: u32) -> u32 {
-        self.master.get(node as usize).copied().unwrap_or(node)
-    }
-
-    /// Return whether the graph has the row of a node, or of its master.
+    /// Return whether the graph has the row of a node.
     fn has(&self, node: u32) -> bool {
-        let node = self.master(node) as usize;
-        self.ptr[node] < self.ptr[node + 1]
+        self.ptr[node as usize] < self.ptr[node as usize + 1]
     }
 
     /// Return the number of entries of the matrix on this graph with D x D blocks.
@@ -122,9 +115,29 @@ impl NodeGraph {
         Csr { columns: D * n, ptr, values: vec![0.0; col.len()], col }
     }
 
+    /// Add a block of nodal stiffness to a matrix on this graph, in the rows and columns of the nodes that move two nodes.
+    fn add_moved<const D: usize>(
+        &self,
+        [rows, columns]: [&Movers<D>; 2],
+        entry: impl Fn(usize, usize) -> f64,
+        matrix: &mut Csr,
+    ) {
+        self.add_block::<D>([rows.node, columns.node], &entry, matrix);
+        let right = |rotation: &Rotation<D>, i, j| (0..D).map(|k| entry(i, k) * rotation.matrix[k][j]).sum::<f64>();
+        if let Some(column) = &columns.rotation {
+            self.add_block::<D>([rows.node, column.pole], |i, j| right(column, i, j), matrix);
+        }
+        let Some(row) = &rows.rotation else { return };
+        let left = |k: usize, i: usize| row.matrix[k][i];
+        self.add_block::<D>([row.pole, columns.node], |i, j| (0..D).map(|k| left(k, i) * entry(k, j)).sum(), matrix);
+        if let Some(column) = &columns.rotation {
+            let both = |i, j| (0..D).map(|k| left(k, i) * right(column, k, j)).sum();
+            self.add_block::<D>([row.pole, column.pole], both, matrix);
+        }
+    }
+
     /// Add a block to a matrix on this graph, in the rows of node `i` and the columns of node `j`.
-    fn add_block<const D: usize>(&self, nodes: [u32; 2], entry: impl Fn(usize, usize) -> f64, matrix: &mut Csr) {
-        let [i, j] = nodes.map(|node| self.master(node));
+    fn add_block<const D: usize>(&self, [i, j]: [u32; 2], entry: impl Fn(usize, usize) -> f64, matrix: &mut Csr) {
         let (from, to) = (self.ptr[i as usize] as usize, self.ptr[i as usize + 1] as usize);
         let Ok(place) = self.col[from..to].binary_search(&j) else {
             unreachable!("the graph holds every pair of nodes of a cell")
@@ -136,6 +149,25 @@ impl NodeGraph {
             }
         }
     }
+}
+
+/// Return, for each cell with nodes on surfaces that turn, the nodes that move its nodes.
+fn turned_cells<'a, const D: usize>(
+    space: &'a Space<D>,
+    frame: &'a Frame<D>,
+) -> impl Iterator<Item = Vec<u32>> + use<'a, D> {
+    let cells = space.cells.chunks_exact(space.stride).filter(|_| !frame.levers.is_empty());
+    cells.filter_map(|cell| {
+        let poles = cell.iter().filter_map(|&node| Some(frame.movers(node).rotation?.pole));
+        let mut nodes: Vec<u32> = poles.collect();
+        if nodes.is_empty() {
+            return None;
+        }
+        nodes.extend(cell.iter().map(|&node| frame.node(node)));
+        nodes.sort_unstable();
+        nodes.dedup();
+        Some(nodes)
+    })
 }
 
 /// Invert a list of sets of nodes below `n`. Return row starts, n + 1 entries, and the indices of the sets that contain each node.
@@ -167,9 +199,12 @@ pub struct NodalBlock<const D: usize> {
 }
 
 /// Add springs to a stiffness matrix on a graph.
-pub fn add_blocks<const D: usize>(graph: &NodeGraph, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
-    for NodalBlock { nodes, block } in blocks.iter().filter(|block| graph.has(block.nodes[0])) {
-        graph.add_block::<D>(*nodes, |i, j| block[i][j], matrix);
+pub fn add_blocks<const D: usize>(graph: &NodeGraph, frame: &Frame<D>, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
+    for NodalBlock { nodes, block } in blocks {
+        let [rows, columns] = nodes.map(|node| frame.movers(node));
+        if graph.has(rows.node) {
+            graph.add_moved([&rows, &columns], |i, j| block[i][j], matrix);
+        }
     }
 }
 
@@ -210,22 +245,29 @@ impl Rules {
     }
 }
 
-/// Assemble the stiffness matrix of a space on a graph, which may have the rows of some nodes only.
+/// Assemble the stiffness matrix of a space on a graph, which may have the rows of some nodes only. `frame` ties nodes; its axes are
+/// not applied. The rows of the pole of a surface that turns are on the graph if those of the master are.
 ///
 /// Where the elasticity varies within a cell, and in bodies of revolution, it is evaluated at the points of a rule of degree 2
 /// (P1) or 5 (P2). All of these points lie off the axis.
 ///
 /// # Errors
 /// [`Defect`]: a cell whose map is not invertible at an integration point, or a point without elasticity.
-pub fn stiffness<const D: usize>(space: &Space<D>, graph: &NodeGraph, elasticity: &Elasticity) -> Result<Csr, Defect> {
+pub fn stiffness<const D: usize>(
+    space: &Space<D>,
+    graph: &NodeGraph,
+    frame: &Frame<D>,
+    elasticity: &Elasticity,
+) -> Result<Csr, Defect> {
     let mut matrix = graph.matrix::<D>();
     let mut integrator = CellIntegrator::new(space, elasticity);
     for (index, cell) in space.cells.chunks_exact(space.stride).enumerate() {
-        let mut has_rows = [false; element::MOST];
-        has_rows.iter_mut().zip(cell).for_each(|(has_rows, &node)| *has_rows = graph.has(node));
-        if has_rows.contains(&true) {
+        let mut movers = [Movers { node: 0, rotation: None }; element::MOST];
+        movers.iter_mut().zip(cell).for_each(|(movers, &node)| *movers = frame.movers(node));
+        let movers = &movers[..cell.len()];
+        if movers.iter().any(|movers| graph.has(movers.node)) {
             let blocks = integrator.stiffness(index)?;
-            scatter(graph, cell, &has_rows, blocks, &mut matrix);
+            scatter(graph, movers, blocks, &mut matrix);
         }
     }
     Ok(matrix)
@@ -286,23 +328,17 @@ impl<'a, const D: usize> CellIntegrator<'a, D> {
     }
 }
 
-/// Add the symmetric stiffness matrix of a cell to a matrix. `has_rows` says which nodes of the cell have rows there.
-fn scatter<const D: usize>(
-    graph: &NodeGraph,
-    cell: &[u32],
-    has_rows: &[bool],
-    blocks: &[[[f64; D]; D]],
-    matrix: &mut Csr,
-) {
-    let stride = cell.len();
-    for a in 0..stride {
-        for b in a..stride {
+/// Add the symmetric stiffness matrix of a cell to a matrix. `movers` are the nodes that move each node of the cell.
+fn scatter<const D: usize>(graph: &NodeGraph, movers: &[Movers<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
+    let stride = movers.len();
+    for (a, of_a) in movers.iter().enumerate() {
+        for (b, of_b) in movers.iter().enumerate().skip(a) {
             let block = &blocks[a * stride + b];
-            if has_rows[a] {
-                graph.add_block::<D>([cell[a], cell[b]], |i, j| block[i][j], matrix);
+            if graph.has(of_a.node) {
+                graph.add_moved([of_a, of_b], |i, j| block[i][j], matrix);
             }
-            if a != b && has_rows[b] {
-                graph.add_block::<D>([cell[b], cell[a]], |i, j| block[j][i], matrix);
+            if a != b && graph.has(of_b.node) {
+                graph.add_moved([of_b, of_a], |i, j| block[j][i], matrix);
             }
         }
     }

@@ -1,9 +1,11 @@
 //! The coordinates v in which a body is solved. Nodal displacements are u = T v.
 //!
 //! A support along an inclined direction rotates the axes of its nodes, so that it prescribes one component there. A rigid
-//! surface ties its nodes to one of them, the master, whose dofs move all of them. In v every support is a prescribed dof, and
-//! the blocks of K keep their size.
+//! surface ties its nodes to one of them, the master, whose dofs move all of them; where the surface turns, the dofs of a second node,
+//! the pole, are its rotation. In v every support is a prescribed dof, and the blocks of K keep their size.
 
+use super::lever::{Levers, Rotation};
+use super::minus;
 use crate::exchange::Plain;
 use crate::linalg::Csr;
 use serde::{Deserialize, Serialize};
@@ -12,12 +14,15 @@ use std::collections::BTreeMap;
 /// The map T from dofs v to nodal displacements u, and the transposed map for forces. Nodes without an entry have the same values
 /// in both.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-#[serde(bound = "[[f64; D]; D]: Plain")]
+#[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
 pub struct Frame<const D: usize> {
     /// Orthonormal axes of rotated nodes: v_i = axis_i . u.
     pub axes: BTreeMap<u32, [[f64; D]; D]>,
-    /// Master of each tied node: u = v + v_master, and v = 0 must be prescribed.
+    /// Master of each tied node: u = v + v_master + R v_pole, and v = 0 must be prescribed, except at the pole. The rotation R v_pole is
+    /// zero where the surface does not turn. The pole moves by u = v_master + R v.
     pub master: BTreeMap<u32, u32>,
+    /// Levers R of the surfaces that turn, by their master. None of their nodes has axes of its own.
+    pub levers: BTreeMap<u32, Levers<D>>,
 }
 
 /// Return the position of a node in a sorted slice.
@@ -25,24 +30,48 @@ pub fn place(nodes: &[u32], node: u32) -> Option<u32> {
     nodes.binary_search(&node).ok().map(|place| place as u32)
 }
 
+/// The nodes whose dofs move a node.
+#[derive(Clone, Copy)]
+pub struct Movers<'a, const D: usize> {
+    /// Master of the node, or the node itself. The displacement of the node has the dofs of this one as a summand.
+    pub node: u32,
+    /// Rotation, where the node is on a surface that turns.
+    pub rotation: Option<Rotation<'a, D>>,
+}
+
 impl<const D: usize> Frame<D> {
-    /// Return the node whose dofs move a node: its master, or the node itself.
+    /// Return the node whose dofs move a node as a translation: its master, or the node itself.
     pub fn node(&self, node: u32) -> u32 {
         self.master.get(&node).copied().unwrap_or(node)
     }
 
-    /// Return the map for the sorted `nodes`, renumbered by their positions in this slice.
+    /// Return the nodes whose dofs move a node.
+    pub fn movers(&self, node: u32) -> Movers<'_, D> {
+        let master = self.node(node);
+        let rotation = self.levers.get(&master).and_then(|levers| levers.rotation_of(node));
+        Movers { node: master, rotation }
+    }
+
+    /// Return the nodes on which the displacements or dofs of tied nodes depend, in any order and with repetitions.
+    pub fn leaders(&self) -> impl Iterator<Item = u32> + Clone + '_ {
+        let turning = self.levers.values().flat_map(|levers| levers.weights.keys().chain([&levers.pole]));
+        self.master.values().chain(turning).copied()
+    }
+
+    /// Return the map for the sorted `nodes`, renumbered by their positions in this slice. It must contain the [`Frame::leaders`].
     pub fn on(&self, nodes: &[u32]) -> Self {
         let number = |node: &u32| place(nodes, *node);
         let axes = self.axes.iter().filter_map(|(node, axes)| Some((number(node)?, *axes)));
         let master = self.master.iter().filter_map(|(node, master)| Some((number(node)?, number(master)?)));
-        Self { axes: axes.collect(), master: master.collect() }
+        let levers = self.levers.iter().filter_map(|(master, of)| Some((number(master)?, of.renumbered(number)?)));
+        Self { axes: axes.collect(), master: master.collect(), levers: levers.collect() }
     }
 
-    /// Return a force at a node, or the entries of a row of B, as a force at dofs: the node of these dofs and the components.
-    pub fn force(&self, node: u32, force: [f64; D]) -> (u32, [f64; D]) {
-        let node = self.node(node);
-        (node, self.along_axes(node, force))
+    /// Return a force at a node, or the entries of a row of B, as forces at dofs: the nodes of these dofs and the components.
+    pub fn force(&self, node: u32, force: [f64; D]) -> impl Iterator<Item = (u32, [f64; D])> {
+        let Movers { node, rotation } = self.movers(node);
+        let at_pole = rotation.map(|rotation| (rotation.pole, rotation.turning(force)));
+        std::iter::once((node, self.along_axes(node, force))).chain(at_pole)
     }
 
     /// Return the components of a vector along the axes of a node.
@@ -53,23 +82,33 @@ impl<const D: usize> Frame<D> {
         }
     }
 
-    /// Replace nodal forces f by forces at dofs, T'f. The forces of tied nodes go to their master.
+    /// Replace nodal forces f by forces at dofs, T'f. The forces of tied nodes go to their master, and their moments to the pole.
     pub fn forces(&self, f: &mut [f64]) {
+        let at_pole = |levers: &Levers<D>| (levers.pole, levers.turning(|node| vector(f, node)));
+        let moments: Vec<(u32, [f64; D])> = self.levers.values().map(at_pole).collect();
         for (&node, &master) in &self.master {
             for c in 0..D {
                 f[D * master as usize + c] += std::mem::take(&mut f[D * node as usize + c]);
             }
         }
+        moments.iter().for_each(|(pole, moment)| f[D * *pole as usize..][..D].copy_from_slice(moment));
         self.rotate(f);
+    }
+
+    /// Replace numbers at nodes by their sums over the nodes that the dofs of a node move.
+    pub fn sum(&self, per_node: &mut [f64]) {
+        let at_pole =
+            |levers: &Levers<D>| (levers.pole, levers.matrix.keys().map(|&node| per_node[node as usize]).sum());
+        let sums: Vec<(u32, f64)> = self.levers.values().map(at_pole).collect();
+        self.master.iter().for_each(|(&node, &master)| per_node[master as usize] += per_node[node as usize]);
+        sums.iter().for_each(|(pole, sum)| per_node[*pole as usize] = *sum);
     }
 
     /// Return the dofs of nodal displacements, v = T^-1 u.
     pub fn dofs(&self, u: &[f64]) -> Vec<f64> {
         let mut v = u.to_vec();
-        for (&node, &master) in &self.master {
-            for c in 0..D {
-                v[D * node as usize + c] -= u[D * master as usize + c];
-            }
+        for &node in self.master.keys() {
+            v[D * node as usize..][..D].copy_from_slice(&self.at(node, |node| vector(u, node)));
         }
         self.rotate(&mut v);
         v
@@ -82,12 +121,13 @@ impl<const D: usize> Frame<D> {
 
     /// Return the values at the dofs of a node of a field with the nodal displacements `u`.
     pub fn at(&self, node: u32, u: impl Fn(u32) -> [f64; D]) -> [f64; D] {
-        let mut relative = u(node);
-        if let Some(&master) = self.master.get(&node) {
-            let of_master = u(master);
-            relative = std::array::from_fn(|c| relative[c] - of_master[c]);
+        let Some(&master) = self.master.get(&node) else { return self.along_axes(node, u(node)) };
+        let relative = |node: u32| minus(u(node), u(master));
+        match self.levers.get(&master) {
+            None => relative(node),
+            Some(levers) if levers.pole == node => levers.dofs(relative),
+            Some(levers) => minus(relative(node), levers.displacement(node, levers.dofs(relative))),
         }
-        self.along_axes(node, relative)
     }
 
     /// Return the nodal displacements of dofs, u = T v.
@@ -98,9 +138,11 @@ impl<const D: usize> Frame<D> {
                 u[D * node as usize + c] = (0..D).map(|i| axes[i][c] * v[D * node as usize + i]).sum();
             }
         }
+        self.levers.values().for_each(|levers| u[D * levers.pole as usize..][..D].fill(0.0));
         for (&node, &master) in &self.master {
+            let turned = self.levers.get(&master).map(|levers| levers.displacement(node, vector(v, levers.pole)));
             for c in 0..D {
-                u[D * node as usize + c] += u[D * master as usize + c];
+                u[D * node as usize + c] += u[D * master as usize + c] + turned.map_or(0.0, |turned| turned[c]);
             }
         }
         u
@@ -141,6 +183,11 @@ impl<const D: usize> Frame<D> {
     }
 }
 
+/// Return the vector at a node.
+fn vector<const D: usize>(all: &[f64], node: u32) -> [f64; D] {
+    std::array::from_fn(|c| all[D * node as usize + c])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,6 +199,7 @@ mod tests {
         let frame = Frame::<2> {
             axes: BTreeMap::from([(1, [[c, s], [-s, c]]), (2, [[s, c], [c, -s]])]),
             master: BTreeMap::from([(0, 2), (3, 2)]),
+            levers: BTreeMap::new(),
         };
         let v = [0.0, 0.0, 0.3, -0.7, 1.1, 0.4, 0.0, 0.0, 5.0, 6.0];
         let u = frame.displacements(&v);
@@ -163,12 +211,12 @@ mod tests {
         let work = dot(&f, &u);
         frame.forces(&mut f);
         assert!((dot(&f, &v) - work).abs() < 1e-13);
-        assert_eq!(frame.force(3, [0.0, 5.0]), (2, [4.0, -3.0]));
+        assert_eq!(frame.force(3, [0.0, 5.0]).collect::<Vec<_>>(), [(2, [4.0, -3.0])]);
     }
 
     #[test]
     fn a_turned_matrix_is_the_same_form() {
-        let frame = Frame::<2> { axes: BTreeMap::from([(1, [[0.8, 0.6], [-0.6, 0.8]])]), master: BTreeMap::new() };
+        let frame = Frame::<2> { axes: BTreeMap::from([(1, [[0.8, 0.6], [-0.6, 0.8]])]), ..Frame::default() };
         // The matrix couples the nodes 0 - 1 - 2 by symmetric blocks.
         let dense = |i: usize, j: usize| {
             let (i, j) = (i.min(j), i.max(j));

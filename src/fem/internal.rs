@@ -159,7 +159,7 @@ mod tests {
         let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
         let elasticity = Elasticity::new(&[&spec], Vec::new(), D, plane).expect("a material");
         let graph = NodeGraph::new(&space, &[], &Frame::default());
-        let matrix = assemble::stiffness(&space, &graph, &elasticity).expect("a matrix");
+        let matrix = assemble::stiffness(&space, &graph, &Frame::default(), &elasticity).expect("a matrix");
         let u: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.7).sin()).collect();
         let v: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.3).cos()).collect();
         let mut expected = vec![0.0; u.len()];

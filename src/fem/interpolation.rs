@@ -26,13 +26,13 @@ impl Interpolation {
     }
 }
 
-/// Return the nodes of linear displacements, sorted: the corners of the cells of this rank, and the masters of tied nodes.
+/// Return the nodes of linear displacements, sorted: the corners of the cells of this rank, and the nodes that move tied ones.
 pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u32> {
     match space.order {
         Order::P1 => (0..space.nodes.len() as u32).collect(),
         Order::P2 => {
             let corners = space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]);
-            Space::<D>::among(corners.chain(frame.master.values()).copied())
+            Space::<D>::among(corners.copied().chain(frame.leaders()))
         }
     }
 }
@@ -90,9 +90,10 @@ fn mean_of_ends<const D: usize>(
     coarse: &[u32],
 ) -> Vec<(usize, f64)> {
     let mut row: Vec<(usize, f64)> = Vec::new();
-    for end in ends {
-        let (end, shares) = frame.force(end, axis);
-        let Ok(place) = coarse.binary_search(&end) else { unreachable!("a vertex is coarse, and so is its master") };
+    for (end, shares) in ends.into_iter().flat_map(|end| frame.force(end, axis)) {
+        let Ok(place) = coarse.binary_search(&end) else {
+            unreachable!("a vertex is coarse, and so are the nodes that move it")
+        };
         for (k, share) in shares.into_iter().enumerate().filter(|(k, _)| !is_prescribed(D * end as usize + k)) {
             match row.iter_mut().find(|entry| entry.0 == D * place + k) {
                 Some(entry) => entry.1 += 0.5 * share,

@@ -12,6 +12,7 @@ pub mod forces;
 pub mod frame;
 pub mod internal;
 pub mod interpolation;
+pub mod lever;
 pub mod material;
 pub mod norms;
 pub mod quadrature;
@@ -25,6 +26,8 @@ pub mod strain;
 pub mod stress;
 mod support;
 pub mod surface;
+#[cfg(test)]
+mod tests;
 pub mod turn;
 
 use crate::linalg::dot;
@@ -38,6 +41,7 @@ pub use facets::{Facets, area_vector};
 pub use forces::NodalForces;
 pub use frame::{Frame, place};
 pub use interpolation::Interpolation;
+pub use lever::Levers;
 pub use material::Material;
 pub use quadrature::Parts;
 pub use recovery::Recovery;

@@ -271,7 +271,8 @@ pub struct BalanceReport {
     pub supports: Vec<ForceReport>,
     /// Force of each spring.
     pub springs: Vec<ForceReport>,
-    /// Force of each rigid surface, with that of the supports of its nodes. Its moment keeps the surface from turning.
+    /// Force of each rigid surface, with that of the supports of its nodes. Its moment keeps the surface from turning, or is that of the
+    /// loads on a surface that turns.
     pub rigid: Vec<ForceReport>,
     /// Norm of the sum of all forces, relative to the sum of the norms of all nodal forces.
     pub force_imbalance: f64,

@@ -168,6 +168,13 @@ pub enum LoadKind {
     /// Moment about the centre of the boundary (x, y, z; force times length), by tractions that are linear in the place. In the plane the
     /// first two components are zero.
     Moment([f64; 3]),
+    /// Force and moment on a boundary that moves and turns as a rigid body.
+    Turning {
+        /// Force that acts at the centre of the boundary (x, y, z).
+        force: [f64; 3],
+        /// Moment about the centre (x, y, z; force times length). In the plane the first two components are zero.
+        moment: [f64; 3],
+    },
 }
 
 /// Label and help for a name that is not spelt like the name of a body.

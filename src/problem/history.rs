@@ -122,6 +122,7 @@ pub fn has_common(body: &BodySpec) -> bool {
         LoadKind::Pressure(pressure) => !pressure.is_zero(),
         LoadKind::Traction(traction) => !traction.iter().all(Field::is_zero),
         LoadKind::Force { total, .. } | LoadKind::Moment(total) => total.iter().any(|force| *force != 0.0),
+        LoadKind::Turning { force, moment } => force.iter().chain(moment).any(|component| *component != 0.0),
     };
     let moves = |field: &Field| !field.is_zero();
     body.force.as_ref().is_some_and(|force| !force.iter().all(Field::is_zero))

@@ -138,6 +138,10 @@ fn of_load(load: &Load, dimension: usize) -> Value {
         LoadKind::Traction(traction) => json!({ "traction": of_vector(traction, dimension) }),
         LoadKind::Moment(moment) if dimension == 2 => json!({ "moment": moment[2] }),
         LoadKind::Moment(moment) => json!({ "moment": moment }),
+        LoadKind::Turning { force, moment } if dimension == 2 => {
+            json!({ "force": force[..2], "moment": moment[2], "rigid": true })
+        }
+        LoadKind::Turning { force, moment } => json!({ "force": force, "moment": moment, "rigid": true }),
         LoadKind::Force { total, rigid } => json!({ "force": total[..dimension], "rigid": rigid }),
     };
     map["on"] = json!(on.value);

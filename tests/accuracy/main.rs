@@ -10,4 +10,5 @@ mod layers;
 mod manufactured;
 mod space;
 mod supports;
+mod turning;
 mod verification;

@@ -356,8 +356,8 @@ fn planes_of_symmetry_in_space() {
     }
 }
 
-/// A bar of length 10 with a square section of side 1 and no Poisson's ratio under moments at its end: quadratic elements have the
-/// solution of a beam, u = kappa x^2 / 2 across and M h / (2 I) = 6 M at the edges.
+/// A bar of length 10 with a square section of side 1 and no Poisson's ratio under moments at its end, which is flexible or rigid: quadratic
+/// elements have the solution of a beam, u = kappa x^2 / 2 across and M h / (2 I) = 6 M at the edges.
 #[test]
 fn moments_bend_a_bar() {
     let young = 1e5;
@@ -385,19 +385,25 @@ fn moments_bend_a_bar() {
             "SetFactory(\"OpenCASCADE\");\n{shape}\nPhysical {thing}(\"bar\") = {{1}};\nMesh.MeshSizeMax = 1;\n"
         );
         std::fs::write(scene.path.with_file_name("bar.geo"), script).expect("a script");
-        let run = solve(&scene, &[]).converged();
         let size = f64::hypot(total[0], total[1]);
         let kappa = total.map(|m| 12.0 * m / young);
         // at a corner of the end, where the section has turned about both axes
         let along = 5.0 * (kappa[0].abs() + kappa[1].abs());
         let most = f64::hypot(50.0 * f64::hypot(kappa[0], kappa[1]), along);
-        let relative = |path: &str, exact: f64| (run.number(path) / exact - 1.0).abs();
-        assert!(relative("bodies/0/max_displacement", most) < 1e-9, "{most} {}", run.said());
-        assert!(relative("bodies/0/max_von_mises", 6.0 * (total[0].abs() + total[1].abs())) < 1e-7, "{}", run.said());
-        for (c, exact) in [0.0, total[0], total[1]].into_iter().enumerate() {
-            let held = run.number(&format!("bodies/0/balance/supports/0/moment/{c}"));
-            assert!((held + exact).abs() < 1e-9 * size, "{c}: {held} {}", run.said());
-            assert!(run.number(&format!("bodies/0/balance/loads/force/{c}")).abs() < 1e-9 * size);
+        for rigid in [false, true] {
+            let run = solve(&scene, &["--set", &format!("body.0.load.0.rigid={rigid}")]).converged();
+            let relative = |path: &str, exact: f64| (run.number(path) / exact - 1.0).abs();
+            assert!(relative("bodies/0/max_displacement", most) < 1e-9, "{most} {}", run.said());
+            let most = 6.0 * (total[0].abs() + total[1].abs());
+            assert!(relative("bodies/0/max_von_mises", most) < 1e-7, "{}", run.said());
+            let loaded = if rigid { "rigid/0" } else { "loads" };
+            for (c, exact) in [0.0, total[0], total[1]].into_iter().enumerate() {
+                for (part, sign) in [("supports/0", -1.0), (loaded, 1.0)] {
+                    let number = |kind: &str| run.number(&format!("bodies/0/balance/{part}/{kind}/{c}"));
+                    assert!((number("moment") - sign * exact).abs() < 1e-9 * size, "{part} {c} {}", run.said());
+                    assert!(number("force").abs() < 1e-9 * size, "{part} {c} {}", run.said());
+                }
+            }
         }
     }
 }

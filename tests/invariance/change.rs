@@ -107,6 +107,13 @@ impl Change {
         arrays.into()
     }
 
+    /// Return a moment, where forces grow by `force`. The sense of a turn changes in a mirror.
+    fn moment(&self, moment: [f64; 3], force: f64) -> [f64; 3] {
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| self.vector(axis));
+        let sense: f64 = cross(x, y).iter().zip(z).map(|(a, b)| a * b).sum();
+        self.vector(moment).map(|m| sense * force * self.length * m)
+    }
+
     fn body<const D: usize>(&self, body: &mut BodySpec, mesh: &Mesh<D>, force: f64) {
         let (l, s) = (self.length, self.stress);
         self.elasticity(&mut body.elasticity);
@@ -121,11 +128,10 @@ impl Change {
             match &mut load.kind {
                 LoadKind::Pressure(field) => *field = self.field(field, s),
                 LoadKind::Traction(fields) => *fields = self.fields(fields, s),
-                // the sense of a turn changes in a mirror
-                LoadKind::Moment(moment) => {
-                    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| self.vector(axis));
-                    let sense: f64 = cross(x, y).iter().zip(z).map(|(a, b)| a * b).sum();
-                    *moment = self.vector(*moment).map(|m| sense * force * self.length * m);
+                LoadKind::Moment(moment) => *moment = self.moment(*moment, force),
+                LoadKind::Turning { force: total, moment } => {
+                    *total = self.vector(*total).map(|f| force * f);
+                    *moment = self.moment(*moment, force);
                 }
                 LoadKind::Force { total, .. } => *total = self.vector(*total).map(|f| force * f),
             }

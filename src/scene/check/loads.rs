@@ -41,15 +41,15 @@ impl Scene {
         let acts_along_z = match &load.kind {
             LoadKind::Pressure(_) | LoadKind::Moment(_) => false,
             LoadKind::Traction(traction) => !traction[2].is_zero(),
-            LoadKind::Force { total, .. } => total[2] != 0.0,
+            LoadKind::Force { total, .. } | LoadKind::Turning { force: total, .. } => total[2] != 0.0,
         };
         if self.is_plane() && acts_along_z {
             return at.refuse("a load in z in a plane problem", "", "");
         }
-        if let LoadKind::Moment(moment) = load.kind {
-            return self.check_moment(&at.below("moment"), moment);
+        if let LoadKind::Moment(moment) | LoadKind::Turning { moment, .. } = load.kind {
+            self.check_moment(&at.below("moment"), moment)?;
         }
-        let LoadKind::Force { total, .. } = load.kind else { return Ok(()) };
+        let (LoadKind::Force { total, .. } | LoadKind::Turning { force: total, .. }) = load.kind else { return Ok(()) };
         if total.iter().any(|force| !force.is_finite()) {
             return at.below("force").refuse(format!("the force is {total:?}"), "", "");
         }

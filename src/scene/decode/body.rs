@@ -66,9 +66,14 @@ fn load_shape() -> TableShape {
             one_or_components(),
             "moment about the centre of the boundary, a number: M, in space [MX, MY, MZ]",
         )
-        .optional("rigid", Flag, "whether the boundary moves as one under the force; false")
+        .optional(
+            "rigid",
+            Flag,
+            "whether the boundary moves as a rigid body under the force, without a turn, or with a turn under a moment; false",
+        )
         .optional("path", Text, "column of the table of load steps with its factor")
-        .at_most_one(&["pressure", "traction", "force", "moment"])
+        .at_most_one(&["pressure", "traction", "force"])
+        .not_both(&["moment"], &["pressure", "traction"])
 }
 
 impl Decoder<'_> {
@@ -132,16 +137,25 @@ impl Decoder<'_> {
         let keys = Keys::open(node, &load_shape())?;
         let on = pattern(keys.require("on")?)?;
         let rigid = keys.flag("rigid", false)?;
-        if let (Some(entry), None) = (keys.entry("rigid"), keys.get("force")) {
-            return Err(Error::scene(&entry.key_place, "`rigid` without a force")
+        let [force, moment] = ["force", "moment"].map(|key| keys.get(key));
+        if let (Some(entry), None) = (keys.entry("rigid"), force.or(moment)) {
+            return Err(Error::scene(&entry.key_place, "`rigid` without a force or a moment")
                 .help("a rigid surface moves as one under a total force: force = [0, -10], rigid = true"));
         }
-        let kind = match ["pressure", "traction", "force", "moment"].map(|key| keys.get(key)) {
+        let kind = match [keys.get("pressure"), keys.get("traction"), force, moment] {
             [Some(pressure), ..] => LoadKind::Pressure(self.field(pressure)?),
             [_, Some(traction), ..] => LoadKind::Traction(self.vector(traction)?),
-            [.., Some(force), _] => LoadKind::Force { total: self.numbers(force)?, rigid },
-            [.., Some(moment)] if self.dimension == 2 => LoadKind::Moment([0.0, 0.0, moment.number()?]),
-            [.., Some(moment)] => LoadKind::Moment(self.numbers(moment)?),
+            [.., force, Some(moment)] if rigid => {
+                let force = force.map_or(Ok([0.0; 3]), |force| self.numbers(force))?;
+                LoadKind::Turning { force, moment: self.moment(moment)? }
+            }
+            [.., Some(_), Some(moment)] => {
+                return Err(moment
+                    .refuse("a load has both `force` and `moment`")
+                    .help("give two loads, or rigid = true for a surface that moves and turns as a rigid body"));
+            }
+            [.., Some(force), None] => LoadKind::Force { total: self.numbers(force)?, rigid },
+            [.., Some(moment)] => LoadKind::Moment(self.moment(moment)?),
             [None, None, None, None] => {
                 let components = &["tx", "ty", "tz"][..self.dimension];
                 let advice = format!(
@@ -152,6 +166,11 @@ impl Decoder<'_> {
             }
         };
         Ok(Load { on, kind, path: keys.read("path", Node::name)?, factor: 1.0 })
+    }
+
+    /// Return a moment (x, y, z).
+    fn moment(&self, node: &Node) -> Result<[f64; 3]> {
+        if self.dimension == 2 { Ok([0.0, 0.0, node.number()?]) } else { self.numbers(node) }
     }
 
     /// Return a vector of numbers; expressions in the coordinates are refused.
