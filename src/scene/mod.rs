@@ -1,7 +1,8 @@
 //! Scene files: from TOML to a checked [`Scene`]. Every refusal names file and line, and says what to do.
 //!
 //! [`load`] reads the file into a tree of values, applies the overrides of the command line (`overrides`), and decodes the tree
-//! (`decode`) by the keys that the structs of the scene declare ([`setting`](crate::setting)). The scene that results (`spec`) is then checked (`check`).
+//! (`decode`) by the keys that the structs of the scene declare (module `setting`). The scene that results (`spec`) is then checked
+//! (`check`).
 
 mod build;
 mod check;

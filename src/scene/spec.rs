@@ -12,6 +12,8 @@ use std::path::PathBuf;
 
 keys! {
     /// A checked scene.
+    // the description of `body` has the name of a table in brackets, which is no link
+    #[allow(rustdoc::broken_intra_doc_links)]
     #[derive(Debug, Clone)]
     pub struct Scene "the scene" {
         required {

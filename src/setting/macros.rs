@@ -71,12 +71,14 @@ macro_rules! keys {
             }
 
             /// Return the settings with the default of each key that need not be given.
+            // not every table is also built in Rust
             #[allow(dead_code)]
             pub(crate) fn with_defaults($($( $must: $Must, )*)? $($( $other: $Other, )*)?) -> Self {
                 Self { $($( $must, )*)? $($( $may: $default, )*)? $($( $other, )*)? $($( $state: $initial, )*)? }
             }
 
             /// Decode an open table.
+            // the values of some tables need no context
             #[allow(unused_variables)]
             pub(crate) fn decode(
                 keys: &$crate::setting::Keys,
