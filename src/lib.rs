@@ -41,4 +41,5 @@ pub mod report;
 pub mod robin;
 pub mod run;
 pub mod scene;
+mod setting;
 pub mod solver;

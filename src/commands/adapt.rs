@@ -219,7 +219,7 @@ impl Plan {
     /// Refuse a mesh that is a file, since it cannot follow sizes.
     fn refuse_finished_mesh(&self) -> Result<()> {
         let MeshSource::Msh { file } = &self.scene.mesh else { return Ok(()) };
-        let place = self.goal.as_ref().map_or(&file.place, |goal| &goal.place);
+        let place = self.goal.as_ref().map_or(&file.place, |goal| &goal.error.place);
         Err(Error::scene(place, "a finished mesh cannot be made anew with other sizes")
             .help("let the scene name a Gmsh script: mesh = \"file.geo\""))
     }
@@ -316,7 +316,7 @@ impl Plan {
             return Ok(false);
         }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
-        if error <= goal.error {
+        if error <= goal.error.value {
             return self.end_meshes(session);
         }
         if self.rounds.len() >= goal.rounds {
@@ -330,7 +330,7 @@ impl Plan {
         }
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
-        let share = (AIM * goal.error / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
+        let share = (AIM * goal.error.value / error).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let most = goal.cells as f64 * self.predicted_cells.map_or(1.0, |predicted| predicted / cells);

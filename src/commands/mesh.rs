@@ -82,8 +82,8 @@ fn follow_adapted(scene: &mut Scene) -> Result<bool> {
             return Ok(is_reached);
         }
     }
-    let message = format!("no mesh of {} was adapted to an error of {}", file.value.display(), adapt.error);
-    Err(Error::scene(&adapt.place, message).help(
+    let message = format!("no mesh of {} was adapted to an error of {}", file.value.display(), adapt.error.value);
+    Err(Error::scene(&adapt.error.place, message).help(
         "first run `winkler solve` with the same scene, --set and --tolerance; meshes are kept in the cache ($WINKLER_CACHE)",
     ))
 }

@@ -19,7 +19,7 @@ use crate::error::{Error, Kind, Result};
 use crate::output::progress::Line;
 use crate::output::{LISTED, Verbosity};
 use crate::petsc::Session;
-use crate::problem::{MethodName, name_of};
+use crate::problem::MethodName;
 use crate::run::report::{Shared, solvers_in_words};
 use crate::run::{self, Clock, Prepared};
 use crate::scene::Scene;
@@ -206,7 +206,7 @@ fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
     let (scene, discrete) = (&built.scene, &built.discrete);
     let solvers = Shared::gather(discrete).solvers;
     let mut lines = vec![format!("{}: decided", scene.title)];
-    let name = name_of(&MethodName::ALL, &scene.method.name);
+    let name = scene.method.name.name();
     let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
     let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
     lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));

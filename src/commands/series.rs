@@ -115,7 +115,7 @@ fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
 
 /// Write bodies and contact surfaces for ParaView. `stem` returns the name of a file without its ending.
 fn fields(done: &Done, recovered: &All, folder: &Folder, stem: &dyn Fn(&str) -> String) -> Result<()> {
-    let encoding = done.built.scene.output.encoding;
+    let encoding = done.built.scene.output.encoding();
     let rank = done.model().exchange.rank();
     for (info, recovered) in done.built.discrete.bodies.iter().zip(recovered) {
         if let (true, Some(Ok(recovered))) = (info.ranks.contains(&rank), recovered) {

@@ -277,7 +277,7 @@ impl Results {
         let (scene, label) = (&case.scene, &case.label);
         self.histories.push(convergence_curve(label, &done.outcome));
         let pairs = &done.model().pairs;
-        let most = scene.output.pairs.unwrap_or(LISTED);
+        let most = scene.output.pairs.map_or(LISTED, |most| most.0);
         let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
         for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
             let empty = || pressure_plot(&scene.title, scene, &pairs[i], Vec::new());

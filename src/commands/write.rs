@@ -65,7 +65,7 @@ impl ResultFiles<'_> {
         if first {
             Checksums::withdraw(path);
             let output = &done.built.scene.output;
-            let shown = busiest(&report.pairs, output.pairs.unwrap_or(LISTED));
+            let shown = busiest(&report.pairs, output.pairs.map_or(LISTED, |most| most.0));
             report.left_out = left_out(&report.pairs, &shown);
             let plots = Plots::of(done, &shown);
             written = self.tables(&folder, &report, &shown, &plots);

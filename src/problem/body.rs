@@ -2,37 +2,56 @@
 
 use super::elasticity::{Constants, ElasticitySpec, RegionSpec};
 use super::order::Order;
-use super::pattern::is_pattern;
-use crate::error::{Located, Place};
+use super::pattern::{is_pattern, pattern};
+use crate::error::{Located, Place, Result};
 use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};
+use crate::setting::{Context, Node, keys};
 
-/// A body: a named group of cells with its elasticity, supports and loads. In a scene file the name may be a
-/// [pattern](super::pattern); the table then stands for all bodies whose names match.
-#[derive(Debug, Clone)]
-pub struct BodySpec {
-    /// Name of the physical group of cells in the form of [`plain`]. It is a prefix of PETSc options, without words of PETSc's own.
-    pub name: Located<String>,
-    /// Whether each connected part of the group is a body of its own.
-    pub split: bool,
-    /// Elastic constants.
-    pub elasticity: ElasticitySpec,
-    /// Parts of the body with other elastic constants.
-    pub regions: Vec<RegionSpec>,
-    /// Polynomial order.
-    pub order: Order,
-    /// Supports: prescribed displacement components on named groups.
-    pub fix: Vec<Support>,
-    /// Loads on named groups.
-    pub load: Vec<Load>,
-    /// Springs to the ground on named groups.
-    pub spring: Vec<SpringSpec>,
-    /// Body force density (x, y, z), if any.
-    pub force: Option<[Field; 3]>,
-    /// Factor of the body force at the present load step; 1 without load steps.
-    pub force_factor: f64,
-    /// A known displacement to compare with, if any: functions of x, y (z), one for each dimension of the scene.
-    pub exact: Option<Vec<Expression>>,
+keys! {
+    /// A body: a named group of cells with its elasticity, supports and loads. In a scene file the name may be a
+    /// [pattern](super::pattern); the table then stands for all bodies whose names match.
+    #[derive(Debug, Clone)]
+    pub struct BodySpec "[[body]]" {
+        required {
+            /// group of cells, or a pattern such as "brick_*" for many bodies
+            ///
+            /// It has the form of [`plain`]. It is a prefix of PETSc options, without words of PETSc's own.
+            pub name: Located<String> => body_name,
+        }
+        optional {
+            /// whether each connected part of the group is a body, NAME_1, NAME_2, ...
+            pub split: bool = false,
+            /// linear or quadratic elements
+            pub order: Order = Order::P1,
+            /// supports: fix = [{ on = "base", x = 0, y = 0 }]
+            ///
+            /// They prescribe displacement components on named groups.
+            pub fix: Vec<Support> = Vec::new(),
+            /// loads: load = [{ on = "top", pressure = 10 }]
+            pub load: Vec<Load> = Vec::new(),
+            /// springs to the ground: spring = [{ on = "base", stiffness = 100 }]
+            pub spring: Vec<SpringSpec> = Vec::new(),
+            /// force density, one number or expression for each component
+            pub force: Option<[Field; 3]> = None,
+            /// known displacement to compare with
+            ///
+            /// Functions of x, y (z), one for each dimension of the scene.
+            pub exact: Option<Vec<Expression>> = None,
+            /// a region starts with the line [[body.region]]
+            ///
+            /// Parts of the body with other elastic constants.
+            pub regions as "region": Vec<RegionSpec> = Vec::new(),
+        }
+        besides {
+            /// Elastic constants.
+            pub elasticity: ElasticitySpec,
+        }
+        initially {
+            /// Factor of the body force at the present load step; 1 without load steps.
+            pub force_factor: f64 = 1.0,
+        }
+    }
 }
 
 impl BodySpec {
@@ -41,19 +60,8 @@ impl BodySpec {
     #[track_caller]
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
         let constants = Constants::Isotropic { young: young.into(), poisson: poisson.into() };
-        Self {
-            name: Located::here(&plain_pattern(name)),
-            split: false,
-            elasticity: ElasticitySpec { constants, axes: None, place: Place::here("young, poisson") },
-            regions: Vec::new(),
-            order: Order::P1,
-            fix: Vec::new(),
-            load: Vec::new(),
-            spring: Vec::new(),
-            force: None,
-            force_factor: 1.0,
-            exact: None,
-        }
+        let elasticity = ElasticitySpec { constants, axes: None, place: Place::here("young, poisson") };
+        Self::with_defaults(Located::here(&plain_pattern(name)), elasticity)
     }
 
     /// Let each connected part of the group be a body of its own: `NAME_1`, `NAME_2`, ...
@@ -202,6 +210,14 @@ pub fn plain_pattern(text: &str) -> String {
         if is_sign { c } else { plain_character(c) }
     };
     if is_pattern(text) { text.trim().chars().map(&mut write).collect() } else { plain(text) }
+}
+
+/// Read the name of a body, or a pattern of names, in the form of bodies.
+///
+/// # Errors
+/// An empty text, and a pattern that is none.
+pub(crate) fn body_name(node: &Node, context: &Context) -> Result<Located<String>> {
+    pattern(node, context).map(|name| Located { value: plain_pattern(&name.value), ..name })
 }
 
 fn plain_character(c: char) -> char {

@@ -1,7 +1,9 @@
 //! Elastic constants of bodies, and the axes that they refer to.
 
+use super::pattern::pattern;
 use crate::error::{Located, Place};
 use crate::expression::Field;
+use crate::setting::{keys, words};
 
 /// The elastic constants of a body, or of one of its regions, and their axes.
 #[derive(Debug, Clone)]
@@ -50,13 +52,19 @@ pub enum AxesSpec {
     },
 }
 
-/// A part of a body with constants of its own.
-#[derive(Debug, Clone)]
-pub struct RegionSpec {
-    /// Physical group of the cells.
-    pub on: Located<String>,
-    /// The constants of this part.
-    pub elasticity: ElasticitySpec,
+keys! {
+    /// A part of a body with constants of its own.
+    #[derive(Debug, Clone)]
+    pub struct RegionSpec "[[body.region]]" {
+        required {
+            /// group of its cells
+            pub on: Located<String> => pattern,
+        }
+        besides {
+            /// The constants of this part.
+            pub elasticity: ElasticitySpec,
+        }
+    }
 }
 
 impl Constants {
@@ -92,19 +100,14 @@ impl ElasticitySpec {
     }
 }
 
-/// What a plane problem stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Plane {
-    /// No out-of-plane strain.
-    Strain,
-    /// No out-of-plane stress.
-    Stress,
-    /// A meridian of bodies of revolution: x is the radius, y runs along the axis.
-    Axisymmetric,
-}
-
-impl Plane {
-    /// The choices with their names in the scene.
-    pub const ALL: [(&'static str, Plane); 3] =
-        [("strain", Plane::Strain), ("stress", Plane::Stress), ("axisymmetric", Plane::Axisymmetric)];
+words! {
+    /// What a plane problem stands for.
+    pub enum Plane "plane" {
+        /// No out-of-plane strain.
+        Strain = "strain",
+        /// No out-of-plane stress.
+        Stress = "stress",
+        /// A meridian of bodies of revolution: x is the radius, y runs along the axis.
+        Axisymmetric = "axisymmetric",
+    }
 }

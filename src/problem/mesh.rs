@@ -2,29 +2,40 @@
 
 use super::order::Order;
 use crate::error::{Located, Place};
+use crate::setting::keys;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Limits and settings of Gmsh for a script or a shape.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Guard {
-    /// Time after which Gmsh is ended, in seconds.
-    pub seconds: f64,
-    /// Memory that Gmsh may take, in gigabytes; what is free when it starts if `None`.
-    pub gigabytes: Option<f64>,
-    /// Largest size of elements (a length) in a shape of another program.
-    pub size: Option<f64>,
-    /// Threads of Gmsh's parallel algorithm for free meshes in space (HXT); the algorithm of the script if `None`.
-    pub threads: Option<usize>,
-    /// Whether the user trusts the script, which may then start programs and write files.
-    pub trusted: bool,
+keys! {
+    /// Limits and settings of Gmsh for a script or a shape.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    pub struct Guard "the mesh" {
+        optional {
+            /// largest size of elements in a shape
+            pub size: Option<f64> = None,
+            /// threads of Gmsh for free meshes in space
+            ///
+            /// Gmsh then uses its parallel algorithm (HXT), and that of the script otherwise.
+            pub threads: Option<usize> = None,
+            /// seconds after which Gmsh is ended
+            ///
+            /// The default is ten times what Gmsh takes for a million tetrahedra.
+            pub seconds as "timeout": f64 = 1000.0,
+            /// gigabytes that Gmsh may take; what is free when it starts
+            pub gigabytes as "memory": Option<f64> = None,
+        }
+        initially {
+            /// Whether the user trusts the script, which may then start programs and write files.
+            pub trusted: bool = false,
+        }
+    }
 }
 
 impl Default for Guard {
-    /// Return the limits of a script that the user does not trust. The time is ten times what Gmsh takes for a million tetrahedra.
+    /// Return the limits of a script that the user does not trust.
     fn default() -> Self {
-        Self { seconds: 1000.0, gigabytes: None, size: None, threads: None, trusted: false }
+        Self::with_defaults()
     }
 }
 

@@ -4,32 +4,41 @@ use super::history::History;
 use super::robin::{RobinRule, Zone};
 use super::stop::StopRule;
 use crate::expression::Field;
+use crate::setting::{keys, words};
 use serde::{Deserialize, Serialize};
 
-/// The outer iteration.
-#[derive(Debug, Clone)]
-pub struct MethodSpec {
-    /// The method. A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given, and
-    /// [`MethodName::Auto`] otherwise.
-    pub name: MethodName,
-    /// Robin zone psi.
-    pub psi: Zone,
-    /// Robin coefficient on the zone.
-    pub robin: RobinRule,
-    /// Relaxation gamma of the method `robin`.
-    pub gamma: Gamma,
-    /// Whether `robin` determines the interval (33) of gamma at the end.
-    pub interval: bool,
-    /// Number of earlier steps that the method `anderson` mixes.
-    pub depth: usize,
-    /// How linear steps of Newton's method are solved; the program chooses if `None`.
-    pub linear: Option<Linear>,
-    /// Start of the iteration.
-    pub start: Start,
-    /// Load steps.
-    pub steps: History,
-    /// The rules that stop the run.
-    pub stop: StopRule,
+keys! {
+    /// The outer iteration.
+    #[derive(Debug, Clone)]
+    pub struct MethodSpec "[method]" {
+        optional {
+            /// the method
+            ///
+            /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given, and
+            /// [`MethodName::Auto`] otherwise.
+            pub name: MethodName = MethodName::Auto,
+            /// Robin zone: "none", "full", "active" or a condition
+            pub psi: Zone = Zone::Active,
+            /// relaxation of `robin`: a number, a list, a rule
+            pub gamma: Gamma = Gamma::Stationary(0.6),
+            /// Robin coefficient on the zone, "tangent" if the method is `robin`
+            pub robin: RobinRule = RobinRule::Auto,
+            /// whether `robin` finds the interval of gamma at the end
+            ///
+            /// It is the interval (33).
+            pub interval: bool = false,
+            /// earlier steps that `anderson` mixes
+            pub depth: usize = 5,
+            /// how linear steps are solved; chosen by the program without it
+            pub linear: Option<Linear> = None,
+            /// start of the iteration: "auto", "zero", "nested" or { normal = 1e-4 }
+            pub start: Start = Start::Auto,
+            /// load steps: a number, shares that end with 1, or a table
+            pub steps: History = History::default(),
+            /// when to stop: stop = { residual = 1e-8 }
+            pub stop: StopRule = StopRule::default(),
+        }
+    }
 }
 
 impl MethodSpec {
@@ -42,75 +51,40 @@ impl MethodSpec {
 
 impl Default for MethodSpec {
     fn default() -> Self {
-        Self {
-            name: MethodName::Auto,
-            psi: Zone::Active,
-            robin: RobinRule::Auto,
-            gamma: Gamma::Stationary(0.6),
-            interval: false,
-            depth: 5,
-            linear: None,
-            start: Start::Auto,
-            steps: History::default(),
-            stop: StopRule::default(),
-        }
+        Self::with_defaults()
     }
 }
 
-/// The methods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MethodName {
-    /// Newton's method, with the kind of linear step that suits the bodies, the memory and the number of ranks.
-    Auto,
-    /// The paper's iteration (41)-(42).
-    Robin,
-    /// Nonlinear conjugate gradients over the sweep.
-    Ncg,
-    /// Anderson acceleration of the sweep.
-    Anderson,
-    /// Newton's method with linear steps by conjugate gradients over the sweep.
-    NewtonRobin,
-    /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
-    Newton,
+words! {
+    /// The methods.
+    pub enum MethodName "method" {
+        /// Newton's method, with the kind of linear step that suits the bodies, the memory and the number of ranks.
+        Auto = "auto",
+        /// The paper's iteration (41)-(42).
+        Robin = "robin",
+        /// Nonlinear conjugate gradients over the sweep.
+        Ncg = "ncg",
+        /// Anderson acceleration of the sweep.
+        Anderson = "anderson",
+        /// Newton's method with linear steps by conjugate gradients over the sweep.
+        NewtonRobin = "newton-robin",
+        /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
+        Newton = "newton",
+    }
 }
 
-impl MethodName {
-    /// All methods with their names in the scene.
-    pub const ALL: [(&'static str, MethodName); 6] = [
-        ("auto", MethodName::Auto),
-        ("robin", MethodName::Robin),
-        ("ncg", MethodName::Ncg),
-        ("anderson", MethodName::Anderson),
-        ("newton-robin", MethodName::NewtonRobin),
-        ("newton", MethodName::Newton),
-    ];
-}
-
-/// The ways to solve the linear steps of Newton's method.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Linear {
-    /// One dense matrix of condensed bodies.
-    Dense,
-    /// One sparse factorisation of all bodies.
-    Direct,
-    /// Conjugate gradients with multigrid of all bodies.
-    Multigrid,
-    /// Conjugate gradients over the Robin sweep (one solve in every body).
-    Sweeps,
-}
-
-impl Linear {
-    /// All ways with their names in the scene.
-    pub const ALL: [(&'static str, Linear); 4] = [
-        ("dense", Linear::Dense),
-        ("direct", Linear::Direct),
-        ("multigrid", Linear::Multigrid),
-        ("sweeps", Linear::Sweeps),
-    ];
-
-    /// Return the name in the scene.
-    pub fn name(self) -> &'static str {
-        super::name_of(&Self::ALL, &self)
+words! {
+    /// The ways to solve the linear steps of Newton's method.
+    #[derive(Serialize, Deserialize)]
+    pub enum Linear "way to solve linear steps" {
+        /// One dense matrix of condensed bodies.
+        Dense = "dense",
+        /// One sparse factorisation of all bodies.
+        Direct = "direct",
+        /// Conjugate gradients with multigrid of all bodies.
+        Multigrid = "multigrid",
+        /// Conjugate gradients over the Robin sweep (one solve in every body).
+        Sweeps = "sweeps",
     }
 }
 

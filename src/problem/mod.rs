@@ -7,6 +7,7 @@ pub mod body;
 pub mod contact;
 pub mod elasticity;
 pub mod history;
+pub(crate) mod keys;
 pub mod layer;
 pub mod mesh;
 pub mod method;

@@ -1,5 +1,7 @@
 //! Names of bodies and groups, and patterns that stand for many names, as in shells.
 
+use crate::error::{Located, Result as Checked};
+use crate::setting::{Context, Node};
 use glob::Pattern as Glob;
 
 /// The text that stands for the name of the body in the names of its groups.
@@ -16,6 +18,20 @@ pub struct Pattern<'a> {
     text: &'a str,
     /// The pattern; `None` for a plain name.
     glob: Option<Glob>,
+}
+
+/// Read the name of a group, or a pattern of names.
+///
+/// # Errors
+/// An empty text, and a pattern that is none.
+pub(crate) fn pattern(node: &Node, _: &Context) -> Checked<Located<String>> {
+    let name = node.name()?;
+    match Pattern::new(&name.value) {
+        Ok(_) => Ok(name),
+        Err(flaw) => Err(node
+            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
+            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
+    }
 }
 
 /// How narrow a pattern is; narrower ones compare greater. The entries are: 1 for a plain name and 0 for a pattern, then the numbers of

@@ -1,22 +1,56 @@
 //! The rules that stop a run.
 
-/// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct StopRule {
-    /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md). The default
-    /// is 1e-8 if `increment` is not given.
-    pub residual: Option<f64>,
-    /// Tolerance of the paper's rule: the relative increment of normal displacements, in every body.
-    pub increment: Option<f64>,
-    /// Whether to stop where the error of the iteration is a tenth of the error of the discretisation.
-    pub balanced: bool,
-    /// The most iterations; 2000 by default.
-    pub iterations: usize,
+use crate::error::Result;
+use crate::setting::{Context, Keys, Node, Setting, ValueKind, keys};
+use serde_json::Value as Json;
+
+keys! {
+    /// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct StopRule "the stop rule" {
+        optional {
+            /// relative residual, or error of Newton's method
+            ///
+            /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md). In a
+            /// scene file there is no default if `increment` is given.
+            pub residual: Option<f64> = Some(1e-8),
+            /// the paper's rule on the increment
+            ///
+            /// Tolerance of the relative increment of normal displacements, in every body.
+            pub increment: Option<f64> = None,
+            /// whether a tenth of the mesh's error is enough
+            ///
+            /// The run then stops where the error of the iteration is a tenth of the error of the discretisation.
+            pub balanced: bool = false,
+            /// most iterations
+            pub iterations: usize = 2000,
+        }
+    }
 }
 
 impl Default for StopRule {
     fn default() -> Self {
-        Self { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
+        Self::with_defaults()
+    }
+}
+
+impl Setting for StopRule {
+    fn kind() -> ValueKind {
+        Self::shape().into()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        let stop = Self::decode(&Keys::open(node, &Self::shape())?, context)?;
+        let by_increment = stop.increment.is_some() && !node.has_key("residual");
+        Ok(Self { residual: stop.residual.filter(|_| !by_increment), ..stop })
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        let mut entries = self.entries(dimension);
+        if !self.balanced {
+            entries.remove("balanced");
+        }
+        entries.into()
     }
 }
 

@@ -1,6 +1,8 @@
 //! Names of the units of a scene, which are words for labels. Nothing is converted.
 
-use crate::error::suggestion;
+use crate::error::{Result as Checked, suggestion};
+use crate::setting::{Context, Node, Setting, ValueKind};
+use serde_json::Value as Json;
 
 /// The quantity that a unit measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -98,6 +100,20 @@ impl Units {
     /// Return the text that a scene has for these units.
     pub fn text(&self) -> String {
         format!("{}, {}", self.length, self.stress)
+    }
+}
+
+impl Setting for Units {
+    fn kind() -> ValueKind {
+        ValueKind::Text
+    }
+
+    fn read(node: &Node, _: &Context) -> Checked<Self> {
+        Self::parse(node.string()?).map_err(|(message, advice)| node.refuse(message).help(advice))
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        self.text().into()
     }
 }
 

@@ -1,11 +1,10 @@
 //! A scene built in Rust.
 
-use super::{OutputSpec, Scene};
+use super::Scene;
 use crate::contact::law::LayerLaw;
-use crate::data::Library;
 use crate::ddm::gamma::GammaRule;
 use crate::error::{Located, Place};
-use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Own, Plane, SolverSpec};
+use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec};
 use std::rc::Rc;
 
 impl Scene {
@@ -14,25 +13,8 @@ impl Scene {
     #[track_caller]
     pub fn new(dimension: usize, mesh: impl Into<MeshSource>) -> Self {
         let place = Place::here(&dimension.to_string());
-        Self {
-            path: place.source.name.clone().into(),
-            title: "scene".to_owned(),
-            dimension: Located::new(dimension, place),
-            plane: Plane::Strain,
-            units: None,
-            mesh: mesh.into(),
-            laws: Own::default(),
-            rules: Own::default(),
-            data: Library::new(),
-            bodies: Vec::new(),
-            contacts: Vec::new(),
-            auto: Vec::new(),
-            method: MethodSpec::default(),
-            solver: SolverSpec::default(),
-            estimate: false,
-            adapt: None,
-            output: OutputSpec::default(),
-        }
+        let path = place.source.name.clone().into();
+        Self::with_defaults(mesh.into(), Vec::new(), path, "scene".to_owned(), Located::new(dimension, place))
     }
 
     /// Add a body.

@@ -153,9 +153,9 @@ impl Scene {
     fn check_adapt(&self, at: &At) -> Checked {
         let Some(adapt) = &self.adapt else { return Ok(()) };
         let at = at.below("error");
-        at.positive("the error", adapt.error)?;
-        if adapt.error >= 1.0 {
-            let message = format!("the error is {}", shown(adapt.error));
+        at.positive("the error", adapt.error.value)?;
+        if adapt.error.value >= 1.0 {
+            let message = format!("the error is {}", shown(adapt.error.value));
             return at.refuse(message, "must be less than 1", "it is a share: 0.01 is one per cent");
         }
         Ok(())

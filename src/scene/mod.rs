@@ -1,25 +1,24 @@
 //! Scene files: from TOML to a checked [`Scene`]. Every refusal names file and line, and says what to do.
 //!
-//! [`load`] reads the file into a tree of values (`read`), applies the overrides of the command line (`overrides`), and decodes the tree
-//! (`decode`), whose tables must fit their shapes (`shape`). The scene that results (`spec`) is then checked (`check`).
+//! [`load`] reads the file into a tree of values, applies the overrides of the command line (`overrides`), and decodes the tree
+//! (`decode`) by the keys that the structs of the scene declare (module `setting`). The scene that results (`spec`) is then checked
+//! (`check`).
 
 mod build;
 mod check;
 mod contents;
 mod decode;
 mod overrides;
-mod read;
 mod schema;
-mod settings;
-mod shape;
 mod spec;
 #[cfg(test)]
 mod tests;
 
 pub use schema::schema;
-pub use spec::{AdaptSpec, OutputSpec, Scene};
+pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Scene};
 
 use crate::error::{Error, Kind, Result, Source};
+use crate::setting::document;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -38,7 +37,7 @@ pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
 /// Those of [`load`], but for reading the file.
 pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     let source = Arc::new(Source { name: path.display().to_string(), text });
-    let mut tree = read::document(&source)?;
+    let mut tree = document(&source)?;
     for text in overrides {
         overrides::apply(&mut tree, text)?;
     }

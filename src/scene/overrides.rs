@@ -4,8 +4,8 @@
 //! (`body.upper.order`). VALUE is TOML, or a bare text. The place of a new value lies in the text of the option, so that later refusals
 //! point there.
 
-use super::read::{self, Entry, Node, Value};
 use crate::error::{Error, Kind, Place, Result, Source, few};
+use crate::setting::{Entry, Node, Value, value as toml_value};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -114,7 +114,7 @@ fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
     if bare.is_empty() {
         return Err(Error::scene(&place, "the value is missing").help("an empty text is written \"\""));
     }
-    match read::value(source, place.span.start) {
+    match toml_value(source, place.span.start) {
         Ok(node) => Ok(node),
         // this was meant as TOML: a table, a list, a quoted text, a number too large to hold
         Err(error) if bare.starts_with(['{', '[', '"', '\'']) || bare.parse::<f64>().is_ok() => Err(error),

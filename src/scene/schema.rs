@@ -1,7 +1,7 @@
 //! The JSON schema of scene files, by which editors complete and check them.
 
 use super::decode;
-use super::shape::{TableShape, ValueKind};
+use crate::setting::{TableShape, ValueKind};
 use serde_json::{Map, Value, json};
 
 /// Return the schema (draft 2020-12), made of the shapes by which scenes are decoded.

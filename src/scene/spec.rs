@@ -3,95 +3,157 @@
 use crate::contact::law::OwnLaws;
 use crate::data::Library;
 use crate::ddm::gamma::OwnRules;
-use crate::error::{Located, Place};
+use crate::error::{Located, Result};
 use crate::output::vtu::Encoding;
 use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
+use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, table, word, words};
+use serde_json::{Value as Json, json};
 use std::path::PathBuf;
 
-/// A checked scene.
-#[derive(Debug, Clone)]
-pub struct Scene {
-    /// Path of the scene file, as given.
-    pub path: PathBuf,
-    /// Title; by default the name of the file without its extension.
-    pub title: String,
-    /// Space dimension: 2 or 3.
-    pub dimension: Located<usize>,
-    /// What a plane problem stands for: plane strain (default), plane stress, or bodies of revolution.
-    pub plane: Plane,
-    /// Names of the units for labels, if they are given.
-    pub units: Option<Units>,
-    /// Where the mesh comes from.
-    pub mesh: MeshSource,
-    /// Laws of layers from a Rust program, by name.
-    pub laws: OwnLaws,
-    /// Rules for gamma from a Rust program, by name.
-    pub rules: OwnRules,
-    /// Functions from files, by name. A file that no expression and no layer uses is not read.
-    pub data: Library,
-    /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of groups.
-    pub bodies: Vec<BodySpec>,
-    /// The pairs of contact surfaces, in the order of the file.
-    pub contacts: Vec<ContactSpec>,
-    /// Rules that find pairs on the mesh, in the order of the file.
-    pub auto: Vec<AutoContact>,
-    /// The outer iteration.
-    pub method: MethodSpec,
-    /// The inner solver.
-    pub solver: SolverSpec,
-    /// Whether to estimate the error of the discretisation.
-    pub estimate: bool,
-    /// How meshes are adapted, if the scene requests it.
-    pub adapt: Option<AdaptSpec>,
-    /// What to write.
-    pub output: OutputSpec,
+keys! {
+    /// A checked scene.
+    // the description of `body` has the name of a table in brackets, which is no link
+    #[allow(rustdoc::broken_intra_doc_links)]
+    #[derive(Debug, Clone)]
+    pub struct Scene "the scene" {
+        required {
+            /// a file name, or a table: mesh = { geo = "a.geo", set = { n = 32 } }
+            pub mesh: MeshSource,
+            /// a body starts with the line [[body]]
+            ///
+            /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of groups.
+            pub bodies as "body": Vec<BodySpec>,
+        }
+        optional {
+            /// what a plane problem stands for
+            pub plane: Plane = Plane::Strain,
+            /// words for labels, such as "mm, MPa"; nothing is converted
+            pub units: Option<Units> = None,
+            /// the iteration; Newton's method without it
+            pub method: MethodSpec = MethodSpec::default(),
+            /// the inner solver; chosen by the program without it
+            pub solver: SolverSpec = SolverSpec::default(),
+            /// whether to estimate the error that the mesh leaves
+            pub estimate: bool = false,
+            /// adapts the mesh to an error: adapt = { error = 1e-2 }
+            pub adapt: Option<AdaptSpec> = None,
+            /// what is written, and where
+            pub output: OutputSpec = OutputSpec::default(),
+        }
+        besides {
+            /// Path of the scene file, as given.
+            pub path: PathBuf,
+            /// Title; by default the name of the file without its extension.
+            pub title: String,
+            /// Space dimension: 2 or 3.
+            pub dimension: Located<usize>,
+        }
+        initially {
+            /// Laws of layers from a Rust program, by name.
+            pub laws: OwnLaws = OwnLaws::default(),
+            /// Rules for gamma from a Rust program, by name.
+            pub rules: OwnRules = OwnRules::default(),
+            /// Functions from files, by name. A file that no expression and no layer uses is not read.
+            pub data: Library = Library::new(),
+            /// The pairs of contact surfaces, in the order of the file.
+            pub contacts: Vec<ContactSpec> = Vec::new(),
+            /// Rules that find pairs on the mesh, in the order of the file.
+            pub auto: Vec<AutoContact> = Vec::new(),
+        }
+    }
 }
 
-/// The accuracy to which meshes are adapted, and the limits of adaptation.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AdaptSpec {
-    /// The requested relative error of pressures and displacements.
-    pub error: f64,
-    /// The most cells of a mesh.
-    pub cells: usize,
-    /// The most meshes.
-    pub rounds: usize,
-    /// Place of the requested error.
-    pub place: Place,
+table! {
+    /// The accuracy to which meshes are adapted, and the limits of adaptation.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct AdaptSpec "`adapt`" {
+        required {
+            /// largest relative error of pressures and displacements: 0.01 is one per cent
+            pub error: Located<f64>,
+        }
+        optional {
+            /// most cells of a mesh
+            pub cells: usize = 1_000_000,
+            /// most meshes
+            pub rounds: usize = 10,
+        }
+    }
 }
 
-/// The files to write.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OutputSpec {
-    /// Folder for the results, if the scene names one (`-o` wins).
-    pub dir: Option<PathBuf>,
-    /// Whether to write `<body>.vtu` and the `.pvd`; default false.
-    pub vtu: bool,
-    /// Whether to write `<body>.msh` with views for Gmsh; default false.
-    pub msh: bool,
-    /// How the numbers of `.vtu` files are written.
-    pub encoding: Encoding,
-    /// Whether to write the page of the run, `report.html`; default false.
-    pub report: bool,
-    /// Whether to draw the SVG plots; default true.
-    pub plots: bool,
-    /// The most pairs with tables and plots of their own; by default as many as a person looks through.
-    pub pairs: Option<usize>,
-    /// Minutes between checkpoints; none by default.
-    pub checkpoint: Option<f64>,
+table! {
+    /// The files to write.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct OutputSpec "[output]" {
+        optional {
+            /// folder of the results; results/CASE without it
+            ///
+            /// The option `-o` wins.
+            pub dir: Option<PathBuf> = None,
+            /// whether to write fields for ParaView
+            ///
+            /// They are `<body>.vtu` and the `.pvd`.
+            pub vtu: bool = false,
+            /// whether to write fields as views for Gmsh
+            pub msh: bool = false,
+            /// whether to write the page report.html
+            pub report: bool = false,
+            /// of the numbers in VTU files
+            pub precision: Precision = Precision::Double,
+            /// whether VTU files are compressed
+            pub compress: bool = true,
+            /// whether to draw the SVG plots
+            pub plots: bool = true,
+            /// most pairs with files of their own; 24
+            pub pairs: Option<Most> = None,
+            /// minutes between checkpoints; none without it
+            pub checkpoint: Option<f64> = None,
+        }
+    }
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self {
-            dir: None,
-            vtu: false,
-            msh: false,
-            encoding: Encoding::default(),
-            report: false,
-            plots: true,
-            pairs: None,
-            checkpoint: None,
+        Self::with_defaults()
+    }
+}
+
+impl OutputSpec {
+    /// Return how the numbers of VTU files are written.
+    pub fn encoding(&self) -> Encoding {
+        Encoding { single: self.precision == Precision::Single, compress: self.compress }
+    }
+}
+
+words! {
+    /// The precision of numbers in VTU files.
+    pub enum Precision "precision" {
+        /// Eight bytes.
+        Double = "double",
+        /// Four bytes.
+        Single = "single",
+    }
+}
+
+/// The most pairs with files of their own; the largest number stands for all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Most(pub usize);
+
+/// The word that stands for all pairs.
+const ALL: [(&str, Most); 1] = [("all", Most(usize::MAX))];
+
+impl Setting for Most {
+    fn kind() -> ValueKind {
+        ValueKind::Either(vec![ValueKind::NonNegativeInteger, word(&ALL)])
+    }
+
+    fn read(node: &Node, _: &Context) -> Result<Self> {
+        match node.string() {
+            Ok(_) => choose(node, "number of pairs", &ALL),
+            Err(_) => node.count().map(Self),
         }
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        if self.0 == usize::MAX { json!("all") } else { json!(self.0) }
     }
 }

@@ -5,7 +5,6 @@ use crate::common::{case, example, output, root};
 use std::process::Command;
 use std::time::Duration;
 use winkler::api::*;
-use winkler::problem::contact::ANGLE;
 
 /// The numbers in a line, signs and exponents included.
 fn numbers(line: &str) -> Vec<f64> {
@@ -200,7 +199,7 @@ fn scenes_that_contradict_themselves_are_refused() {
     refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [None; 2]), "holds no component");
     refused(&|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.0).fix("base", [Some(0.0); 3]), "`z` in a plane problem");
     refused(&|s| s.contacts.push(s.contacts[0].clone()), "a second contact of `below` and `above`");
-    refused(&|s| s.contacts[0].angle = 2.0 * ANGLE, "the angle is 120");
+    refused(&|s| s.contacts[0].angle = 120.0, "the angle is 120");
     refused(
         &|s| s.contacts[0].layer = LayerSpec::Table(vec![[1.0, 1.0], [2.0, 1.0]]),
         "the pressure 1 of the table does not exceed 1",

@@ -131,3 +131,43 @@ fn the_schema_refuses_what_the_program_refuses() {
     }
     assert!(tried > 100, "{tried}");
 }
+
+/// Collects each key of a table of the schema, and of the tables below it: name of the table, key, description.
+fn keys<'a>(schema: &'a Value, table: &str, found: &mut Vec<(String, &'a str, &'a str)>) {
+    for (key, property) in schema["properties"].as_object().into_iter().flatten() {
+        found.push((table.to_owned(), key, property["description"].as_str().expect("a description")));
+        keys(property, key, found);
+        keys(&property["items"], key, found);
+        keys(&property["additionalProperties"], key, found);
+        property["anyOf"].as_array().into_iter().flatten().for_each(|kind| keys(kind, key, found));
+    }
+}
+
+/// The page of the scene file has a row for every key, in the section of its table, with the default that the program has.
+#[test]
+fn the_page_has_every_key_with_its_default() {
+    let schema = winkler::scene::schema();
+    let mut found = Vec::new();
+    keys(&schema, "Top level", &mut found);
+    let page = fs::read_to_string(root().join("docs/scene-file.md")).expect("the page");
+    let mut defaults = 0;
+    for (table, key, description) in found {
+        let section =
+            page.split("\n## ").find(|section| section.lines().next().is_some_and(|line| line.contains(&table)));
+        // tables without a section are shown in rows of the table around them
+        let named = if section.is_some() { 1 } else { usize::MAX };
+        let has_key = |cell: &&str| cell.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == key);
+        let lines = section.unwrap_or(&page).lines().filter(|line| line.starts_with('|'));
+        let rows = lines.map(|line| line.split(" | ").collect::<Vec<_>>());
+        let rows: Vec<_> = rows.filter(|row| row.iter().take(named).any(has_key)).collect();
+        assert!(!rows.is_empty(), "docs/scene-file.md has no row for `{key}` of {table}");
+        let default = description.rsplit_once("; ").map_or("", |(_, last)| last);
+        // forms of values in braces have no column of defaults
+        let described = rows.iter().find(|row| row.len() > 3 && row[0].contains(&format!("`{key}`")));
+        if let (Some(row), Ok(_)) = (described, serde_json::from_str::<Value>(default)) {
+            assert!(row[2].contains(default), "docs/scene-file.md: `{key}` has the default {default}, not {}", row[2]);
+            defaults += 1;
+        }
+    }
+    assert!(defaults > 25, "{defaults}");
+}

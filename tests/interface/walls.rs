@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: [&str; 27] = [
+const MODULES: [&str; 28] = [
     "error",
     "exchange",
     "file",
@@ -16,6 +16,7 @@ const MODULES: [&str; 27] = [
     "petsc",
     "data",
     "expression",
+    "setting",
     "problem",
     "mesh",
     "fem",

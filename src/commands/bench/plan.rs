@@ -3,7 +3,7 @@
 use super::request::{Request, usage};
 use crate::commands::{Variation, case_of, combinations};
 use crate::error::Result;
-use crate::problem::{MethodName, Order, Preset, name_of};
+use crate::problem::{Order, Preset};
 use crate::scene::Scene;
 use std::path::PathBuf;
 
@@ -132,7 +132,7 @@ impl Plan {
         key.extend(values.iter().cloned());
         key.extend([
             solver.name.clone(),
-            method.map_or_else(|| name_of(&MethodName::ALL, &scene.method.name).to_owned(), str::to_owned),
+            method.map_or_else(|| scene.method.name.name().to_owned(), str::to_owned),
             order.map_or_else(|| orders_of(scene), |order| order.to_string()),
             ranks.to_string(),
         ]);

@@ -1,16 +1,17 @@
 //! `[data.NAME]`: files whose numbers are functions for expressions.
 
-use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, choose, file, word};
 use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, Missing, Outside, has_header};
 use crate::error::{Error, Place, Result};
 use crate::expression::names;
-use crate::scene::read::Entry;
+use crate::problem::name_of;
+use crate::setting::{Entries, Entry, Keys, Node, TableShape, Value, ValueKind, choose, entries, file, word};
+use serde_json::{Value as Json, json};
 use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
 /// Return the shape of `[data.NAME]`; `name` is its name in messages.
-pub(super) fn shape(name: impl Into<Cow<'static, str>>) -> TableShape {
+pub fn shape(name: impl Into<Cow<'static, str>>) -> TableShape {
     use ValueKind::{Either, Flag, Number, Text};
     let one_or_two = || Either(vec![Number, Number.list()]);
     let number_or_word = || Either(vec![Number, Text]);
@@ -32,18 +33,16 @@ pub(super) fn shape(name: impl Into<Cow<'static, str>>) -> TableShape {
 const SPACING: &str = "spacing = d or [d1, d2] is the distance of the heights along a row and from row to row; or points = true, if each row \
                        is a place and its height";
 
-impl Decoder<'_> {
-    /// Return the data of a scene by name. Their files must exist; they are not read.
-    pub(super) fn library(&self, node: Option<&Node>) -> Result<Library> {
-        const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
-        let Some(node) = node else { return Ok(Library::new()) };
-        let Value::Table(entries) = &node.value else { return Err(node.expected("a table", EXAMPLE)) };
-        let is_table = |entry: &&Entry| matches!(entry.node.value, Value::Table(_));
-        if let Some(Entry { key, key_place, .. }) = entries.iter().find(|entry| !is_table(entry)) {
-            return Err(Error::scene(key_place, format!("`{key}` in data without a name")).help(EXAMPLE));
-        }
-        entries.iter().map(|entry| Ok((entry.key.clone(), Arc::new(Data::new(spec(entry, self.folder)?))))).collect()
+/// Return the data of a scene by name. Their files must exist; they are not read.
+pub fn library(node: Option<&Node>, folder: &Path) -> Result<Library> {
+    const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
+    let Some(node) = node else { return Ok(Library::new()) };
+    let Value::Table(entries) = &node.value else { return Err(node.expected("a table", EXAMPLE)) };
+    let is_table = |entry: &&Entry| matches!(entry.node.value, Value::Table(_));
+    if let Some(Entry { key, key_place, .. }) = entries.iter().find(|entry| !is_table(entry)) {
+        return Err(Error::scene(key_place, format!("`{key}` in data without a name")).help(EXAMPLE));
     }
+    entries.iter().map(|entry| Ok((entry.key.clone(), Arc::new(Data::new(spec(entry, folder)?))))).collect()
 }
 
 /// Refuse names that expressions cannot use, or use for something else.
@@ -89,6 +88,37 @@ fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
             .unwrap_or(Interpolation::Linear),
         outside: keys.read("outside", |node| choose(node, "`outside`", &Outside::ALL))?.unwrap_or(Outside::Error),
     })
+}
+
+/// Return the echo of data by name; null without data.
+pub fn echo(data: &Library) -> Json {
+    match data.is_empty() {
+        true => Json::Null,
+        false => data.values().map(|data| (data.spec.name.clone(), of_spec(&data.spec))).collect::<Entries>().into(),
+    }
+}
+
+fn of_spec(spec: &DataSpec) -> Json {
+    #[rustfmt::skip]
+    let DataSpec {
+        name: _, file, place: _, points, origin, spacing, unit, missing, fill, detrend, interpolation, outside,
+    } = spec;
+    let missing = missing.as_ref().map(|Missing { numbers, words }| {
+        numbers.iter().map(|number| json!(number)).chain(words.iter().map(|word| json!(word))).collect::<Json>()
+    });
+    entries([
+        ("file", json!(file.display().to_string())),
+        ("points", json!(points)),
+        ("origin", json!(origin)),
+        ("spacing", json!(spacing)),
+        ("unit", json!(unit)),
+        ("missing", json!(missing)),
+        ("fill", json!(name_of(&Fill::ALL, fill))),
+        ("detrend", json!(name_of(&Detrend::ALL, detrend))),
+        ("interpolate", json!(name_of(&Interpolation::ALL, interpolation))),
+        ("outside", json!(name_of(&Outside::ALL, outside))),
+    ])
+    .into()
 }
 
 /// Return a number that is not 0.

@@ -16,7 +16,7 @@ const CASES: &[Case] = &[
     // Keys.
     ("young = 2.1e5", "yuong = 2.1e5", "yuong", "unknown key `yuong` in [[body]]", "did you mean `young`?"),
     ("young = 2.1e5", "density = 2.1e5", "density", "unknown key `density` in [[body]]", "its keys are name, young, poisson, "),
-    ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, plane"),
+    ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, mesh, body"),
     ("[method]", "[methods]", "methods", "unknown key `methods` in the scene", "`method`"),
     ("B = 2.5e-5", "b = 2.5e-5", "b", "unknown key `b` in the power layer", "`B`"),
     ("increment", "incremnt", "incremnt", "unknown key `incremnt` in the stop rule", "`increment`"),

@@ -1,15 +1,13 @@
-//! What the decoders of all tables need: numbers, expressions, vectors, words, files.
+//! The context in which settings are read: numbers, expressions, vectors, words, files.
 
+use super::{Node, Value};
 use crate::data::Library;
 use crate::error::{Error, Located, Result};
 use crate::expression::{Expression, Field, Scope};
-use crate::problem::body::plain_pattern;
-use crate::problem::pattern::Pattern;
-use crate::scene::read::{Node, Value};
 use std::path::{Path, PathBuf};
 
 /// The context in which values are decoded.
-pub struct Decoder<'a> {
+pub struct Context<'a> {
     /// Space dimension: 2 or 3.
     pub dimension: usize,
     /// Folder of the scene file.
@@ -22,7 +20,7 @@ pub struct Decoder<'a> {
 /// displacements, and their rounding errors are 1e-32 times as large.
 const LEAST: f64 = 1e-110;
 
-impl Decoder<'_> {
+impl Context<'_> {
     /// Return a number, or an expression in the coordinates.
     ///
     /// # Errors
@@ -110,20 +108,4 @@ pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Resul
     let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
     let otherwise = || format!("it is one of {}", names.join(", "));
     Err(node.refuse(format!("unknown {what} `{word}`")).suggest(word, names.iter().copied(), otherwise))
-}
-
-/// Return the name of a body, or a pattern of names, in the form of bodies.
-pub fn body_name(node: &Node) -> Result<Located<String>> {
-    pattern(node).map(|name| Located { value: plain_pattern(&name.value), ..name })
-}
-
-/// Return the name of a group, or a pattern of names.
-pub fn pattern(node: &Node) -> Result<Located<String>> {
-    let name = node.name()?;
-    match Pattern::new(&name.value) {
-        Ok(_) => Ok(name),
-        Err(flaw) => Err(node
-            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
-            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
-    }
 }

@@ -1,8 +1,9 @@
 //! The shape of each table of a scene: which keys it may have, which kinds of value they take, and what they mean.
 //!
-//! [`Keys::open`](super::read::Keys::open) refuses a table that does not fit its shape, and the [JSON schema](super::schema) is made
-//! of the same shapes.
+//! [`Keys::open`](super::read::Keys::open) refuses a table that does not fit its shape, and the [JSON schema](crate::scene::schema) is
+//! made of the same shapes.
 
+use serde_json::Value as Json;
 use std::borrow::Cow;
 
 /// The shape of a table.
@@ -72,8 +73,28 @@ impl TableShape {
         self.with(KeyShape { name, kind: kind.into(), description: about.into(), required: true })
     }
 
+    /// Add a key whose description is the first paragraph of its doc comment, with the default behind it. A key without a default must
+    /// be there.
+    pub fn key(self, name: &'static str, doc: &[&str], kind: ValueKind, default: Option<Json>) -> Self {
+        let paragraph: Vec<&str> = doc.iter().map(|line| line.trim()).take_while(|line| !line.is_empty()).collect();
+        let required = default.is_none();
+        let default = match default {
+            Some(Json::Number(number)) => format!("; {}", number.to_string().trim_end_matches(".0")),
+            Some(scalar @ (Json::Bool(_) | Json::String(_))) => format!("; {scalar}"),
+            _ => String::new(),
+        };
+        let description = format!("{}{default}", paragraph.join(" ")).into();
+        self.with(KeyShape { name, kind, description, required })
+    }
+
     fn with(mut self, key: KeyShape) -> Self {
         self.keys.push(key);
+        self
+    }
+
+    /// Add all keys of another table.
+    pub fn and(mut self, other: Self) -> Self {
+        self.keys.extend(other.keys);
         self
     }
 

@@ -1,10 +1,11 @@
 //! `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
-use super::{Decoder, Keys, Node, TableShape, Value, ValueKind, file};
 use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
 use crate::file::{other_encoding, with_unix_lines};
 use crate::problem::body::BodySpec;
 use crate::problem::history::{COMMON, History, Step, has_common, paths};
+use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, Value, ValueKind, file};
+use serde_json::{Value as Json, json};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -15,19 +16,23 @@ const MOST_STEPS: usize = 1000;
 const TIME: &str = "time";
 
 /// Return the shape of `steps` from a file.
-pub(super) fn shape() -> TableShape {
+fn shape() -> TableShape {
     use ValueKind::Text;
     TableShape::new("the load steps").required("table", Text, "CSV file with a column of each factor")
 }
 
-impl Decoder<'_> {
-    /// Return the load steps: so many equal ones, a list of factors, or the table of a file.
-    pub(super) fn history(&self, node: &Node) -> Result<History> {
+impl Setting for History {
+    fn kind() -> ValueKind {
+        ValueKind::Either(vec![ValueKind::PositiveInteger, ValueKind::Number.list(), shape().into()])
+    }
+
+    /// Read the load steps: so many equal ones, a list of factors, or the table of a file.
+    fn read(node: &Node, context: &Context) -> Result<Self> {
         match &node.value {
             Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(History::of_shares),
             Value::Table(_) => {
                 let keys = Keys::open(node, &shape())?;
-                read(file(self.folder, keys.require("table")?)?)
+                read_table(file(context.folder, keys.require("table")?)?)
             }
             _ => match node.count()? {
                 count @ 1..=MOST_STEPS => {
@@ -38,18 +43,34 @@ impl Decoder<'_> {
         }
     }
 
+    fn echo(&self, _: usize) -> Json {
+        let factors = |column: usize| self.steps.iter().map(|step| step.factors[column]).collect::<Json>();
+        match &self.table {
+            None if self.steps.is_empty() => Json::Null,
+            None => factors(0),
+            Some(table) => {
+                let times = (TIME.to_owned(), self.steps.iter().map(|step| step.time).collect());
+                let named = self.names.iter().enumerate().map(|(column, name)| (name.clone(), factors(column)));
+                let columns: Entries = std::iter::once(times).chain(named).collect();
+                json!({ "table": table.value.display().to_string(), "columns": columns })
+            }
+        }
+    }
+}
+
+impl History {
     /// Match the columns of a table of load steps with the lines of the bodies that name them by `path`. Set whether some loads have no
     /// factor.
     ///
     /// # Errors
     /// A path that is no column, and a column that no line names.
-    pub(super) fn join(&self, history: &mut History, bodies: &[BodySpec]) -> Result<()> {
-        let Some(table) = &history.table else { return Ok(()) };
-        let columns = || history.names.iter().map(String::as_str).filter(|name| *name != COMMON);
+    pub fn join(&mut self, bodies: &[BodySpec]) -> Result<()> {
+        let Some(table) = &self.table else { return Ok(()) };
+        let columns = || self.names.iter().map(String::as_str).filter(|name| *name != COMMON);
         for path in bodies.iter().flat_map(paths) {
-            if history.names.iter().all(|name| *name != path.value) {
+            if self.names.iter().all(|name| *name != path.value) {
                 let message = format!("the table of load steps has no column `{}`", path.value);
-                let otherwise = || format!("its columns are {}", joined(history.names.iter().map(String::as_str)));
+                let otherwise = || format!("its columns are {}", joined(self.names.iter().map(String::as_str)));
                 return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
@@ -62,14 +83,14 @@ impl Decoder<'_> {
                 "path = \"{unused}\" in a line of `load` or `fix`; `{COMMON}` is the column of all lines without"
             )));
         }
-        let common = history.names.iter().any(|name| name == COMMON);
-        history.constant = !common && bodies.iter().any(has_common);
+        let common = self.names.iter().any(|name| name == COMMON);
+        self.constant = !common && bodies.iter().any(has_common);
         Ok(())
     }
 }
 
 /// Read a table of factors: a line of names, then one line a step.
-fn read(file: Located<PathBuf>) -> Result<History> {
+fn read_table(file: Located<PathBuf>) -> Result<History> {
     let source = text_of(&file)?;
     let mut lines = Lines::new(&source);
     let mut history = History::default();

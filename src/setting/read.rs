@@ -8,14 +8,14 @@ use toml::de::{DeTable, DeValue};
 
 /// A TOML value and its place.
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub struct Node {
     pub place: Place,
     pub value: Value,
 }
 
 /// A TOML value.
 #[derive(Debug, Clone)]
-pub(super) enum Value {
+pub enum Value {
     String(String),
     Integer(i64),
     Float(f64),
@@ -28,7 +28,7 @@ pub(super) enum Value {
 
 /// A key of a table and its value.
 #[derive(Debug, Clone)]
-pub(super) struct Entry {
+pub struct Entry {
     pub key: String,
     pub key_place: Place,
     pub node: Node,
@@ -38,7 +38,7 @@ pub(super) struct Entry {
 ///
 /// # Errors
 /// A text that is not TOML, and numbers that are too large to hold.
-pub(super) fn document(source: &Arc<Source>) -> Result<Node> {
+pub fn document(source: &Arc<Source>) -> Result<Node> {
     let table = DeTable::parse(&source.text).map_err(|error| syntax(source, 0, &error))?;
     let convert = Convert { source, offset: 0 };
     let value = Value::Table(convert.entries(table.get_ref())?);
@@ -49,7 +49,7 @@ pub(super) fn document(source: &Arc<Source>) -> Result<Node> {
 ///
 /// # Errors
 /// Those of [`document`].
-pub(super) fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
+pub fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
     let value = DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
     Convert { source, offset }.node(&value)
 }
@@ -279,7 +279,7 @@ const SYNONYMS: [(&str, &str); 6] =
 const TOP_LEVEL: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "solver", "estimate", "adapt"];
 
 /// A table that fits its shape: all its keys are known, and their values are of the right kind.
-pub(super) struct Keys<'a> {
+pub struct Keys<'a> {
     /// The table itself.
     pub node: &'a Node,
     entries: &'a [Entry],
