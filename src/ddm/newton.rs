@@ -123,7 +123,7 @@ impl Newton<'_, '_> {
         let springs = resisting(model, states.springs(model));
         let compression = model.compression(&self.u.trace);
         let (residual, _) = residual(model, &self.u, &model.forces(&states.linear(&compression)));
-        let rho = self.run.memory.progress.slopes(model, &self.unit);
+        let rho = self.run.memory.progress.slopes(model, &self.unit, states);
         let scale = (self.tolerance, &self.run.scale);
         let mut forcing = Forcing::new(states, compression, &rho, scale, self.linear.roughest());
         let is_correction = self.correction.is_some();
@@ -145,7 +145,7 @@ impl Newton<'_, '_> {
         }
         let roundoff = of_compressions(model, &self.u.trace);
         let ends = [[&before[..], &roundoff], [&whole, &whole_pressure]];
-        let length = progress.step_length(model, &self.unit, &self.states.smoothing, ends);
+        let length = progress.step_length(model, &self.unit, &self.states, ends);
         Part { length, whole_pressure }
     }
 
@@ -157,7 +157,7 @@ impl Newton<'_, '_> {
         self.u.retrace(model);
         // pressures of the linear step, not of the compressions at its end: a stiff layer would magnify the roundoff of displacements
         let pressure = progress.go(length, whole_pressure);
-        let rho = progress.slopes(model, &self.unit);
+        let rho = progress.slopes(model, &self.unit, &self.states);
         if self.states.closed > 0 && self.states.smoothing.is_empty() {
             fit::rigid_correction(model, [&mut self.u, &mut step.field], &pressure, &rho, self.tolerance);
         }

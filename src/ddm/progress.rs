@@ -12,10 +12,12 @@
 //!
 //! Any slope leads to the same solution. The bodies answer with dp = -S dc between states in equilibrium: the longest waves as stiffly as in the last
 //! step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like single nodes. The laws themselves are best resolved with the slopes of the last step. Where
-//! they are smoothed, many points move at once, and the geometric mean is the nearest to all waves (docs/methods.md).
+//! they are smoothed, many points move at once, some of which are hardly pressed and some nearly fixed. There the slope is the geometric mean of
+//! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself (docs/methods.md).
 
 use super::path::{Equilibrium, Path};
 use crate::model::Model;
+use crate::model::layer::Layer;
 use crate::model::rigid::PART;
 
 /// What Newton's method remembers of its steps.
@@ -34,17 +36,30 @@ pub(super) struct Progress {
 const HALVINGS: i32 = 7;
 
 impl Progress {
-    /// Return rho, n: the slopes on which laws are resolved now, of meeting slopes `unit`, n.
-    pub fn slopes(&self, model: &Model, unit: &[f64]) -> Vec<f64> {
-        let mut slopes = unit.to_vec();
+    /// Return the stiffnesses with which the bodies answered the last step, n, of meeting slopes `unit`, n.
+    pub fn answers(&self, model: &Model, unit: &[f64]) -> Vec<f64> {
+        let mut answers = unit.to_vec();
         for (pair, answer) in self.answer.iter().enumerate() {
-            slopes[model.range(pair)].iter_mut().for_each(|slope| *slope *= answer);
+            answers[model.range(pair)].iter_mut().for_each(|slope| *slope *= answer);
+        }
+        answers
+    }
+
+    /// Return rho, n: the slopes on which laws are resolved after a step from `states`, of meeting slopes `unit`, n.
+    pub fn slopes(&self, model: &Model, unit: &[f64], states: &Layer) -> Vec<f64> {
+        let mut slopes = self.answers(model, unit);
+        if !states.smoothing.is_empty() {
+            let nodes_and_layers = unit.iter().zip(&states.tangent);
+            slopes
+                .iter_mut()
+                .zip(nodes_and_layers)
+                .for_each(|(slope, (&node, &layer))| *slope = mean(*slope, node, layer));
         }
         slopes
     }
 
     /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
-    fn observe(&mut self, model: &Model, unit: &[f64], dc: &[f64], dp: &[f64], is_smoothed: bool) {
+    fn observe(&mut self, model: &Model, unit: &[f64], dc: &[f64], dp: &[f64]) {
         self.answer.resize(model.pairs.len(), 1.0);
         for (pair, answer) in self.answer.iter_mut().enumerate() {
             let (mut pressures, mut compressions) = (0.0, 0.0);
@@ -55,36 +70,34 @@ impl Progress {
             let stiffness = (pressures / compressions).sqrt();
             if stiffness.is_finite() {
                 // softer are motions of whole bodies, which `fit` finds
-                let stiffness = stiffness.clamp(PART, PART.recip());
-                *answer = if is_smoothed { stiffness.sqrt() } else { stiffness };
+                *answer = stiffness.clamp(PART, PART.recip());
             }
         }
     }
 
     /// Return the length of a step from compressions `from`, known but for their `roundoff`, to the state (c, p), n each: the part of the way that comes no
-    /// farther from the laws with this smoothing. Meeting slopes are `unit`.
+    /// farther from the laws with the smoothing of `states`, from which the step is taken. Meeting slopes are `unit`.
     pub fn step_length(
         &mut self,
         model: &Model,
         unit: &[f64],
-        smoothing: &[f64],
+        states: &Layer,
         [[from, roundoff], [c, p]]: [[&[f64]; 2]; 2],
     ) -> f64 {
         if self.pressure.is_empty() {
             return 1.0;
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
-        let is_smoothed = !smoothing.is_empty();
-        self.observe(model, unit, &change(from, c), &change(&self.pressure, p), is_smoothed);
-        let rho = &self.slopes(model, unit)[..];
+        self.observe(model, unit, &change(from, c), &change(&self.pressure, p));
+        let rho = &self.slopes(model, unit, states)[..];
         let off = |t: f64| {
             let (compression, pressure) = (&between(from, c, t)[..], &between(&self.pressure, p, t)[..]);
-            Equilibrium { compression, roundoff, pressure, rho }.distance(model, smoothing)
+            Equilibrium { compression, roundoff, pressure, rho }.distance(model, &states.smoothing)
         };
         let here = off(0.0);
         let mut lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
         let length = lengths.find(|&t| off(t) <= here).unwrap_or(0.5f64.powi(HALVINGS));
-        self.path.note(length, is_smoothed);
+        self.path.note(length, !states.smoothing.is_empty());
         length
     }
 
@@ -93,6 +106,12 @@ impl Progress {
         self.pressure = if length < 1.0 { between(&self.pressure, &pressure, length) } else { pressure };
         self.pressure.clone()
     }
+}
+
+/// Return the geometric mean of stiffnesses of the bodies, of a node and of a smoothed layer, as far as there are such: a layer at an infinite gap has none.
+fn mean(bodies: f64, node: f64, layer: f64) -> f64 {
+    let both = (bodies * node).sqrt();
+    if layer > 0.0 { both.powf(2.0 / 3.0) * layer.cbrt() } else { both }
 }
 
 fn between(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
@@ -112,7 +131,7 @@ mod tests {
         let rho = [2.0, 0.5, 0.25, 3.0];
         let (from, start, exact) = ([0.5, 0.5, 1.0, 1.0], [2.0, 4.0, 1.0, 1.0], [0.0; 4]);
         let length = |progress: &mut Progress, rho: &[f64; 4], roundoff: &[f64; 4], c: &[f64; 4], p: &[f64; 4]| {
-            progress.step_length(&model, rho, &[], [[&from, roundoff], [c, p]])
+            progress.step_length(&model, rho, &Layer::default(), [[&from, roundoff], [c, p]])
         };
         let begin = || Progress { pressure: start.to_vec(), ..Progress::default() };
         let mut progress = Progress::default();
@@ -133,7 +152,8 @@ mod tests {
         assert_eq!(away, 0.5f64.powi(7));
     }
 
-    /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed laws, the geometric mean of both.
+    /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed laws, the geometric mean of both
+    /// and the stiffness of the layer, where it has one.
     #[test]
     fn lines_are_as_steep_as_the_bodies_answer() {
         let (model, unit) = (two_pairs(), [2.0, 8.0, 1.0, 1.0]);
@@ -142,10 +162,14 @@ mod tests {
         let [w, v] = [model.weight[0], model.weight[1]];
         let times = ((w * 36.0 / 2.0 + v * 144.0 / 8.0) / (w * 2.0 + v * 0.25 * 8.0)).sqrt();
         let mut progress = Progress::default();
-        for (is_smoothed, answer) in [(false, [times, 1e-6]), (true, [times.sqrt(), 1e-3])] {
-            progress.observe(&model, &unit, &dc, &dp, is_smoothed);
-            let expected = [2.0 * answer[0], 8.0 * answer[0], answer[1], answer[1]];
-            let slopes = progress.slopes(&model, &unit);
+        progress.observe(&model, &unit, &dc, &dp);
+        let smoothed = Layer { tangent: vec![27.0, 0.0, 1.0, 1e-3], smoothing: vec![1.0; 4], ..Layer::default() };
+        let expected = [
+            (Layer::default(), [2.0 * times, 8.0 * times, 1e-6, 1e-6]),
+            (smoothed, [3.0 * (4.0 * times).cbrt(), 8.0 * times.sqrt(), 1e-2, 1e-3]),
+        ];
+        for (states, expected) in expected {
+            let slopes = progress.slopes(&model, &unit, &states);
             assert!(slopes.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-14 * e), "{slopes:?} {expected:?}");
         }
     }

@@ -344,7 +344,7 @@ impl Run<'_> {
         let answer = match is_sweeps {
             true => vec![f64::INFINITY; model.points()],
             false => {
-                let rho = self.memory.progress.slopes(model, &meeting_slopes(model));
+                let rho = self.memory.progress.answers(model, &meeting_slopes(model));
                 rho.iter().zip(surface_slopes(model)).map(|(rho, surface)| surface.max(*rho)).collect()
             }
         };
