@@ -4,6 +4,7 @@
 mod common;
 
 mod curved;
+mod ends;
 mod foreign;
 mod gmsh;
 mod meshes;
