@@ -5,6 +5,7 @@ mod common;
 
 mod curved;
 mod ends;
+mod fits;
 mod foreign;
 mod gmsh;
 mod meshes;
