@@ -97,6 +97,7 @@ fn a_step_is_no_overlap() {
             (0.2, "between = [\"top\", \"under\"]"),
             (0.2, "between = \"auto\"\ndistance = 0.3"),
             (0.2, "between = \"auto\"\ndistance = 0.15"),
+            (0.2, "between = [\"top\", \"under\"]\ndistance = 0.15"),
             (2.0, "between = [\"under\", \"top\"]"),
         ] {
             let run = pressed(&[[0.0, 0.001], [1.0, 0.001], [1.0, step], [2.0, step]], space, order, contact);
