@@ -1,7 +1,9 @@
 //! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are weighted.
 
 use super::pieces::Shared;
+use crate::fem::Facets;
 use crate::fem::element::{self, EDGES};
+use crate::linalg::Joined;
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -60,8 +62,14 @@ const STEADY: f64 = 5.0;
 
 impl PressureBasis {
     /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration
-    /// points of the part that side b covers.
-    pub fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>]) -> Self {
+    /// points of the part that the facets `b` of side b cover.
+    ///
+    /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of the jump: an overlap
+    /// where there is none.
+    pub fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>], b: &Facets<D>) -> Self {
+        if are_apart(b, chunk) {
+            return Self::Hats;
+        }
         if order == Order::P2 && D == 3 {
             return Self::MidEdges.or_hats(order, D..2 * D, chunk);
         }
@@ -117,6 +125,21 @@ impl PressureBasis {
             Self::MidEdges => Carriers::MidEdges,
         }
     }
+}
+
+/// Return whether the facets of side b at these points are of several parts that have no vertex in common.
+fn are_apart<const D: usize>(b: &Facets<D>, chunk: &[Shared<D>]) -> bool {
+    let mut facets: Vec<usize> = chunk.iter().map(|point| point.facet_b).collect();
+    facets.sort_unstable();
+    facets.dedup();
+    let vertices = |i: usize| &b.facet(facets[i])[..D];
+    let mut joined = Joined::new(facets.len());
+    for i in 1..facets.len() {
+        for j in (0..i).filter(|&j| vertices(i).iter().any(|node| vertices(j).contains(node))) {
+            joined.join(i as u32, j as u32);
+        }
+    }
+    joined.classes().0 > 1
 }
 
 /// Return the function diag(int phi) M^-1 phi of a flat quadratic triangle for mid-edge `edge`, from the values `phi` of the

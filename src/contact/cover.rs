@@ -48,7 +48,7 @@ impl Coverage {
         let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });
         let of_facet = |i: usize| {
             let share = covered[i] / measure(a, i, &rule);
-            let left = Left::of(share, common.refused[i]);
+            let left = Left::of(share, &common.refused[i]);
             let lost = if left == Left::Lost { common.refused[i].lost } else { 0 };
             Self { share, left, lost, carriers: carriers[i] }
         };
@@ -68,14 +68,14 @@ fn measure<const D: usize>(a: &Side<D>, i: usize, rule: &Rule) -> f64 {
 
 impl Left {
     /// Return the reason for a facet with this paired share, from what was refused before it.
-    fn of(share: f64, refused: Refused) -> Self {
+    fn of(share: f64, refused: &Refused) -> Self {
         if share > WHOLE {
             Self::Nothing
         } else if refused.lost > 0 {
             Self::Lost
         } else if refused.steep {
             Self::Steep
-        } else if refused.far {
+        } else if !refused.far.is_empty() {
             Self::Far
         } else {
             Self::Bare

@@ -113,7 +113,7 @@ impl<const D: usize> Fine<D> {
     /// Append the rows of the integration points on one facet of side a. `point_of` gives the contact point of a node.
     fn push_rows(&mut self, a: &Side<D>, chunk: &[Shared<D>], point_of: &HashMap<u32, usize>) {
         let (order, nodes) = (a.facets.order, a.facets.facet(chunk[0].facet_a));
-        let basis = PressureBasis::on(order, nodes.len(), chunk);
+        let basis = PressureBasis::on(order, nodes.len(), chunk, &self.sides[1].facets);
         let carriers = basis.carriers();
         let row = |values: [f64; element::MOST]| {
             let of_point = |(node, value): (&u32, f64)| point_of.get(node).map(|&q| (q, value));

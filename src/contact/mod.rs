@@ -6,6 +6,7 @@
 mod basis;
 mod chords;
 mod cover;
+mod ends;
 mod faces;
 pub mod fine;
 pub mod law;
@@ -20,6 +21,7 @@ pub use crate::fem::{cross, pad};
 pub use basis::Carriers;
 pub use chords::Chords;
 pub use cover::{Coverage, Left};
+pub use ends::End;
 pub use faces::{Faces, ROUNDING};
 pub use fine::Fine;
 pub use law::{LayerLaw, Response};

@@ -164,7 +164,7 @@ fn integrate<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>) -> In
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let facet = chunk[0].facet_a;
         let nodes = a.facets.facet(facet);
-        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk);
+        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets);
         carriers[facet] = Some(basis.carriers());
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);

@@ -2,7 +2,7 @@
 
 use super::post::Post;
 use super::surface::ContactSurface;
-use crate::contact::Chords;
+use crate::contact::{Chords, End};
 use crate::mesh::Checked;
 use crate::problem::ContactSpec;
 use serde::{Deserialize, Serialize};
@@ -95,6 +95,8 @@ pub struct ContactInfo {
     pub idle: usize,
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
+    /// Contact points where the pair ends because the surfaces are too far apart.
+    pub ends: Vec<End>,
     /// Whether side a, which carries the points, is the second of `spec.between`.
     pub swapped: bool,
     /// Mesh of side a, for output.

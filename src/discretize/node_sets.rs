@@ -4,7 +4,7 @@ use super::find::earlier;
 use super::roster;
 use crate::error::{Error, Located, Result};
 use crate::mesh::Mesh;
-use crate::problem::body::{BodySpec, LoadKind, SpringKind};
+use crate::problem::body::{BodySpec, LoadKind, SpringKind, plain, plain_pattern};
 use crate::problem::pattern::{BODY, Pattern};
 use crate::scene::Scene;
 use std::collections::{HashMap, HashSet};
@@ -36,7 +36,7 @@ pub fn to_surfaces<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<
     for place in 0..mesh.groups.len() {
         let group = &mesh.groups[place];
         let own: Vec<Use> =
-            uses.iter().copied().filter(|(on, _)| group.dimension == 0 && names(on, &group.name)).collect();
+            uses.iter().copied().filter(|(on, _)| group.dimension == 0 && names(on, mesh, &group.name)).collect();
         if !own.iter().any(|(_, need)| matches!(need, Need::Facets | Need::Either)) {
             continue;
         }
@@ -78,10 +78,12 @@ fn refuse_points(own: &[Use], lost: usize) -> Result<()> {
     }
 }
 
-/// Return whether a line names a group, itself or by a pattern.
-fn names(on: &Located<String>, group: &str) -> bool {
+/// Return whether a line names a group, itself or by a pattern. The plain form of the name counts if no group has the name itself.
+fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, group: &str) -> bool {
     let any = on.value.replace(BODY, "*");
-    Pattern::new(&any).is_ok_and(|pattern| pattern.matches(group))
+    let form = plain_pattern(&any);
+    let is = |form: &str, name: &str| Pattern::new(form).is_ok_and(|pattern| pattern.matches(name));
+    is(&any, group) || is(&form, &plain(group)) && !mesh.groups.iter().any(|other| is(&any, &other.name))
 }
 
 fn of_body(body: &BodySpec) -> Vec<Use<'_>> {

@@ -8,7 +8,7 @@ use super::split::{Piece, Split};
 use super::surface::{ContactSurface, Surface};
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Reach};
-use crate::contact::{self, Chords, ContactPair, Faces, Fault, Fine, Side};
+use crate::contact::{self, Chords, ContactPair, End, Faces, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::Facets;
 use crate::mesh::{Group, Mesh};
@@ -31,6 +31,8 @@ pub struct Contact<const D: usize> {
     pub idle: usize,
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
+    /// Contact points where the pair ends because the surfaces are too far apart.
+    pub ends: Vec<End>,
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
 }
@@ -163,7 +165,12 @@ fn named_pieces<const D: usize>(
     }
     // Surfaces without edges stay as they are, and so do those that do not face each other, which are refused later.
     if pieces.is_empty() {
-        pieces.push(Piece { facets: sides.map(|side| side.facets), face: [None; 2], idle: [0; 2] });
+        pieces.push(Piece {
+            facets: sides.map(|side| side.facets),
+            face: [None; 2],
+            idle: [0; 2],
+            far: Default::default(),
+        });
     }
     pieces
 }
@@ -187,6 +194,8 @@ struct Opposite<'a, const D: usize> {
     swapped: bool,
     /// Number of facets of side a that belong to no pair, counted in one pair of two surfaces.
     idle: usize,
+    /// Nodes of facets of side a that face side b, but are too far away.
+    far: BTreeSet<u32>,
     reach: Reach,
 }
 
@@ -201,16 +210,16 @@ impl<'a, const D: usize> Opposite<'a, D> {
         piece: Piece<D>,
     ) -> Self {
         let spec = origin.spec(scene);
-        let [on_first, on_second] = piece.facets;
+        let Piece { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
         let first = parts[bodies[0]].side(names[0], on_first);
         let second = parts[bodies[1]].side(names[1], on_second);
         let swapped = second_carries([&first, &second]);
-        let ((body_a, a), (body_b, b)) = match swapped {
-            true => ((bodies[1], second), (bodies[0], first)),
-            false => ((bodies[0], first), (bodies[1], second)),
+        let ((body_a, a, far), (body_b, b)) = match swapped {
+            true => ((bodies[1], second, far_second), (bodies[0], first)),
+            false => ((bodies[0], first, far_first), (bodies[1], second)),
         };
         let reach = Reach::between(&a, &b, spec.angle, spec.distance);
-        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, idle: piece.idle[usize::from(swapped)], reach }
+        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, idle: idle[usize::from(swapped)], far, reach }
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them.
@@ -219,7 +228,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
-        let Self { origin, spec, bodies, a, b, swapped, idle, .. } = self;
+        let Self { origin, spec, bodies, a, b, swapped, idle, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
         let refuse = |fault| refuse(&spec, fault, || apart::why(&a, &b, cut, &spec));
@@ -242,7 +251,10 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let surface = ContactSurface::new(&a, &pair);
         let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
-        Ok(Contact { origin, pair, fine, swapped, idle, chords, surface })
+        let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
+        let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
+        let ends = spec.distance.map_or(Vec::new(), |distance| End::all(&a, &common, &pair, &far, distance, drawn));
+        Ok(Contact { origin, pair, fine, swapped, idle, chords, ends, surface })
     }
 }
 

@@ -16,7 +16,7 @@ use super::surface::ContactSurface;
 use super::unassembled::{LocalBody, OnDofs, SharedBody, Unassembled};
 use super::verify::Verified;
 use crate::contact::pieces::Cut;
-use crate::contact::{self, Chords, ContactPair};
+use crate::contact::{self, Chords, ContactPair, End};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::NodeGraph;
@@ -53,14 +53,15 @@ pub struct SharedContact {
     swapped: bool,
     idle: usize,
     chords: Option<Chords>,
+    ends: Vec<End>,
     surface: ContactSurface,
 }
 
 impl SharedContact {
     /// Return the facts of the pair, including its description in the scene.
     pub fn info(self, scene: &Scene) -> ContactInfo {
-        let Self { origin, swapped, idle, chords, surface } = self;
-        ContactInfo { spec: origin.spec(scene), is_split: origin.is_split, swapped, idle, chords, surface }
+        let Self { origin, swapped, idle, chords, ends, surface } = self;
+        ContactInfo { spec: origin.spec(scene), is_split: origin.is_split, swapped, idle, chords, ends, surface }
     }
 }
 
@@ -183,10 +184,10 @@ fn pair_surfaces<const D: usize>(
 ) -> Result<Paired<D>> {
     let mut paired = Paired { pairs: Vec::new(), contacts: Vec::new(), fine: Vec::new() };
     for found in pairs::all(scene, mesh, cut, parts, keep)? {
-        let Contact { origin, pair, fine, swapped, idle, chords, surface } = found;
+        let Contact { origin, pair, fine, swapped, idle, chords, ends, surface } = found;
         paired.pairs.push(pair);
         paired.fine.extend(fine);
-        paired.contacts.push(SharedContact { origin, swapped, idle, chords, surface });
+        paired.contacts.push(SharedContact { origin, swapped, idle, chords, ends, surface });
     }
     Ok(paired)
 }

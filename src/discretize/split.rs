@@ -13,6 +13,8 @@ pub struct Piece<const D: usize> {
     pub face: [Option<usize>; 2],
     /// Number of facets of each surface that belong to no pair. One piece of two surfaces counts them.
     pub idle: [usize; 2],
+    /// Nodes of the facets of both surfaces that face each other, but are too far apart, with or without pairs.
+    pub far: [BTreeSet<u32>; 2],
 }
 
 impl<const D: usize> Piece<D> {
@@ -21,6 +23,7 @@ impl<const D: usize> Piece<D> {
         self.facets.swap(0, 1);
         self.face.swap(0, 1);
         self.idle.swap(0, 1);
+        self.far.swap(0, 1);
     }
 }
 
@@ -38,6 +41,8 @@ pub struct Split<'a, const D: usize> {
     sides: [&'a Side<'a, D>; 2],
     faces: [Faces; 2],
     met: BTreeMap<[usize; 2], Used>,
+    /// Nodes of the facets of both surfaces that face each other, but are too far apart.
+    far: [BTreeSet<u32>; 2],
 }
 
 impl<'a, const D: usize> Split<'a, D> {
@@ -47,17 +52,23 @@ impl<'a, const D: usize> Split<'a, D> {
     pub fn new(sides: [&'a Side<'a, D>; 2], edge: f64, cut: Cut<D>, reach: &Reach) -> Self {
         let faces = sides.map(|side| Faces::new(side, edge));
         let mut met: BTreeMap<[usize; 2], Used> = BTreeMap::new();
+        let mut far = [BTreeSet::new(), BTreeSet::new()];
         for face in 0..faces[0].count {
             let is_own: Vec<bool> = faces[0].of_facet.iter().map(|&of| of == face).collect();
             let own: Vec<usize> = (0..is_own.len()).filter(|&i| is_own[i]).collect();
-            for point in cut(&sides[0].only(&is_own), sides[1], reach).points {
+            let common = cut(&sides[0].only(&is_own), sides[1], reach);
+            for (i, j) in common.far() {
+                far[0].extend(sides[0].facets.facet(own[i]));
+                far[1].extend(sides[1].facets.facet(j));
+            }
+            for point in common.points {
                 let (i, j) = (own[point.facet_a], point.facet_b);
                 let none = || sides.map(|side| vec![false; side.facets.count()]);
                 let used = met.entry([face, faces[1].of_facet[j]]).or_insert_with(none);
                 (used[0][i], used[1][j]) = (true, true);
             }
         }
-        Self { sides, faces, met }
+        Self { sides, faces, met, far }
     }
 
     /// Return the pairs with the facets that have common pieces, and no others. The list is empty if nothing has common pieces.
@@ -116,7 +127,7 @@ impl<'a, const D: usize> Split<'a, D> {
             let face = *group.faces[side].first().filter(|_| is_one_of_several)?;
             self.number(side, face)
         };
-        Piece { facets, face: [number(0), number(1)], idle: [0, 0] }
+        Piece { facets, face: [number(0), number(1)], idle: [0, 0], far: self.far.clone() }
     }
 
     /// Return the number of a face among the faces of its surface that are in pairs, from 1; `None` if it is the only one. Faces are

@@ -84,9 +84,13 @@ fn write_groups(mut lines: &[&str], elements: &HashSet<String>, made: &mut Strin
         else {
             return;
         };
-        let (members, after) = rest.split_at(count.div_ceil(2).min(rest.len()));
-        lines = after;
-        let words: Vec<&str> = members.iter().flat_map(|line| line.split_whitespace()).collect();
+        // Most programs write two members a line.
+        let (mut words, mut members) = (Vec::new(), rest.iter());
+        while words.len() < count.saturating_mul(4) {
+            let Some(line) = members.next() else { break };
+            words.extend(line.split_whitespace());
+        }
+        lines = members.as_slice();
         let known: Vec<&str> = words
             .chunks(4)
             .filter(|member| member[0] == ELEMENT && member.get(1).is_some_and(|tag| elements.contains(*tag)))
@@ -123,5 +127,10 @@ mod tests {
         assert_eq!(groups.len(), 7, "{made}");
         assert_eq!([groups[1], groups[4]], ["Low", "Beam"]);
         assert_eq!(groups[2].split_whitespace().collect::<Vec<_>>(), ["8", "2", "0", "0"]);
+        for members in [" 8 2 0 0\n 7 1 0 0\n 8 9 0 0\n", " 8 2 0 0 7 1 0 0 8 9 0 0\n", " 8 2\n0 0 7 1 0 0 8\n9 0 0\n"]
+        {
+            let other = readable(&text.replace(" 8 2 0 0 7 1 0 0\n 8 9 0 0\n", members));
+            assert_eq!(other, made, "{members}");
+        }
     }
 }

@@ -9,6 +9,7 @@ mod beyond;
 pub mod clock;
 mod distributed;
 pub mod ended;
+mod ends;
 pub mod inner;
 pub mod look;
 pub mod measure;

@@ -7,7 +7,7 @@ use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Done, Prepared};
 use super::surfaces;
 use super::words::in_words;
-use super::{method, steps, swapped};
+use super::{ends, method, steps, swapped};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, Balanced, Discrete, Verified, point};
@@ -373,7 +373,8 @@ pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, 
         false => steps::iterate(ready, keep, clock),
     };
     keep_apart();
-    let done = done?;
+    let mut done = done?;
+    ends::note(&mut done);
     clock.phase("iterate");
     Ok(done)
 }

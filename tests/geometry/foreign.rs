@@ -366,6 +366,8 @@ fn node_sets_are_surfaces() {
     let text = BLOCKS.to_owned() + sets;
     let of = |lid: &str, load: &str| pressed(&[("a.inp", &text)], load, ["n1", "n2", "n3", lid]);
     is_ten(of("n5", "pressure = 10"), &[], "pressure");
+    // the file has no capitals, whatever the scene has
+    is_ten(pressed(&[("a.inp", &text)], "pressure = 10", ["N1", "N2", "N3", "N5"]), &[], "capitals");
     is_ten(of("n5", "force = [0, 0, -10]"), &[], "force on a face");
     is_ten(of("n5", "force = [0, 0, -10], rigid = true"), &[], "rigid");
     // two nodes bear the whole force

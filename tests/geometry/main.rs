@@ -4,6 +4,8 @@
 mod common;
 
 mod curved;
+mod ends;
+mod fits;
 mod foreign;
 mod gmsh;
 mod meshes;

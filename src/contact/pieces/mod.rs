@@ -44,6 +44,13 @@ pub struct Common<const D: usize> {
     pub refused: Vec<Refused>,
 }
 
+impl<const D: usize> Common<D> {
+    /// Return the facets of both sides that face each other, but are too far apart.
+    pub fn far(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.refused.iter().enumerate().flat_map(|(i, refused)| refused.far.iter().map(move |&j| (i, j)))
+    }
+}
+
 /// A function that finds the common pieces of two surfaces.
 pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Common<D>;
 

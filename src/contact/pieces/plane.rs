@@ -15,8 +15,8 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
     for i in 0..a.facets.count() {
         let facet = Curve::of(a, i);
         let refused = &mut common.refused[i];
-        let near = search.around(a, i, reach).into_iter().map(|index| (index, Curve::of(b, index)));
-        for (low, high, Piece { index, other, .. }) in nearest(&facing(&facet, near, reach, refused)) {
+        let pieces = search.pieces(a, i, reach, refused, |near, refused| facing(&facet, b, near, reach, refused));
+        for (low, high, Piece { index, other, .. }) in nearest(&pieces) {
             let offset = minus(facet.from, other.from);
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
@@ -29,7 +29,7 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
                 };
                 let gap = other.distance(t, from, normal);
                 if !reach.holds(gap) {
-                    refused.far = true;
+                    refused.far.insert(*index);
                     continue;
                 }
                 common.points.push(Shared {
@@ -47,20 +47,14 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
 }
 
 /// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others are none.
-fn facing(
-    facet: &Curve,
-    near: impl Iterator<Item = (usize, Curve)>,
-    reach: &Reach,
-    refused: &mut Refused,
-) -> Vec<Piece> {
+fn facing(facet: &Curve, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
-    for (index, other) in near {
-        let direction = other.direction;
+    for &index in near {
+        let other = Curve::of(b, index);
+        let directions = [facet.direction, other.direction];
         match Piece::between(facet, other, index) {
-            Ok(piece) => {
-                pieces.extend(piece.filter(|p| refused.admits(reach, p.gap, facet.direction, direction)));
-            }
-            Err(Lost) => refused.lost += usize::from(reach.faces(facet.direction, direction)),
+            Ok(piece) => pieces.extend(piece.filter(|p| refused.admits(reach, index, p.gap, directions))),
+            Err(Lost) => refused.lost += usize::from(reach.faces(directions[0], directions[1])),
         }
     }
     pieces.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));

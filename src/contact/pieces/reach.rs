@@ -2,6 +2,7 @@
 
 use crate::contact::side::{Side, length};
 use crate::linalg::dot;
+use std::collections::BTreeSet;
 
 /// The limits of distance and inclination within which two facets face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,17 +11,19 @@ pub struct Reach {
     pub gap: f64,
     /// Largest overlap.
     pub overlap: f64,
+    /// How far away facets can be at all: facets beyond `gap` are no partners, but they are known to be too far away.
+    pub farthest: f64,
     /// Least cosine between the normal of one facet and minus that of the other.
     pub facing: f64,
 }
 
 /// The reasons why facets of side b that lie before a facet of side a are not its partners.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Refused {
     /// The angle between the normals is too large.
     pub steep: bool,
-    /// The distance is too large.
-    pub far: bool,
+    /// Facets of side b whose distance is too large.
+    pub far: BTreeSet<usize>,
     /// Number of pieces and of points of pieces that the search has lost.
     pub lost: usize,
 }
@@ -45,7 +48,7 @@ impl Reach {
         let ((low, high), (from, to)) = (a.extent(), b.extent());
         let diagonal: [f64; D] = std::array::from_fn(|c| high[c].max(to[c]) - low[c].min(from[c]));
         let gap = length(diagonal);
-        Self { gap, overlap: gap, facing: angle.to_radians().cos() }
+        Self { gap, overlap: gap, farthest: gap, facing: angle.to_radians().cos() }
     }
 
     /// Return whether a signed distance is within the limits.
@@ -60,17 +63,20 @@ impl Reach {
 }
 
 impl Refused {
-    /// Return whether `reach` admits facets with these unit normals at this distance, and note the reason if not.
+    /// Return whether `reach` admits facet `index` of side b at this distance, where a facet of side a has one of these unit `normals` and the
+    /// other one is its own. Note the reason if not.
     pub(super) fn admits<const D: usize>(
         &mut self,
         reach: &Reach,
+        index: usize,
         gap: f64,
-        normal: [f64; D],
-        other: [f64; D],
+        normals: [[f64; D]; 2],
     ) -> bool {
-        let (faces, holds) = (reach.faces(normal, other), reach.holds(gap));
+        let (faces, holds) = (reach.faces(normals[0], normals[1]), reach.holds(gap));
         self.steep |= holds && !faces;
-        self.far |= faces && gap > reach.gap;
+        if faces && gap > reach.gap {
+            self.far.insert(index);
+        }
         faces && holds
     }
 }
@@ -82,7 +88,7 @@ mod tests {
     /// A refused facet is steep where the distance would do, and far where the direction would do.
     #[test]
     fn refusals_have_their_reasons() {
-        let reach = Reach { gap: 2.0, overlap: 1.0, facing: 0.5 };
+        let reach = Reach { gap: 2.0, overlap: 1.0, farthest: 9.0, facing: 0.5 };
         let (up, down, steep) = ([0.0, 1.0], [0.0, -1.0], [1.0, 0.0]);
         for (gap, other, admitted, is_steep, is_far) in [
             (1.0, down, true, false, false),
@@ -93,8 +99,8 @@ mod tests {
             (3.0, steep, false, false, false),
         ] {
             let mut refused = Refused::default();
-            assert_eq!(refused.admits(&reach, gap, up, other), admitted, "{gap} {other:?}");
-            assert_eq!((refused.steep, refused.far), (is_steep, is_far), "{gap} {other:?}");
+            assert_eq!(refused.admits(&reach, 7, gap, [up, other]), admitted, "{gap} {other:?}");
+            assert_eq!((refused.steep, refused.far.contains(&7)), (is_steep, is_far), "{gap} {other:?}");
         }
         assert!(!reach.faces(up, up) && !reach.faces(up, [0.9, -0.4]) && reach.faces(up, [0.8, -0.6]));
     }

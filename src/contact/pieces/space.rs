@@ -39,7 +39,8 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
-        let pieces = facing(&facet, &facets_b, &search.around(a, i, reach), reach, refused);
+        let pieces =
+            search.pieces(a, i, reach, refused, |near, refused| facing(&facet, &facets_b, near, reach, refused));
         for Piece { polygon, index, .. } in pieces {
             let other = &facets_b[index];
             let offset = minus(facet.from, other.from);
@@ -56,7 +57,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
                     let weight = weight * share * length(facet.area(u, v));
                     let gap = t * length(normal);
                     if !reach.holds(gap) {
-                        refused.far = true;
+                        refused.far.insert(index);
                         continue;
                     }
                     let at_a = [1.0 - u - v, u, v];
@@ -84,7 +85,7 @@ fn without_overlaps(pieces: Vec<Piece>) -> Vec<Piece> {
 fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for parts in PARTS {
-        let before = *refused;
+        let before = refused.clone();
         let mut found = Vec::new();
         let mut without_image = 0;
         for &index in near {
@@ -94,7 +95,7 @@ fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &m
                 without_image += clipped.without_image;
                 refused.lost += clipped.lost;
             }
-            let admitted = |p: &Piece| refused.admits(reach, p.gap, facet.direction, other.direction);
+            let admitted = |p: &Piece| refused.admits(reach, p.index, p.gap, [facet.direction, other.direction]);
             found.extend(clipped.pieces.into_iter().filter(admitted));
         }
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));

@@ -1,0 +1,39 @@
+//! Contact points where a pair ends because its surfaces are farther apart than its largest distance.
+
+use super::pair::ContactPair;
+use super::pieces::Common;
+use super::side::Side;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+
+/// A contact point on a facet, or beside one, that has no partner or only a part of one, because what lies before it is too far away.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct End {
+    /// Index of the contact point.
+    pub point: usize,
+    /// Compression of the layer from which the contact probably goes on where the pair has ended.
+    pub compression: f64,
+}
+
+/// Approach of the surfaces, as a share of the largest distance of the pair, from which a contact at the end of the pair goes on beyond it. On a
+/// curved surface the distance at an end is nearly the largest one. At a step of the surface it is less, and the surfaces have to approach by all
+/// of the step until what lies beyond touches.
+const NEARLY: f64 = 0.5;
+
+impl End {
+    /// Return the ends of a pair whose facets may be apart by `distance`. `far` are the nodes of facets of side a that were found to be too far
+    /// away before the pair was made. `drawn` gives the distance of the meshes at a contact point; with `None` the surfaces touch at any distance.
+    pub fn all<const D: usize>(
+        a: &Side<D>,
+        common: &Common<D>,
+        pair: &ContactPair,
+        far: &BTreeSet<u32>,
+        distance: f64,
+        drawn: Option<&dyn Fn(usize) -> f64>,
+    ) -> Vec<Self> {
+        let ends: BTreeSet<u32> = common.far().flat_map(|(i, _)| a.facets.facet(i).iter().copied()).collect();
+        let is_end = |point: &usize| [&ends, far].iter().any(|nodes| nodes.contains(&pair.nodes[*point]));
+        let compression = |point: usize| drawn.map_or(0.0, |drawn| (NEARLY * distance - drawn(point)).max(0.0));
+        (0..pair.len()).filter(is_end).map(|point| Self { point, compression: compression(point) }).collect()
+    }
+}
