@@ -452,9 +452,9 @@ fn nothing_that_petsc_shows_may_stand_in_a_scene() {
     let mut names = BTreeSet::new();
     for solver in ["cg -pc_type gamg", "gmres -pc_type hypre", "lsqr -pc_type asm", "preonly -pc_type cholesky"] {
         let help = groove(&format!("-help -ksp_type {solver}")).stdout;
-        let lines = help
-            .lines()
-            .filter(|line| ["ascii[:", "(null)", "filename", "tmpdir"].iter().any(|word| line.contains(word)));
+        // PETSc 3.24 shows a switch without a value as it shows a missing text
+        let is_text = |line: &&str| ["ascii[:", "(null)", "filename", "tmpdir"].iter().any(|word| line.contains(word));
+        let lines = help.lines().filter(is_text).filter(|line| !line.contains("keeptranspose"));
         names.extend(lines.filter_map(|line| {
             let word = line.trim_start().strip_prefix('-')?;
             Some(word[..word.find(|sign: char| !sign.is_ascii_alphanumeric() && sign != '_')?].to_owned())
@@ -564,7 +564,7 @@ fn odd_files_of_options_are_refused() {
 #[test]
 fn a_solver_without_iterations_is_refused() {
     let layered = ["--set", "mesh.set.n=4", "--set", "solver=hypre"];
-    for option in ["-ksp_max_it 0", "-newton_ksp_max_it 0", "-ksp_max_it -1", "-ksp_type gmres -ksp_max_it 0"] {
+    for option in ["-ksp_max_it 0", "-newton_ksp_max_it 0", "-ksp_type gmres -ksp_max_it 0"] {
         let words: Vec<&str> = layered.into_iter().chain(option.split(' ')).collect();
         // sweeps have no matrix of all bodies
         let methods = ["newton", "newton-robin"].into_iter().take(if option.starts_with("-newton") { 1 } else { 2 });
@@ -574,6 +574,9 @@ fn a_solver_without_iterations_is_refused() {
             assert!(run.stderr.starts_with("error: ") && run.stderr.contains("ksp_max_it"), "{}", run.said());
         }
     }
+    // PETSc 3.22 and newer take -1 for their default
+    let run = solve(case("groove3d"), &[&layered[..], &["-ksp_max_it", "-1"]].concat());
+    assert!(run.code == 0 || run.code == 5 && run.stderr.contains("ksp_max_it"), "{}", run.said());
     for option in ["-pc_type jacobi -ksp_max_it 0", "-pc_type gamg -upper_ksp_max_it 0"] {
         let run = groove(option);
         assert!(run.code == 5 && run.stderr.contains("ksp_max_it is 0"), "{option}: {}", run.said());
