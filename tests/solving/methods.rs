@@ -317,7 +317,7 @@ fn leaves(n: usize, layer: &str) -> Scene {
 /// needs none. Beams share the load of 5 so that 2 goes through the tip.
 #[test]
 fn leaves_peel_in_a_few_steps() {
-    for layer in ["linear = { stiffness = 1e7 }", "power = { B = 1e-5, a = 0.5 }"] {
+    for (layer, most) in [("linear = { stiffness = 1e7 }", 14), ("power = { B = 1e-5, a = 0.5 }", 16)] {
         let mut steps = Vec::new();
         for n in [60, 120] {
             let run = solve(&leaves(n, layer).path, &["--method", "newton"]).converged();
@@ -331,7 +331,7 @@ fn leaves_peel_in_a_few_steps() {
             let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
             assert!(apart < 1e-7, "{layer} {n}: {apart:e}");
         }
-        assert!(steps[0].abs_diff(steps[1]) <= 1 && steps[0].max(steps[1]) <= 15, "{layer}: {steps:?}");
+        assert!(steps[0].abs_diff(steps[1]) <= 1 && steps[0].max(steps[1]) <= most, "{layer}: {steps:?}");
     }
 }
 
