@@ -9,18 +9,22 @@ pub fn note(done: &mut Done) {
         return;
     }
     for i in 0..done.model().pairs.len() {
-        let [a, b] = done.built.discrete.contacts[i].spec.between.each_ref().map(|name| &name.value);
-        let title = format!("{a} - {b}: the contact reaches places");
         let reached = reached(done, i);
-        if reached > 0 && !done.warnings.iter().any(|warning| warning.starts_with(&title)) {
-            let distance = done.built.discrete.contacts[i].spec.distance.unwrap_or_default();
-            let step =
-                if done.steps.is_empty() { String::new() } else { format!(" in load step {}", done.steps.len()) };
-            done.warnings.push(format!(
-                "{title}{step} where the surfaces are farther apart than {distance} (key `distance`), and the pair ends: {reached} contact points \
-                 there are under pressure, and facets beyond them carry none; give a larger distance"
-            ));
+        if reached == 0 {
+            continue;
         }
+        let spec = &done.built.discrete.contacts[i].spec;
+        let [a, b] = spec.between.each_ref().map(|name| &name.value);
+        let title = format!("{a} - {b}: the contact reaches places");
+        if done.warnings.iter().any(|warning| warning.starts_with(&title)) {
+            continue;
+        }
+        let distance = spec.distance.unwrap_or_default();
+        let step = if done.steps.is_empty() { String::new() } else { format!(" in load step {}", done.steps.len()) };
+        done.warnings.push(format!(
+            "{title}{step} where the surfaces are farther apart than {distance} (key `distance`), and the pair ends: {reached} contact points \
+             there are under pressure, and facets beyond them carry none; give a larger distance"
+        ));
     }
 }
 
