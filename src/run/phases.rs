@@ -12,7 +12,7 @@ use crate::contact::pieces::{self, Cut};
 use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, Balanced, Discrete, Verified, point};
 use crate::error::{Error, Kind, Result};
-use crate::estimate::{self, Estimate};
+use crate::estimate::{self, Cause, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
@@ -407,12 +407,19 @@ fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
     for (i, pair) in model.pairs.iter().enumerate() {
         let [a, b] = &pair.surfaces;
-        if let Some(place) = estimate.guesses[i] {
-            warnings.push(format!(
-                "the estimated error of the pressures between `{a}` and `{b}` is a guess: most of it is at the edge of the contact, at {}, \
-                 where pressures may be singular",
-                point(place)
-            ));
+        if let Some(guess) = estimate.guesses[i] {
+            let place = point(guess.place);
+            let reason = match guess.cause {
+                Cause::Rim => {
+                    format!("most of it is at the edge of the contact, at {place}, where pressures may be singular")
+                }
+                Cause::FewFacets => {
+                    format!(
+                        "contact ends within the facets that carry most of the pressure, around {place}: make them smaller"
+                    )
+                }
+            };
+            warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
         }
         let change = estimate.sides[i];
         if change > estimate.pressure[i].max(ONE_SIDED) {
