@@ -16,15 +16,12 @@ use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
 use crate::solver::cost::{Candidate, Comparison, Step};
 use crate::solver::memory;
-use crate::solver::options::{Chosen, Typed};
+use crate::solver::options::{Chosen, Typed, WHOLE};
 use crate::solver::preset::{self, Size};
 use crate::solver::speed;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::collections::{BTreeMap, HashMap};
-
-/// Prefix of the PETSc options of the matrix of all bodies.
-pub const WHOLE: &str = "newton";
 
 /// A factory that chooses and makes the inner solvers of a scene's bodies.
 pub struct Inner<'a> {
@@ -63,7 +60,7 @@ impl<'a> Inner<'a> {
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        let typed = Typed::read(session, &[bodies, &[WHOLE]].concat())?;
+        let typed = Typed::read(session, bodies)?;
         Ok(Self {
             session,
             asked: scene.solver.preset,

@@ -103,11 +103,6 @@ impl Built {
         meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
     }
 
-    /// Whether no solver of PETSc is part of the problem: linear steps are dense, or all bodies are condensed.
-    pub fn is_without_petsc(&self) -> bool {
-        self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
-    }
-
     /// Return the condensed bodies with their counters reset, for other loads, layers or gaps.
     pub fn into_condensed(self) -> Vec<BodySlot> {
         let mut slots = self.discrete.model.bodies;

@@ -10,14 +10,6 @@ use std::path::Path;
 ///
 /// A PETSc option has one dash and two or more letters. It takes the next word as its value unless that looks like an
 /// option. A scene file (`*.toml`) or a command is never a value, except of `-options_file`. All words after `--` belong to the program.
-///
-/// ```
-/// use winkler::solver::options::split;
-/// let words = ["solve", "-ksp_monitor", "scene.toml", "-ksp_rtol", "1e-9", "-o", "out", "-pc_shift", "-1e-3", "--set", "a=1"];
-/// let (program, petsc) = split(words.map(String::from));
-/// assert_eq!(program, ["solve", "scene.toml", "-o", "out", "--set", "a=1"]);
-/// assert_eq!(petsc, ["-ksp_monitor", "-ksp_rtol", "1e-9", "-pc_shift", "-1e-3"]);
-/// ```
 pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<String>) {
     let (mut program, mut petsc) = (Vec::new(), Vec::new());
     let mut words = words.into_iter().peekable();
