@@ -53,14 +53,14 @@ pub struct Inner<'a> {
 }
 
 impl<'a> Inner<'a> {
-    /// Start from the free memory and the options that the user wrote for `bodies`. This scene can reuse the bodies `kept` of an earlier one. Collective.
-    pub fn new(session: &'a Session, scene: &Scene, bodies: &[&str], kept: Vec<BodySlot>) -> Result<Self> {
+    /// Start from the free memory and the options that the user wrote. This scene can reuse the bodies `kept` of an earlier one. Collective.
+    pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
         let mine = memory::available() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        let typed = Typed::read(session, bodies)?;
+        let typed = Typed::read(session)?;
         Ok(Self {
             session,
             asked: scene.solver.preset,

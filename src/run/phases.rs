@@ -118,7 +118,7 @@ where
         let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         collectively(session, options::set_of_scene(session, &names, &scene.solver.options))?;
-        let mut inner = Inner::new(session, scene, &names, kept)?;
+        let mut inner = Inner::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
         let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);

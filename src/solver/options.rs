@@ -14,12 +14,10 @@ mod chosen;
 mod command_line;
 mod names;
 mod scene;
-mod typed;
 mod unread;
 
-pub use chosen::Chosen;
+pub use chosen::{Chosen, Typed, WHOLE};
 pub use command_line::{refuse_log, refuse_traps, split};
 pub use names::looks;
 pub use scene::{check_of_scene, pairs, set_of_scene, withdraw};
-pub use typed::{Typed, WHOLE};
 pub use unread::{show_help, unread};

@@ -176,7 +176,7 @@ fn options_come_from_line_file_and_environment() {
     expect_success(alone("petsc::options_come_from_line_file_and_environment", 0, &environment, || {
         let file = std::env::var("WINKLER_FILE").unwrap_or_default();
         let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
-        let (options, upper) = (session.options(), Typed::read(&session, &["upper"])?.of("upper"));
+        let (options, upper) = (session.options(), Typed::read(&session)?.of("upper"));
         for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
             assert_eq!(upper.typed(name), Some(value));
         }
@@ -213,13 +213,12 @@ fn settings_of_open_mpi_by_the_user_are_kept() {
 #[test]
 fn an_option_read_on_one_rank_is_read() {
     expect_success(alone("petsc::an_option_read_on_one_rank_is_read", 2, &[], || {
-        let line =
-            "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
+        let line = "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
         let session = Session::start(&words(line))?;
         let bodies = ["upper", "lower"];
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        let mut chosen = Typed::read(&session, &bodies)?.of(body);
+        let mut chosen = Typed::read(&session)?.of(body);
         chosen.set_default("pc_type", "jacobi");
         let matrix = chain(&session, 9)?;
         chosen.lend(&session, || solver(&session, &format!("{body}_"), &matrix)?.set_up())?;

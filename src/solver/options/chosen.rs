@@ -1,13 +1,42 @@
-//! The options of one solver, which PETSc sees only while that solver works.
+//! What the user wrote, and the options of one solver, which PETSc sees only while that solver works.
 
 use super::names::{looks, nest_of};
 use crate::error::Result;
-use crate::petsc::{Session, is_of_family};
+use crate::petsc::{Entry, Session, is_of_family};
 use std::collections::BTreeMap;
+
+/// Prefix of the options of the matrix of all bodies.
+pub const WHOLE: &str = "newton";
+
+/// The options that the user wrote: on the command line, in files, and in the scene.
+#[derive(Default)]
+pub struct Typed(Vec<Entry>);
+
+impl Typed {
+    /// Read PETSc's table.
+    pub fn read(session: &Session) -> Result<Self> {
+        session.options().all().map(Self)
+    }
+
+    /// Return the options of the solver with a prefix: its own ones, and plain ones of PETSc's objects that it has not as its own.
+    pub fn of(&self, prefix: &str) -> Chosen {
+        let mut chosen = Chosen::new(prefix);
+        for (start, origin) in [(format!("-{prefix}_"), Origin::Own), ("-".to_owned(), Origin::Plain)] {
+            for (option, value) in &self.0 {
+                let name = option.to_ascii_lowercase();
+                // no name of a body has a word of a family in it
+                if let Some(name) = name.strip_prefix(&start).filter(|name| is_of_family(name)) {
+                    chosen.add(name, value.as_deref(), origin);
+                }
+            }
+        }
+        chosen
+    }
+}
 
 /// Why a solver has an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Origin {
+enum Origin {
     /// The user wrote it with the prefix of this solver, so that it stands in PETSc's table.
     Own,
     /// The user wrote it for all solvers.
@@ -48,7 +77,7 @@ impl Chosen {
     }
 
     /// Add an option, unless one of this name is there already. So own options are added first, then plain ones, then defaults.
-    pub(super) fn add(&mut self, name: &str, value: Option<&str>, origin: Origin) {
+    fn add(&mut self, name: &str, value: Option<&str>, origin: Origin) {
         let choice = || Choice { name: name.to_owned(), value: value.map(str::to_owned), origin };
         self.choices.entry(name.to_ascii_lowercase()).or_insert_with(choice);
     }
@@ -145,31 +174,44 @@ impl Chosen {
 mod tests {
     use super::*;
 
-    /// The option that is added first wins, whatever the case of its letters, and a default is added last.
+    fn typed(options: &[(&str, &str)]) -> Typed {
+        Typed(options.iter().map(|(name, value)| ((*name).to_owned(), Some((*value).to_owned()))).collect())
+    }
+
     #[test]
     fn own_options_win_over_those_of_all_and_over_defaults() {
-        let mut chosen = Chosen::new("b7");
-        chosen.add("ksp_type", Some("cg"), Origin::Own);
-        chosen.add("KSP_type", Some("gmres"), Origin::Plain);
-        chosen.add("pc_type", Some("lu"), Origin::Plain);
+        let typed =
+            typed(&[("-KSP_type", "gmres"), ("-b_1_pc_type", "icc"), ("-b_ksp_type", "cg"), ("-pc_type", "lu")]);
+        let mut chosen = typed.of("b");
         chosen.set_default("pc_type", "hypre");
         chosen.set_default("ksp_rtol", "1e-6");
-        let names = ["ksp_type", "pc_type", "ksp_rtol", "none"];
+        let names = ["ksp_type", "PC_type", "ksp_rtol", "none"];
         assert_eq!(names.map(|name| chosen.get(name)), [Some("cg"), Some("lu"), Some("1e-6"), None]);
         assert_eq!(names.map(|name| chosen.typed(name)), [Some("cg"), Some("lu"), None, None]);
-        assert!(chosen.has_own() && chosen.has_typed() && chosen.asks_for_ksp());
+        assert_eq!(
+            ["ksp_type", "pc_type"].map(|name| typed.of("b_1").get(name).map(str::to_owned)),
+            ["gmres", "icc"].map(|value| Some(value.to_owned()))
+        );
+        assert!(chosen.has_own() && !typed.of("c").has_own() && typed.of("c").has_typed_of("pc_"));
     }
 
     /// Options that look and controls of MUMPS leave the choice of the solver to the program.
     #[test]
     fn some_options_ask_for_a_solver_of_petsc() {
         for (name, asks) in
-            [("mat_mumps_icntl_14", false), ("log_view", false), ("ksp_view", false), ("ksp_rtol", true)]
+            [("-mat_mumps_icntl_14", false), ("-log_view", false), ("-ksp_view", false), ("-b_ksp_rtol", true)]
         {
-            let mut chosen = Chosen::new("b");
+            let mut chosen = typed(&[(name, "1")]).of("b");
             chosen.set_default("pc_type", "gamg");
-            chosen.add(name, Some("1"), Origin::Plain);
             assert_eq!(chosen.asks_for_ksp(), asks, "{name}");
         }
+    }
+
+    #[test]
+    fn factorisations_are_those_of_mumps() {
+        let mut chosen = typed(&[("-pc_type", "asm"), ("-sub_pc_type", "lu")]).of("b");
+        chosen.prefer_mumps();
+        let package = |nest: &str| chosen.get(&format!("{nest}pc_factor_mat_solver_type"));
+        assert_eq!([package("sub_"), package("")], [Some("mumps"), None]);
     }
 }

@@ -80,14 +80,9 @@ pub fn refuse_traps(session: &Session) -> Result<()> {
 pub fn refuse_log(session: &Session) -> Result<()> {
     // the value has the form TYPE:FILE:FORMAT
     let log = session.options().get("-log_view").unwrap_or_default();
-    match log.split(':').nth(1).filter(|file| !file.is_empty() && session.rank() == 0) {
-        Some(file) => try_file(Path::new(file)),
-        None => Ok(()),
-    }
-}
-
-/// Check that a file can be written. A file that was created for the check is removed again.
-fn try_file(path: &Path) -> Result<()> {
+    let Some(path) = log.split(':').nth(1).filter(|file| !file.is_empty() && session.rank() == 0).map(Path::new) else {
+        return Ok(());
+    };
     let is_new = !path.exists();
     OpenOptions::new().append(true).create(true).open(path).map_err(|cause| {
         Error::file(path, "write", &cause).help("-log_view names this file: let it lie in a folder that is there")

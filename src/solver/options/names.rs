@@ -3,6 +3,7 @@
 //! PETSc has no list of its options. These are in the help of PETSc 3.18 for all its solvers. Each was looked up in PETSc's sources, and takes
 //! numbers, a switch, or words of a closed list: a scene may have it. `unread` adds to them what a solver of the run says in its help.
 
+use super::WHOLE;
 use crate::error::nearest;
 use crate::petsc::is_of_family;
 
@@ -179,6 +180,12 @@ pub(super) fn ends(name: &str) -> impl DoubleEndedIterator<Item = (&str, &str)> 
     std::iter::once(("", name)).chain(name.match_indices('_').map(|(at, _)| (&name[..at], &name[at + 1..])))
 }
 
+/// Return the names that an option may have without its dash and the prefix of a solver: the whole name, and the rest behind the name of a body.
+pub(super) fn bare<'a>(option: &'a str, bodies: &[&str]) -> impl Iterator<Item = &'a str> {
+    let is_prefix = |head: &str| head.is_empty() || head == WHOLE || bodies.contains(&head);
+    ends(option.trim_start_matches('-')).filter(move |(head, _)| is_prefix(head)).map(|(_, name)| name)
+}
+
 /// Return whether a name is among those that are `known`, or a control of MUMPS. It may begin with the prefix of a nested solver.
 pub(super) fn is_known(name: &str, known: &[&str]) -> bool {
     let is_number = |word: &str| word.bytes().all(|byte| byte.is_ascii_digit());
@@ -193,6 +200,7 @@ pub(super) fn is_known(name: &str, known: &[&str]) -> bool {
 
 /// Return the name that is meant, if a name, its last part, or the name of a body before it is mistyped.
 pub(super) fn corrected(name: &str, known: &[&str], bodies: &[&str]) -> Option<String> {
+    let name = name.trim_start_matches('-');
     let mut parts = ends(name).rev().filter(|(head, end)| head.is_empty() || is_of_family(end));
     let (head, near) = parts.find_map(|(head, end)| Some((head, nearest(end, known.iter().copied())?)))?;
     let body = nearest(head, bodies.iter().copied()).filter(|_| !head.is_empty()).unwrap_or(head);

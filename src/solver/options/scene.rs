@@ -3,8 +3,7 @@
 //! PETSc's options also write files, remove folders, call a shell, load libraries and read more options. A scene may come from anybody, so it
 //! may only have options of the lists in [`names`](super::names). An option that PETSc adds later is not among them.
 
-use super::names::{Takes, corrected, ends, looks, of_scenes, takes};
-use super::typed::Prefixes;
+use super::names::{Takes, bare, corrected, ends, looks, of_scenes, takes};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::{Session, is_global};
 use std::cell::RefCell;
@@ -79,8 +78,7 @@ pub fn pairs(words: &[String]) -> Result<Vec<(&str, Option<&str>)>> {
 /// Any other option, and a value that such an option does not take.
 pub fn check_of_scene(name: &str, value: Option<&str>) -> Result<()> {
     let Some(takes) = name.strip_prefix('-').and_then(takes_in_scene) else {
-        let bare = name.trim_start_matches('-');
-        let near = corrected(bare, &of_scenes().collect::<Vec<_>>(), &[]).filter(|_| !looks(bare));
+        let near = corrected(name, &of_scenes().collect::<Vec<_>>(), &[]).filter(|_| !looks(name));
         let typed = value.map_or(name.to_owned(), |value| format!("{name} {value}"));
         let help = format!(
             "a scene chooses solvers and sets their parameters; what else PETSc can do is for the command line: winkler solve SCENE {typed}"
@@ -104,13 +102,10 @@ pub fn check_of_scene(name: &str, value: Option<&str>) -> Result<()> {
 pub fn set_of_scene(session: &Session, bodies: &[&str], words: &[String]) -> Result<()> {
     let options = session.options();
     withdraw(session)?;
-    let prefixes = Prefixes::new(bodies);
     for (name, value) in pairs(words)? {
         check_of_scene(name, value)?;
-        let is_typed = |name: &str| options.has(name) && !OF_SCENE.with_borrow(|names| names.contains(name));
-        let lower = name.to_ascii_lowercase();
-        let (prefix, bare) = prefixes.split(&lower);
-        if !is_typed(name) && !prefix.is_some_and(|_| is_typed(bare)) {
+        let of_scene = |name: &str| OF_SCENE.with_borrow(|names| names.contains(&format!("-{name}")));
+        if !bare(name, bodies).any(|name| options.has(name) && !of_scene(name)) {
             options.set(name, value)?;
             OF_SCENE.with_borrow_mut(|names| names.insert(name.to_owned()));
         }
@@ -127,65 +122,32 @@ pub fn withdraw(session: &Session) -> Result<()> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn solvers_and_their_parameters_pass() {
-        for (name, value) in [
-            ("-ksp_rtol", "1e-8"),
-            ("-KSP_Type", "gmres"),
-            ("-upper_ksp_type", "minres"),
-            ("-newton_mg_coarse_pc_hypre_boomeramg_relax_type_all", "symmetric-SOR/Jacobi"),
-            ("-pc_hypre_boomeramg_P_max", "4"),
-            ("-mg_levels_3_esteig_ksp_max_it", "12"),
-            ("-ksp_chebyshev_esteig", "0,0.1,0,1.1"),
-            ("-pc_fieldsplit_fields", "0,1"),
-            ("-ksp_knoll", ""),
-            ("-ksp_reuse_preconditioner", "false"),
-            ("-pc_hypre_boomeramg_print_statistics", "1"),
-            ("-sub_pc_factor_mat_ordering_type", "rcm"),
-            ("-mat_mumps_cntl_7", "1e-3"),
-            ("-ksp_divtol", "inf"),
-        ] {
-            let value = Some(value).filter(|value| !value.is_empty());
-            assert!(check_of_scene(name, value).is_ok(), "{name} {value:?}");
+    /// Check that the options of a text, separated by `|`, pass or do not pass.
+    fn check_all(options: &str, pass: bool) {
+        for option in options.split('|').map(str::trim) {
+            let (name, value) = option.split_once(' ').map_or((option, None), |(name, value)| (name, Some(value)));
+            assert_eq!(check_of_scene(name, value).is_ok(), pass, "{option}");
         }
     }
 
     #[test]
+    fn solvers_and_their_parameters_pass() {
+        let passing = "-ksp_rtol 1e-8 | -KSP_Type gmres | -upper_ksp_type minres | -pc_hypre_boomeramg_P_max 4 | -ksp_divtol inf | \
+            -newton_mg_coarse_pc_hypre_boomeramg_relax_type_all symmetric-SOR/Jacobi | -mg_levels_3_esteig_ksp_max_it 12 | \
+            -ksp_chebyshev_esteig 0,0.1,0,1.1 | -pc_fieldsplit_fields 0,1 | -ksp_knoll | -ksp_reuse_preconditioner false | \
+            -pc_hypre_boomeramg_print_statistics 1 | -sub_pc_factor_mat_ordering_type rcm | -mat_mumps_cntl_7 1e-3";
+        check_all(passing, true);
+    }
+
+    #[test]
     fn what_writes_loads_or_reads_is_refused() {
-        for option in [
-            "-ksp_view :f",
-            "-ksp_monitor",
-            "-upper_ksp_view_mat binary:f",
-            "-draw_save $(touch f)",
-            "-log_view :f",
-            "-options_file f",
-            "-OPTIONS_FILE f",
-            "-prefix_push x_",
-            "-dll_append f.so",
-            "-mat_mumps_ooc_tmpdir f",
-            "-mat_mumps_icntl_01 7",
-            "-mat_mumps_icntl_22 1",
-            "-mat_mumps_icntl_+4 7",
-            "-pc_type shell",
-            "-pc_type hpddm",
-            "-ksp_type python",
-            "-pc_python_type a.b",
-            "-pc_hypre_type euclid",
-            "-pc_hypre_boomeramg_smooth_type Euclid",
-            "-ksp_rtol 1e-8:f",
-            "-ksp_norm_type :f",
-            "-ksp_norm_type ../f",
-            "-ksp_norm_type ${HOME}",
-            "-pc_factor_mat_ordering_type",
-            "--ksp_type cg",
-            "-ksp type cg",
-            "-help",
-            "-h",
-            "-",
-        ] {
-            let (name, value) = option.split_once(' ').map_or((option, None), |(name, value)| (name, Some(value)));
-            assert!(check_of_scene(name, value).is_err(), "{option}");
-        }
+        let refused = "-ksp_view :f | -ksp_monitor | -upper_ksp_view_mat binary:f | -draw_save $(touch f) | -log_view :f | \
+            -options_file f | -OPTIONS_FILE f | -prefix_push x_ | -dll_append f.so | -mat_mumps_ooc_tmpdir f | \
+            -mat_mumps_icntl_01 7 | -mat_mumps_icntl_22 1 | -mat_mumps_icntl_+4 7 | -pc_type shell | -pc_type hpddm | \
+            -ksp_type python | -pc_python_type a.b | -pc_hypre_type euclid | -pc_hypre_boomeramg_smooth_type Euclid | \
+            -ksp_rtol 1e-8:f | -ksp_norm_type :f | -ksp_norm_type ../f | -ksp_norm_type ${HOME} | \
+            -pc_factor_mat_ordering_type | --ksp_type cg | -ksp type cg | -help | -h | -";
+        check_all(refused, false);
     }
 
     #[test]

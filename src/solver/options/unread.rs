@@ -1,7 +1,6 @@
 //! Options that nobody read: mistyped ones, and valid ones that have no effect.
 
-use super::names::{self, looks, nest_of};
-use super::typed::{Typed, Word};
+use super::names::{self, bare, looks, nest_of};
 use super::{Chosen, WHOLE};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::{Ksp, Matrix, Session, is_global, is_of_family, printed};
@@ -17,65 +16,63 @@ use std::cell::Cell;
 /// # Errors
 /// PETSc knows no such option, as far as this program can tell.
 pub fn unread(session: &Session, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<String>> {
-    let typed = Typed::read(session, bodies)?;
-    let left = left(session, &typed, bodies, solvers)?;
+    let left = left(session, bodies, solvers)?;
     if left.is_empty() {
         return Ok(Vec::new());
     }
     let help = help_of(session, solvers.first())?;
     let mut known: Vec<&str> = names::all();
     known.extend(names_in(&help));
-    if let Some(word) = left.iter().find(|word| !names::is_known(&word.name, &known)) {
-        let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", word.option));
-        let near = names::corrected(word.option.trim_start_matches('-'), &known, &[bodies, &[WHOLE]].concat());
+    let is_known = |option: &&String| bare(option, bodies).any(|name| names::is_known(name, &known));
+    if let Some(option) = left.iter().find(|option| !is_known(option)) {
+        let error = Error::new(Kind::Solver, format!("PETSc knows no option {option}"));
+        let near = names::corrected(option, &known, &[bodies, &[WHOLE]].concat());
         let help = || "`-help` lists the options of this run".to_owned();
         return Err(error.help(near.map_or_else(help, |near| format!("did you mean -{near}?"))));
     }
-    let (watching, other): (Vec<&Word>, Vec<&Word>) =
-        left.into_iter().partition(|word| solvers.is_empty() && looks(&word.name) && is_of_family(&word.name));
-    let warning = |word: &Word| format!("option {} was not used: no solver of this run reads it", word.option);
+    let is_watching = |name: &str| solvers.is_empty() && looks(name) && is_of_family(name);
+    let (watching, other): (Vec<String>, Vec<String>) =
+        left.into_iter().partition(|option| bare(option, bodies).any(is_watching));
+    let warning = |option: String| format!("option {option} was not used: no solver of this run reads it");
     let mut warnings: Vec<String> = other.into_iter().map(warning).collect();
     if !watching.is_empty() {
-        let names: Vec<&str> = watching.iter().map(|word| word.option.as_str()).collect();
         warnings.push(format!(
             "nothing to show for {}: the bodies are condensed, so that PETSc has no solver here; --set solver=mumps gives each body one",
-            names.join(" ")
+            watching.join(" ")
         ));
     }
     Ok(warnings)
 }
 
 /// Return the options of solvers that nobody has read on any rank. PETSc knows of the others that they are read.
-fn left<'a>(session: &Session, typed: &'a Typed, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<&'a Word>> {
+fn left(session: &Session, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<String>> {
     let options = session.options();
-    let prefixes: Vec<&str> = solvers.iter().map(Chosen::prefix).collect();
+    let mut all: Vec<String> = options.all()?.into_iter().map(|(name, _)| name).collect();
     // PETSc as a whole reads its options at any time
-    let words = typed.0.iter().filter(|word| word.prefix.is_some() || !is_global(&word.name));
-    let is_read = |word: &&Word| {
-        // a solve reads this one
-        let is_late = !solvers.is_empty() && nest_of(&word.name, "ksp_converged_reason").is_some();
-        // a plain option has no effect if every solver has an own one of this name; this is no mistake
-        let is_replaced =
-            word.prefix.is_none() && [bodies, &prefixes].into_iter().any(|all| typed.all_own(all, &word.name));
-        u8::from(options.used(&word.option) || is_late || is_replaced)
+    all.retain(|option| !is_global(&option[1..].to_ascii_lowercase()));
+    let prefixes: Vec<&str> = solvers.iter().map(Chosen::prefix).collect();
+    let own = |prefix: &&str, option: &str| {
+        let own = format!("-{prefix}_{}", &option[1..]);
+        all.iter().any(|option| option.eq_ignore_ascii_case(&own))
     };
-    let mine: Vec<u8> = words.clone().map(|word| is_read(&word)).collect();
+    let is_read = |option: &String| {
+        // a solve reads this one
+        let is_late = !solvers.is_empty() && nest_of(&option[1..], "ksp_converged_reason").is_some();
+        // an option has no effect if every solver has an own one of this name; this is no mistake
+        let is_replaced =
+            [bodies, &prefixes].iter().any(|all| !all.is_empty() && all.iter().all(|prefix| own(prefix, option)));
+        u8::from(options.used(option) || is_late || is_replaced)
+    };
+    let mine: Vec<u8> = all.iter().map(is_read).collect();
     let mut read = mine.clone();
     if session.size() > 1 && !mine.is_empty() {
         session.world().all_reduce_into(&mine[..], &mut read[..], SystemOperation::max());
     }
     // without -options_left PETSc would list what is left at its end once more
     let is_listed = options.has("-options_left");
-    let mut left = Vec::new();
-    for (word, read) in words.zip(read) {
-        if read == 1 || !is_listed {
-            options.mark_used(&word.option)?;
-        }
-        if read == 0 {
-            left.push(word);
-        }
-    }
-    Ok(left)
+    let mut marked = all.iter().zip(&read).filter(|(_, read)| **read == 1 || !is_listed);
+    marked.try_for_each(|(option, _)| options.mark_used(option))?;
+    Ok(all.into_iter().zip(read).filter(|(_, read)| *read == 0).map(|(option, _)| option).collect())
 }
 
 /// Return the help of a solver with the types of this one, without the prefix of its options. Without a solver it is that of PETSc's default.
