@@ -135,26 +135,18 @@ where
         let mut warnings = warnings(session, &discrete, D);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
-        let (linear, whole) = (inner.linear, inner.whole.clone());
-        let (choice, condensed) = (inner.reason(), inner.condensed());
-        let interpolation = inner.interpolation.take();
-        let scene = scene.clone();
-        let (options, again) = (inner.into_options(), None);
-        let mesh = read.as_ref().map(|read| read.digest.clone());
-        let splits = verified.splits();
         let mut built = Built {
-            scene,
+            scene: scene.clone(),
             discrete,
-            splits,
-            mesh,
-            linear,
-            whole,
-            interpolation,
-            choice,
-            condensed,
-            options,
+            splits: verified.splits(),
+            mesh: read.as_ref().map(|read| read.digest.clone()),
+            linear: inner.linear,
+            interpolation: inner.interpolation.take(),
+            choice: inner.reason(),
+            condensed: inner.condensed(),
+            options: inner.into_options(),
             warnings,
-            again,
+            again: None,
         };
         built.warnings.extend(swapped::warnings(&built));
         Ok(built)

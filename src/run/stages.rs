@@ -26,15 +26,13 @@ pub struct Built {
     pub mesh: Option<String>,
     /// The solver of linear steps.
     pub linear: Linear,
-    /// PETSc options for the joint matrix of all bodies.
-    pub whole: Chosen,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Interpolation>,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, which another run can reuse.
     pub condensed: Vec<String>,
-    /// Options of all PETSc solvers of the problem.
+    /// Options of all PETSc solvers of the problem: of bodies, or of the joint matrix of all bodies.
     pub options: Vec<Chosen>,
     /// Warnings on the problem.
     pub warnings: Vec<String>,

@@ -63,7 +63,7 @@ impl Choice {
 /// nothing.
 ///
 /// PETSc's table holds only 512 options, so these are not kept there; they are [lent](Self::lend) to it.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Chosen {
     prefix: String,
     /// Keys are names in small letters, because PETSc ignores the case of names.
