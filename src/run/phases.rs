@@ -5,9 +5,8 @@ use super::clock::Clock;
 use super::inner::Inner;
 use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Done, Prepared};
-use super::surfaces;
 use super::words::in_words;
-use super::{ends, method, steps, swapped};
+use super::{method, pairs, steps};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, Balanced, Discrete, Verified, point};
@@ -148,7 +147,7 @@ where
             warnings,
             again: None,
         };
-        built.warnings.extend(swapped::warnings(&built));
+        built.warnings.extend(pairs::swapped_tables(&built));
         Ok(built)
     }
 
@@ -232,7 +231,7 @@ fn warnings(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<Str
     warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(surfaces::warnings(&discrete.model.pairs, &discrete.contacts));
+    warnings.extend(pairs::of_surfaces(&discrete.model.pairs, &discrete.contacts));
     warnings
 }
 
@@ -313,7 +312,7 @@ pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, 
     };
     keep_apart();
     let mut done = done?;
-    ends::note(&mut done);
+    pairs::note_ends(&mut done);
     clock.phase("iterate");
     Ok(done)
 }
