@@ -16,8 +16,8 @@ mod names;
 mod scene;
 mod unread;
 
-pub use chosen::{Chosen, Typed, WHOLE};
+pub use chosen::{Chosen, Typed};
 pub use command_line::{refuse_log, refuse_traps, split};
-pub use names::looks;
+pub use names::{WHOLE, looks};
 pub use scene::{check_of_scene, pairs, set_of_scene, withdraw};
 pub use unread::{show_help, unread};

@@ -5,9 +5,6 @@ use crate::error::Result;
 use crate::petsc::{Entry, Session, is_of_family};
 use std::collections::BTreeMap;
 
-/// Prefix of the options of the matrix of all bodies.
-pub const WHOLE: &str = "newton";
-
 /// The options that the user wrote: on the command line, in files, and in the scene.
 #[derive(Default)]
 pub struct Typed(Vec<Entry>);

@@ -3,9 +3,11 @@
 //! PETSc has no list of its options. These are in the help of PETSc 3.18 for all its solvers. Each was looked up in PETSc's sources, and takes
 //! numbers, a switch, or words of a closed list: a scene may have it. `unread` adds to them what a solver of the run says in its help.
 
-use super::WHOLE;
 use crate::error::nearest;
 use crate::petsc::is_of_family;
+
+/// Prefix of the options of the matrix of all bodies.
+pub const WHOLE: &str = "newton";
 
 /// Options that are on or off, or that only print to the terminal.
 const SWITCHES: &str = "ksp_bcgsl_cxpoly ksp_bcgsl_mrpoly ksp_bcgsl_pinv ksp_cg_single_reduction \

@@ -1,7 +1,7 @@
 //! Options that nobody read: mistyped ones, and valid ones that have no effect.
 
-use super::names::{self, bare, looks, nest_of};
-use super::{Chosen, WHOLE};
+use super::Chosen;
+use super::names::{self, WHOLE, bare, looks, nest_of};
 use crate::error::{Error, Kind, Result};
 use crate::petsc::{Ksp, Matrix, Session, is_global, is_of_family, printed};
 use mpi::collective::SystemOperation;
