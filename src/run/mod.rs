@@ -5,15 +5,14 @@
 
 mod alike;
 mod balance;
-mod beyond;
 pub mod clock;
 mod distributed;
 pub mod ended;
-mod ends;
 pub mod inner;
 pub mod look;
 pub mod measure;
 pub mod method;
+mod pairs;
 mod phases;
 mod plan;
 pub mod preflight;
@@ -23,8 +22,6 @@ pub mod requests;
 pub mod results;
 pub mod stages;
 pub mod steps;
-mod surfaces;
-mod swapped;
 pub mod verdict;
 pub mod words;
 

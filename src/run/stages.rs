@@ -26,15 +26,13 @@ pub struct Built {
     pub mesh: Option<String>,
     /// The solver of linear steps.
     pub linear: Linear,
-    /// PETSc options for the joint matrix of all bodies.
-    pub whole: Chosen,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Interpolation>,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, which another run can reuse.
     pub condensed: Vec<String>,
-    /// Options of all PETSc solvers of the problem.
+    /// Options of all PETSc solvers of the problem: of bodies, or of the joint matrix of all bodies.
     pub options: Vec<Chosen>,
     /// Warnings on the problem.
     pub warnings: Vec<String>,
@@ -101,11 +99,6 @@ impl Built {
     pub fn balance(&self) -> Option<Box<dyn Discretisation>> {
         let meshes = self.discrete.meshes.clone().filter(|_| self.scene.method.stop.balanced);
         meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
-    }
-
-    /// Whether no solver of PETSc is part of the problem: linear steps are dense, or all bodies are condensed.
-    pub fn is_without_petsc(&self) -> bool {
-        self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
     }
 
     /// Return the condensed bodies with their counters reset, for other loads, layers or gaps.

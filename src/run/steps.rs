@@ -7,8 +7,8 @@
 
 use super::clock::Clock;
 use super::ended::{self, All};
-use super::ends;
 use super::measure;
+use super::pairs;
 use super::recorder::{self, Recorder};
 use super::report::Shared;
 use super::results;
@@ -51,7 +51,7 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
         }
         let of_step = done.outcome.clone();
         let recovered = all.complete(&mut done);
-        ends::note(&mut done);
+        pairs::note_ends(&mut done);
         all.keep.step(&done, &recovered);
         drop(recovered);
         if last || interrupted {
