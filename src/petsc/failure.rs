@@ -5,6 +5,11 @@ use super::{Int, Ksp, ffi};
 use crate::error::Result;
 use std::ptr::null_mut;
 
+/// Return whether this INFOG(1) of MUMPS says that its work space or its message buffers are too small.
+pub(super) fn is_lack_of_space(info: Int) -> bool {
+    matches!(info, -8 | -9 | -17 | -20)
+}
+
 impl Ksp {
     /// Return why the set-up of the preconditioner failed, such as a zero pivot, or `None` if it did not.
     pub fn failure(&self) -> Option<String> {
@@ -57,7 +62,7 @@ impl Ksp {
     /// The need of several ranks depends on the order of their messages.
     pub(super) fn lacks_space(&self) -> bool {
         let info = || self.mumps_info(self.pc().ok()?);
-        self.failure().is_some() && info().is_some_and(|(first, _)| matches!(first, -8 | -9 | -17 | -20))
+        self.failure().is_some() && info().is_some_and(|(first, _)| is_lack_of_space(first))
     }
 
     /// Allow the next factorisation `percent` more space than MUMPS' analysis foresees. To be called before its set-up.

@@ -54,18 +54,10 @@ impl Ksp {
             let message = format!("an interpolation of {} rows for a matrix of {rows}", row_ptr.len() - 1);
             return Err(Error::new(Kind::Solver, message));
         }
-        let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
-        let (comm, mut mat, pc) = (matrix.scope().comm(matrix.session()), null_mut(), self.pc()?);
-        // SAFETY: the new matrix.
-        unsafe { petsc!(MatCreate(comm, &mut mat)) }?;
-        // SAFETY: the three arrays were checked to be rows of this width; PETSc copies them.
+        let (mut mat, pc) = (tall(matrix, [row_ptr, columns], values, own)?, self.pc()?);
+        // SAFETY: a matrix with the rows of A, and a preconditioner of A.
         let made = (|| unsafe {
-            petsc!(MatSetSizes(mat, rows as Int, own as Int, DETERMINE, DETERMINE))?;
-            petsc!(MatSetType(mat, c"aij".as_ptr()))?;
             petsc!(MatSetBlockSizes(mat, block, block))?;
-            // one call is for matrices of one process and one for several; each ignores the other kind
-            petsc!(MatSeqAIJSetPreallocationCSR(mat, i, j, v))?;
-            petsc!(MatMPIAIJSetPreallocationCSR(mat, i, j, v))?;
             petsc!(PCSetType(pc, c"mg".as_ptr()))?;
             petsc!(PCMGSetLevels(pc, 2, null_mut()))?;
             petsc!(PCMGSetInterpolation(pc, 1, mat))?;
@@ -120,4 +112,22 @@ impl Ksp {
             petsc!(KSPSetUp(smoother))
         }
     }
+}
+
+/// Return a matrix with the rows of `matrix` and `own` columns of this process, from compressed rows with global columns. Collective.
+///
+/// Row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same positions.
+pub(super) fn tall(matrix: &Matrix, [row_ptr, columns]: [&[Int]; 2], values: &[f64], own: usize) -> Result<ffi::Mat> {
+    let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
+    let (comm, rows, mut mat) = (matrix.scope().comm(matrix.session()), matrix.rows() as Int, null_mut());
+    // SAFETY: a new matrix; PETSc copies the three arrays, which are rows of this width by the callers.
+    unsafe {
+        petsc!(MatCreate(comm, &mut mat))?;
+        petsc!(MatSetSizes(mat, rows, own as Int, DETERMINE, DETERMINE))?;
+        petsc!(MatSetType(mat, c"aij".as_ptr()))?;
+        // one call is for matrices of one process and one for several; each ignores the other kind
+        petsc!(MatSeqAIJSetPreallocationCSR(mat, i, j, v))?;
+        petsc!(MatMPIAIJSetPreallocationCSR(mat, i, j, v))?;
+    }
+    Ok(mat)
 }
