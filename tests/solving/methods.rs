@@ -206,6 +206,18 @@ fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
     }
 }
 
+/// Stiff layers between bodies that move: dofs at the layers and rigid motions of the bodies are one space. One after the other, conjugate
+/// gradients end without an answer.
+#[test]
+fn rigid_layers_between_blocks_are_solved() {
+    for stiffness in ["1e6", "1e8"] {
+        let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
+        let sets = ["--set", "mesh.set.k=2", "--set", "solver=hypre", "--set", "output.plots=false", "--set", &layer];
+        let run = solve(case("blocks"), &sets).converged();
+        assert!(run.count("inner_iterations") <= 250, "{stiffness}: {}", run.said());
+    }
+}
+
 /// Rigid motions of all bodies around multigrid: iterations do not grow with the number of bodies (56, 150 and 223 without). Two bodies of
 /// which one is held have no use for them.
 #[test]
