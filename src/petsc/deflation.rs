@@ -7,13 +7,12 @@
 //! preconditioner inside is behind a PCSHELL.
 
 use super::error::ERROR;
-use super::failure::is_lack_of_space;
 use super::integers::flag;
-use super::interpolation::tall;
 use super::library::{self, petsc};
-use super::mumps::EXTRA_SPACE;
+use super::matrix::tall;
+use super::mumps::{EXTRA_SPACE, is_lack_of_space};
 use super::vector::slice;
-use super::{Int, Ksp, Matrix, Scope, ffi};
+use super::{Int, Matrix, Scope, ffi};
 use crate::error::Result;
 use mpi::ffi::RSMPI_COMM_SELF;
 use std::ffi::c_void;
@@ -49,7 +48,7 @@ struct Entry {
 
 /// PCDEFLATION around the preconditioner that options chose.
 pub(super) struct Deflation {
-    outer: ffi::PC,
+    pub(super) outer: ffi::PC,
     /// The preconditioner inside.
     pub(super) inner: ffi::PC,
     /// One iteration of Richardson's method: an exact solve in the space before and after one application of the preconditioner.
@@ -67,104 +66,36 @@ impl Drop for Deflation {
     }
 }
 
-impl Ksp {
-    /// Solve exactly in a space before the iteration and after each application of the preconditioner, which stays as it is.
-    ///
-    /// The space has the unit vectors of `dofs` and of those within `layers` of the graph of the `matrix` around them, by whole nodes, and the
-    /// `motions`. `dofs` are global indices, the same on all processes. New values of the matrix need a new call. Collective.
-    ///
-    /// Return false, and change nothing, if W'AW is not positive definite to rounding.
-    ///
-    /// ```
-    /// use winkler::petsc::{Ksp, Matrix, MotionPart, Motions, Session};
-    /// let session = Session::start(&["-ksp_type", "cg", "-pc_type", "jacobi"].map(String::from))?;
-    /// // a spring in a chain of ten becomes a million times as stiff
-    /// let (mut ptr, mut columns, mut values) = (vec![0], vec![], vec![]);
-    /// for i in 0..10 {
-    ///     for j in [i - 1, i, i + 1].into_iter().filter(|j| (0..10).contains(j)) {
-    ///         columns.push(j);
-    ///         values.push(if i == j { 2.0 } else { -1.0 });
-    ///     }
-    ///     ptr.push(columns.len() as _);
-    /// }
-    /// let mut matrix = Matrix::from_csr(&session, 1, ptr, columns, values)?;
-    /// matrix.set_spd()?;
-    /// let mut ksp = Ksp::new(&session, "")?;
-    /// ksp.set_operator(&matrix)?;
-    /// ksp.set_from_options()?;
-    /// ksp.set_up()?;
-    /// ksp.set_reuse_preconditioner(true)?;
-    /// matrix.update(|values| [9, 12].map(|at| values[at] += 1e6))?;
-    /// matrix.update(|values| [10, 11].map(|at| values[at] -= 1e6))?;
-    /// let mut x = [0.0; 10];
-    /// let worn = ksp.solve(&[1.0; 10], &mut x)?.iterations;
-    /// let motions = Motions { count: 1, parts: vec![MotionPart { motion: 0, first: 5, values: vec![5.0, 4.0, 3.0, 2.0, 1.0] }] };
-    /// let iterations = [&[][..], &[3, 4]].map(|dofs| {
-    ///     assert!(ksp.deflate(&matrix, dofs, 0, Some(&motions)).is_ok_and(|is_definite| is_definite));
-    ///     let solved = ksp.solve(&[1.0; 10], &mut x).expect("PETSc");
-    ///     ksp.undeflate().expect("PETSc");
-    ///     assert!((x[3] - x[4]).abs() < 1e-4 && x[3] > 12.0, "{x:?}");
-    ///     solved.iterations
-    /// });
-    /// assert!(iterations[1] < iterations[0] && iterations[0] < worn, "{worn} {iterations:?}");
-    /// assert_eq!(ksp.pc_type(), "jacobi");
-    /// // one application corrects before and after: the residual has no part in the space
-    /// assert!(ksp.deflate(&matrix, &[3, 4], 0, None)?);
-    /// let (mut z, mut az) = ([0.0; 10], [0.0; 10]);
-    /// ksp.precondition(&[1.0; 10], &mut z)?;
-    /// matrix.multiply(&z, &mut az)?;
-    /// assert!((3..5).all(|i| (az[i] - 1.0).abs() < 1e-8) && (az[0] - 1.0).abs() > 0.1, "{az:?}");
-    /// // a vector twice is no basis
-    /// assert!(!ksp.deflate(&matrix, &[3], 0, Some(&Motions { count: 1, parts: vec![MotionPart { motion: 0, first: 3, values: vec![1.0] }] }))?);
-    /// # Ok::<(), winkler::error::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// PETSc's.
-    pub fn deflate(
-        &mut self,
+/// Options by which MUMPS factors W'AW: PETSc would take LU by another package.
+const FACTOR: [(&str, &str); 2] =
+    [("-winkler_deflation_pc_type", "cholesky"), ("-winkler_deflation_pc_factor_mat_solver_type", "mumps")];
+
+impl Deflation {
+    /// Make the preconditioner of the space of `dofs` and `motions` around the preconditioner `inner` of a matrix. Return `None` if W'AW is not positive
+    /// definite to rounding. Collective.
+    pub(super) fn new(
         matrix: &Matrix,
-        dofs: &[usize],
-        layers: usize,
+        inner: ffi::PC,
+        (dofs, layers): (&[usize], usize),
         motions: Option<&Motions>,
-    ) -> Result<bool> {
-        self.undeflate()?;
-        self.recover()?;
-        let mut space = space(matrix, &of_whole_nodes(around(matrix, dofs, layers)?, matrix.block_size()), motions)?;
-        let made = self.make_definite(matrix, space);
+    ) -> Result<Option<Self>> {
+        let dofs = of_whole_nodes(around(matrix, dofs, layers)?, matrix.block_size());
+        let mut space = space(matrix, &dofs, motions)?;
+        let made = Self::definite(matrix, inner, space);
         // SAFETY: our reference; PETSc keeps its own.
         unsafe { petsc!(MatDestroy(&mut space)) }?;
-        let Some(deflation) = made? else { return Ok(false) };
-        // SAFETY: a preconditioner of the same matrix.
-        unsafe {
-            petsc!(KSPSetPC(self.ksp, deflation.outer))?;
-            petsc!(KSPConvergedDefaultSetUIRNorm(self.ksp))?;
-        }
-        self.deflation = Some(deflation);
-        Ok(true)
-    }
-
-    /// Go back to the preconditioner that options chose.
-    ///
-    /// # Errors
-    /// PETSc's.
-    pub fn undeflate(&mut self) -> Result<()> {
-        match self.deflation.take() {
-            // SAFETY: the preconditioner that this solver had.
-            Some(deflation) => unsafe { petsc!(KSPSetPC(self.ksp, deflation.inner)) },
-            None => Ok(()),
-        }
+        made
     }
 
     /// Make the preconditioner of a space, with more work space for MUMPS where its analysis foresees too little. Return `None` if W'AW is not positive
     /// definite to rounding.
-    fn make_definite(&self, matrix: &Matrix, space: ffi::Mat) -> Result<Option<Deflation>> {
+    fn definite(matrix: &Matrix, inner: ffi::PC, space: ffi::Mat) -> Result<Option<Self>> {
         let options = matrix.session().options();
         for percent in EXTRA_SPACE {
             let percent = percent.to_string();
             let set = [FACTOR[0], FACTOR[1], ("-winkler_deflation_mat_mumps_icntl_14", &percent)];
             set.iter().try_for_each(|(name, value)| options.set(name, Some(value)))?;
-            let made = self.make(matrix, space);
+            let made = Self::make(matrix, inner, space);
             set.iter().try_for_each(|(name, _)| options.clear(name))?;
             let made = made?;
             match made.failure(matrix)? {
@@ -180,12 +111,12 @@ impl Ksp {
     ///
     /// The first process factors W'AW. For two spheres of 99 900 dofs (8166 of them in the space) on two processes the run takes 5.4 CPU s and 267 MB,
     /// and 6.7 s and 249 MB with MUMPS on both, the least of five pairs.
-    fn make(&self, matrix: &Matrix, space: ffi::Mat) -> Result<Deflation> {
+    fn make(matrix: &Matrix, inner: ffi::PC, space: ffi::Mat) -> Result<Self> {
         let (session, scope) = (matrix.session(), matrix.scope());
-        let (comm, inner, mut within) = (scope.comm(session), self.outermost_pc()?, null_mut());
-        // SAFETY: our own reference to the preconditioner of this solver.
+        let (comm, mut within) = (scope.comm(session), null_mut());
+        // SAFETY: our own reference to the preconditioner.
         unsafe { petsc!(PetscObjectReference(inner.cast())) }?;
-        let mut made = Deflation { outer: null_mut(), inner, once: null_mut() };
+        let mut made = Self { outer: null_mut(), inner, once: null_mut() };
         // SAFETY: new objects of one communicator. The context of the shell is `inner`, which lives as long as `made`.
         unsafe {
             petsc!(PCCreate(comm, &mut made.outer))?;
@@ -210,13 +141,7 @@ impl Ksp {
         }
         Ok(made)
     }
-}
 
-/// Options by which MUMPS factors W'AW: PETSc would take LU by another package.
-const FACTOR: [(&str, &str); 2] =
-    [("-winkler_deflation_pc_type", "cholesky"), ("-winkler_deflation_pc_factor_mat_solver_type", "mumps")];
-
-impl Deflation {
     /// Return MUMPS' INFOG(1) if W'AW could not be factored, 0 if it could. Collective.
     fn failure(&self, matrix: &Matrix) -> Result<Int> {
         let (mut coarse, mut gathered, mut solver, mut pc) = (null_mut(), null_mut(), null_mut(), null_mut());

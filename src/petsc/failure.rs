@@ -1,14 +1,10 @@
 //! Preconditioners and factorisations that fail, and how a solver recovers.
 
 use super::library::petsc;
+use super::mumps::is_lack_of_space;
 use super::{Int, Ksp, ffi};
 use crate::error::Result;
 use std::ptr::null_mut;
-
-/// Return whether this INFOG(1) of MUMPS says that its work space or its message buffers are too small.
-pub(super) fn is_lack_of_space(info: Int) -> bool {
-    matches!(info, -8 | -9 | -17 | -20)
-}
 
 impl Ksp {
     /// Return why the set-up of the preconditioner failed, such as a zero pivot, or `None` if it did not.

@@ -2,8 +2,8 @@
 
 use super::integers::flag;
 use super::library::petsc;
+use super::matrix::tall;
 use super::rows::check;
-use super::vector::DETERMINE;
 use super::{Int, Ksp, Matrix, Scope, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::collective::SystemOperation;
@@ -112,22 +112,4 @@ impl Ksp {
             petsc!(KSPSetUp(smoother))
         }
     }
-}
-
-/// Return a matrix with the rows of `matrix` and `own` columns of this process, from compressed rows with global columns. Collective.
-///
-/// Row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same positions.
-pub(super) fn tall(matrix: &Matrix, [row_ptr, columns]: [&[Int]; 2], values: &[f64], own: usize) -> Result<ffi::Mat> {
-    let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
-    let (comm, rows, mut mat) = (matrix.scope().comm(matrix.session()), matrix.rows() as Int, null_mut());
-    // SAFETY: a new matrix; PETSc copies the three arrays, which are rows of this width by the callers.
-    unsafe {
-        petsc!(MatCreate(comm, &mut mat))?;
-        petsc!(MatSetSizes(mat, rows, own as Int, DETERMINE, DETERMINE))?;
-        petsc!(MatSetType(mat, c"aij".as_ptr()))?;
-        // one call is for matrices of one process and one for several; each ignores the other kind
-        petsc!(MatSeqAIJSetPreallocationCSR(mat, i, j, v))?;
-        petsc!(MatMPIAIJSetPreallocationCSR(mat, i, j, v))?;
-    }
-    Ok(mat)
 }

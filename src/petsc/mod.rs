@@ -25,6 +25,7 @@
 
 mod beside;
 mod blas;
+mod deflate;
 mod deflation;
 mod error;
 mod failure;
