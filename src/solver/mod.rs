@@ -22,7 +22,6 @@ pub mod speed;
 mod split;
 mod union;
 
-pub use coarse::RigidSpace;
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
@@ -36,7 +35,7 @@ pub use union::Union;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Enough, Int, Matrix, Rows, Subspace};
+use crate::petsc::{Enough, Int, Matrix, Motions, Rows};
 
 /// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
 fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
@@ -61,8 +60,8 @@ pub struct Change<'a> {
     pub changed: &'a dyn Fn() -> Vec<usize>,
     /// Returns the dofs of contact rows at which even a new preconditioner is poor: their springs are stiff.
     pub stiff: &'a dyn Fn() -> Vec<usize>,
-    /// Returns the rigid motions of bodies as a subspace to be put around a preconditioner, if there are any.
-    pub coarse: &'a dyn Fn() -> Option<Box<dyn Subspace>>,
+    /// The rigid motions of bodies, in which G is solved exactly around a preconditioner.
+    pub motions: Option<&'a Motions>,
 }
 
 /// What a solver works with after a change of G.

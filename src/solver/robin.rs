@@ -1,12 +1,11 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{Change, InnerSolver, RigidSpace, Seen};
+use super::{Change, InnerSolver, Seen};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
-use crate::petsc::Rows;
+use crate::petsc::{Motions, Rows};
 use std::ops::Range;
-use std::rc::Rc;
 use std::time::Instant;
 
 /// G of one body, or of all bodies together.
@@ -23,7 +22,7 @@ pub struct RobinMatrix<S> {
     soft: Vec<f64>,
     coupling: Coupling,
     /// Rigid motions that are put around the preconditioner, if G is of several bodies.
-    coarse: Option<Rc<RigidSpace>>,
+    motions: Option<Motions>,
     counts: BodyCounts,
     /// Factorisations of the solver before the counters were last set to zero.
     before: [usize; 3],
@@ -31,12 +30,13 @@ pub struct RobinMatrix<S> {
 
 impl<S: InnerSolver> RobinMatrix<S> {
     /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
-    /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
+    /// of all ranks. In the
+    /// rigid `motions` G is solved exactly around the preconditioner.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
         row_stiffness: Vec<f64>,
-        coarse: Option<RigidSpace>,
+        motions: Option<Motions>,
         make: impl FnOnce(Rows) -> Result<S>,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
@@ -47,7 +47,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
-            coarse: coarse.map(Rc::new),
+            motions,
             counts: BodyCounts::default(),
             before: [0; 3],
             solver: make(stiffness)?,
@@ -68,7 +68,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             write: &|g| coupling.write(rows, weight, g),
             changed: &|| poor_dofs(rows, soft, prepared, weight),
             stiff: &|| poor_dofs(rows, soft, &softened, weight),
-            coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
+            motions: self.motions.as_ref(),
         };
         let began = Instant::now();
         match self.solver.update(change)? {
