@@ -4,6 +4,7 @@
 pub mod adapt;
 mod adapted;
 pub mod bench;
+mod cases;
 pub mod check;
 pub mod checkpoint;
 pub mod mesh;
@@ -15,7 +16,7 @@ pub mod sweep;
 pub mod transfer;
 pub mod write;
 
-use crate::error::{Error, Kind, Result};
+use crate::error::Result;
 use crate::output::progress::Line;
 use crate::output::{LISTED, Verbosity};
 use crate::petsc::Session;
@@ -90,61 +91,6 @@ impl SceneArgs {
 /// Return those of the flags that the user typed.
 fn flags<const N: usize>(all: [(bool, &str); N]) -> impl Iterator<Item = String> {
     all.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned())
-}
-
-/// One `--over`: a key of the scene and the values that it takes.
-struct Variation {
-    /// Key of the scene.
-    key: String,
-    /// Its values as they were typed.
-    values: Vec<String>,
-}
-
-impl Variation {
-    /// Read `KEY=V1,V2,...`. Commas inside brackets, braces, parentheses or quotes do not separate values.
-    ///
-    /// # Errors
-    /// A text that is not of this form.
-    fn parse(text: &str) -> Result<Self> {
-        let refuse = || {
-            Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
-                .help("for example --over method.gamma=0.3,0.6,0.9")
-        };
-        let (key, list) = text.split_once('=').ok_or_else(refuse)?;
-        let mut values = vec![String::new()];
-        let (mut depth, mut quote) = (0, None);
-        for c in list.chars() {
-            match (quote, c) {
-                (None, '"' | '\'') => quote = Some(c),
-                (Some(open), c) if c == open => quote = None,
-                (None, '[' | '{' | '(') => depth += 1,
-                (None, ']' | '}' | ')') => depth -= 1,
-                (None, ',') if depth == 0 => {
-                    values.push(String::new());
-                    continue;
-                }
-                _ => {}
-            }
-            if let Some(value) = values.last_mut() {
-                value.push(c);
-            }
-        }
-        if key.trim().is_empty() || values.iter().any(|value| value.trim().is_empty()) {
-            return Err(refuse());
-        }
-        let values = values.into_iter().map(|value| value.trim().to_owned()).collect();
-        Ok(Self { key: key.trim().to_owned(), values })
-    }
-}
-
-/// Return all combinations of values, one value of each variation; those of the last variation change first.
-fn combinations(variations: &[Variation]) -> Vec<Vec<String>> {
-    variations.iter().fold(vec![Vec::new()], |combinations, Variation { values, .. }| {
-        combinations
-            .iter()
-            .flat_map(|before| values.iter().map(move |value| [before.clone(), vec![value.clone()]].concat()))
-            .collect()
-    })
 }
 
 /// Return the folder of results: that of `-o`, else that of the scene, else `results/<case>`.
@@ -230,21 +176,4 @@ fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
         lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
     }
     Ok(lines)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
-        let a = Variation::parse("method.gamma=0.3, 0.6").expect("two numbers");
-        assert_eq!((a.key.as_str(), &a.values[..]), ("method.gamma", &["0.3".to_owned(), "0.6".to_owned()][..]));
-        let b = Variation::parse("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
-        assert_eq!(b.values, ["\"max(x, 1)\"", "0"]);
-        assert!(Variation::parse("method.gamma").is_err() && Variation::parse("method.gamma=1,,2").is_err());
-        let runs = combinations(&[a, b]);
-        assert_eq!(runs.len(), 4);
-        assert_eq!(runs[1], ["0.3", "0"]);
-    }
 }

@@ -1,11 +1,10 @@
 //! `winkler sweep`: solve a scene for every combination of values of its keys, one row of a table for each run.
-//!
-//! A run takes over what it can from the run before it. The stiffness matrix of a body does not depend on method, layers, gaps and the values
-//! of loads and supports: then a condensed body is reused. Where only the method changes, the whole problem is reused.
+//! A run takes over what it can from the run before it.
 
+use super::cases::{Axis, Choice, combinations, named};
 use super::solve::claim;
 use super::write::{convergence_curve, pressure_curve, pressure_plot, reference_curve, to_json};
-use super::{SceneArgs, Variation, VerbosityArgs, combinations, decisions, folder_of};
+use super::{SceneArgs, VerbosityArgs, decisions, folder_of};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
@@ -13,15 +12,12 @@ use crate::output::steps::{contact_column, vector_columns, vector_fields};
 use crate::output::{
     ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
 };
-use crate::parallel::{Ranks, collectively};
+use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::problem::method::{MethodName, MethodSpec};
 use crate::run::words::numbered;
 use crate::run::{self, Begin, Built, Clock, Done, Prepared, Recorder, Requests, measure, report, results};
 use crate::scene::Scene;
-use crate::solver::options;
 use indicatif::ProgressBar;
-use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -48,10 +44,9 @@ pub struct Request {
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
 pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let variations =
-        collectively(session, request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>())?;
-    let load = |values| Case::load(request, &variations, values);
-    let cases = collectively(session, combinations(&variations).into_iter().map(load).collect::<Result<Vec<_>>>())?;
+    let axes = collectively(session, Axis::all_over(&request.over))?;
+    let load = |choices: Vec<&Choice>| Case::load(request, &axes, &choices);
+    let cases = collectively(session, combinations(&axes).into_iter().map(load).collect::<Result<Vec<_>>>())?;
     let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
     let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
@@ -64,7 +59,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     for case in &cases {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
-        let ready = sweep.prepare(&variations, case, before.take(), &mut clock)?;
+        let ready = sweep.prepare(&axes, case, before.take(), &mut clock)?;
         let done = run::iterate(ready, interrupt, &mut watcher, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
@@ -87,7 +82,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
 
 /// One run of the sweep.
 struct Case {
-    /// Values of the keys, in the order of the variations.
+    /// Values of the keys, in the order of the axes.
     values: Vec<String>,
     /// The values with their keys, as they are printed.
     label: String,
@@ -96,24 +91,15 @@ struct Case {
 
 impl Case {
     /// Load the scene with the values of a run.
-    fn load(request: &Request, variations: &[Variation], values: Vec<String>) -> Result<Self> {
-        let mut overrides = request.scene.overrides();
-        let values_of_keys = variations.iter().zip(&values);
-        overrides.extend(values_of_keys.map(|(Variation { key, .. }, value)| format!("--over {key}={value}")));
+    fn load(request: &Request, axes: &[Axis], choices: &[&Choice]) -> Result<Self> {
+        let own = choices.iter().flat_map(|choice| &choice.overrides).map(|text| format!("--over {text}"));
+        let overrides: Vec<String> = request.scene.overrides().into_iter().chain(own).collect();
         let scene = Rc::new(crate::scene::load(&request.scene.scene, &overrides)?);
-        Ok(Case { label: label(variations, &values), values, scene })
+        let values: Vec<String> = choices.iter().map(|choice| choice.text.clone()).collect();
+        let keys: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
+        let parts: Vec<String> = keys.iter().zip(&values).map(|(key, value)| named(key, value, &keys)).collect();
+        Ok(Case { values, label: parts.join(", "), scene })
     }
-}
-
-/// Return the values with the last words of their keys, or with whole keys where two have the same last word.
-fn label(variations: &[Variation], values: &[String]) -> String {
-    let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
-    let parts = variations.iter().zip(values).map(|(Variation { key, .. }, value)| {
-        let is_ambiguous = variations.iter().filter(|other| last(&other.key) == last(key)).count() > 1;
-        let short = if is_ambiguous { key.clone() } else { last(key) };
-        format!("{short} = {value}")
-    });
-    parts.collect::<Vec<_>>().join(", ")
 }
 
 /// An observer that passes signals on, and writes no rows.
@@ -150,16 +136,10 @@ impl Sweep<'_> {
     ///
     /// # Errors
     /// Refusals of the problem; a run whose row would have other columns than those before; failures of the file system.
-    fn prepare(
-        &mut self,
-        variations: &[Variation],
-        case: &Case,
-        before: Option<Done>,
-        clock: &mut Clock,
-    ) -> Result<Prepared> {
+    fn prepare(&mut self, axes: &[Axis], case: &Case, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
         let session = self.session;
-        let built = build(session, case.scene.clone(), before, self.interrupt, clock)?;
-        let header = header(variations, &built);
+        let built = run::build_after(session, case.scene.clone(), before, self.interrupt, clock)?;
+        let header = header(axes, &built);
         let columns = self.columns.get_or_insert_with(|| header.clone());
         collectively(session, refuse_other_columns(columns, &header, &case.label))?;
         let ready = run::set_up(session, built, Begin::default(), clock)?;
@@ -208,10 +188,10 @@ impl Sweep<'_> {
 }
 
 /// Return the columns of the table.
-fn header(variations: &[Variation], built: &Built) -> Vec<String> {
+fn header(axes: &[Axis], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
-    let mut header: Vec<String> = variations.iter().map(|variation| variation.key.clone()).collect();
+    let mut header: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
     let columns = "status iterations sweeps factorizations dense_factorizations inner_iterations residual increment F1 dofs seconds";
     header.extend(columns.split_whitespace().map(str::to_owned));
     for pair in &pairs {
@@ -301,88 +281,4 @@ impl Results {
         }
         Ok(())
     }
-}
-
-/// Build `scene` with what the run before has left.
-///
-/// # Errors
-/// Those of [`run::build`].
-fn build(
-    session: &Session,
-    scene: Rc<Scene>,
-    before: Option<Done>,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Built> {
-    let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
-    if serves(&last, &scene) {
-        let discrete = &mut last.discrete;
-        discrete.model.exchange = Rc::new(Ranks::new(session));
-        let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-        discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
-        discrete.assemblies = 0;
-        return Ok(Built { scene, ..last });
-    }
-    let is_same = settings(&last.scene, without_values) == settings(&scene, without_values);
-    let condensed = if is_same { last.into_condensed() } else { Vec::new() };
-    options::withdraw(session)?;
-    run::build_with(session, scene, condensed, interrupt, clock)
-}
-
-/// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.
-fn serves(last: &Built, scene: &Scene) -> bool {
-    let both = [&*last.scene, scene];
-    // an estimate of the error needs the meshes, which are kept only for it
-    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate || scene.method.stop.balanced);
-    // how linear steps are solved was chosen for the method
-    let [old_joint, new_joint] = both.map(|scene| {
-        let MethodSpec { name, linear, .. } = &scene.method;
-        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
-    });
-    last.condensed.len() == last.discrete.bodies.len()
-        && old_meshes == new_meshes
-        // tables of factors change the loads of bodies
-        && both.iter().all(|scene| !scene.method.steps.is_table())
-        && old_joint == new_joint
-        && settings(&last.scene, |_| ()) == settings(scene, |_| ())
-}
-
-/// Return the settings of a scene on which bodies can depend, changed by `edit`.
-fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
-    let mut settings = scene.settings();
-    if let Value::Object(map) = &mut settings {
-        ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
-    }
-    edit(&mut settings);
-    settings
-}
-
-/// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
-fn without_values(settings: &mut Value) {
-    each(settings.get_mut("contact"), |contact| without(contact, &["gap", "layer", "reference"]));
-    each(settings.get_mut("body"), |body| {
-        without(body, &["force", "path"]);
-        if let Some(Value::Array(loads)) = body.get_mut("load") {
-            // only rigid surfaces change the dofs: they join them
-            loads.retain(|load| load["rigid"] == true);
-        }
-        for key in ["load", "fix"] {
-            each(body.get_mut(key), |item| {
-                without(item, &["path"]);
-                for key in ["force", "moment", "x", "y", "z", "normal"] {
-                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
-                }
-            });
-        }
-    });
-}
-
-fn without(table: &mut Map<String, Value>, keys: &[&str]) {
-    keys.iter().for_each(|key| drop(table.remove(*key)));
-}
-
-/// Edit each table of a list in the settings.
-fn each(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
-    let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
-    tables.filter_map(Value::as_object_mut).for_each(edit);
 }

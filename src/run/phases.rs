@@ -4,7 +4,7 @@
 use super::clock::Clock;
 use super::inner::{Inner, WHOLE};
 use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Done, Prepared};
+use super::stages::{Begin, Built, Done, Legs, Prepared};
 use super::surfaces;
 use super::words::in_words;
 use super::{ends, method, steps, swapped};
@@ -82,10 +82,7 @@ where
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
     if begun < history.steps.len() && history.leg(begun) != (0..history.steps.len()) {
-        built.again = Some(Rc::new(move |step, begin, kept, clock| {
-            options::withdraw(&source.session)?;
-            set_up(&source.session, source.build(step, kept, clock)?, begin, clock)
-        }));
+        built.legs = Some(Rc::new(source));
     }
     Ok(built)
 }
@@ -142,7 +139,7 @@ where
         let (choice, condensed) = (inner.reason(), inner.condensed());
         let interpolation = inner.interpolation.take();
         let scene = scene.clone();
-        let (options, again) = (inner.into_options(), None);
+        let options = inner.into_options();
         let mesh = read.as_ref().map(|read| read.digest.clone());
         let splits = verified.splits();
         let mut built = Built {
@@ -157,7 +154,7 @@ where
             condensed,
             options,
             warnings,
-            again,
+            legs: None,
         };
         built.warnings.extend(swapped::warnings(&built));
         Ok(built)
@@ -169,6 +166,17 @@ where
         let changed = in_parts(verified.mesh.split).into_iter().chain(made_straight(verified.mesh.straightened));
         let of_file = read.iter().flat_map(|read| &read.warnings).chain(&verified.notes);
         changed.chain(of_file.cloned()).collect()
+    }
+}
+
+impl<const D: usize> Legs for Source<D>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
+    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
+        options::withdraw(&self.session)?;
+        set_up(&self.session, self.build(step, condensed, clock)?, begin, clock)
     }
 }
 

@@ -1,16 +1,16 @@
 //! The plots of a benchmark.
 
-use super::plan::{ASKED, Plan, part};
-use super::table::{Row, Table};
+use super::plan::{ASKED, Plan, is_of_mesh, part};
+use super::row::Row;
 use crate::linalg::fit;
 use crate::output::{Axis, Color, Plot, Series, Style};
 
 /// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the scene in it.
-pub(super) fn all(table: &Table, plan: &Plan) -> Vec<(String, Plot)> {
+pub(super) fn all(rows: &[Row], plan: &Plan) -> Vec<(String, Plot)> {
     let mut plots = Vec::new();
     for (name, scene) in plan.names.iter().zip(&plan.scenes) {
         let rows: Vec<&Row> =
-            table.rows.iter().filter(|row| row.key[0] == *name && row.is_good() && !row.is_linear()).collect();
+            rows.iter().filter(|row| row.key[0] == *name && row.is_good() && !row.is_linear()).collect();
         let stem =
             |what: &str| if plan.scenes.len() == 1 { format!("{what}.svg") } else { format!("{what}-{name}.svg") };
         let chart = Chart { rows: &rows, plan, title: &scene.title };
@@ -59,7 +59,8 @@ impl Chart<'_> {
                 curve.rows.push(row);
                 continue;
             }
-            let parts: Vec<String> = named.iter().map(|&column| part(&columns[column], &value(row, column))).collect();
+            let parts: Vec<String> =
+                named.iter().map(|&column| part(&columns[column], &value(row, column), &columns)).collect();
             let name = if parts.is_empty() { row.key[columns.len() - 4].clone() } else { parts.join(", ") };
             curves.push(Curve { key, name, rows: vec![row] });
         }
@@ -120,11 +121,6 @@ impl Chart<'_> {
         }
         all
     }
-}
-
-/// Return whether a column is a key of the mesh.
-fn is_of_mesh(column: &str) -> bool {
-    column.starts_with("mesh.")
 }
 
 /// Relative difference of errors below which two runs are those of different solvers on one mesh.

@@ -3,28 +3,90 @@
 
 mod charts;
 mod compare;
-mod errors;
 mod plan;
 mod process;
-mod request;
+mod row;
 mod summary;
 mod table;
 
-pub use request::Request;
-
 use super::folder_of;
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, progress, say};
 use crate::scene::Scene;
+use compare::References;
 use plan::{Case, Plan};
 use process::Runner;
-use request::usage;
+use row::Row;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
-use table::{Row, Table};
+use table::Table;
+
+/// The command line of `winkler bench`.
+#[derive(clap::Args)]
+pub struct Request {
+    /// Scene files (TOML)
+    #[arg(value_name = "SCENE", required = true)]
+    pub scenes: Vec<PathBuf>,
+    /// Folder for the results [default: bench in that of solve]
+    #[arg(short = 'o', value_name = "DIR")]
+    pub folder: Option<PathBuf>,
+    /// Key and its values, for example mesh.set.n=16,32,64; may be repeated
+    #[arg(long, value_name = "KEY=V1,V2,...")]
+    pub over: Vec<String>,
+    /// Inner solvers: mumps,hypre,... or one string of PETSc options; may be repeated [default: all presets]
+    #[arg(long = "solver", value_name = "LIST|OPTIONS", allow_hyphen_values = true)]
+    pub solvers: Vec<String>,
+    /// Methods [default: the scene's]
+    #[arg(long = "method", value_name = "LIST", value_delimiter = ',')]
+    pub methods: Vec<String>,
+    /// Element orders of all bodies [default: the scene's]
+    #[arg(long = "order", value_name = "LIST", value_delimiter = ',')]
+    pub orders: Vec<usize>,
+    /// Numbers of MPI ranks
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1")]
+    pub ranks: Vec<usize>,
+    /// Runs of each combination; times are their medians
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub repeat: usize,
+    /// Contact table, or folder of results, that errors are measured against
+    #[arg(long, value_name = "PATH")]
+    pub against: Option<PathBuf>,
+    /// Seconds after which a run is ended
+    #[arg(long, value_name = "S", default_value = "3600", allow_negative_numbers = true)]
+    pub timeout: f64,
+    /// Seconds after which no further run begins
+    #[arg(long, value_name = "S", default_value = "inf", allow_negative_numbers = true)]
+    pub budget: f64,
+    /// Also measure one linear factor-and-solve of the same bodies
+    #[arg(long)]
+    pub linear: bool,
+    /// Keep the rows that the folder has already
+    #[arg(long)]
+    pub resume: bool,
+    /// Replace a key of the scene in all runs; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+    /// Run the meshes' .geo scripts even if they can start programs or write files
+    #[arg(long)]
+    pub trust_geo: bool,
+    /// Print errors, warnings and the folder of the results only
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// PETSc options for every run.
+    #[arg(skip)]
+    pub petsc: Vec<String>,
+}
+
+impl Request {
+    /// Return the overrides of the scenes for every run.
+    fn all_overrides(&self) -> Vec<String> {
+        let trust = self.trust_geo.then(|| "trust_geo=true".to_owned());
+        self.overrides.iter().cloned().chain(trust).collect()
+    }
+}
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -41,40 +103,38 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     }
     let plan = Plan::new(request)?;
     let folder = Folder::claim(folder(request, &plan))?;
-    let reference = compare::References::read(request.against.as_deref(), &plan)?;
+    let reference = References::read(request.against.as_deref(), &plan)?;
     let mut table = Table::open(&folder, &plan, request, &reference)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
     let bar = progress::runs(plan.cases.len(), !request.quiet);
     let mut meshed = BTreeSet::new();
     let began = Instant::now();
     for case in &plan.cases {
-        bar.set_message(case.label());
+        bar.set_message(case.label.clone());
         let scene = crate::scene::load(&case.scene, &case.overrides);
         let inputs = scene.as_ref().ok().and_then(inputs);
         let old = table.old_row(case, inputs.as_deref());
         let is_new = old.is_none();
         let mut row = match old {
             Some(row) => row,
-            None if table.is_beyond(&plan, case) => Row::skipped(case, "an earlier mesh took too long"),
+            None if table.is_beyond(case) => Row::skipped(case, "an earlier mesh took too long"),
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
             None => measure(case, scene, &runner, &reference, &mut meshed)?,
         };
         row.inputs = inputs.unwrap_or_default();
         if !(request.quiet && row.is_good()) {
-            bar.suspend(|| say(row.line(&case.label(), is_new)))?;
+            bar.suspend(|| say(row.line(&case.label, is_new)))?;
         }
         table.add(row, is_new).iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    errors::against_finest(&mut table, &plan);
-    table.compare_with_linear();
-    let mut written = table.rewrite();
-    for (name, plot) in charts::all(&table, &plan) {
+    let mut written = table.complete();
+    for (name, plot) in charts::all(&table.rows, &plan) {
         written = written.and(folder.write(&name, |out| plot.write(out)));
     }
     if !request.quiet {
-        say(summary::of(&table, &plan))?;
+        say(summary::of(&table.rows, &plan))?;
     }
     say(format_args!("results in {}", folder.path().display()))?;
     written?;
@@ -90,6 +150,11 @@ fn folder(request: &Request, plan: &Plan) -> PathBuf {
     }
 }
 
+/// Return a refusal of the command line.
+fn usage(message: impl Into<String>) -> Error {
+    Error::new(Kind::Usage, message)
+}
+
 /// Return a digest of all inputs of a run: the scene, its data, and what its mesh is made from; none if that is not known before the run.
 fn inputs(scene: &Scene) -> Option<String> {
     let order = scene.bodies.iter().map(|body| body.order).max()?;
@@ -102,7 +167,7 @@ fn measure(
     case: &Case,
     scene: Result<Scene>,
     runner: &Runner,
-    reference: &compare::References,
+    reference: &References,
     meshed: &mut BTreeSet<Vec<String>>,
 ) -> Result<Row> {
     let scene = match scene {
@@ -129,7 +194,7 @@ fn measure(
 fn known_error(
     scene: &Scene,
     row: &Row,
-    reference: &compare::References,
+    reference: &References,
     runner: &Runner,
     case: &Case,
 ) -> Option<(f64, &'static str)> {

@@ -1,7 +1,7 @@
 //! One run as a process of its own: its messages, its time and its memory.
 
 use super::plan::Case;
-use super::request::{Request, usage};
+use super::{Request, usage};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
@@ -34,6 +34,13 @@ pub(super) struct Run {
     pub report: Value,
     /// Inner iterations of its last sweep; `None` without a history of two rows.
     pub last_sweep: Option<f64>,
+}
+
+impl Run {
+    /// Return the number at a path of the report.
+    pub fn number(&self, path: &str) -> Option<f64> {
+        self.report.pointer(path).and_then(Value::as_f64)
+    }
 }
 
 /// The program that starts runs, and their limits.
