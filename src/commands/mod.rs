@@ -17,8 +17,8 @@ pub mod transfer;
 pub mod write;
 
 use crate::error::Result;
+use crate::output::LISTED;
 use crate::output::progress::Line;
-use crate::output::{LISTED, Verbosity};
 use crate::petsc::Session;
 use crate::problem::MethodName;
 use crate::run::report::{Shared, solvers_in_words};
@@ -41,14 +41,37 @@ pub struct VerbosityArgs {
     verbose: bool,
 }
 
-impl VerbosityArgs {
-    /// Return the verbosity that these options ask for.
-    pub fn verbosity(&self) -> Verbosity {
-        match (self.quiet, self.verbose) {
-            (true, _) => Verbosity::Quiet,
-            (_, true) => Verbosity::Verbose,
-            _ => Verbosity::Usual,
-        }
+/// What a command prints on this rank.
+#[derive(Debug, Clone, Copy)]
+pub struct Terminal {
+    /// Whether this rank is the first one, which prints and writes.
+    pub is_first: bool,
+    /// Whether the report is printed as JSON, and nothing else.
+    pub json: bool,
+    /// Whether only errors, warnings and the folder of the results are printed.
+    pub is_quiet: bool,
+    is_verbose: bool,
+}
+
+impl Terminal {
+    /// Return what the options of a command ask for.
+    fn new(session: &Session, scene: &SceneArgs, verbosity: &VerbosityArgs) -> Self {
+        let &VerbosityArgs { quiet: is_quiet, verbose: is_verbose } = verbosity;
+        Self { is_first: session.rank() == 0, json: scene.json, is_quiet, is_verbose }
+    }
+
+    /// Return whether progress is printed.
+    pub fn is_loud(&self) -> bool {
+        self.is_first && !self.json && !self.is_quiet
+    }
+
+    /// Return the lines of `--verbose` to be printed on this rank: what was decided and why, and the PETSc options of each body. Collective.
+    ///
+    /// # Errors
+    /// When PETSc is out of memory.
+    fn decisions(&self, session: &Session, ready: &Prepared) -> Result<Vec<String>> {
+        let lines = if self.is_verbose { decisions(session, ready)? } else { Vec::new() };
+        Ok(if self.is_first { lines } else { Vec::new() })
     }
 }
 
@@ -143,10 +166,7 @@ fn line_after(ended: &str, estimate: Option<f64>) -> Option<Line> {
     }
 }
 
-/// Return the lines of `--verbose`: what was decided and why, and the PETSc options of each body. Collective.
-///
-/// # Errors
-/// When PETSc is out of memory.
+/// Do the work of [`Terminal::decisions`].
 fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
     let built = &ready.built;
     let (scene, discrete) = (&built.scene, &built.discrete);

@@ -4,14 +4,12 @@
 use super::cases::{Axis, Choice, combinations, named};
 use super::solve::claim;
 use super::write::{convergence_curve, pressure_curve, pressure_plot, reference_curve, to_json};
-use super::{SceneArgs, VerbosityArgs, decisions, folder_of};
+use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::steps::{contact_column, vector_columns, vector_fields};
-use crate::output::{
-    ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
-};
+use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, busiest, progress, say, sci};
 use crate::parallel::collectively;
 use crate::petsc::Session;
 use crate::run::words::numbered;
@@ -50,10 +48,9 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
     let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
-    let (json, verbosity) = (request.scene.json, request.verbosity.verbosity());
-    let is_loud = session.rank() == 0 && !json && verbosity != Verbosity::Quiet;
-    let bar = progress::runs(cases.len(), is_loud);
-    let mut sweep = Sweep { session, interrupt, verbosity, is_loud, json, folder, bar, columns: None, table: None };
+    let terminal = Terminal::new(session, &request.scene, &request.verbosity);
+    let bar = progress::runs(cases.len(), terminal.is_loud());
+    let mut sweep = Sweep { session, interrupt, terminal, folder, bar, columns: None, table: None };
     let mut watcher = Watcher(Requests::new(interrupt, None));
     let (mut collected, mut exit, mut before) = (Results::default(), 0, None);
     for case in &cases {
@@ -119,10 +116,7 @@ impl Recorder for Watcher {}
 struct Sweep<'a> {
     session: &'a Session,
     interrupt: &'a Interrupt,
-    verbosity: Verbosity,
-    /// Whether this rank prints progress on the terminal.
-    is_loud: bool,
-    json: bool,
+    terminal: Terminal,
     folder: Folder,
     bar: ProgressBar,
     /// Columns of the table, from the first run on.
@@ -148,10 +142,8 @@ impl Sweep<'_> {
             self.folder.clear()?;
             self.table = Some(RowFile::create(&self.folder, "sweep.csv", &header, &[])?);
         }
-        if self.verbosity == Verbosity::Verbose {
-            let lines = decisions(session, &ready)?;
-            self.bar.suspend(|| lines.iter().filter(|_| session.rank() == 0).for_each(|line| eprintln!("{line}")));
-        }
+        let decisions = self.terminal.decisions(session, &ready)?;
+        self.bar.suspend(|| decisions.iter().for_each(|line| eprintln!("{line}")));
         Ok(ready)
     }
 
@@ -163,7 +155,7 @@ impl Sweep<'_> {
         }
         self.bar.inc(1);
         // with `-q` only runs that are not solved are printed
-        if self.is_loud || (!self.json && report::exit_code(done) != 0) {
+        if self.terminal.is_loud() || (!self.terminal.json && report::exit_code(done) != 0) {
             let (label, status, iterations) = (&case.label, &report.status, report.iterations);
             let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
             self.bar
@@ -178,7 +170,7 @@ impl Sweep<'_> {
         if scene.output.plots {
             written = written.and(results.write_plots(&self.folder, &scene.title));
         }
-        if self.json {
+        if self.terminal.json {
             say(to_json(&results.reports)?.trim_end())?;
         } else {
             say(format_args!("results in {}", self.folder.path().display()))?;

@@ -5,88 +5,29 @@ mod charts;
 mod compare;
 mod plan;
 mod process;
+mod request;
 mod row;
 mod summary;
 mod table;
 
+pub use request::Request;
+
 use super::folder_of;
-use crate::error::{Error, Kind, Result};
+use crate::error::Result;
 use crate::file::digest;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, progress, say};
+use crate::petsc::Session;
 use crate::scene::Scene;
 use compare::References;
 use plan::{Case, Plan};
 use process::Runner;
+use request::usage;
 use row::Row;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 use table::Table;
-
-/// The command line of `winkler bench`.
-#[derive(clap::Args)]
-pub struct Request {
-    /// Scene files (TOML)
-    #[arg(value_name = "SCENE", required = true)]
-    pub scenes: Vec<PathBuf>,
-    /// Folder for the results [default: bench in that of solve]
-    #[arg(short = 'o', value_name = "DIR")]
-    pub folder: Option<PathBuf>,
-    /// Key and its values, for example mesh.set.n=16,32,64; may be repeated
-    #[arg(long, value_name = "KEY=V1,V2,...")]
-    pub over: Vec<String>,
-    /// Inner solvers: mumps,hypre,... or one string of PETSc options; may be repeated [default: all presets]
-    #[arg(long = "solver", value_name = "LIST|OPTIONS", allow_hyphen_values = true)]
-    pub solvers: Vec<String>,
-    /// Methods [default: the scene's]
-    #[arg(long = "method", value_name = "LIST", value_delimiter = ',')]
-    pub methods: Vec<String>,
-    /// Element orders of all bodies [default: the scene's]
-    #[arg(long = "order", value_name = "LIST", value_delimiter = ',')]
-    pub orders: Vec<usize>,
-    /// Numbers of MPI ranks
-    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1")]
-    pub ranks: Vec<usize>,
-    /// Runs of each combination; times are their medians
-    #[arg(long, value_name = "N", default_value = "1")]
-    pub repeat: usize,
-    /// Contact table, or folder of results, that errors are measured against
-    #[arg(long, value_name = "PATH")]
-    pub against: Option<PathBuf>,
-    /// Seconds after which a run is ended
-    #[arg(long, value_name = "S", default_value = "3600", allow_negative_numbers = true)]
-    pub timeout: f64,
-    /// Seconds after which no further run begins
-    #[arg(long, value_name = "S", default_value = "inf", allow_negative_numbers = true)]
-    pub budget: f64,
-    /// Also measure one linear factor-and-solve of the same bodies
-    #[arg(long)]
-    pub linear: bool,
-    /// Keep the rows that the folder has already
-    #[arg(long)]
-    pub resume: bool,
-    /// Replace a key of the scene in all runs; may be repeated
-    #[arg(long = "set", value_name = "KEY=VALUE")]
-    pub overrides: Vec<String>,
-    /// Run the meshes' .geo scripts even if they can start programs or write files
-    #[arg(long)]
-    pub trust_geo: bool,
-    /// Print errors, warnings and the folder of the results only
-    #[arg(short, long)]
-    pub quiet: bool,
-    /// PETSc options for every run.
-    #[arg(skip)]
-    pub petsc: Vec<String>,
-}
-
-impl Request {
-    /// Return the overrides of the scenes for every run.
-    fn all_overrides(&self) -> Vec<String> {
-        let trust = self.trust_geo.then(|| "trust_geo=true".to_owned());
-        self.overrides.iter().cloned().chain(trust).collect()
-    }
-}
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -97,8 +38,7 @@ impl Request {
 /// but a row.
 pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     interrupt.hold();
-    let is_one_of_many = |name| std::env::var(name).is_ok_and(|size| size.parse::<usize>().is_ok_and(|size| size > 1));
-    if ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().any(is_one_of_many) {
+    if Session::is_one_of_several() {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
     }
     let plan = Plan::new(request)?;
@@ -148,11 +88,6 @@ fn folder(request: &Request, plan: &Plan) -> PathBuf {
         (None, [scene]) => folder_of(scene, None).join("bench"),
         (None, _) => PathBuf::from("results/bench"),
     }
-}
-
-/// Return a refusal of the command line.
-fn usage(message: impl Into<String>) -> Error {
-    Error::new(Kind::Usage, message)
 }
 
 /// Return a digest of all inputs of a run: the scene, its data, and what its mesh is made from; none if that is not known before the run.

@@ -1,6 +1,6 @@
 //! The plan of a benchmark: all combinations of scenes, keys, orders, methods, solvers and ranks.
 
-use super::{Request, usage};
+use super::request::{Request, usage};
 use crate::commands::case_of;
 use crate::commands::cases::{Axis, Choice, combinations, named};
 use crate::error::Result;

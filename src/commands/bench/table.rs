@@ -1,9 +1,9 @@
 //! The rows of a benchmark, in memory and in `bench.csv`, and what only all of them together tell.
 
-use super::Request;
 use super::compare::{self, References};
 use super::plan::{Case, Plan, is_of_mesh};
 use super::process::{RUNS, folder_of};
+use super::request::Request;
 use super::row::{Row, SKIPPED};
 use crate::error::Result;
 use crate::output::{Folder, RowFile};
