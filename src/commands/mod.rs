@@ -9,6 +9,7 @@ pub mod check;
 pub mod checkpoint;
 pub mod mesh;
 pub mod new;
+mod plots;
 mod series;
 pub mod solve;
 pub mod surfaces;

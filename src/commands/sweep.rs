@@ -2,21 +2,20 @@
 //! A run takes over what it can from the run before it.
 
 use super::cases::{Axis, Choice, combinations, named};
+use super::plots::Plots;
 use super::solve::claim;
-use super::write::{convergence_curve, pressure_curve, pressure_plot, reference_curve, to_json};
+use super::write::to_json;
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::steps::{contact_column, vector_columns, vector_fields};
-use crate::output::{ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, busiest, progress, say, sci};
+use crate::output::{Folder, LISTED, Report, RowFile, busiest, progress, say, sci};
 use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::run::words::numbered;
 use crate::run::{self, Begin, Built, Clock, Done, Prepared, Recorder, Requests, measure, report, results};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -50,9 +49,20 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = progress::runs(cases.len(), terminal.is_loud());
-    let mut sweep = Sweep { session, interrupt, terminal, folder, bar, columns: None, table: None };
+    let mut sweep = Sweep {
+        session,
+        interrupt,
+        terminal,
+        folder,
+        bar,
+        columns: None,
+        table: None,
+        shown: None,
+        plots: Plots::default(),
+        reports: Vec::new(),
+    };
     let mut watcher = Watcher(Requests::new(interrupt, None));
-    let (mut collected, mut exit, mut before) = (Results::default(), 0, None);
+    let (mut exit, mut before) = (0, None);
     for case in &cases {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
@@ -63,7 +73,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         exit = exit.max(report::exit_code(&done));
         if session.rank() == 0 {
             sweep.write_row(case, &done, &report)?;
-            collected.add(case, &done, report);
+            sweep.collect(case, &done, report);
         }
         if matches!(done.outcome.status, Status::Paused { .. }) {
             break;
@@ -72,7 +82,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     }
     sweep.bar.finish_and_clear();
     if session.rank() == 0 {
-        sweep.finish(&cases[0].scene, collected)?;
+        sweep.finish(cases[0].scene.output.plots)?;
     }
     Ok(exit)
 }
@@ -123,6 +133,10 @@ struct Sweep<'a> {
     columns: Option<Vec<String>>,
     /// `sweep.csv`, on the first rank and from the first run on.
     table: Option<RowFile>,
+    /// Pairs whose pressures are drawn, the same for all runs.
+    shown: Option<Vec<usize>>,
+    plots: Plots,
+    reports: Vec<Report>,
 }
 
 impl Sweep<'_> {
@@ -164,14 +178,22 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    /// End the table, draw the plots, and print the reports or the folder.
-    fn finish(self, scene: &Scene, results: Results) -> Result<()> {
+    /// Add a run to the plots and the reports.
+    fn collect(&mut self, case: &Case, done: &Done, report: Report) {
+        let most = case.scene.output.pairs.map_or(LISTED, |most| most.0);
+        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
+        self.plots.add(&case.label, done, shown);
+        self.reports.push(report);
+    }
+
+    /// End the table, draw the plots if they are wanted, and print the reports or the folder.
+    fn finish(self, has_plots: bool) -> Result<()> {
         let mut written = self.table.map_or(Ok(()), RowFile::finish);
-        if scene.output.plots {
-            written = written.and(results.write_plots(&self.folder, &scene.title));
+        if has_plots {
+            written = written.and(self.plots.write(&self.folder));
         }
         if self.terminal.json {
-            say(to_json(&results.reports)?.trim_end())?;
+            say(to_json(&self.reports)?.trim_end())?;
         } else {
             say(format_args!("results in {}", self.folder.path().display()))?;
         }
@@ -227,50 +249,4 @@ fn refuse_other_columns(columns: &[String], header: &[String], label: &str) -> R
     )
     .because("all rows of sweep.csv have the same columns")
     .help("sweep over values that leave them as they are; the rows so far are kept"))
-}
-
-/// The results of all runs, from which reports are printed and plots are drawn.
-#[derive(Default)]
-struct Results {
-    reports: Vec<Report>,
-    /// Residual and increment of each run.
-    histories: Vec<ConvergenceSeries>,
-    /// Pairs whose pressures are drawn, the same for all runs.
-    shown: Option<Vec<usize>>,
-    /// The pressures of all runs along each pair.
-    pressures: BTreeMap<usize, Plot>,
-    /// The first reference pressure that the scenes have, with its pair.
-    reference: Option<(usize, Series)>,
-}
-
-impl Results {
-    /// Add a run.
-    fn add(&mut self, case: &Case, done: &Done, report: Report) {
-        let (scene, label) = (&case.scene, &case.label);
-        self.histories.push(convergence_curve(label, &done.outcome));
-        let pairs = &done.model().pairs;
-        let most = scene.output.pairs.map_or(LISTED, |most| most.0);
-        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
-        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
-            let empty = || pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
-            self.pressures.entry(i).or_insert_with(empty).series.push(pressure_curve(label, done, i));
-            if let Some(curve) = reference_curve(&done.built.discrete, i) {
-                self.reference.get_or_insert((i, curve));
-            }
-        }
-        self.reports.push(report);
-    }
-
-    fn write_plots(&self, folder: &Folder, title: &str) -> Result<()> {
-        let convergence = Plot::convergence(title, &self.histories);
-        folder.write("convergence.svg", |out| convergence.write(out))?;
-        let names = numbered(self.pressures.iter().map(|_| "pressure".to_owned()));
-        for ((pair, of_pair), name) in self.pressures.iter().zip(names) {
-            let mut curves = of_pair.series.clone();
-            curves.extend(self.reference.iter().filter(|(index, _)| index == pair).map(|(_, curve)| curve.clone()));
-            let plot = Plot::pressure(title, &of_pair.x.label, &of_pair.y.label, curves);
-            folder.write(&format!("{name}.svg"), |out| plot.write(out))?;
-        }
-        Ok(())
-    }
 }

@@ -34,36 +34,20 @@ pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
     }
 }
 
-/// The levels between the bands of a picture.
-pub struct Levels {
-    /// Smallest and largest value.
-    range: [f64; 2],
-    /// Whether the levels grow as squares.
-    squares: bool,
-    /// Whether values that are not positive have no band: contacts are open there.
-    opens: bool,
-}
-
 /// The values of a band: from the first on, below the second.
 pub type Band = [f64; 2];
 
+/// The levels between the bands of a picture.
+pub struct Levels {
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+    /// Whether the levels grow as squares. A stress peaks at contacts, and with equal steps most of a body would have the first colour.
+    pub squares: bool,
+    /// Whether values that are not positive have no band: contacts are open there.
+    pub opens: bool,
+}
+
 impl Levels {
-    /// Return the levels of a stress, which grow as squares. A stress peaks at contacts, and with equal steps most of a body would have the
-    /// first colour.
-    pub fn of_stress(range: [f64; 2]) -> Self {
-        Self { range, squares: true, opens: false }
-    }
-
-    /// Return equal steps for the lengths of displacements.
-    pub fn of_displacement(range: [f64; 2]) -> Self {
-        Self { range, squares: false, opens: false }
-    }
-
-    /// Return equal steps for contact pressures up to `most`, which are zero where the contact is open.
-    pub fn of_pressure(most: f64) -> Self {
-        Self { range: [0.0, most], squares: false, opens: true }
-    }
-
     /// Return the smallest value of each band, and the largest of all.
     pub fn levels(&self) -> Vec<f64> {
         let [least, most] = self.range;

@@ -72,7 +72,7 @@ fn picture(
     };
     let values: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
     let [_, most] = range(values.iter());
-    let (levels, view) = (Levels::of_pressure(most), View::flat(axes));
+    let (levels, view) = (Levels { range: [0.0, most], squares: false, opens: true }, View::flat(axes));
     let drawing = picture::Picture { title: &title, levels, view, magnification: None, outlines: has_facets, alone };
     let svg = drawing.svg(&[surface], &[values]).map_err(failed)?;
     let note = (every > 1).then(|| format!("One of {every} contact points; the table has all."));

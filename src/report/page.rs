@@ -194,10 +194,11 @@ impl Results {
         let values: Vec<Vec<f64>> =
             bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();
         let range = bands::range(values.iter().flatten());
-        let (title, levels) = match stress {
-            true => (self.label("von Mises stress", |units| units.stress), Levels::of_stress(range)),
-            false => (self.label("displacement", |units| units.length), Levels::of_displacement(range)),
+        let title = match stress {
+            true => self.label("von Mises stress", |units| units.stress),
+            false => self.label("displacement", |units| units.length),
         };
+        let levels = Levels { range, squares: stress, opens: false };
         let (view, outlines) = if self.is_space() { (View::space(), false) } else { (View::flat([0, 1]), true) };
         let magnification = Some(magnification(bodies));
         let picture = Picture { title: &title, levels, view, magnification, outlines, alone: true };

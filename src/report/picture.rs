@@ -317,7 +317,7 @@ mod tests {
         let part = part(points, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], true);
         let picture = Picture {
             title: "v",
-            levels: Levels::of_displacement([0.0, 12.0]),
+            levels: Levels { range: [0.0, 12.0], squares: false, opens: false },
             view: View::space(),
             magnification: Some(1.0),
             outlines: false,
