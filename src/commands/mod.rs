@@ -15,6 +15,7 @@ pub mod solve;
 pub mod surfaces;
 pub mod sweep;
 pub mod transfer;
+mod watcher;
 pub mod write;
 
 use crate::error::Result;
