@@ -4,7 +4,7 @@
 use super::clock::Clock;
 use super::inner::Inner;
 use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Done, Prepared};
+use super::stages::{Begin, Built, Done, Legs, Prepared};
 use super::words::in_words;
 use super::{method, pairs, steps};
 use crate::contact::pieces::{self, Cut};
@@ -79,9 +79,7 @@ where
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
     if begun < history.steps.len() && history.leg(begun) != (0..history.steps.len()) {
-        built.again = Some(Rc::new(move |step, begin, kept, clock| {
-            set_up(&source.session, source.build(step, kept, clock)?, begin, clock)
-        }));
+        built.legs = Some(Rc::new(source));
     }
     Ok(built)
 }
@@ -145,7 +143,7 @@ where
             condensed: inner.condensed(),
             options: inner.into_options(),
             warnings,
-            again: None,
+            legs: None,
         };
         built.warnings.extend(pairs::swapped_tables(&built));
         Ok(built)
@@ -157,6 +155,16 @@ where
         let changed = in_parts(verified.mesh.split).into_iter().chain(made_straight(verified.mesh.straightened));
         let of_file = read.iter().flat_map(|read| &read.warnings).chain(&verified.notes);
         changed.chain(of_file.cloned()).collect()
+    }
+}
+
+impl<const D: usize> Legs for Source<D>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
+    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
+        set_up(&self.session, self.build(step, condensed, clock)?, begin, clock)
     }
 }
 

@@ -36,14 +36,18 @@ pub struct Built {
     pub options: Vec<Chosen>,
     /// Warnings on the problem.
     pub warnings: Vec<String>,
-    /// Function that prepares the problem of another leg of the load history; none if this problem serves all load steps. On a leg,
-    /// all loads are proportional.
-    pub again: Option<Reprepare>,
+    /// The legs of the load history; none if this problem serves all load steps. On a leg, all loads are proportional.
+    pub legs: Option<Rc<dyn Legs>>,
 }
 
-/// A function that prepares the problem with the loads of another leg of a history. Its arguments are the first step of the leg, the
-/// start, the condensed bodies of the leg before, and the clock. Collective.
-pub type Reprepare = Rc<dyn Fn(usize, Begin, Vec<BodySlot>, &mut Clock) -> Result<Prepared>>;
+/// A scene with its mesh, from which the problem of each leg of its load history is prepared.
+pub trait Legs {
+    /// Prepare the problem of the leg that begins with a step. Condensed bodies of the leg before are reused. Collective.
+    ///
+    /// # Errors
+    /// Loads that a body cannot have, and failures of the solver library.
+    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared>;
+}
 
 /// The start of a run that continues one on another mesh or in another process.
 #[derive(Default)]
