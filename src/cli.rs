@@ -85,7 +85,7 @@ enum Command {
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
     },
-    /// Draw one picture of a run as SVG or PNG
+    /// Draw one picture of a run as SVG
     Plot {
         /// Folder of results
         #[arg(value_name = "DIR")]
@@ -93,7 +93,7 @@ enum Command {
         /// What to draw: stress, displacement, pressure, convergence, or area (in contact, over the force at load steps)
         #[arg(value_name = "WHAT")]
         what: String,
-        /// File to write, .svg or .png [default: WHAT.svg in the folder]
+        /// File to write, .svg [default: WHAT.svg in the folder]
         #[arg(short, value_name = "FILE")]
         output: Option<PathBuf>,
     },

@@ -5,6 +5,7 @@
 //! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
 
 mod field;
+mod guess;
 mod held;
 mod layer;
 mod rim;
@@ -14,10 +15,12 @@ pub mod sizes;
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::{Meshes, Recovered};
 use crate::error::{Error, Kind, Result};
-use crate::linalg::axpy;
+use crate::fem::InterpolationError;
+use crate::linalg::{axpy, dot};
 use crate::model::field::residual;
 use crate::model::surface::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
+pub use guess::{Cause, Guess};
 use held::HoldingSprings;
 use layer::LayerError;
 use rim::RimError;
@@ -41,11 +44,11 @@ pub struct Estimate {
     pub pressure_error: Vec<f64>,
     /// Relative error of the pressures of each pair at its points: root mean square over the surface, with the factor `SAFETY`.
     pub pressure: Vec<f64>,
-    /// For each pair whose error of the pressures is a guess, since most of it is at a rim of the contact: the place of the largest part.
-    pub guesses: Vec<Option<[f64; 3]>>,
+    /// Why the error of the pressures of each pair is a guess, if it is one.
+    pub guesses: Vec<Option<Guess>>,
     /// Relative change of the pressures of each pair if the other side gave the normals.
     pub sides: Vec<f64>,
-    /// Relative error of the normal displacements of all contact surfaces, measured likewise; at least [`Estimate::energy`] squared.
+    /// Relative error of the normal displacements of all contact surfaces, measured likewise.
     pub displacement: f64,
 }
 
@@ -71,7 +74,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = LocalErrors::of_bodies(meshes, &recovered);
+    let mut local = LocalErrors::of_bodies(meshes, &recovered, &displacements);
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, pair);
     }
@@ -101,10 +104,9 @@ pub fn estimate(
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
         pressure: relative_errors(model, layer, &pressure_error, &rims),
-        guesses: guesses(model, layer, &pressure_error, &rims),
+        guesses: guess::of_pairs(meshes, model, layer, &pressure_error, &rims),
         pressure_error,
-        // the displacements at the loads lack at least this share: the work of the loads f on the error e is f'e = a(u, e) = a(e, e), since a(u_h, e) = 0
-        displacement: SAFETY * displacement.max(energy * energy),
+        displacement: SAFETY * displacement,
         cells,
         bodies,
         layers,
@@ -187,18 +189,19 @@ struct LocalErrors {
 }
 
 impl LocalErrors {
-    /// Return the errors of the bodies, without those of the layers.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies) -> Self {
+    /// Return the errors of the bodies, without those of the layers. `displacements` are those from which `recovered` was made.
+    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, displacements: &[Option<Vec<f64>>]) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, strips, loads) = (none(), none(), none());
         let mut local = Self { cells, strips, loads, layers: Vec::new(), sides: Vec::new(), mean_error: Vec::new() };
-        for (body, recovered) in recovered.iter().enumerate() {
-            if let Some(recovered) = recovered {
-                local.cells[body] = recovered.energy_errors();
+        for (body, (recovered, u)) in recovered.iter().zip(displacements).enumerate() {
+            if let (Some(recovered), Some(u)) = (recovered, u) {
+                let (cells, mut loads) = errors_and_loads(&**recovered, u);
+                recovered.add_strip(&mut loads);
+                loads.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
+                (local.cells[body], local.loads[body]) = (cells, loads);
                 local.strips[body] = recovered.strip_energies();
-                local.loads[body] = recovered.interpolation_residual();
-                local.loads[body].iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
             }
         }
         local
@@ -247,6 +250,27 @@ impl LocalErrors {
         self.layers.push(of_layer.energy);
         self.mean_error.extend(mean_error);
     }
+}
+
+/// Return the squared energy error of each cell of a body, and the load whose response is the error of its displacements, at all nodes.
+///
+/// The discrete solution is the best in the space of the elements. So both its distance from the recovered one and that of any other
+/// discrete displacement are at least the error, if the recovered one is exact. The nodal interpolant is nearer where the solution is singular.
+///
+/// The load of the interpolation error does the work eta^2 on `u`, the discrete displacement, except where the solution is singular. What it lacks
+/// is done by a part of [`Recovered::softening`], at most by the whole.
+fn errors_and_loads(recovered: &dyn Recovered, u: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let InterpolationError { residual: mut loads, cells: of_interpolant } = recovered.interpolation_error();
+    let of_solution = recovered.energy_errors();
+    let total = |cells: &[f64]| cells.iter().sum::<f64>();
+    let cells = if total(&of_interpolant) < total(&of_solution) { of_interpolant } else { of_solution };
+    let softening = recovered.softening(&cells);
+    let work = dot(&softening, u);
+    if work > 0.0 {
+        let lacking = (total(&cells) - dot(&loads, u)) / work;
+        axpy(lacking.clamp(0.0, 1.0), &softening, &mut loads);
+    }
+    (cells, loads)
 }
 
 /// Turn loads at the nodes of each body into those at its dofs, on all ranks that have a part of the body. Collective.
@@ -302,20 +326,6 @@ fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
     let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
     let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
     resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect()
-}
-
-/// Relative error of the pressures below which nothing is called a guess: a hundred times the default tolerance of the iteration, at
-/// which differences within a facet are those of an unfinished iteration.
-const UNFINISHED: f64 = 1e-6;
-
-/// Return, for each pair with most of its error at rims, the place where it is largest.
-fn guesses(model: &Model, layer: &Layer, error: &[f64], rims: &[RimError]) -> Vec<Option<[f64; 3]>> {
-    let of_pair = |(pair, rim): (usize, &RimError)| {
-        let least = UNFINISHED.powi(2) * square(model, pair, &layer.pressure);
-        let is_guess = rim.squared > square(model, pair, error).max(least);
-        is_guess.then(|| model.pairs[pair].position[rim.worst])
-    };
-    rims.iter().enumerate().map(of_pair).collect()
 }
 
 /// Return the relative error of the pressures of each pair.

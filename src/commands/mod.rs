@@ -4,20 +4,23 @@
 pub mod adapt;
 mod adapted;
 pub mod bench;
+mod cases;
 pub mod check;
 pub mod checkpoint;
 pub mod mesh;
 pub mod new;
+mod plots;
 mod series;
 pub mod solve;
 pub mod surfaces;
 pub mod sweep;
 pub mod transfer;
+mod watcher;
 pub mod write;
 
-use crate::error::{Error, Kind, Result};
+use crate::error::Result;
+use crate::output::LISTED;
 use crate::output::progress::Line;
-use crate::output::{LISTED, Verbosity};
 use crate::petsc::Session;
 use crate::problem::MethodName;
 use crate::run::report::{Shared, solvers_in_words};
@@ -40,14 +43,37 @@ pub struct VerbosityArgs {
     verbose: bool,
 }
 
-impl VerbosityArgs {
-    /// Return the verbosity that these options ask for.
-    pub fn verbosity(&self) -> Verbosity {
-        match (self.quiet, self.verbose) {
-            (true, _) => Verbosity::Quiet,
-            (_, true) => Verbosity::Verbose,
-            _ => Verbosity::Usual,
-        }
+/// What a command prints on this rank.
+#[derive(Debug, Clone, Copy)]
+pub struct Terminal {
+    /// Whether this rank is the first one, which prints and writes.
+    pub is_first: bool,
+    /// Whether the report is printed as JSON, and nothing else.
+    pub json: bool,
+    /// Whether only errors, warnings and the folder of the results are printed.
+    pub is_quiet: bool,
+    is_verbose: bool,
+}
+
+impl Terminal {
+    /// Return what the options of a command ask for.
+    fn new(session: &Session, scene: &SceneArgs, verbosity: &VerbosityArgs) -> Self {
+        let &VerbosityArgs { quiet: is_quiet, verbose: is_verbose } = verbosity;
+        Self { is_first: session.rank() == 0, json: scene.json, is_quiet, is_verbose }
+    }
+
+    /// Return whether progress is printed.
+    pub fn is_loud(&self) -> bool {
+        self.is_first && !self.json && !self.is_quiet
+    }
+
+    /// Return the lines of `--verbose` to be printed on this rank: what was decided and why, and the PETSc options of each body. Collective.
+    ///
+    /// # Errors
+    /// When PETSc is out of memory.
+    fn decisions(&self, session: &Session, ready: &Prepared) -> Result<Vec<String>> {
+        let lines = if self.is_verbose { decisions(session, ready)? } else { Vec::new() };
+        Ok(if self.is_first { lines } else { Vec::new() })
     }
 }
 
@@ -90,61 +116,6 @@ impl SceneArgs {
 /// Return those of the flags that the user typed.
 fn flags<const N: usize>(all: [(bool, &str); N]) -> impl Iterator<Item = String> {
     all.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.to_owned())
-}
-
-/// One `--over`: a key of the scene and the values that it takes.
-struct Variation {
-    /// Key of the scene.
-    key: String,
-    /// Its values as they were typed.
-    values: Vec<String>,
-}
-
-impl Variation {
-    /// Read `KEY=V1,V2,...`. Commas inside brackets, braces, parentheses or quotes do not separate values.
-    ///
-    /// # Errors
-    /// A text that is not of this form.
-    fn parse(text: &str) -> Result<Self> {
-        let refuse = || {
-            Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
-                .help("for example --over method.gamma=0.3,0.6,0.9")
-        };
-        let (key, list) = text.split_once('=').ok_or_else(refuse)?;
-        let mut values = vec![String::new()];
-        let (mut depth, mut quote) = (0, None);
-        for c in list.chars() {
-            match (quote, c) {
-                (None, '"' | '\'') => quote = Some(c),
-                (Some(open), c) if c == open => quote = None,
-                (None, '[' | '{' | '(') => depth += 1,
-                (None, ']' | '}' | ')') => depth -= 1,
-                (None, ',') if depth == 0 => {
-                    values.push(String::new());
-                    continue;
-                }
-                _ => {}
-            }
-            if let Some(value) = values.last_mut() {
-                value.push(c);
-            }
-        }
-        if key.trim().is_empty() || values.iter().any(|value| value.trim().is_empty()) {
-            return Err(refuse());
-        }
-        let values = values.into_iter().map(|value| value.trim().to_owned()).collect();
-        Ok(Self { key: key.trim().to_owned(), values })
-    }
-}
-
-/// Return all combinations of values, one value of each variation; those of the last variation change first.
-fn combinations(variations: &[Variation]) -> Vec<Vec<String>> {
-    variations.iter().fold(vec![Vec::new()], |combinations, Variation { values, .. }| {
-        combinations
-            .iter()
-            .flat_map(|before| values.iter().map(move |value| [before.clone(), vec![value.clone()]].concat()))
-            .collect()
-    })
 }
 
 /// Return the folder of results: that of `-o`, else that of the scene, else `results/<case>`.
@@ -197,10 +168,7 @@ fn line_after(ended: &str, estimate: Option<f64>) -> Option<Line> {
     }
 }
 
-/// Return the lines of `--verbose`: what was decided and why, and the PETSc options of each body. Collective.
-///
-/// # Errors
-/// When PETSc is out of memory.
+/// Do the work of [`Terminal::decisions`].
 fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
     let built = &ready.built;
     let (scene, discrete) = (&built.scene, &built.discrete);
@@ -230,21 +198,4 @@ fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
         lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
     }
     Ok(lines)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
-        let a = Variation::parse("method.gamma=0.3, 0.6").expect("two numbers");
-        assert_eq!((a.key.as_str(), &a.values[..]), ("method.gamma", &["0.3".to_owned(), "0.6".to_owned()][..]));
-        let b = Variation::parse("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
-        assert_eq!(b.values, ["\"max(x, 1)\"", "0"]);
-        assert!(Variation::parse("method.gamma").is_err() && Variation::parse("method.gamma=1,,2").is_err());
-        let runs = combinations(&[a, b]);
-        assert_eq!(runs.len(), 4);
-        assert_eq!(runs[1], ["0.3", "0"]);
-    }
 }

@@ -2,21 +2,18 @@
 
 use super::adapt::Plan;
 use super::checkpoint::{self, Checkpoint};
+use super::watcher::{Tables, Watcher};
 use super::write::{ResultFiles, to_json};
-use super::{SceneArgs, VerbosityArgs, clock_with_phases, decisions, flags, folder_of, load, series};
-use crate::ddm::{Observer, Row, Status};
+use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::interrupt::Interrupt;
 use crate::output::progress::Line;
-use crate::output::{
-    Checksums, Folder, HistoryWriter, IterationTable, Report, StepTable, Verbosity, say, warning_lines,
-};
+use crate::output::{Checksums, Folder, IterationTable, Report, say, warning_lines};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
-use crate::run::requests::{is_snapshot, signal};
-use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, measure, report};
+use crate::run::{self, Clock, Done, Prepared, Requests, report};
 use std::path::{Path, PathBuf};
 
 /// The command line of `winkler solve`.
@@ -61,17 +58,15 @@ impl Request {
 /// Everything that keeps the run from starting, and failures of the file system. A run that does not converge is no error: it has an exit code
 /// of its own, and all that was computed is written.
 pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let first = session.rank() == 0;
-    let (json, verbosity) = (request.scene.json, request.verbosity.verbosity());
-    let is_loud = first && !json && verbosity != Verbosity::Quiet;
-    let mut clock = clock_with_phases(is_loud);
+    let terminal = Terminal::new(session, &request.scene, &request.verbosity);
+    let mut clock = clock_with_phases(terminal.is_loud());
     let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
     let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
     let mut plan = Plan::new(session, scene, checkpoint, interrupt, &mut clock)?;
     // only one rank measures the time between checkpoints
-    let asking = Requests::new(interrupt, plan.scene.output.checkpoint.filter(|_| first));
+    let asking = Requests::new(interrupt, plan.scene.output.checkpoint.filter(|_| terminal.is_first));
     let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
     let mut solver = Solver {
@@ -79,10 +74,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         interrupt,
         asking: &asking,
         folder: &folder,
-        first,
-        json,
-        verbosity,
-        is_loud,
+        terminal,
         clock,
         has_checkpoint,
         has_tables: false,
@@ -106,12 +98,7 @@ struct Solver<'s> {
     interrupt: &'s Interrupt,
     asking: &'s Requests,
     folder: &'s Folder,
-    /// Whether this rank is the first one, which writes.
-    first: bool,
-    json: bool,
-    verbosity: Verbosity,
-    /// Whether this rank prints progress on the terminal.
-    is_loud: bool,
+    terminal: Terminal,
     clock: Clock,
     /// Whether the folder has a checkpoint of this run.
     has_checkpoint: bool,
@@ -138,14 +125,15 @@ impl Solver<'_> {
         let ready = run::set_up(session, built, begin, &mut self.clock)?;
         let all = session.options().all()?;
         let is_monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
-        if self.verbosity == Verbosity::Verbose {
-            let decisions = decisions(session, &ready)?;
-            decisions.iter().filter(|_| self.first).for_each(|line| eprintln!("{line}"));
-        }
+        self.terminal.decisions(session, &ready)?.iter().for_each(|line| eprintln!("{line}"));
         let tables = self.open_tables(&ready)?;
         let stop = &plan.scene.method.stop;
         let mut watcher = Watcher {
-            table: IterationTable::new(self.is_loud && !is_monitored, &run::targets(&plan.scene), stop.residual),
+            table: IterationTable::new(
+                self.terminal.is_loud() && !is_monitored,
+                &run::targets(&plan.scene),
+                stop.residual,
+            ),
             tables,
             folder,
             asking: self.asking,
@@ -172,7 +160,7 @@ impl Solver<'_> {
 
     /// Open the tables of a round. If those of a later mesh cannot be written, the run goes on without them, since its results are worth more.
     fn open_tables(&mut self, ready: &Prepared) -> Result<Tables> {
-        if !self.first {
+        if !self.terminal.is_first {
             return Ok(Tables::default());
         }
         // nothing can be refused any more: from here on the folder has this run alone
@@ -209,9 +197,10 @@ impl Solver<'_> {
 
     /// Write all results of the last mesh, and return the exit code.
     fn finish(mut self, plan: &Plan, Round { done, estimate, tables }: Round) -> Result<i32> {
-        let Self { session, folder, first, is_loud, .. } = self;
+        let Self { session, folder, terminal, .. } = self;
+        let first = terminal.is_first;
         let path = folder.path();
-        let line = is_loud.then(|| Line::new("stresses and files", None));
+        let line = terminal.is_loud().then(|| Line::new("stresses and files", None));
         let estimate = estimate.as_ref();
         let files = ResultFiles { session, path, plan, done: &done, estimate, fields: true, is_last: true };
         let (report, written) = files.write(&mut self.clock, |report| {
@@ -240,12 +229,12 @@ impl Solver<'_> {
 
     /// Print how the run ended.
     fn print(&self, report: &Report, done: &Done, code: i32) -> Result<()> {
-        if self.json {
+        if self.terminal.json {
             return say(to_json(report)?.trim_end());
         }
         let again = if self.has_checkpoint && code > 1 { "; --restart with this folder goes on" } else { "" };
         let results = format!("  results in {}{again}", self.folder.path().display());
-        if self.verbosity == Verbosity::Quiet {
+        if self.terminal.is_quiet {
             return say(brief_summary(report, code, &results));
         }
         let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
@@ -288,113 +277,4 @@ fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
 fn write_page(done: &Done, path: &Path, first: bool) -> Result<()> {
     all_gather(&*done.model().exchange, ());
     if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
-}
-
-/// The tables that grow while a round iterates. They are open only on the rank that writes.
-#[derive(Default)]
-struct Tables {
-    /// Rows of the iterations.
-    history: Option<HistoryWriter>,
-    /// Rows of the load steps, if there are any.
-    steps: Option<StepTable>,
-}
-
-impl Tables {
-    /// Open the tables of a round. The table of load steps begins with those of another process.
-    fn open(folder: &Folder, ready: &Prepared) -> Result<Self> {
-        let (built, history) = (&ready.built, &ready.built.scene.method.steps);
-        let bodies: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-        let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
-        let mut tables = Self { history: Some(rows), steps: None };
-        if !history.is_empty() {
-            let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
-            let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
-            let mut steps = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
-            ready.steps.iter().for_each(|step| steps.row(&history.names, step));
-            tables.steps = Some(steps);
-        }
-        Ok(tables)
-    }
-
-    fn finish(self) -> Result<()> {
-        let history = self.history.map_or(Ok(()), |history| history.finish());
-        history.and(self.steps.map_or(Ok(()), |steps| steps.finish()))
-    }
-}
-
-/// The observer of a round: it writes iterations and load steps to the terminal and to tables, passes requests of the user on, and writes
-/// checkpoints and snapshots.
-struct Watcher<'a> {
-    /// The table on the terminal.
-    table: IterationTable,
-    /// The tables in files.
-    tables: Tables,
-    folder: &'a Folder,
-    asking: &'a Requests,
-    session: &'a Session,
-    plan: &'a Plan,
-    clock: Clock,
-    /// Whether the folder has a checkpoint of this run.
-    has_checkpoint: bool,
-    /// Messages about files that could not be written.
-    unwritten: Vec<String>,
-}
-
-impl Observer for Watcher<'_> {
-    fn row(&mut self, row: &Row) {
-        self.table.row(row);
-        if let Some(history) = &mut self.tables.history {
-            history.row(row);
-            history.complaint().iter().for_each(|text| self.table.warn(text));
-        }
-    }
-
-    fn asked(&self) -> u8 {
-        self.asking.bits()
-    }
-}
-
-impl Watcher<'_> {
-    /// Note a failure to write, each message once. The run goes on: a disk that is full now may have room later.
-    fn note_failure(&mut self, what: &str, written: Result<()>) {
-        if let Err(error) = written {
-            let text = format!("{what} was not written: {}", error.message());
-            if !self.unwritten.contains(&text) {
-                self.unwritten.push(text);
-            }
-        }
-    }
-}
-
-impl Recorder for Watcher<'_> {
-    fn state(&mut self, done: &Done) {
-        let Status::Paused { asked } = done.outcome.status else { return };
-        let is_due = signal(asked).is_some() || !is_snapshot(asked);
-        let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
-        let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
-        self.has_checkpoint |= written.is_ok();
-        self.note_failure("a checkpoint", written);
-    }
-
-    fn step(&mut self, done: &Done, recovered: &All) {
-        let scene = &done.built.scene;
-        let history = &scene.method.steps;
-        if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
-            table.row(&history.names, step);
-            table.complaint().iter().for_each(|text| self.table.warn(text));
-        }
-        let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
-        if scene.output.vtu && !ends {
-            let written = series::write(done, recovered, self.folder);
-            self.note_failure("a field of a load step", written);
-        }
-    }
-
-    fn results(&mut self, done: &mut Done) {
-        let Self { session, plan, .. } = *self;
-        let path = self.folder.path();
-        let files = ResultFiles { session, path, plan, done, estimate: None, fields: true, is_last: false };
-        let (_, written) = files.write(&mut self.clock.clone(), |_| {});
-        self.note_failure("a snapshot", written);
-    }
 }

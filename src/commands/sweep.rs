@@ -1,28 +1,21 @@
 //! `winkler sweep`: solve a scene for every combination of values of its keys, one row of a table for each run.
-//!
-//! A run takes over what it can from the run before it. The stiffness matrix of a body does not depend on method, layers, gaps and the values
-//! of loads and supports: then a condensed body is reused. Where only the method changes, the whole problem is reused.
+//! A run takes over what it can from the run before it.
 
+use super::cases::{Axis, Choice, combinations, named};
+use super::plots::Plots;
 use super::solve::claim;
-use super::write::{convergence_curve, pressure_curve, pressure_plot, reference_curve, to_json};
-use super::{SceneArgs, Variation, VerbosityArgs, combinations, decisions, folder_of};
+use super::write::to_json;
+use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::steps::{contact_column, vector_columns, vector_fields};
-use crate::output::{
-    ConvergenceSeries, Folder, LISTED, Plot, Report, RowFile, Series, Verbosity, busiest, progress, say, sci,
-};
-use crate::parallel::{Ranks, collectively};
+use crate::output::{Folder, LISTED, Report, RowFile, busiest, progress, say, sci};
+use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::problem::method::{MethodName, MethodSpec};
-use crate::run::words::numbered;
 use crate::run::{self, Begin, Built, Clock, Done, Prepared, Recorder, Requests, measure, report, results};
 use crate::scene::Scene;
-use crate::solver::options;
 use indicatif::ProgressBar;
-use serde_json::{Map, Value};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -48,30 +41,39 @@ pub struct Request {
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
 pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let variations =
-        collectively(session, request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>())?;
-    let load = |values| Case::load(request, &variations, values);
-    let cases = collectively(session, combinations(&variations).into_iter().map(load).collect::<Result<Vec<_>>>())?;
+    let axes = collectively(session, Axis::all_over(&request.over))?;
+    let load = |choices: Vec<&Choice>| Case::load(request, &axes, &choices);
+    let cases = collectively(session, combinations(&axes).into_iter().map(load).collect::<Result<Vec<_>>>())?;
     let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
     let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
-    let (json, verbosity) = (request.scene.json, request.verbosity.verbosity());
-    let is_loud = session.rank() == 0 && !json && verbosity != Verbosity::Quiet;
-    let bar = progress::runs(cases.len(), is_loud);
-    let mut sweep = Sweep { session, interrupt, verbosity, is_loud, json, folder, bar, columns: None, table: None };
+    let terminal = Terminal::new(session, &request.scene, &request.verbosity);
+    let bar = progress::runs(cases.len(), terminal.is_loud());
+    let mut sweep = Sweep {
+        session,
+        interrupt,
+        terminal,
+        folder,
+        bar,
+        columns: None,
+        table: None,
+        shown: None,
+        plots: Plots::default(),
+        reports: Vec::new(),
+    };
     let mut watcher = Watcher(Requests::new(interrupt, None));
-    let (mut collected, mut exit, mut before) = (Results::default(), 0, None);
+    let (mut exit, mut before) = (0, None);
     for case in &cases {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
-        let ready = sweep.prepare(&variations, case, before.take(), &mut clock)?;
+        let ready = sweep.prepare(&axes, case, before.take(), &mut clock)?;
         let done = run::iterate(ready, interrupt, &mut watcher, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
         exit = exit.max(report::exit_code(&done));
         if session.rank() == 0 {
             sweep.write_row(case, &done, &report)?;
-            collected.add(case, &done, report);
+            sweep.collect(case, &done, report);
         }
         if matches!(done.outcome.status, Status::Paused { .. }) {
             break;
@@ -80,14 +82,14 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     }
     sweep.bar.finish_and_clear();
     if session.rank() == 0 {
-        sweep.finish(&cases[0].scene, collected)?;
+        sweep.finish(cases[0].scene.output.plots)?;
     }
     Ok(exit)
 }
 
 /// One run of the sweep.
 struct Case {
-    /// Values of the keys, in the order of the variations.
+    /// Values of the keys, in the order of the axes.
     values: Vec<String>,
     /// The values with their keys, as they are printed.
     label: String,
@@ -96,24 +98,15 @@ struct Case {
 
 impl Case {
     /// Load the scene with the values of a run.
-    fn load(request: &Request, variations: &[Variation], values: Vec<String>) -> Result<Self> {
-        let mut overrides = request.scene.overrides();
-        let values_of_keys = variations.iter().zip(&values);
-        overrides.extend(values_of_keys.map(|(Variation { key, .. }, value)| format!("--over {key}={value}")));
+    fn load(request: &Request, axes: &[Axis], choices: &[&Choice]) -> Result<Self> {
+        let own = choices.iter().flat_map(|choice| &choice.overrides).map(|text| format!("--over {text}"));
+        let overrides: Vec<String> = request.scene.overrides().into_iter().chain(own).collect();
         let scene = Rc::new(crate::scene::load(&request.scene.scene, &overrides)?);
-        Ok(Case { label: label(variations, &values), values, scene })
+        let values: Vec<String> = choices.iter().map(|choice| choice.text.clone()).collect();
+        let keys: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
+        let parts: Vec<String> = keys.iter().zip(&values).map(|(key, value)| named(key, value, &keys)).collect();
+        Ok(Case { values, label: parts.join(", "), scene })
     }
-}
-
-/// Return the values with the last words of their keys, or with whole keys where two have the same last word.
-fn label(variations: &[Variation], values: &[String]) -> String {
-    let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
-    let parts = variations.iter().zip(values).map(|(Variation { key, .. }, value)| {
-        let is_ambiguous = variations.iter().filter(|other| last(&other.key) == last(key)).count() > 1;
-        let short = if is_ambiguous { key.clone() } else { last(key) };
-        format!("{short} = {value}")
-    });
-    parts.collect::<Vec<_>>().join(", ")
 }
 
 /// An observer that passes signals on, and writes no rows.
@@ -133,16 +126,17 @@ impl Recorder for Watcher {}
 struct Sweep<'a> {
     session: &'a Session,
     interrupt: &'a Interrupt,
-    verbosity: Verbosity,
-    /// Whether this rank prints progress on the terminal.
-    is_loud: bool,
-    json: bool,
+    terminal: Terminal,
     folder: Folder,
     bar: ProgressBar,
     /// Columns of the table, from the first run on.
     columns: Option<Vec<String>>,
     /// `sweep.csv`, on the first rank and from the first run on.
     table: Option<RowFile>,
+    /// Pairs whose pressures are drawn, the same for all runs.
+    shown: Option<Vec<usize>>,
+    plots: Plots,
+    reports: Vec<Report>,
 }
 
 impl Sweep<'_> {
@@ -150,16 +144,10 @@ impl Sweep<'_> {
     ///
     /// # Errors
     /// Refusals of the problem; a run whose row would have other columns than those before; failures of the file system.
-    fn prepare(
-        &mut self,
-        variations: &[Variation],
-        case: &Case,
-        before: Option<Done>,
-        clock: &mut Clock,
-    ) -> Result<Prepared> {
+    fn prepare(&mut self, axes: &[Axis], case: &Case, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
         let session = self.session;
-        let built = build(session, case.scene.clone(), before, self.interrupt, clock)?;
-        let header = header(variations, &built);
+        let built = run::build_after(session, case.scene.clone(), before, self.interrupt, clock)?;
+        let header = header(axes, &built);
         let columns = self.columns.get_or_insert_with(|| header.clone());
         collectively(session, refuse_other_columns(columns, &header, &case.label))?;
         let ready = run::set_up(session, built, Begin::default(), clock)?;
@@ -168,10 +156,8 @@ impl Sweep<'_> {
             self.folder.clear()?;
             self.table = Some(RowFile::create(&self.folder, "sweep.csv", &header, &[])?);
         }
-        if self.verbosity == Verbosity::Verbose {
-            let lines = decisions(session, &ready)?;
-            self.bar.suspend(|| lines.iter().filter(|_| session.rank() == 0).for_each(|line| eprintln!("{line}")));
-        }
+        let decisions = self.terminal.decisions(session, &ready)?;
+        self.bar.suspend(|| decisions.iter().for_each(|line| eprintln!("{line}")));
         Ok(ready)
     }
 
@@ -183,7 +169,7 @@ impl Sweep<'_> {
         }
         self.bar.inc(1);
         // with `-q` only runs that are not solved are printed
-        if self.is_loud || (!self.json && report::exit_code(done) != 0) {
+        if self.terminal.is_loud() || (!self.terminal.json && report::exit_code(done) != 0) {
             let (label, status, iterations) = (&case.label, &report.status, report.iterations);
             let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
             self.bar
@@ -192,14 +178,22 @@ impl Sweep<'_> {
         Ok(())
     }
 
-    /// End the table, draw the plots, and print the reports or the folder.
-    fn finish(self, scene: &Scene, results: Results) -> Result<()> {
+    /// Add a run to the plots and the reports.
+    fn collect(&mut self, case: &Case, done: &Done, report: Report) {
+        let most = case.scene.output.pairs.map_or(LISTED, |most| most.0);
+        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
+        self.plots.add(&case.label, done, shown);
+        self.reports.push(report);
+    }
+
+    /// End the table, draw the plots if they are wanted, and print the reports or the folder.
+    fn finish(self, has_plots: bool) -> Result<()> {
         let mut written = self.table.map_or(Ok(()), RowFile::finish);
-        if scene.output.plots {
-            written = written.and(results.write_plots(&self.folder, &scene.title));
+        if has_plots {
+            written = written.and(self.plots.write(&self.folder));
         }
-        if self.json {
-            say(to_json(&results.reports)?.trim_end())?;
+        if self.terminal.json {
+            say(to_json(&self.reports)?.trim_end())?;
         } else {
             say(format_args!("results in {}", self.folder.path().display()))?;
         }
@@ -208,10 +202,10 @@ impl Sweep<'_> {
 }
 
 /// Return the columns of the table.
-fn header(variations: &[Variation], built: &Built) -> Vec<String> {
+fn header(axes: &[Axis], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
-    let mut header: Vec<String> = variations.iter().map(|variation| variation.key.clone()).collect();
+    let mut header: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
     let columns = "status iterations sweeps factorizations dense_factorizations inner_iterations residual increment F1 dofs seconds";
     header.extend(columns.split_whitespace().map(str::to_owned));
     for pair in &pairs {
@@ -255,134 +249,4 @@ fn refuse_other_columns(columns: &[String], header: &[String], label: &str) -> R
     )
     .because("all rows of sweep.csv have the same columns")
     .help("sweep over values that leave them as they are; the rows so far are kept"))
-}
-
-/// The results of all runs, from which reports are printed and plots are drawn.
-#[derive(Default)]
-struct Results {
-    reports: Vec<Report>,
-    /// Residual and increment of each run.
-    histories: Vec<ConvergenceSeries>,
-    /// Pairs whose pressures are drawn, the same for all runs.
-    shown: Option<Vec<usize>>,
-    /// The pressures of all runs along each pair.
-    pressures: BTreeMap<usize, Plot>,
-    /// The first reference pressure that the scenes have, with its pair.
-    reference: Option<(usize, Series)>,
-}
-
-impl Results {
-    /// Add a run.
-    fn add(&mut self, case: &Case, done: &Done, report: Report) {
-        let (scene, label) = (&case.scene, &case.label);
-        self.histories.push(convergence_curve(label, &done.outcome));
-        let pairs = &done.model().pairs;
-        let most = scene.output.pairs.map_or(LISTED, |most| most.0);
-        let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
-        for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
-            let empty = || pressure_plot(&scene.title, scene, &pairs[i], Vec::new());
-            self.pressures.entry(i).or_insert_with(empty).series.push(pressure_curve(label, done, i));
-            if let Some(curve) = reference_curve(&done.built.discrete, i) {
-                self.reference.get_or_insert((i, curve));
-            }
-        }
-        self.reports.push(report);
-    }
-
-    fn write_plots(&self, folder: &Folder, title: &str) -> Result<()> {
-        let convergence = Plot::convergence(title, &self.histories);
-        folder.write("convergence.svg", |out| convergence.write(out))?;
-        let names = numbered(self.pressures.iter().map(|_| "pressure".to_owned()));
-        for ((pair, of_pair), name) in self.pressures.iter().zip(names) {
-            let mut curves = of_pair.series.clone();
-            curves.extend(self.reference.iter().filter(|(index, _)| index == pair).map(|(_, curve)| curve.clone()));
-            let plot = Plot::pressure(title, &of_pair.x.label, &of_pair.y.label, curves);
-            folder.write(&format!("{name}.svg"), |out| plot.write(out))?;
-        }
-        Ok(())
-    }
-}
-
-/// Build `scene` with what the run before has left.
-///
-/// # Errors
-/// Those of [`run::build`].
-fn build(
-    session: &Session,
-    scene: Rc<Scene>,
-    before: Option<Done>,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Built> {
-    let Some(Done { built: mut last, .. }) = before else { return run::build(session, scene, interrupt, clock) };
-    if serves(&last, &scene) {
-        let discrete = &mut last.discrete;
-        discrete.model.exchange = Rc::new(Ranks::new(session));
-        let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-        discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
-        discrete.assemblies = 0;
-        return Ok(Built { scene, ..last });
-    }
-    let is_same = settings(&last.scene, without_values) == settings(&scene, without_values);
-    let condensed = if is_same { last.into_condensed() } else { Vec::new() };
-    options::withdraw(session)?;
-    run::build_with(session, scene, condensed, interrupt, clock)
-}
-
-/// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.
-fn serves(last: &Built, scene: &Scene) -> bool {
-    let both = [&*last.scene, scene];
-    // an estimate of the error needs the meshes, which are kept only for it
-    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate || scene.method.stop.balanced);
-    // how linear steps are solved was chosen for the method
-    let [old_joint, new_joint] = both.map(|scene| {
-        let MethodSpec { name, linear, .. } = &scene.method;
-        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
-    });
-    last.condensed.len() == last.discrete.bodies.len()
-        && old_meshes == new_meshes
-        // tables of factors change the loads of bodies
-        && both.iter().all(|scene| !scene.method.steps.is_table())
-        && old_joint == new_joint
-        && settings(&last.scene, |_| ()) == settings(scene, |_| ())
-}
-
-/// Return the settings of a scene on which bodies can depend, changed by `edit`.
-fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
-    let mut settings = scene.settings();
-    if let Value::Object(map) = &mut settings {
-        ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
-    }
-    edit(&mut settings);
-    settings
-}
-
-/// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
-fn without_values(settings: &mut Value) {
-    each(settings.get_mut("contact"), |contact| without(contact, &["gap", "layer", "reference"]));
-    each(settings.get_mut("body"), |body| {
-        without(body, &["force", "path"]);
-        if let Some(Value::Array(loads)) = body.get_mut("load") {
-            // only rigid surfaces change the dofs: they join them
-            loads.retain(|load| load["rigid"] == true);
-        }
-        for key in ["load", "fix"] {
-            each(body.get_mut(key), |item| {
-                without(item, &["path"]);
-                for key in ["force", "moment", "x", "y", "z", "normal"] {
-                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
-                }
-            });
-        }
-    });
-}
-
-fn without(table: &mut Map<String, Value>, keys: &[&str]) {
-    keys.iter().for_each(|key| drop(table.remove(*key)));
-}
-
-/// Edit each table of a list in the settings.
-fn each(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
-    let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
-    tables.filter_map(Value::as_object_mut).for_each(edit);
 }

@@ -1,24 +1,14 @@
 //! The files of the results of a run. Small files come first, so that on a full disk fields are missing and not results.
 
 use super::adapt::Plan;
+use super::plots::{self, Plots};
 use super::series;
-use crate::contact::ContactPair;
-use crate::ddm::Outcome;
-use crate::discretize::Discrete;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
-use crate::linalg::bounds;
-use crate::output::{
-    Checksums, Color, ConvergenceSeries, Folder, LISTED, PairReport, PairRow, Plot, Report, Series, StepReport, Style,
-    busiest, contacts,
-};
+use crate::output::{Checksums, Folder, LISTED, PairReport, PairRow, Report, busiest, contacts};
 use crate::petsc::Session;
-use crate::problem::units::label;
-use crate::problem::{Plane, force_labels};
-use crate::run::words::numbered;
-use crate::run::{All, Clock, Done, measure, report, results};
-use crate::scene::Scene;
+use crate::run::{All, Clock, Done, report, results};
 use serde::Serialize;
 use std::path::Path;
 
@@ -67,13 +57,18 @@ impl ResultFiles<'_> {
             let output = &done.built.scene.output;
             let shown = busiest(&report.pairs, output.pairs.map_or(LISTED, |most| most.0));
             report.left_out = left_out(&report.pairs, &shown);
-            let plots = Plots::of(done, &shown);
+            let mut plots = Plots::default();
+            if output.plots {
+                plots.add("pressure", done, &shown);
+            }
             written = self.tables(&folder, &report, &shown, &plots);
             if output.plots || fields {
                 // once before the large files
                 written = written.and(self.report(&folder, &mut report, fields));
             }
-            written = written.and(plots.write(done, &folder));
+            if output.plots {
+                written = written.and(plots.write(&folder)).and(plots::write_approach(done, &shown, &folder));
+            }
         }
         if fields {
             written = written.and(series::write_last(done, &recovered, &folder));
@@ -107,7 +102,7 @@ impl ResultFiles<'_> {
         let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
         let stems = series::stems(self.done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
-        plots.plotted.iter().for_each(|(i, file)| rows[*i].plot.clone_from(file));
+        plots.files().for_each(|(i, file)| rows[i].plot = file);
         let save = |&i: &usize| {
             let table = report::contact_table(self.done, self.estimate, i);
             folder.write(&rows[i].table, |out| table.write(out))
@@ -168,100 +163,4 @@ fn left_out(pairs: &[PairReport], shown: &[usize]) -> Option<String> {
              each, and --set output.pairs=all writes all"
         )
     })
-}
-
-/// Return the approach and the force of pair `i` in each step.
-fn approach(steps: &[StepReport], i: usize) -> Vec<(f64, f64)> {
-    let of_step = |step: &StepReport| {
-        let pair = &step.pairs[i];
-        (pair.approach.unwrap_or(f64::NAN), pair.force.iter().map(|f| f * f).sum::<f64>().sqrt())
-    };
-    steps.iter().map(of_step).collect()
-}
-
-/// The plots of a run.
-struct Plots {
-    /// Indices of the pairs that are shown.
-    shown: Vec<usize>,
-    /// Indices of those that have a plot of their pressure, each with the name of its file.
-    plotted: Vec<(usize, String)>,
-}
-
-impl Plots {
-    /// Return the plots of the pairs `shown`. Pressures are plotted only along curves: points of a surface over one coordinate would be a cloud.
-    fn of(done: &Done, shown: &[usize]) -> Self {
-        let has_plot = |i: &usize| done.built.scene.output.plots && done.model().pairs[*i].along_curve;
-        let plotted: Vec<usize> = shown.iter().copied().filter(has_plot).collect();
-        let files = numbered(plotted.iter().map(|_| "pressure".to_owned()));
-        let plotted = plotted.into_iter().zip(files.into_iter().map(|name| format!("{name}.svg"))).collect();
-        Self { shown: shown.to_vec(), plotted }
-    }
-
-    fn write(&self, done: &Done, folder: &Folder) -> Result<()> {
-        let (scene, model) = (&done.built.scene, done.model());
-        if !scene.output.plots {
-            return Ok(());
-        }
-        let convergence = Plot::convergence(&scene.title, &[convergence_curve("", &done.outcome)]);
-        folder.write("convergence.svg", |out| convergence.write(out))?;
-        if done.steps.len() > 1 {
-            let names = measure::pair_names(&done.built);
-            let curves = self.shown.iter().map(|&i| (names[i].as_str(), approach(&done.steps, i)));
-            let is_whole = scene.dimension.value == 3 || scene.plane == Plane::Axisymmetric;
-            let units = scene.units.clone().map(|units| if is_whole { units } else { units.per_thickness() });
-            let plot = Plot::approach(&scene.title, force_labels(units.as_ref()), curves);
-            folder.write("force-approach.svg", |out| plot.write(out))?;
-        }
-        for &(i, ref file) in &self.plotted {
-            let mut curves = vec![pressure_curve("pressure", done, i)];
-            curves.extend(reference_curve(&done.built.discrete, i));
-            // among many plots each has the names of its surfaces
-            let title = match model.pairs.len() {
-                ..=LISTED => scene.title.clone(),
-                _ => format!("{}: {} - {}", scene.title, model.pairs[i].surfaces[0], model.pairs[i].surfaces[1]),
-            };
-            let plot = pressure_plot(&title, scene, &model.pairs[i], curves);
-            folder.write(file, |out| plot.write(out))?;
-        }
-        Ok(())
-    }
-}
-
-/// Return residual and increment of a run against the iteration.
-pub fn convergence_curve(label: &str, outcome: &Outcome) -> ConvergenceSeries {
-    let rows = outcome.rows.iter().map(|row| (row.iteration, row.residual, row.increment)).collect();
-    ConvergenceSeries { label: label.to_owned(), rows }
-}
-
-/// Return the pressure of pair `i` along its surface, against the coordinate that varies most.
-pub fn pressure_curve(label: &str, done: &Done, i: usize) -> Series {
-    let model = done.model();
-    let (axis, _) = main_axis(&model.pairs[i]);
-    let pressure = &done.outcome.layer.pressure[model.range(i)];
-    let points = model.pairs[i].position.iter().zip(pressure).map(|(x, &p)| (x[axis], p)).collect();
-    Series::new(label, points, Style::Line)
-}
-
-/// Return the scene's reference pressure of pair `i`, if it has one.
-pub fn reference_curve(discrete: &Discrete, i: usize) -> Option<Series> {
-    let field = discrete.contacts[i].spec.reference.as_ref()?;
-    let pair = &discrete.model.pairs[i];
-    let (axis, _) = main_axis(pair);
-    let points = pair.position.iter().map(|&x| (x[axis], field.eval(x))).collect();
-    Some(Series::new("reference", points, Style::Dashed).color(Color::Grey))
-}
-
-/// Return the plot of pressures along a pair, in the units of the scene.
-pub fn pressure_plot(title: &str, scene: &Scene, pair: &ContactPair, curves: Vec<Series>) -> Plot {
-    let units = scene.units.as_ref();
-    let x = label(main_axis(pair).1, units.map(|units| units.length));
-    Plot::pressure(title, &x, &label("contact pressure", units.map(|units| units.stress)), curves)
-}
-
-/// Return the coordinate along which a pair's points spread most, and its name.
-fn main_axis(pair: &ContactPair) -> (usize, &'static str) {
-    let [low, high] = bounds(pair.position.iter().copied());
-    let spread = |k: usize| high[k] - low[k];
-    let axis = (0..3).max_by(|&i, &j| spread(i).total_cmp(&spread(j)).then(j.cmp(&i))).unwrap_or(0);
-    (axis, ["x", "y", "z"][axis])
 }

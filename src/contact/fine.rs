@@ -4,7 +4,7 @@
 
 use super::basis::{Carriers, PressureBasis};
 use super::cover::Left;
-use super::near::Projections;
+use super::near::{Projections, rise};
 use super::pair::ContactPair;
 use super::pieces::{Common, Shared};
 use super::rim::facets_at_rim;
@@ -24,7 +24,8 @@ pub struct Fine<const D: usize> {
     pub bodies: [usize; 2],
     /// Length (area) of each point.
     pub weight: Vec<f64>,
-    /// Gap of each point: distance of the meshes along the normal plus the gap that the scene adds.
+    /// Gap of each point: distance of the surfaces along the normal plus the gap that the scene adds. Over straight facets the surfaces rise, see
+    /// [`rise`].
     pub gap: Vec<f64>,
     /// Size of the facet of side a under each point: its length, or the side of the square that two such triangles make.
     pub size: Vec<f64>,
@@ -68,7 +69,7 @@ impl<const D: usize> Fine<D> {
     /// Collect the integration points of `pair`, which was made of these sides and common pieces.
     ///
     /// `gap(x)` is the gap that the scene adds to the distance of the meshes. If the surfaces are `touching`, the difference
-    /// between that distance at a contact point and its mean around it counts as zero.
+    /// between that distance at a contact point and its mean around it counts as zero, as does the height of surfaces above their facets.
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
@@ -85,13 +86,17 @@ impl<const D: usize> Fine<D> {
             at: points.iter().map(at).collect(),
         };
         let rounding = a.rounding_along_normals();
+        let rise_of_both = |point: &Shared<D>| match touching {
+            true => 0.0,
+            false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
+        };
         let at_rim = facets_at_rim(a, b, common, &pair.cover);
         let is_quadratic =
             |facet: usize| D == 2 && a.facets.order == Order::P2 && pair.cover[facet].left == Left::Nothing;
         let mut fine = Self {
             bodies: pair.bodies,
             weight: points.iter().map(|point| point.weight).collect(),
-            gap: points.iter().map(|point| gap_at(a, point, rounding, gap)).collect(),
+            gap: points.iter().map(|point| gap_at(a, point, rounding, gap) - rise_of_both(point)).collect(),
             size: points.iter().map(|point| size_under(a, point)).collect(),
             normal: points.iter().map(|point| normal_at(a, point.facet_a, &point.at_a)).collect(),
             tilt: points.iter().map(|point| tilt_at(a, b, point)).collect(),

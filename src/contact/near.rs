@@ -92,22 +92,28 @@ fn project<const D: usize>(b: &Side<D>, facet: usize, from: [f64; D], normal: [f
 }
 
 /// Return the distance along a normal from a point to the surface at the barycentric coordinates `at` of a facet.
+fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
+    let x = b.facets.coordinates(facet, b.space);
+    let to: [f64; D] = interpolate(&x, &element::values(b.facets.order, at));
+    dot(&normal, &minus(to, from)) - rise(b, facet, at)
+}
+
+/// Return the height of the surface of a side above a facet at barycentric coordinates.
 ///
 /// A quadratic facet is the surface itself. Over a straight facet the surface is taken to rise by
 /// l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a curve between two normals is a parabola. Here l_i is the
 /// barycentric coordinate, n_i the normal and x_i the place of corner i.
-fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
-    let x = b.facets.coordinates(facet, b.space);
-    let to: [f64; D] = interpolate(&x, &element::values(b.facets.order, at));
-    let mut distance = dot(&normal, &minus(to, from));
-    if b.facets.order == Order::P1 {
-        let normals: Vec<[f64; D]> = b.facets.facet(facet).iter().map(|node| b.normals[node]).collect();
-        for i in 0..D {
-            for j in i + 1..D {
-                let bend = dot(&minus(normals[j], normals[i]), &minus(x[j], x[i]));
-                distance -= 0.5 * at[i] * at[j] * bend;
-            }
+pub(super) fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
+    if side.facets.order != Order::P1 {
+        return 0.0;
+    }
+    let x = side.facets.coordinates(facet, side.space);
+    let normals: Vec<[f64; D]> = side.facets.facet(facet).iter().map(|node| side.normals[node]).collect();
+    let mut rise = 0.0;
+    for i in 0..D {
+        for j in i + 1..D {
+            rise += 0.5 * at[i] * at[j] * dot(&minus(normals[j], normals[i]), &minus(x[j], x[i]));
         }
     }
-    distance
+    rise
 }

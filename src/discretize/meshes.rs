@@ -2,7 +2,7 @@
 
 use super::supports::Constraints;
 use crate::contact::Fine;
-use crate::fem::{Elasticity, Recovery, RigidMotion, Space, element};
+use crate::fem::{Elasticity, InterpolationError, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
 use crate::problem::order::Order;
 use std::rc::Rc;
@@ -91,9 +91,14 @@ pub trait Recovered {
     /// Return the energy of the strip between straight facets and a curved boundary at each cell, see [`Recovery::strip_energies`].
     fn strip_energies(&self) -> Vec<f64>;
 
-    /// Return the residual of the interpolation error at all nodes, see [`Recovery::interpolation_residual`]. It includes the
-    /// strip between straight facets and a curved boundary, see [`Recovery::add_strip`].
-    fn interpolation_residual(&self) -> Vec<f64>;
+    /// Compute the residual and the energy of the interpolation error, see [`Recovery::interpolation_error`].
+    fn interpolation_error(&self) -> InterpolationError;
+
+    /// Return the load of a body that is too stiff by these squared energy errors of its cells, see [`Recovery::softening`].
+    fn softening(&self, errors: &[f64]) -> Vec<f64>;
+
+    /// Add the load on the strip between straight facets and a curved boundary to `r`, see [`Recovery::add_strip`].
+    fn add_strip(&self, r: &mut [f64]);
 
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
@@ -270,11 +275,16 @@ impl<const D: usize> Recovered for OnBody<'_, D> {
         self.recovery.strip_energies(&|cell, x, strain| self.stress(cell, x, strain))
     }
 
-    fn interpolation_residual(&self) -> Vec<f64> {
-        let law = |cell, x, strain: &[f64; 6]| self.stress(cell, x, strain);
-        let mut residual = self.recovery.interpolation_residual(&law);
-        self.recovery.add_strip(&law, &mut residual);
-        residual
+    fn interpolation_error(&self) -> InterpolationError {
+        self.recovery.interpolation_error(&|cell, x, strain| self.stress(cell, x, strain))
+    }
+
+    fn softening(&self, errors: &[f64]) -> Vec<f64> {
+        self.recovery.softening(&|cell, x, strain| self.stress(cell, x, strain), errors)
+    }
+
+    fn add_strip(&self, r: &mut [f64]) {
+        self.recovery.add_strip(&|cell, x, strain| self.stress(cell, x, strain), r);
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {

@@ -44,7 +44,7 @@ pub use interpolation::Interpolation;
 pub use lever::Levers;
 pub use material::Material;
 pub use quadrature::Parts;
-pub use recovery::Recovery;
+pub use recovery::{InterpolationError, Recovery};
 pub use rigid::{FreeMotion, RigidMotion};
 pub use slope::Slope;
 pub use space::Space;

@@ -8,6 +8,7 @@
 mod blend;
 mod patch;
 mod rings;
+mod soften;
 mod strip;
 #[cfg(test)]
 mod tests;
@@ -16,6 +17,7 @@ use super::assemble::interpolate;
 use super::space::Space;
 use super::{Slope, element, quadrature};
 use crate::problem::order::Order;
+pub use blend::InterpolationError;
 use patch::{Monomials, Patch};
 use rings::Rings;
 

@@ -176,10 +176,8 @@ impl Pen {
         let mut elements = match self.style {
             Style::Line | Style::LineMarkers => vec![PathElement::new(points, line(1.9)).into_dyn()],
             Style::Dashed => vec![DashedPathElement::new(points.to_vec(), fine(6.4), fine(4.2), line(1.6)).into_dyn()],
-            Style::Markers => Vec::new(),
         };
-        let marked = matches!(self.style, Style::Markers | Style::LineMarkers);
-        for &(x, y) in points.iter().filter(|_| marked || points.len() == 1) {
+        for &(x, y) in points.iter().filter(|_| self.style == Style::LineMarkers || points.len() == 1) {
             let corners: Vec<At> = self.mark.iter().map(|(u, v)| (x + fine(*u), y + fine(*v))).collect();
             elements.push(Polygon::new(corners, self.color.filled()).into_dyn());
         }
@@ -192,8 +190,7 @@ impl Pen {
             let style = ShapeStyle::from(self.color).stroke_width(fine(1.6) as u32);
             return DashedPathElement::new(vec![(x, y), (x + fine(30.0), y)], fine(6.4), fine(4.2), style).into_dyn();
         }
-        let half = if self.style == Style::Markers { 0.0 } else { 0.95 };
-        let line = [(15.0, half), (0.0, half), (0.0, -half), (30.0, -half), (30.0, half), (15.0, half)];
+        let line = [(15.0, 0.95), (0.0, 0.95), (0.0, -0.95), (30.0, -0.95), (30.0, 0.95), (15.0, 0.95)];
         let marked = self.style != Style::Line;
         let mark = self.mark.iter().chain(self.mark.first()).filter(|_| marked).map(|(u, v)| (15.0 + u, *v));
         let corners = line.into_iter().chain(mark).map(|(u, v)| (x + fine(u), y + fine(v)));

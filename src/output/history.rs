@@ -8,7 +8,8 @@ use crate::error::Result;
 
 /// An observer that writes one line of `history.csv` for each row.
 pub struct HistoryWriter {
-    rows: RowFile,
+    /// The file.
+    pub rows: RowFile,
     bodies: usize,
     /// Whether rows have the column of load steps.
     steps: bool,
@@ -24,34 +25,9 @@ impl HistoryWriter {
         let mut header: Vec<String> = if steps { vec!["step".into()] } else { Vec::new() };
         header.extend(["iteration", "residual", "error", "increment"].map(String::from));
         header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
-        header.extend(
-            [
-                "gamma",
-                "energy",
-                "closed",
-                "points",
-                "sweeps",
-                "factorizations",
-                "inner_iterations",
-                "smoothed",
-                "seconds",
-            ]
-            .map(String::from),
-        );
+        let last = "gamma energy closed points sweeps factorizations inner_iterations smoothed seconds";
+        header.extend(last.split_whitespace().map(String::from));
         Ok(Self { rows: RowFile::create(folder, "history.csv", &header, &[])?, bodies: bodies.len(), steps })
-    }
-
-    /// Return in words why rows are missing, only the first time.
-    pub fn complaint(&mut self) -> Option<String> {
-        self.rows.complaint()
-    }
-
-    /// Complete the file.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when rows could still not be written.
-    pub fn finish(self) -> Result<()> {
-        self.rows.finish()
     }
 }
 
@@ -120,7 +96,7 @@ mod tests {
                 "2,1,1e-9,2e-9,0.5,0.5,0.3333333333333333,0.25,-0.2,4,9,2,3,7,1,1.5",
             ]
         );
-        history.finish().unwrap();
+        history.rows.finish().unwrap();
         assert_eq!(folder.files(), [base.path().join("history.csv")]);
     }
 }

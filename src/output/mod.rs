@@ -65,5 +65,5 @@ pub use rows::RowFile;
 pub use steps::{Extent, ReactionReport, StepPairReport, StepReport, StepTable};
 pub use summary::warning_lines;
 #[cfg(feature = "cli")]
-pub use table::{IterationTable, Verbosity};
+pub use table::IterationTable;
 pub use vtu::{BodyField, CellKind, Encoding, Grid};

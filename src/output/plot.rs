@@ -43,8 +43,6 @@ pub enum Style {
     Line,
     /// A dashed line.
     Dashed,
-    /// Marks at the points.
-    Markers,
     /// A solid line with marks at the points.
     LineMarkers,
 }

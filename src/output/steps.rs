@@ -117,7 +117,8 @@ pub fn vector_fields(vector: &[f64; 3], dimension: usize) -> impl Iterator<Item 
 
 /// The table `steps.csv`, one line per load step.
 pub struct StepTable {
-    rows: RowFile,
+    /// The file.
+    pub rows: RowFile,
     dimension: usize,
     count: usize,
 }
@@ -162,18 +163,5 @@ impl StepTable {
         }
         line.extend(step.reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, self.dimension)));
         self.rows.push(&line);
-    }
-
-    /// Return in words why rows are missing, only the first time.
-    pub fn complaint(&mut self) -> Option<String> {
-        self.rows.complaint()
-    }
-
-    /// Complete the file.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when rows could still not be written.
-    pub fn finish(self) -> Result<()> {
-        self.rows.finish()
     }
 }

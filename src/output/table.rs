@@ -10,17 +10,6 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{self, IsTerminal, Write};
 use std::time::Duration;
 
-/// The amount of output of a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verbosity {
-    /// Errors, warnings, and where the results are.
-    Quiet,
-    /// Tables and progress lines if there is a terminal, and a summary of the results.
-    Usual,
-    /// Also the decisions of the program with their reasons.
-    Verbose,
-}
-
 /// An observer that prints one line per iteration: all up to 20, every 10th up to 200, every 100th after that, and the last.
 pub struct IterationTable {
     /// Output of the table; `None` prints no table.

@@ -1,13 +1,13 @@
 //! Pictures of the pressures of pairs from their tables: curves in the plane, maps in space.
 
-use super::bands::{self, BANDS, colors, range};
+use super::bands::{Levels, range};
 use super::body::Part;
 use super::files::{Files, value};
+use super::picture::{self, View};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::bounds;
 use crate::output::{Plot, Series, Style};
 use crate::problem::units::{Units, label};
-use minijinja::context;
 use serde::Serialize;
 
 /// A picture of the pressure of a pair.
@@ -64,38 +64,51 @@ fn picture(
     let title = format!("{title}: {pressure}");
     // the facets show more than the points, if the run wrote them
     let file = format!("{}.vtu", table.strip_suffix(".csv").unwrap_or(table));
-    if files.path(&file).is_file() {
-        let surface = Part::read(files, &file, &title, "pressure")?;
-        let svg = bands::pressure(&surface, axes, &title, alone).map_err(failed)?;
-        return Ok(Picture { kind: "map", svg, note: None });
-    }
-    map(&title, &points, &pressures, axes, alone)
-}
-
-/// Return a map of points, seen in two coordinates and coloured by the pressure. Points without pressure are grey.
-fn map(title: &str, points: &[[f64; 3]], pressures: &[f64], axes: [usize; 2], alone: bool) -> Result<Picture> {
-    let [low, high] = bounds(points.iter().copied());
-    let size = axes.map(|k| high[k] - low[k]);
-    let pixel = (size[0] / 400.0).max(size[1] / 400.0).max(f64::MIN_POSITIVE);
-    let [width, height] = size.map(|size| size / pixel);
-    let [_, most] = range(pressures.iter());
-    let every = points.len().div_ceil(POINTS).max(1);
-    let point = |(x, &p): (&[f64; 3], &f64)| {
-        let band = if p > 0.0 { bands::band(p, [0.0, most], false) as i64 } else { -1 };
-        ((x[axes[0]] - low[axes[0]]) / pixel, (high[axes[1]] - x[axes[1]]) / pixel, band)
+    let has_facets = files.path(&file).is_file();
+    let every = if has_facets { 1 } else { points.len().div_ceil(POINTS).max(1) };
+    let surface = match has_facets {
+        true => Part::read(files, &file, &title, "pressure")?,
+        false => discs(&title, points.iter().zip(&pressures).step_by(every), axes),
     };
-    let points: Vec<_> = points.iter().zip(pressures).step_by(every).map(point).collect();
-    // the discs together cover about the box
-    let radius = (width.max(1.0) * height.max(1.0) / points.len() as f64).sqrt().clamp(1.0, 12.0) * 0.62;
-    let levels: Vec<f64> = (0..=BANDS).map(|band| most * band as f64 / BANDS as f64).collect();
-    let is_open = points.iter().any(|&(_, _, band)| band < 0);
-    let context =
-        context! { title, alone, points, is_open, radius, width, height, levels, colors => colors().to_vec() };
-    let svg = super::words::environment()
-        .render_named_str("map.svg.html", include_str!("map.svg"), context)
-        .map_err(failed)?;
+    let values: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
+    let [_, most] = range(values.iter());
+    let (levels, view) = (Levels { range: [0.0, most], squares: false, opens: true }, View::flat(axes));
+    let drawing = picture::Picture { title: &title, levels, view, magnification: None, outlines: has_facets, alone };
+    let svg = drawing.svg(&[surface], &[values]).map_err(failed)?;
     let note = (every > 1).then(|| format!("One of {every} contact points; the table has all."));
     Ok(Picture { kind: "map", svg, note })
+}
+
+/// Return points with pressures as hexagons in the plane of two coordinates, which together cover about their box.
+fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>, axes: [usize; 2]) -> Part {
+    let (points, pressures): (Vec<[f64; 3]>, Vec<f64>) = points.unzip();
+    let [low, high] = bounds(points.iter().copied());
+    let size = axes.map(|k| high[k] - low[k]);
+    let longest = size[0].max(size[1]);
+    // on a line of points the box has no area, and a single point has no size
+    let spacing = (size[0] * size[1] / points.len() as f64).sqrt().clamp(longest / 400.0, longest / 30.0);
+    let radius = if longest > 0.0 { 0.62 * spacing } else { 1.0 };
+    let (corners, displacement) = (6 * points.len(), [0.0; 3]);
+    let mut disc = Part {
+        name: title.to_owned(),
+        points: Vec::with_capacity(corners),
+        triangles: Vec::new(),
+        displacement: vec![displacement; corners],
+        value: pressures.iter().flat_map(|&pressure| [pressure; 6]).collect(),
+        is_solid: false,
+    };
+    for centre in points {
+        let first = disc.points.len() as u32;
+        disc.triangles.extend((1..5).map(|k| [first, first + k, first + k + 1]));
+        disc.points.extend((0..6).map(|k| {
+            let (sine, cosine) = (f64::from(k) * std::f64::consts::FRAC_PI_3).sin_cos();
+            let mut corner = centre;
+            corner[axes[0]] += radius * cosine;
+            corner[axes[1]] += radius * sine;
+            corner
+        }));
+    }
+    disc
 }
 
 /// Return the error for a picture that cannot be drawn.

@@ -1,8 +1,7 @@
-//! Single pictures of a run as SVG or PNG files.
+//! Single pictures of a run as SVG files.
 
 use super::contact::failed;
 use super::page::Results;
-use super::raster;
 use crate::error::{Error, Kind, Result};
 use crate::output::{Folder, write_whole};
 use std::path::{Path, PathBuf};
@@ -27,10 +26,9 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
         ));
     }
     let out_path = out.map_or_else(|| folder.join(format!("{what}.svg")), Path::to_owned);
-    let ending = out_path.extension().unwrap_or_default().to_string_lossy().into_owned();
-    if !matches!(ending.as_str(), "svg" | "png") {
-        return Err(Error::new(Kind::Usage, format!("{} ends neither in .svg nor in .png", out_path.display()))
-            .help("pictures are SVG or PNG; rsvg-convert or Inkscape make PDF of SVG"));
+    if out_path.extension().is_none_or(|ending| ending != "svg") {
+        return Err(Error::new(Kind::Usage, format!("{} does not end in .svg", out_path.display()))
+            .help("pictures are SVG; rsvg-convert or Inkscape make PDF or PNG of them"));
     }
     let results = Results::read(folder)?;
     if out.is_none() {
@@ -40,8 +38,7 @@ pub fn draw(folder: &Path, what: &str, out: Option<&Path>) -> Result<Vec<PathBuf
     let mut paths = Vec::new();
     for (k, svg) in pictures(&results, folder, what)?.into_iter().enumerate() {
         let path = if k == 0 { out_path.clone() } else { numbered(&out_path, k + 1) };
-        let bytes = if ending == "png" { raster::png(&svg)? } else { svg.into_bytes() };
-        write_whole(&path, |out| out.write_all(&bytes))?;
+        write_whole(&path, |out| out.write_all(svg.as_bytes()))?;
         paths.push(path);
     }
     Ok(paths)
@@ -77,7 +74,7 @@ fn pictures(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>>
             if bodies.is_empty() {
                 return Err(lacks("no fields of bodies", "solve the scene again with --vtu"));
             }
-            vec![results.bands(&bodies, what == "stress", true)?]
+            vec![results.field(&bodies, what == "stress")?]
         }
     };
     if pictures.is_empty() {

@@ -2,15 +2,14 @@
 //!
 //! Unless a function says otherwise, its errors are those of the files that it reads and of the templates.
 
-pub mod bands;
-pub mod body;
+mod bands;
+mod body;
 mod contact;
 mod figure;
 mod files;
-pub mod page;
-mod raster;
-mod solid;
-mod space;
+mod page;
+mod picture;
+mod view;
 mod vtu;
 mod words;
 

@@ -1,11 +1,13 @@
 //! The page of a run: one HTML file with the contents of its folder. The file needs nothing from other places.
 
+use super::bands::{self, Levels};
 use super::body::{Part, magnification};
-use super::contact::{Picture, failed, pictures};
+use super::contact::{self, failed, pictures};
 use super::files::{Files, value};
-use super::{bands, solid, space, words};
+use super::picture::{Picture, View};
+use super::{view, words};
 use crate::error::{Error, Kind, Result};
-use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, write_whole};
+use crate::output::{Axis, Color, ConvergenceSeries, Folder, LISTED, Plot, Series, Style, safe_name, write_whole};
 use crate::problem::units::{Units, force_labels, label};
 use minijinja::{UndefinedBehavior, context};
 use serde_json::Value;
@@ -93,8 +95,11 @@ impl Results {
         parts.map(|(name, file)| Part::read(&self.files, &file, name, "von_mises")).collect()
     }
 
-    /// Return the contact surfaces, if the run wrote them.
-    pub fn surfaces(&self) -> Result<Vec<Part>> {
+    /// Return the contact surfaces in space, if the run wrote them. In the plane they are lines, which have plots.
+    fn surfaces(&self) -> Result<Vec<Part>> {
+        if !self.is_space() {
+            return Ok(Vec::new());
+        }
         let files = self.names("files", |file| Some(file.as_str()?.strip_suffix(".vtu")?.to_owned()));
         let surfaces = files.iter().filter(|name| name.starts_with("contact-"));
         let parts = surfaces.filter_map(|name| Some((name, self.file(&[name])?)));
@@ -125,21 +130,18 @@ impl Results {
     pub fn convergence(&self) -> Result<Option<Plot>> {
         let rows = self.files.rows("history.csv")?;
         // iterations count from zero in each load step, so rows are numbered through
-        let abscissa =
-            |k: usize| if rows[k].contains_key("step") { k as f64 + 1.0 } else { value(&rows[k], "iteration") };
-        let curve = |name: &str, column: &str, style| {
-            let points: Vec<_> = (0..rows.len()).map(|k| (abscissa(k), value(&rows[k], column))).collect();
-            points.iter().any(|point| point.1 > 0.0).then(|| Series::new(name, points, style))
-        };
-        let error = if self.report["error_bound"].is_null() { "estimated error" } else { "bound of the error" };
-        let series = [
-            curve("residual", "residual", Style::Line),
-            curve(error, "error", Style::LineMarkers),
-            curve("increment", "increment", Style::Dashed),
-        ];
-        let series: Vec<Series> = series.into_iter().flatten().collect();
-        let (title, x, y) = (String::new(), Axis::linear("iteration"), Axis::log("relative"));
-        Ok((!series.is_empty()).then_some(Plot { title, x, y, series }))
+        let steps = rows.first().is_some_and(|row| row.contains_key("step"));
+        let number = |k: usize| if steps { k + 1 } else { value(&rows[k], "iteration") as usize };
+        let column = |name: &str| -> Vec<f64> { rows.iter().map(|row| value(row, name)).collect() };
+        let [residual, error, increment] = ["residual", "error", "increment"].map(column);
+        let numbered = (0..rows.len()).map(|k| (number(k), residual[k], increment[k])).collect();
+        let mut plot = Plot::convergence("", &[ConvergenceSeries { label: String::new(), rows: numbered }]);
+        let known = if self.report["error_bound"].is_null() { "estimated error" } else { "bound of the error" };
+        if error.iter().any(|&error| error > 0.0) {
+            let points = (0..rows.len()).map(|k| (number(k) as f64, error[k])).collect();
+            plot.series.push(Series::new(known, points, Style::LineMarkers).color(Color::Palette(1)));
+        }
+        Ok((!rows.is_empty()).then_some(plot))
     }
 
     /// Return a curve over the load steps for each pair, none without steps.
@@ -183,20 +185,24 @@ impl Results {
     }
 
     /// Return a picture of the pressure of each pair that touches and has a table.
-    pub fn pressures(&self, alone: bool) -> Result<Vec<Picture>> {
+    pub fn pressures(&self, alone: bool) -> Result<Vec<contact::Picture>> {
         pictures(&self.files, self.is_space(), self.units.as_ref(), alone)
     }
 
     /// Return the picture of the stress, or else the displacement, on deformed bodies. Bodies in space show their surfaces.
-    pub fn bands(&self, bodies: &[Part], stress: bool, alone: bool) -> Result<String> {
+    pub fn field(&self, bodies: &[Part], stress: bool) -> Result<String> {
         let values: Vec<Vec<f64>> =
             bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();
+        let range = bands::range(values.iter().flatten());
         let title = match stress {
             true => self.label("von Mises stress", |units| units.stress),
             false => self.label("displacement", |units| units.length),
         };
-        let draw = if bodies.iter().any(|part| part.is_solid) { solid::svg } else { bands::svg };
-        draw(bodies, &values, stress, &title, magnification(bodies), alone).map_err(failed)
+        let levels = Levels { range, squares: stress, opens: false };
+        let (view, outlines) = if self.is_space() { (View::space(), false) } else { (View::flat([0, 1]), true) };
+        let magnification = Some(magnification(bodies));
+        let picture = Picture { title: &title, levels, view, magnification, outlines, alone: true };
+        picture.svg(bodies, &values).map_err(failed)
     }
 
     /// Return the command of the run for a shell, after a change to its directory; empty if the report does not have it.
@@ -214,12 +220,10 @@ impl Results {
     fn page(&self) -> Result<String> {
         let report = &self.report;
         let bodies = self.bodies()?;
-        let (mut view, mut drawn) = (None, Vec::new());
-        if bodies.iter().any(|part| part.is_solid) {
-            view = Some(space::view(&bodies, &self.surfaces()?, magnification(&bodies)));
-        } else if !bodies.is_empty() {
-            drawn = vec![self.bands(&bodies, true, false)?, self.bands(&bodies, false, false)?];
-        }
+        let view = match bodies.is_empty() {
+            true => None,
+            false => Some(view::data(&bodies, &self.surfaces()?, magnification(&bodies), self.is_space())),
+        };
         let convergence = self.convergence()?.map(|plot| plot.svg().map_err(failed)).transpose()?;
         let unit = |unit: fn(&Units) -> &str| self.label("", unit);
         let phases = ["mesh", "discretize", "set-up", "iterate", "estimate", "output"];
@@ -236,7 +240,6 @@ impl Results {
             size_unit => label("", self.size_unit().as_deref()),
             is_area => self.is_area(),
             view,
-            pictures => drawn,
             pressures => self.pressures(false)?,
             convergence,
             approach => self.approach().map(|plot| plot.svg().map_err(failed)).transpose()?,

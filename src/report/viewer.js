@@ -1,10 +1,10 @@
-// Bodies in space: drag turns, shift or right button moves, wheel or two fingers zoom.
+// Bodies in space: drag turns, shift or right button moves, wheel or two fingers zoom. In the plane drag moves.
 (() => {
   const data = JSON.parse(document.getElementById("view").textContent);
-  const figure = document.getElementById("space"), canvas = figure.querySelector("canvas");
+  const figure = document.getElementById("bodies"), canvas = figure.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
   if (!gl) {
-    canvas.replaceWith("This browser shows no WebGL 2. ParaView opens bodies.pvd in the folder of results.");
+    canvas.replaceWith("This browser shows no WebGL 2. The command `winkler plot` draws the bodies as SVG, and ParaView opens bodies.pvd in the folder of results.");
     return;
   }
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
@@ -19,7 +19,7 @@
     }`, `#version 300 es
     precision highp float;
     in float shade; in vec3 place; out vec4 color;
-    uniform vec3 colors[12], toward; uniform vec4 cut; uniform float squares;
+    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform float squares;
     void main() {
       if (dot(place, cut.xyz) > cut.w) discard;
       vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
@@ -28,8 +28,19 @@
       // beyond a section the inner side of the surface is seen, which is grey like points without a value
       bool inner = cut.xyz != vec3(0.0) && !gl_FrontFacing;
       vec3 paint = inner || shade > 1.00001 ? vec3(0.72) : colors[band];
-      color = vec4(paint * light, 1.0);
+      // lines have ink
+      color = ink.a > 0.5 ? ink : vec4(paint * light, 1.0);
     }`]);
+  // the edges that belong to one triangle alone
+  const rim = (triangles, points) => {
+    const edges = new Map();
+    triangles.forEach((from, k) => {
+      const to = triangles[k % 3 === 2 ? k - 2 : k + 1];
+      const edge = Math.min(from, to) * points + Math.max(from, to);
+      edges.has(edge) ? edges.delete(edge) : edges.set(edge, [from, to]);
+    });
+    return new Uint32Array([...edges.values()].flat());
+  };
   const part = (part, kind) => {
     const arrays = {
       point: { numComponents: 3, data: new Float32Array(bytes(part.points)) },
@@ -37,7 +48,11 @@
       value: { numComponents: 1, data: new Uint16Array(bytes(part.value)), normalize: true },
       indices: new Uint32Array(bytes(part.triangles)),
     };
-    return { kind, name: part.name, shown: true, buffer: twgl.createBufferInfoFromArrays(gl, arrays) };
+    const buffer = twgl.createBufferInfoFromArrays(gl, arrays);
+    // bodies in the plane have outlines
+    const lines = data.space ? [] : rim(arrays.indices, arrays.value.data.length);
+    const outline = lines.length ? twgl.createBufferInfoFromArrays(gl, { ...arrays, indices: lines }) : null;
+    return { kind, shown: true, buffer, outline };
   };
   const parts = [...data.bodies.map(b => part(b, "body")), ...data.surfaces.map(s => part(s, "surface"))];
   const middle = data.low.map((low, k) => (low + data.high[k]) / 2);
@@ -45,7 +60,7 @@
   const colors = data.colors.flatMap(c => [1, 3, 5].map(k => parseInt(c.slice(k, k + 2), 16) / 255));
   const eye = {};
   const reset = () => {
-    const turn = -0.9, rise = 0.45, aspect = canvas.clientWidth / canvas.clientHeight || 1;
+    const [turn, rise] = data.space ? [-0.9, 0.45] : [-Math.PI / 2, Math.PI / 2], aspect = canvas.clientWidth / canvas.clientHeight || 1;
     // half of the box along a direction, and a tenth more for displacements
     const half = v => 0.55 * data.low.reduce((sum, low, k) => sum + Math.abs(v[k]) * (data.high[k] - low), 0);
     const right = half([Math.sin(turn), Math.cos(turn), 0]);
@@ -58,7 +73,7 @@
   const factor = () => scale.value / 50 * data.scale;
   // the plane of the section: what lies beyond it along x, y or z is not drawn
   const section = () => {
-    const k = ["x", "y", "z"].indexOf(across.value);
+    const k = ["x", "y", "z"].indexOf(across?.value);
     const normal = [0, 1, 2].map(axis => axis === k ? 1 : 0);
     return [...normal, k < 0 ? 1 : data.low[k] + depth.value / 100 * (data.high[k] - data.low[k])];
   };
@@ -73,19 +88,26 @@
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.LEQUAL);
     const m4 = twgl.m4, aspect = canvas.width / canvas.height, half = 0.5 * size / eye.zoom;
     const [w, h] = aspect > 1 ? [half * aspect, half] : [half, half / aspect];
     const toward = [Math.cos(eye.rise) * Math.cos(eye.turn), Math.cos(eye.rise) * Math.sin(eye.turn), Math.sin(eye.rise)];
-    const camera = m4.lookAt(middle.map((x, k) => x + 2 * size * toward[k]), middle, [0, 0, 1]);
+    const camera = m4.lookAt(middle.map((x, k) => x + 2 * size * toward[k]), middle, data.space ? [0, 0, 1] : [0, 1, 0]);
     const flat = m4.ortho(eye.right - w, eye.right + w, eye.up - h, eye.up + h, -20 * size, 40 * size);
     gl.useProgram(program.program);
     const pressure = what.value === "pressure";
+    // the colour of the text around
+    const ink = [...getComputedStyle(figure).color.match(/\d+/g).slice(0, 3).map(part => part / 255), 1];
     const lit = { view: m4.multiply(flat, m4.inverse(camera)), toward, colors, cut: section(), scale: factor(), travel: data.travel };
     for (const part of parts) {
       if (!part.shown || pressure !== (part.kind === "surface")) continue;
       twgl.setBuffersAndAttributes(gl, program, part.buffer);
-      twgl.setUniforms(program, { ...lit, travels: what.value === "travel" ? 1 : 0, squares: what.value === "stress" ? 1 : 0 });
+      twgl.setUniforms(program, { ...lit, travels: what.value === "travel" ? 1 : 0, squares: what.value === "stress" ? 1 : 0, ink: [0, 0, 0, 0] });
       twgl.drawBufferInfo(gl, part.buffer);
+      if (!part.outline) continue;
+      twgl.setBuffersAndAttributes(gl, program, part.outline);
+      twgl.setUniforms(program, { ink });
+      twgl.drawBufferInfo(gl, part.outline, gl.LINES);
     }
     shown.textContent = "× " + number(factor());
   }
@@ -99,7 +121,7 @@
       return cell;
     }), "to " + number(high));
     open.hidden = what.value !== "pressure";
-    depth.hidden = !across.value;
+    if (depth) depth.hidden = !across.value;
     redraw();
   }
 
@@ -114,7 +136,7 @@
       const [other] = [...fingers.values()].filter(f => f.pointerId !== e.pointerId);
       const apart = f => Math.hypot(f.clientX - other.clientX, f.clientY - other.clientY) || 1;
       eye.zoom *= apart(e) / apart(before);
-    } else if (e.shiftKey || e.buttons & 2) {
+    } else if (!data.space || e.shiftKey || e.buttons & 2) {
       const pixel = size / eye.zoom / Math.min(canvas.clientWidth, canvas.clientHeight);
       eye.right -= dx * pixel;
       eye.up += dy * pixel;
@@ -127,8 +149,8 @@
   });
   canvas.addEventListener("wheel", e => { e.preventDefault(); eye.zoom *= Math.exp(-e.deltaY * 0.001); redraw(); }, { passive: false });
   canvas.addEventListener("contextmenu", e => e.preventDefault());
-  for (const choice of [what, across]) choice.addEventListener("change", legend);
-  for (const slider of [scale, depth]) slider.addEventListener("input", redraw);
+  for (const choice of [what, across]) choice?.addEventListener("change", legend);
+  for (const slider of [scale, depth]) slider?.addEventListener("input", redraw);
   figure.querySelector("button").addEventListener("click", () => { reset(); redraw(); });
   for (const box of figure.querySelectorAll("input[type=checkbox]"))
     box.addEventListener("change", () => { parts[box.value].shown = box.checked; redraw(); });

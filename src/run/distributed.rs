@@ -58,7 +58,7 @@ fn is_for_several(plan: &Plan) -> bool {
         }
         _ => false,
     };
-    chosen.typed_that_end("pc_type").all(|(name, value)| works(name, value))
+    chosen.all_typed().filter(|(name, _)| name.ends_with("pc_type")).all(|(name, value)| works(name, value))
 }
 
 #[cfg(test)]

@@ -16,15 +16,12 @@ use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
 use crate::solver::cost::{Candidate, Comparison, Step};
 use crate::solver::memory;
-use crate::solver::options::{Chosen, Typed};
+use crate::solver::options::{Chosen, Typed, WHOLE};
 use crate::solver::preset::{self, Size};
 use crate::solver::speed;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::collections::{BTreeMap, HashMap};
-
-/// Prefix of the PETSc options of the matrix of all bodies.
-pub const WHOLE: &str = "newton";
 
 /// A factory that chooses and makes the inner solvers of a scene's bodies.
 pub struct Inner<'a> {
@@ -56,14 +53,14 @@ pub struct Inner<'a> {
 }
 
 impl<'a> Inner<'a> {
-    /// Start from the free memory and the options that the user wrote for `bodies`. This scene can reuse the bodies `kept` of an earlier one. Collective.
-    pub fn new(session: &'a Session, scene: &Scene, bodies: &[&str], kept: Vec<BodySlot>) -> Result<Self> {
+    /// Start from the free memory and the options that the user wrote. This scene can reuse the bodies `kept` of an earlier one. Collective.
+    pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
         let mine = memory::available() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        let typed = Typed::read(session, &[bodies, &[WHOLE]].concat())?;
+        let typed = Typed::read(session)?;
         Ok(Self {
             session,
             asked: scene.solver.preset,

@@ -17,7 +17,7 @@ use crate::solver::{Dense, Krylov, Monolithic, Union};
 /// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
 /// automatic start, it is stored in `start`.
 pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
-    let Built { scene, discrete, linear, whole, interpolation, .. } = built;
+    let Built { scene, discrete, linear, options, interpolation, .. } = built;
     let model = &mut discrete.model;
     let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
@@ -26,7 +26,7 @@ pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<M
                 session,
                 scene,
                 model,
-                (*linear, whole, interpolation.take()),
+                (*linear, options, interpolation.take()),
                 coefficient(),
                 start,
             )?));
@@ -39,13 +39,13 @@ pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<M
     Ok(Method::Sweeps { acceleration, coefficient: coefficient(), linear: Box::new(Sweeps::carried()) })
 }
 
-/// Return the solver of the linear steps of Newton's method. The tuple has its kind, the options of the matrix of all bodies, and
-/// the interpolation of this matrix.
+/// Return the solver of the linear steps of Newton's method. The tuple has its kind, the options of all solvers of PETSc, and the
+/// interpolation of the matrix of all bodies.
 fn linear_step(
     session: &Session,
     scene: &Scene,
     model: &mut Model,
-    (linear, whole, interpolation): (Linear, &Chosen, Option<Interpolation>),
+    (linear, options, interpolation): (Linear, &[Chosen], Option<Interpolation>),
     coefficient: Coefficient,
     start: &mut Start,
 ) -> Result<Box<dyn LinearStep>> {
@@ -64,7 +64,7 @@ fn linear_step(
     let mut step: Box<dyn LinearStep> = match linear {
         Linear::Dense => Box::new(Monolithic::new(union.without_zeros(), |stiffness| Ok(Dense::new(stiffness)))?),
         _ => {
-            let krylov = |stiffness| Krylov::new(session, whole.clone(), block, stiffness, &[], interpolation);
+            let krylov = |stiffness| Krylov::new(session, options[0].clone(), block, stiffness, &[], interpolation);
             let monolithic = Monolithic::new(union, krylov)?;
             model.joint = nodes.then(|| monolithic.joint());
             Box::new(monolithic)

@@ -5,15 +5,14 @@
 
 mod alike;
 mod balance;
-mod beyond;
 pub mod clock;
 mod distributed;
 pub mod ended;
-mod ends;
 pub mod inner;
 pub mod look;
 pub mod measure;
 pub mod method;
+mod pairs;
 mod phases;
 mod plan;
 pub mod preflight;
@@ -21,17 +20,17 @@ pub mod recorder;
 pub mod report;
 pub mod requests;
 pub mod results;
+mod reuse;
 pub mod stages;
 pub mod steps;
-mod surfaces;
-mod swapped;
 pub mod verdict;
 pub mod words;
 
 pub use alike::refuse_other_scenes;
 pub use clock::Clock;
 pub use ended::{All, Recovered};
-pub use phases::{build, build_with, estimate, in_parts, iterate, made_straight, set_up, targets};
+pub use phases::{build, estimate, in_parts, iterate, made_straight, set_up, targets};
 pub use recorder::Recorder;
 pub use requests::Requests;
+pub use reuse::build_after;
 pub use stages::{Begin, Built, Done, Prepared};

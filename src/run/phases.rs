@@ -2,17 +2,16 @@
 //! iteration.
 
 use super::clock::Clock;
-use super::inner::{Inner, WHOLE};
+use super::inner::Inner;
 use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Done, Prepared};
-use super::surfaces;
+use super::stages::{Begin, Built, Done, Legs, Prepared};
 use super::words::in_words;
-use super::{ends, method, steps, swapped};
+use super::{method, pairs, steps};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::{self, Outcome, Start, Status};
 use crate::discretize::{self, Balanced, Discrete, Verified, point};
-use crate::error::{Error, Kind, Result};
-use crate::estimate::{self, Estimate};
+use crate::error::Result;
+use crate::estimate::{self, Cause, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
@@ -20,11 +19,9 @@ use crate::model::{BodySlot, Mechanism, Model};
 use crate::output::sci;
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::{Schur, Session, has_metis, keep_apart, keep_at_hand};
-use crate::problem::{Linear, Order};
+use crate::problem::Order;
 use crate::scene::Scene;
 use crate::solver::options;
-use mpi::collective::SystemOperation;
-use mpi::traits::CommunicatorCollectives;
 use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
@@ -82,10 +79,7 @@ where
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
     if begun < history.steps.len() && history.leg(begun) != (0..history.steps.len()) {
-        built.again = Some(Rc::new(move |step, begin, kept, clock| {
-            options::withdraw(&source.session)?;
-            set_up(&source.session, source.build(step, kept, clock)?, begin, clock)
-        }));
+        built.legs = Some(Rc::new(source));
     }
     Ok(built)
 }
@@ -120,8 +114,8 @@ where
         scene.method.steps.apply(step, &mut bodies);
         let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        collectively(session, scene_options(session, scene, &names))?;
-        let mut inner = Inner::new(session, scene, &names, kept)?;
+        collectively(session, options::set_of_scene(session, &names, &scene.solver.options))?;
+        let mut inner = Inner::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
         let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
@@ -138,28 +132,20 @@ where
         let mut warnings = warnings(session, &discrete, D);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
-        let (linear, whole) = (inner.linear, inner.whole.clone());
-        let (choice, condensed) = (inner.reason(), inner.condensed());
-        let interpolation = inner.interpolation.take();
-        let scene = scene.clone();
-        let (options, again) = (inner.into_options(), None);
-        let mesh = read.as_ref().map(|read| read.digest.clone());
-        let splits = verified.splits();
         let mut built = Built {
-            scene,
+            scene: scene.clone(),
             discrete,
-            splits,
-            mesh,
-            linear,
-            whole,
-            interpolation,
-            choice,
-            condensed,
-            options,
+            splits: verified.splits(),
+            mesh: read.as_ref().map(|read| read.digest.clone()),
+            linear: inner.linear,
+            interpolation: inner.interpolation.take(),
+            choice: inner.reason(),
+            condensed: inner.condensed(),
+            options: inner.into_options(),
             warnings,
-            again,
+            legs: None,
         };
-        built.warnings.extend(swapped::warnings(&built));
+        built.warnings.extend(pairs::swapped_tables(&built));
         Ok(built)
     }
 
@@ -172,12 +158,14 @@ where
     }
 }
 
-/// Set the PETSc options of the scene. Typed options take precedence over them.
-fn scene_options(session: &Session, scene: &Scene, bodies: &[&str]) -> Result<()> {
-    for (name, value) in options::pairs(&scene.solver.options)? {
-        options::set_of_scene(session, bodies, name, value)?;
+impl<const D: usize> Legs for Source<D>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
+    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
+        set_up(&self.session, self.build(step, condensed, clock)?, begin, clock)
     }
-    Ok(())
 }
 
 /// Return the bodies of a scene and their mesh. The first rank runs Gmsh, reads the mesh and checks it. Collective.
@@ -251,7 +239,7 @@ fn warnings(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<Str
     warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(surfaces::warnings(&discrete.model.pairs, &discrete.contacts));
+    warnings.extend(pairs::of_surfaces(&discrete.model.pairs, &discrete.contacts));
     warnings
 }
 
@@ -310,55 +298,13 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         // The start that the set-up found is that of the run. Load steps have other loads.
         start = full;
     }
-    let mut names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-    if matches!(built.linear, Linear::Direct | Linear::Multigrid) {
-        names.push(WHOLE);
-    }
-    let watching = if built.is_without_petsc() { options::watching(session, &names)? } else { Vec::new() };
-    let mut warnings = agree_on_unread(session, &names, &watching)?;
-    if !watching.is_empty() {
-        warnings.push(format!(
-            "{} {} nothing to show: the bodies are condensed, so that PETSc has no solver here; --set solver=mumps gives each body one",
-            in_words(watching.iter()),
-            if watching.len() == 1 { "has" } else { "have" }
-        ));
-    }
-    if built.is_without_petsc() && session.options().has("-help") {
+    let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
+    let warnings = collectively(session, options::unread(session, &names, &built.options))?;
+    if built.options.is_empty() && session.options().has("-help") {
         options::show_help(session)?;
     }
     clock.phase("set-up");
     Ok(Prepared { built, method, start, steps, earlier, warnings })
-}
-
-/// Return the warnings of options that no solver with one of these `names` has read. Options in `known` are excluded.
-///
-/// # Errors
-/// PETSc does not know an option.
-fn agree_on_unread(session: &Session, names: &[&str], known: &[String]) -> Result<Vec<String>> {
-    let any = |flags: &mut [u8]| {
-        if session.size() > 1 && !flags.is_empty() {
-            let mine = flags.to_vec();
-            session.world().all_reduce_into(&mine[..], flags, SystemOperation::max());
-        }
-    };
-    let (mut warnings, mut unknown) = (Vec::new(), Ok(()));
-    for option in options::unread(session, names, &any)? {
-        match option.kind {
-            options::UnreadKind::NotInUse if known.contains(&option.name) => {}
-            options::UnreadKind::NotInUse => {
-                warnings.push(format!("option {} was not used: no solver of this run reads it", option.name));
-            }
-            options::UnreadKind::Unknown => {
-                let error = Error::new(Kind::Solver, format!("PETSc knows no option {}", option.name));
-                unknown = unknown.and(Err(match option.nearest {
-                    Some(near) => error.help(format!("did you mean {near}?")),
-                    None => error.help("`-help` lists the options of this run"),
-                }));
-            }
-        }
-    }
-    collectively(session, unknown)?;
-    Ok(warnings)
 }
 
 /// Iterate. From here on a signal ends the run after the current step, so that its results are written.
@@ -374,7 +320,7 @@ pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, 
     };
     keep_apart();
     let mut done = done?;
-    ends::note(&mut done);
+    pairs::note_ends(&mut done);
     clock.phase("iterate");
     Ok(done)
 }
@@ -407,12 +353,19 @@ fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
     for (i, pair) in model.pairs.iter().enumerate() {
         let [a, b] = &pair.surfaces;
-        if let Some(place) = estimate.guesses[i] {
-            warnings.push(format!(
-                "the estimated error of the pressures between `{a}` and `{b}` is a guess: most of it is at the edge of the contact, at {}, \
-                 where pressures may be singular",
-                point(place)
-            ));
+        if let Some(guess) = estimate.guesses[i] {
+            let place = point(guess.place);
+            let reason = match guess.cause {
+                Cause::Rim => {
+                    format!("most of it is at the edge of the contact, at {place}, where pressures may be singular")
+                }
+                Cause::FewFacets => {
+                    format!(
+                        "contact ends within the facets that carry most of the pressure, around {place}: make them smaller"
+                    )
+                }
+            };
+            warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
         }
         let change = estimate.sides[i];
         if change > estimate.pressure[i].max(ONE_SIDED) {

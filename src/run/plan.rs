@@ -3,19 +3,23 @@
 use crate::problem::{Order, Preset};
 use crate::solver::Retained;
 use crate::solver::options::Chosen;
+use serde::{Deserialize, Serialize};
 
 /// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and 250 MB.
 pub const DENSE: usize = 3000;
 
-/// The choice of a solver for a body.
+/// The choice of a solver for a body, made by the first rank. Other ranks do not get what is skipped here.
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Plan {
     /// Name of the body.
     pub name: String,
-    /// PETSc options of the body.
+    /// PETSc options of the body, which each rank reads.
+    #[serde(skip)]
     pub chosen: Chosen,
     /// Preset of its solver.
     pub preset: Preset,
     /// Reason for the preset, in words.
+    #[serde(skip)]
     pub reason: String,
     /// Number of dofs of a node.
     pub dimension: usize,
@@ -24,6 +28,7 @@ pub struct Plan {
     /// Number of dofs of the body.
     pub dofs: usize,
     /// Whether the body could be condensed.
+    #[serde(skip)]
     pub condensable: bool,
     /// Interface dofs of a condensed body, until it is made.
     pub retained: Option<Retained>,

@@ -4,7 +4,7 @@ use super::clock::Clock;
 use super::ended::{All, Look};
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
-use super::{balance, beyond, measure, preflight, requests, results};
+use super::{balance, measure, pairs, preflight, requests, results};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Reached, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
@@ -44,7 +44,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
-    report.warnings.extend(too_large.into_iter().chain(beyond::warnings(done)));
+    report.warnings.extend(too_large.into_iter().chain(pairs::beyond_laws(done)));
     let approaches = measure::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = balance::gather(done, recovered);

@@ -26,26 +26,28 @@ pub struct Built {
     pub mesh: Option<String>,
     /// The solver of linear steps.
     pub linear: Linear,
-    /// PETSc options for the joint matrix of all bodies.
-    pub whole: Chosen,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Interpolation>,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, which another run can reuse.
     pub condensed: Vec<String>,
-    /// Options of all PETSc solvers of the problem.
+    /// Options of all PETSc solvers of the problem: of bodies, or of the joint matrix of all bodies.
     pub options: Vec<Chosen>,
     /// Warnings on the problem.
     pub warnings: Vec<String>,
-    /// Function that prepares the problem of another leg of the load history; none if this problem serves all load steps. On a leg,
-    /// all loads are proportional.
-    pub again: Option<Reprepare>,
+    /// The legs of the load history; none if this problem serves all load steps. On a leg, all loads are proportional.
+    pub legs: Option<Rc<dyn Legs>>,
 }
 
-/// A function that prepares the problem with the loads of another leg of a history. Its arguments are the first step of the leg, the
-/// start, the condensed bodies of the leg before, and the clock. Collective.
-pub type Reprepare = Rc<dyn Fn(usize, Begin, Vec<BodySlot>, &mut Clock) -> Result<Prepared>>;
+/// A scene with its mesh, from which the problem of each leg of its load history is prepared.
+pub trait Legs {
+    /// Prepare the problem of the leg that begins with a step. Condensed bodies of the leg before are reused. Collective.
+    ///
+    /// # Errors
+    /// Loads that a body cannot have, and failures of the solver library.
+    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared>;
+}
 
 /// The start of a run that continues one on another mesh or in another process.
 #[derive(Default)]
@@ -101,11 +103,6 @@ impl Built {
     pub fn balance(&self) -> Option<Box<dyn Discretisation>> {
         let meshes = self.discrete.meshes.clone().filter(|_| self.scene.method.stop.balanced);
         meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
-    }
-
-    /// Whether no solver of PETSc is part of the problem: linear steps are dense, or all bodies are condensed.
-    pub fn is_without_petsc(&self) -> bool {
-        self.linear == Linear::Dense || self.condensed.len() == self.discrete.bodies.len()
     }
 
     /// Return the condensed bodies with their counters reset, for other loads, layers or gaps.

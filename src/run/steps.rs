@@ -7,8 +7,8 @@
 
 use super::clock::Clock;
 use super::ended::{self, All};
-use super::ends;
 use super::measure;
+use super::pairs;
 use super::recorder::{self, Recorder};
 use super::report::Shared;
 use super::results;
@@ -51,7 +51,7 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
         }
         let of_step = done.outcome.clone();
         let recovered = all.complete(&mut done);
-        ends::note(&mut done);
+        pairs::note_ends(&mut done);
         all.keep.step(&done, &recovered);
         drop(recovered);
         if last || interrupted {
@@ -187,12 +187,12 @@ impl<'a> Steps<'a> {
         let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
         // at zero load the ratio p/s is undefined, so there is no warm start
         let start = (usable && !self.history.is_at_rest(self.step)).then_some(Start::Pressure(outcome.layer.pressure));
-        let (again, mut known) = (built.again.clone(), built.warnings.clone());
+        let (legs, mut known) = (built.legs.clone(), built.warnings.clone());
         drop(method);
         let condensed = built.into_condensed();
-        let Some(prepare) = again else { unreachable!("a history of several legs comes with the way to them") };
-        let mut ready = prepare(self.step, Begin { start, steps, earlier }, condensed, clock)?;
-        ready.built.again = Some(prepare);
+        let Some(legs) = legs else { unreachable!("a history of several legs comes with the way to them") };
+        let mut ready = legs.prepare(self.step, Begin { start, steps, earlier }, condensed, clock)?;
+        ready.built.legs = Some(legs);
         ready.built.discrete.assemblies += assemblies;
         ready.built.discrete.assemblies_avoided += assemblies_avoided;
         self.laws = laws(&ready.built.discrete.model);

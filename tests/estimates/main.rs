@@ -6,3 +6,4 @@ mod common;
 mod bound;
 mod effectivity;
 mod estimate;
+mod parts;

@@ -177,6 +177,22 @@ fn rows_name_what_ran() {
     }
 }
 
+/// Elements of another order are other meshes of the same scene, and the runs are told apart by what differs: two keys with one last word have
+/// whole names.
+#[test]
+fn orders_are_an_axis_and_lines_name_what_differs() {
+    let over =
+        ["--over", "contact.0.layer.power.a=0.5,1", "--over", "body.0.young=1e5", "--over", "body.1.young=1e5,2e5"];
+    let words = ["--solver", "condensed", "--method", "newton", "--order", "1,2", "--set", "mesh.set.n=4"];
+    let (run, rows) = bench(&[&[scene("groove-held").as_str()], &words[..], &over].concat());
+    assert_eq!((run.code, rows.len()), (0, 8), "{}", run.said());
+    for pair in rows.chunks(2) {
+        assert_eq!((pair[0]["order"].as_str(), pair[1]["order"].as_str()), ("1", "2"));
+        assert!(number(&pair[1], "dofs") > 3.0 * number(&pair[0], "dofs"));
+    }
+    assert!(run.stdout.contains("a = 0.5, body.1.young = 2e5, P2: converged"), "{}", run.said());
+}
+
 /// What goes wrong is a row with its words, and the other rows are there.
 #[test]
 fn failures_are_rows() {

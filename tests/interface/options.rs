@@ -162,6 +162,11 @@ fn a_good_option_of_a_solver_not_in_use_is_a_warning() {
         assert!(run.warnings().contains(name), "{}", run.warnings());
         assert!(run.stdout.contains("warning") && run.stdout.contains(name), "{}", run.stdout);
     }
+    // a method without a matrix of all bodies; a sweep over methods has some of them
+    assert!(groove("-newton_pc_type hypre").converged().warnings().contains("-newton_pc_type was not used"));
+    // capitals are those of PETSc, and what every solver has as its own is no mistake
+    let own = groove("-KSP_Type cg -pc_type gamg -upper_pc_type icc -lower_pc_type jacobi").converged();
+    assert_eq!((own.warnings(), own.solvers()), (String::new(), vec!["cg + jacobi", "cg + icc by petsc"]));
     // it is in use in one body of two
     assert_eq!(groove("-pc_gamg_threshold 0.1 -lower_pc_type gamg").converged().warnings(), "");
     let run =
@@ -300,6 +305,19 @@ fn flags_of_the_program_are_none_of_petscs_business() {
     assert!(run.stdout.contains("There are no unused options"), "{}", run.stdout);
     for own in ["-o ", "--set", "-json", "mesh.set.n", "signal_handler", "results"] {
         assert!(!table.contains(own), "{own}\n{table}");
+    }
+}
+
+/// PETSc's own list has what no solver has read on any rank, where it is asked for.
+#[test]
+fn petsc_lists_what_is_left() {
+    for ranks in [1, 2] {
+        let words = ["-options_left", "-upper_ksp_type", "cg", "-pc_sor_its", "2"];
+        let run = solve_on(ranks, case("groove"), &[&SCENE[..], &words].concat()).converged();
+        assert!(run.stdout.contains("one unused database option"), "{ranks}: {}", run.stdout);
+        assert!(run.stdout.contains("left: name:-pc_sor_its value: 2"), "{ranks}: {}", run.stdout);
+        let run = solve_on(ranks, case("groove"), &[&SCENE[..], &words[1..]].concat()).converged();
+        assert!(!run.stdout.contains("not used!") && run.warnings().contains("-pc_sor_its"), "{ranks}: {}", run.stdout);
     }
 }
 

@@ -6,7 +6,7 @@ use crate::common::alone::{TIMEOUT, alone, expect_success};
 use std::time::Instant;
 use winkler::error::Result;
 use winkler::petsc::{Int, Ksp, Matrix, MotionPart, Motions, Rows, Schur, Scope, Session};
-use winkler::solver::options::{Typed, UnreadKind, unread};
+use winkler::solver::options::{Typed, unread};
 
 fn words(line: &str) -> Vec<String> {
     line.split_whitespace().map(String::from).collect()
@@ -176,14 +176,14 @@ fn options_come_from_line_file_and_environment() {
     expect_success(alone("petsc::options_come_from_line_file_and_environment", 0, &environment, || {
         let file = std::env::var("WINKLER_FILE").unwrap_or_default();
         let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
-        let (options, upper) = (session.options(), Typed::read(&session, &["upper"])?.of("upper"));
+        let (options, upper) = (session.options(), Typed::read(&session)?.of("upper"));
         for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
             assert_eq!(upper.typed(name), Some(value));
         }
         assert_eq!(options.get("-shift").as_deref(), Some("-1e-3"));
-        let left = unread(&session, &["upper"], &|_| ())?;
-        assert!(left.iter().any(|option| option.name == "-shift" && option.kind == UnreadKind::Unknown), "{left:?}");
-        assert!(left.iter().all(|option| !option.name.starts_with("-upper")), "{left:?}");
+        let error = unread(&session, &["upper"], &[upper]).expect_err("PETSc has no -shift");
+        assert!(error.message().ends_with("no option -shift"), "{error}");
+        assert_eq!(options.left()?, []);
         Ok(())
     }));
 }
@@ -213,30 +213,27 @@ fn settings_of_open_mpi_by_the_user_are_kept() {
 #[test]
 fn an_option_read_on_one_rank_is_read() {
     expect_success(alone("petsc::an_option_read_on_one_rank_is_read", 2, &[], || {
-        use mpi::collective::SystemOperation;
-        use mpi::traits::CommunicatorCollectives;
-        let line =
-            "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -log_veiw";
+        let line = "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
         let session = Session::start(&words(line))?;
         let bodies = ["upper", "lower"];
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        let mut chosen = Typed::read(&session, &bodies)?.of(body);
+        let mut chosen = Typed::read(&session)?.of(body);
         chosen.set_default("pc_type", "jacobi");
         let matrix = chain(&session, 9)?;
         chosen.lend(&session, || solver(&session, &format!("{body}_"), &matrix)?.set_up())?;
-        let or = |flags: &mut [u8]| {
-            let mine = flags.to_vec();
-            session.world().all_reduce_into(&mine[..], flags, SystemOperation::bitwise_or());
-        };
-        let found: Vec<(String, UnreadKind)> =
-            unread(&session, &bodies, &or)?.into_iter().map(|option| (option.name, option.kind)).collect();
-        let expected = [
-            ("-log_veiw", UnreadKind::Unknown),
-            ("-pc_sor_its", UnreadKind::NotInUse),
-            ("-upper_ksp_rtoll", UnreadKind::Unknown),
-        ];
-        assert_eq!(found, expected.map(|(name, kind)| (name.to_owned(), kind)));
+        let error = unread(&session, &bodies, &[chosen.clone()]).expect_err("a typing mistake");
+        assert!(error.message().ends_with("no option -upper_ksp_rtoll"), "{error}");
+        assert_eq!(error.advice(), Some("did you mean -upper_ksp_rtol?"));
+        session.options().clear("-upper_ksp_rtoll")?;
+        // both count as read now
+        for name in ["-pc_sor_its", "-newton_ksp_rtol"] {
+            session.options().clear(name)?;
+            session.options().set(name, Some("2"))?;
+        }
+        let warnings = unread(&session, &bodies, &[chosen])?;
+        assert!(warnings.len() == 2 && warnings.iter().all(|text| text.contains("was not used")), "{warnings:?}");
+        assert!(warnings[0].contains("-newton_ksp_rtol") && warnings[1].contains("-pc_sor_its"), "{warnings:?}");
         assert_eq!(session.options().left()?, []);
         Ok(())
     }));

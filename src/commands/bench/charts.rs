@@ -1,16 +1,16 @@
 //! The plots of a benchmark.
 
-use super::plan::{ASKED, Plan, part};
-use super::table::{Row, Table};
+use super::plan::{ASKED, Plan, is_of_mesh, part};
+use super::row::Row;
 use crate::linalg::fit;
 use crate::output::{Axis, Color, Plot, Series, Style};
 
 /// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the scene in it.
-pub(super) fn all(table: &Table, plan: &Plan) -> Vec<(String, Plot)> {
+pub(super) fn all(rows: &[Row], plan: &Plan) -> Vec<(String, Plot)> {
     let mut plots = Vec::new();
     for (name, scene) in plan.names.iter().zip(&plan.scenes) {
         let rows: Vec<&Row> =
-            table.rows.iter().filter(|row| row.key[0] == *name && row.is_good() && !row.is_linear()).collect();
+            rows.iter().filter(|row| row.key[0] == *name && row.is_good() && !row.is_linear()).collect();
         let stem =
             |what: &str| if plan.scenes.len() == 1 { format!("{what}.svg") } else { format!("{what}-{name}.svg") };
         let chart = Chart { rows: &rows, plan, title: &scene.title };
@@ -32,40 +32,7 @@ struct Chart<'a> {
     title: &'a str,
 }
 
-/// The rows of one curve.
-struct Curve<'a> {
-    /// The values that its rows have in common.
-    key: Vec<String>,
-    /// The name of the curve: those of the values that differ between curves.
-    name: String,
-    rows: Vec<&'a Row>,
-}
-
 impl Chart<'_> {
-    /// Return the curves whose rows differ only in the columns for which `along` holds.
-    fn curves(&self, along: impl Fn(&str) -> bool) -> Vec<Curve<'_>> {
-        let columns = self.plan.columns();
-        let common: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).collect();
-        // the method of a curve is the one that ran
-        let value = |row: &'_ Row, column: usize| -> String {
-            if columns[column] == ASKED { row.method.clone() } else { row.key[column].clone() }
-        };
-        let differs = |column: usize| self.rows.iter().any(|row| value(row, column) != value(self.rows[0], column));
-        let named: Vec<usize> = common.iter().copied().filter(|&column| differs(column)).collect();
-        let mut curves: Vec<Curve> = Vec::new();
-        for row in self.rows {
-            let key: Vec<String> = common.iter().map(|&column| value(row, column)).collect();
-            if let Some(curve) = curves.iter_mut().find(|curve| curve.key == key) {
-                curve.rows.push(row);
-                continue;
-            }
-            let parts: Vec<String> = named.iter().map(|&column| part(&columns[column], &value(row, column))).collect();
-            let name = if parts.is_empty() { row.key[columns.len() - 4].clone() } else { parts.join(", ") };
-            curves.push(Curve { key, name, rows: vec![row] });
-        }
-        curves
-    }
-
     /// Return a plot with logarithmic axes; none without points.
     fn plot(&self, x: &str, y: &str, series: Vec<Series>) -> Option<Plot> {
         let has_points = series.iter().any(|series| !series.points.is_empty());
@@ -103,28 +70,38 @@ impl Chart<'_> {
         self.plot("1 / (1 - theta)", "sweeps", series)
     }
 
-    /// Return the points (x, y) of each curve, sorted by x. The text of `suffix` is added to the name.
+    /// Return the points (x, y) of each curve, sorted by x. The rows of a curve differ only in the columns for which `along` holds, and its name
+    /// has the other values that differ between rows. The text of `suffix` is added to the name.
     fn series(
         &self,
         along: impl Fn(&str) -> bool,
         point: impl Fn(&Row) -> Option<(f64, f64)>,
         suffix: impl Fn(&[(f64, f64)]) -> String,
     ) -> Vec<Series> {
-        let mut all = Vec::new();
-        for Curve { name, rows, .. } in self.curves(along) {
-            let mut points: Vec<(f64, f64)> = rows.into_iter().filter_map(&point).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            if !points.is_empty() {
-                all.push(Series::new(name + &suffix(&points), points, Style::LineMarkers));
+        let columns = self.plan.columns();
+        // the method of a curve is the one that ran
+        let value = |row: &Row, column: usize| -> String {
+            if columns[column] == ASKED { row.method.clone() } else { row.key[column].clone() }
+        };
+        let differs = |&column: &usize| self.rows.iter().any(|row| value(row, column) != value(self.rows[0], column));
+        let named: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).filter(differs).collect();
+        let solver = columns.len() - 4;
+        let mut all: Vec<Series> = Vec::new();
+        for row in self.rows {
+            let Some(point) = point(row) else { continue };
+            let parts: Vec<String> = named.iter().map(|&k| part(&columns[k], &value(row, k), &columns)).collect();
+            let label = if parts.is_empty() { row.key[solver].clone() } else { parts.join(", ") };
+            match all.iter_mut().find(|series| series.label == label) {
+                Some(series) => series.points.push(point),
+                None => all.push(Series::new(label, vec![point], Style::LineMarkers)),
             }
+        }
+        for series in &mut all {
+            series.points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            series.label += &suffix(&series.points);
         }
         all
     }
-}
-
-/// Return whether a column is a key of the mesh.
-fn is_of_mesh(column: &str) -> bool {
-    column.starts_with("mesh.")
 }
 
 /// Relative difference of errors below which two runs are those of different solvers on one mesh.

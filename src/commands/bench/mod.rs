@@ -3,10 +3,10 @@
 
 mod charts;
 mod compare;
-mod errors;
 mod plan;
 mod process;
 mod request;
+mod row;
 mod summary;
 mod table;
 
@@ -17,14 +17,17 @@ use crate::error::Result;
 use crate::file::digest;
 use crate::interrupt::Interrupt;
 use crate::output::{Folder, progress, say};
+use crate::petsc::Session;
 use crate::scene::Scene;
+use compare::References;
 use plan::{Case, Plan};
 use process::Runner;
 use request::usage;
+use row::Row;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
-use table::{Row, Table};
+use table::Table;
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -35,46 +38,43 @@ use table::{Row, Table};
 /// but a row.
 pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     interrupt.hold();
-    let is_one_of_many = |name| std::env::var(name).is_ok_and(|size| size.parse::<usize>().is_ok_and(|size| size > 1));
-    if ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].into_iter().any(is_one_of_many) {
+    if Session::is_one_of_several() {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
     }
     let plan = Plan::new(request)?;
     let folder = Folder::claim(folder(request, &plan))?;
-    let reference = compare::References::read(request.against.as_deref(), &plan)?;
+    let reference = References::read(request.against.as_deref(), &plan)?;
     let mut table = Table::open(&folder, &plan, request, &reference)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
     let bar = progress::runs(plan.cases.len(), !request.quiet);
     let mut meshed = BTreeSet::new();
     let began = Instant::now();
     for case in &plan.cases {
-        bar.set_message(case.label());
+        bar.set_message(case.label.clone());
         let scene = crate::scene::load(&case.scene, &case.overrides);
         let inputs = scene.as_ref().ok().and_then(inputs);
         let old = table.old_row(case, inputs.as_deref());
         let is_new = old.is_none();
         let mut row = match old {
             Some(row) => row,
-            None if table.is_beyond(&plan, case) => Row::skipped(case, "an earlier mesh took too long"),
+            None if table.is_beyond(case) => Row::skipped(case, "an earlier mesh took too long"),
             None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
             None => measure(case, scene, &runner, &reference, &mut meshed)?,
         };
         row.inputs = inputs.unwrap_or_default();
         if !(request.quiet && row.is_good()) {
-            bar.suspend(|| say(row.line(&case.label(), is_new)))?;
+            bar.suspend(|| say(row.line(&case.label, is_new)))?;
         }
         table.add(row, is_new).iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
         bar.inc(1);
     }
     bar.finish_and_clear();
-    errors::against_finest(&mut table, &plan);
-    table.compare_with_linear();
-    let mut written = table.rewrite();
-    for (name, plot) in charts::all(&table, &plan) {
+    let mut written = table.complete();
+    for (name, plot) in charts::all(&table.rows, &plan) {
         written = written.and(folder.write(&name, |out| plot.write(out)));
     }
     if !request.quiet {
-        say(summary::of(&table, &plan))?;
+        say(summary::of(&table.rows, &plan))?;
     }
     say(format_args!("results in {}", folder.path().display()))?;
     written?;
@@ -102,7 +102,7 @@ fn measure(
     case: &Case,
     scene: Result<Scene>,
     runner: &Runner,
-    reference: &compare::References,
+    reference: &References,
     meshed: &mut BTreeSet<Vec<String>>,
 ) -> Result<Row> {
     let scene = match scene {
@@ -129,7 +129,7 @@ fn measure(
 fn known_error(
     scene: &Scene,
     row: &Row,
-    reference: &compare::References,
+    reference: &References,
     runner: &Runner,
     case: &Case,
 ) -> Option<(f64, &'static str)> {

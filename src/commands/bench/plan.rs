@@ -1,7 +1,8 @@
 //! The plan of a benchmark: all combinations of scenes, keys, orders, methods, solvers and ranks.
 
 use super::request::{Request, usage};
-use crate::commands::{Variation, case_of, combinations};
+use crate::commands::case_of;
+use crate::commands::cases::{Axis, Choice, combinations, named};
 use crate::error::Result;
 use crate::problem::{Order, Preset};
 use crate::scene::Scene;
@@ -26,8 +27,8 @@ pub(super) struct Case {
     pub scene: PathBuf,
     /// Values of the columns that distinguish it from other cases: see [`Plan::columns`].
     pub key: Vec<String>,
-    /// Short texts of those values that differ within the plan.
-    parts: Vec<String>,
+    /// A text that distinguishes it from the other cases of the plan.
+    pub label: String,
     /// Overrides of the scene.
     pub overrides: Vec<String>,
     /// Those overrides that the mesh depends on.
@@ -41,33 +42,20 @@ pub(super) struct Case {
 /// The method's name for one linear factor-and-solve.
 pub(super) const LINEAR: &str = "linear";
 
+/// Overrides of a run with one sweep after the start, whatever the tolerance, which has a linear factor-and-solve.
+const ONE_SWEEP: &str = "method={name=\"robin\", robin=\"auto\", stop={residual=1e-300, iterations=1}}";
+
+/// The solver that has no factorisation of whole stiffness matrices, so that one solve by it is no reference cost.
+const CONDENSED: &str = "condensed";
+
 /// Columns of a key after the scene and those of `--over`.
 const COLUMNS: [&str; 4] = ["solver", ASKED, "order", "ranks"];
 
 /// Column of the method that was asked for. The method that ran can be another.
 pub(super) const ASKED: &str = "asked";
 
-/// An inner solver: a name in the table with its overrides of the scene and its PETSc options.
-#[derive(Clone)]
-struct Solver {
-    name: String,
-    overrides: Vec<String>,
-    petsc: Vec<String>,
-    /// Whether it factors or preconditions whole stiffness matrices, so that one solve by it is a reference cost.
-    is_whole: bool,
-}
-
-/// The choices that make a case of a scene and a mesh.
-struct Choice<'a> {
-    /// Values of the keys.
-    values: &'a [String],
-    /// Element order of all bodies, if it is not the scene's.
-    order: Option<usize>,
-    /// Method, if it is not the scene's.
-    method: Option<&'a str>,
-    solver: &'a Solver,
-    ranks: usize,
-}
+/// Overrides of all runs: only tables are needed.
+const OUTPUT: [&str; 3] = ["output.vtu=false", "output.plots=false", "output.pairs=all"];
 
 impl Plan {
     /// Return the plan of a request.
@@ -75,8 +63,8 @@ impl Plan {
     /// # Errors
     /// Scenes that cannot be read, lists that make no sense.
     pub fn new(request: &Request) -> Result<Self> {
-        let variations = request.over.iter().map(|text| Variation::parse(text)).collect::<Result<Vec<_>>>()?;
-        if variations.iter().any(|variation| variation.key == "solver") {
+        let over = Axis::all_over(&request.over)?;
+        if over.iter().any(|axis| axis.name == "solver") {
             return Err(usage("`--over solver=...` would hide the solvers of the table").help("--solver mumps,hypre"));
         }
         let solvers = solvers(&request.solvers)?;
@@ -89,73 +77,64 @@ impl Plan {
         let overrides = request.all_overrides();
         let scenes =
             request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
-        let keys = variations.iter().map(|variation| variation.key.clone()).collect();
+        let keys = over.iter().map(|axis| axis.name.clone()).collect();
+        let mut axes = over;
         let mut plan = Plan { names: names(&scenes), scenes, keys, cases: Vec::new() };
         for index in 0..plan.scenes.len() {
-            for values in combinations(&variations) {
-                plan.add(index, request, &values, &solvers);
-            }
+            axes.truncate(plan.keys.len());
+            axes.extend(plan.own_axes(index, request, &solvers));
+            let cases = combinations(&axes).into_iter().filter_map(|choices| plan.case(index, request, &choices));
+            let cases: Vec<Case> = cases.collect();
+            plan.cases.extend(cases);
         }
-        plan.shorten();
+        plan.label_cases();
         Ok(plan)
     }
 
-    /// Add all cases of a scene for some values of the keys.
-    fn add(&mut self, index: usize, request: &Request, values: &[String], solvers: &[Solver]) {
-        let (orders, mut methods) = (choices(&request.orders), choices(&request.methods));
+    /// Return the axes of a scene behind those of `--over`, from the slowest to the fastest.
+    fn own_axes(&self, index: usize, request: &Request, solvers: &[Choice]) -> [Axis; 4] {
+        let scene = &self.scenes[index];
+        let of_order = |order: &usize| {
+            let bodies = 0..scene.bodies.len();
+            Choice::of_scene(order.to_string(), bodies.map(|body| format!("body.{body}.order={order}")).collect())
+        };
+        let of_method = |name: &String| Choice::of_scene(name, vec![format!("method.name={name}")]);
+        let orders = choices(&request.orders, of_order, || orders_of(scene));
+        let mut methods = choices(&request.methods, of_method, || scene.method.name.name().to_owned());
         if request.linear {
-            methods.insert(0, Some(LINEAR.to_owned()));
+            // a reference cost is that of a solve to 1e-8, unless another tolerance is typed
+            let petsc = ["-ksp_rtol", "1e-8"].map(str::to_owned).to_vec();
+            methods.insert(0, Choice { petsc, ..Choice::of_scene(LINEAR, vec![ONE_SWEEP.to_owned()]) });
         }
-        for order in orders {
-            let mut mesh = request.all_overrides();
-            mesh.extend(self.keys.iter().zip(values).map(|(key, value)| format!("{key}={value}")));
-            if let Some(order) = order {
-                mesh.extend((0..self.scenes[index].bodies.len()).map(|body| format!("body.{body}.order={order}")));
-            }
-            for method in methods.iter().map(Option::as_deref) {
-                for solver in solvers.iter().filter(|solver| method != Some(LINEAR) || solver.is_whole) {
-                    for &ranks in &request.ranks {
-                        let choice = Choice { values, order, method, solver, ranks };
-                        let case = self.case(index, &mesh, &request.petsc, &choice);
-                        self.cases.push(case);
-                    }
-                }
-            }
-        }
+        let ranks = request.ranks.iter().map(|ranks| Choice::of_scene(ranks.to_string(), Vec::new())).collect();
+        [
+            Axis::new("order", orders),
+            Axis::new(ASKED, methods),
+            Axis::new("solver", solvers.to_vec()),
+            Axis::new("ranks", ranks),
+        ]
     }
 
-    /// Return a case of a scene.
-    fn case(&self, index: usize, mesh_overrides: &[String], petsc: &[String], choice: &Choice) -> Case {
-        let scene = &self.scenes[index];
-        let &Choice { values, order, method, solver, ranks } = choice;
-        let mut key = vec![self.names[index].clone()];
-        key.extend(values.iter().cloned());
-        key.extend([
-            solver.name.clone(),
-            method.map_or_else(|| scene.method.name.name().to_owned(), str::to_owned),
-            order.map_or_else(|| orders_of(scene), |order| order.to_string()),
-            ranks.to_string(),
-        ]);
-        let mut overrides = mesh_overrides.to_vec();
-        overrides.extend(["output.vtu=false", "output.plots=false", "output.pairs=all"].map(str::to_owned));
-        overrides.extend(solver.overrides.iter().cloned());
-        overrides.extend(method.map(|name| match name {
-            // one sweep after the start, whatever the tolerance
-            LINEAR => "method={name=\"robin\", robin=\"auto\", stop={residual=1e-300, iterations=1}}".to_owned(),
-            name => format!("method.name={name}"),
-        }));
-        // a reference cost is that of a solve to 1e-8, unless another tolerance is typed
-        let precise: &[&str] = if method == Some(LINEAR) { &["-ksp_rtol", "1e-8"] } else { &[] };
-        let precise = precise.iter().map(|&word| word.to_owned());
-        Case {
-            scene: scene.path.clone(),
-            key,
-            parts: Vec::new(),
-            overrides,
-            mesh_overrides: mesh_overrides.to_vec(),
-            petsc: precise.chain(petsc.iter().chain(&solver.petsc).cloned()).collect(),
-            ranks,
+    /// Return the case of a scene with these choices of the axes; none for a reference cost of a solver that has none.
+    fn case(&self, index: usize, request: &Request, choices: &[&Choice]) -> Option<Case> {
+        let (values, [order, method, solver, ranks]) = choices.split_last_chunk::<4>()?;
+        if method.text == LINEAR && solver.text == CONDENSED {
+            return None;
         }
+        let texts = |choices: &[&Choice]| choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
+        let overrides = |choices: &[&Choice]| choices.iter().flat_map(|choice| choice.overrides.clone()).collect();
+        let mesh_overrides: Vec<String> = [request.all_overrides(), overrides(values), overrides(&[order])].concat();
+        Some(Case {
+            scene: self.scenes[index].path.clone(),
+            key: [vec![self.names[index].clone()], texts(values), texts(&[solver, method, order, ranks])].concat(),
+            label: String::new(),
+            overrides: [mesh_overrides.clone(), OUTPUT.map(str::to_owned).to_vec(), overrides(&[solver, method])]
+                .concat(),
+            mesh_overrides,
+            // what is typed for all runs wins over the precision of a reference cost, and a solver over both
+            petsc: [&method.petsc[..], &request.petsc, &solver.petsc].concat(),
+            ranks: ranks.text.parse().ok()?,
+        })
     }
 
     /// Return the scene of a name.
@@ -169,33 +148,31 @@ impl Plan {
         std::iter::once("scene").chain(keys).chain(COLUMNS).map(str::to_owned).collect()
     }
 
-    /// Give every case the parts of its label: the values of its key that differ within the plan.
-    fn shorten(&mut self) {
+    /// Give every case its label: the values of its key that differ within the plan, or else the solver.
+    fn label_cases(&mut self) {
         let columns = self.columns();
-        let differs: Vec<bool> = (0..columns.len())
-            .map(|column| self.cases.iter().any(|case| case.key[column] != self.cases[0].key[column]))
-            .collect();
+        let differs = |column: &usize| self.cases.iter().any(|case| case.key[*column] != self.cases[0].key[*column]);
+        let mut shown: Vec<usize> = (0..columns.len()).filter(differs).collect();
+        if shown.is_empty() {
+            shown.push(columns.len() - COLUMNS.len());
+        }
         for case in &mut self.cases {
-            let parts = columns.iter().zip(&case.key).zip(&differs);
-            case.parts = parts.filter(|(_, differs)| **differs).map(|((name, value), _)| part(name, value)).collect();
-            if case.parts.is_empty() {
-                case.parts.push(case.key[columns.len() - 4].clone());
-            }
+            let parts: Vec<String> =
+                shown.iter().map(|&column| part(&columns[column], &case.key[column], &columns)).collect();
+            case.label = parts.join(", ");
         }
     }
 }
 
-/// Return the requested choices, or one `None`, the scene's own choice, if there are none.
-fn choices<T: Clone>(requested: &[T]) -> Vec<Option<T>> {
-    if requested.is_empty() { vec![None] } else { requested.iter().cloned().map(Some).collect() }
+/// Return a choice for each of the `requested` values, or the scene's own one, which changes nothing, if there are none.
+fn choices<T>(requested: &[T], choice: impl Fn(&T) -> Choice, own: impl Fn() -> String) -> Vec<Choice> {
+    match requested {
+        [] => vec![Choice::of_scene(own(), Vec::new())],
+        _ => requested.iter().map(choice).collect(),
+    }
 }
 
 impl Case {
-    /// Return a text that distinguishes it from the other cases of the plan.
-    pub fn label(&self) -> String {
-        self.parts.join(", ")
-    }
-
     /// Return the method that was asked for.
     pub fn requested_method(&self) -> &str {
         &self.key[self.key.len() - 3]
@@ -207,15 +184,19 @@ impl Case {
     }
 }
 
-/// Return a part of a label. Scenes, solvers and methods need no name of their column.
-pub(super) fn part(column: &str, value: &str) -> String {
-    let last = column.rsplit('.').next().unwrap_or(column);
+/// Return the value of one of the columns as a part of a label. Scenes, solvers and methods need no name.
+pub(super) fn part(column: &str, value: &str, columns: &[String]) -> String {
     match column {
         "scene" | "solver" | ASKED => value.to_owned(),
         "order" => format!("P{value}"),
         "ranks" => format!("{value} ranks"),
-        _ => format!("{last} = {value}"),
+        _ => named(column, value, columns),
     }
+}
+
+/// Return whether a column is a key of the mesh.
+pub(super) fn is_of_mesh(column: &str) -> bool {
+    column.starts_with("mesh.")
 }
 
 /// Return the name of each scene's case, or its path where two scenes have the same name.
@@ -237,13 +218,8 @@ fn orders_of(scene: &Scene) -> String {
 }
 
 /// Return the solvers of `--solver`, or all presets if there is none.
-fn solvers(typed: &[String]) -> Result<Vec<Solver>> {
-    let preset = |name: &str| Solver {
-        name: name.to_owned(),
-        overrides: vec![format!("solver={name}")],
-        petsc: Vec::new(),
-        is_whole: name != "condensed",
-    };
+fn solvers(typed: &[String]) -> Result<Vec<Choice>> {
+    let preset = |name: &str| Choice::of_scene(name, vec![format!("solver={name}")]);
     if typed.is_empty() {
         return Ok(Preset::ALL.iter().map(|(name, _)| preset(name)).collect());
     }
@@ -251,7 +227,7 @@ fn solvers(typed: &[String]) -> Result<Vec<Solver>> {
     for text in typed {
         if text.trim_start().starts_with('-') {
             let petsc: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
-            solvers.push(Solver { name: petsc.join(" "), overrides: Vec::new(), petsc, is_whole: true });
+            solvers.push(Choice { petsc: petsc.clone(), ..Choice::of_scene(petsc.join(" "), Vec::new()) });
             continue;
         }
         for name in text.split(',').map(str::trim) {
@@ -271,7 +247,7 @@ mod tests {
     #[test]
     fn option_strings_stay_whole_and_names_are_split() {
         let list = solvers(&["mumps, hypre".to_owned(), "-pc_type icc -ksp_rtol 1e-9,5".to_owned()]).expect("solvers");
-        let names: Vec<&str> = list.iter().map(|solver| solver.name.as_str()).collect();
+        let names: Vec<&str> = list.iter().map(|solver| solver.text.as_str()).collect();
         assert_eq!(names, ["mumps", "hypre", "-pc_type icc -ksp_rtol 1e-9,5"]);
         assert_eq!(list[2].petsc.len(), 4);
         assert!(solvers(&["mumps,,icc".to_owned()]).is_err());

@@ -36,6 +36,13 @@ pub(super) struct Run {
     pub last_sweep: Option<f64>,
 }
 
+impl Run {
+    /// Return the number at a path of the report.
+    pub fn number(&self, path: &str) -> Option<f64> {
+        self.report.pointer(path).and_then(Value::as_f64)
+    }
+}
+
 /// The program that starts runs, and their limits.
 pub(super) struct Runner {
     program: PathBuf,

@@ -1,7 +1,7 @@
 //! The table on the terminal at the end of a benchmark.
 
 use super::plan::{ASKED, Plan};
-use super::table::{Row, Table as Rows};
+use super::row::Row;
 use crate::output::{sci, seconds};
 use comfy_table::{CellAlignment, Table, presets};
 
@@ -33,13 +33,12 @@ fn two(value: f64) -> String {
 }
 
 /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
-pub(super) fn of(rows: &Rows, plan: &Plan) -> Table {
+pub(super) fn of(rows: &[Row], plan: &Plan) -> Table {
     let columns = plan.columns();
-    let differs = |column: &usize| {
-        columns[*column] != ASKED && rows.rows.iter().any(|row| row.key[*column] != rows.rows[0].key[*column])
-    };
+    let differs =
+        |column: &usize| columns[*column] != ASKED && rows.iter().any(|row| row.key[*column] != rows[0].key[*column]);
     let named: Vec<usize> = (0..columns.len()).filter(differs).collect();
-    let known = |name: &str| rows.rows.iter().any(|row| row.number(name).is_some());
+    let known = |name: &str| rows.iter().any(|row| row.number(name).is_some());
     let numbers: Vec<_> = NUMBERS.iter().filter(|(_, name, _)| known(name)).collect();
     let mut table = Table::new();
     table.load_style(presets::NOTHING);
@@ -50,7 +49,7 @@ pub(super) fn of(rows: &Rows, plan: &Plan) -> Table {
         let words = words.chain([row.method.clone(), row.status.clone()]);
         words.chain(numbers.iter().map(|(_, name, format)| row.number(name).map_or(String::new(), format))).collect()
     };
-    table.add_rows(rows.rows.iter().map(line));
+    table.add_rows(rows.iter().map(line));
     for column in table.column_iter_mut().skip(named.len() + 2) {
         column.set_cell_alignment(CellAlignment::Right);
     }

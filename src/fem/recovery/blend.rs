@@ -11,6 +11,7 @@
 
 use super::{Law, Recovery};
 use crate::fem::{EDGES, Slope, assemble::interpolate, element, quadrature};
+use crate::linalg::dot;
 use crate::problem::order::Order;
 
 impl<const D: usize> Recovery<'_, D> {
@@ -56,23 +57,27 @@ impl<const D: usize> Recovery<'_, D> {
         sum
     }
 
-    /// Return the residual of the interpolation error: `-int sigma(b) : grad v` for every shape function v.
+    /// Compute the residual `-int sigma(b) : grad v` of the interpolation error b for every shape function v, and the squared energy norm of b on
+    /// each cell.
     ///
     /// With b the error of the nodal interpolant, a displacement w with this residual is the error of the nodal values.
-    pub fn interpolation_residual(&self, law: Law<D>) -> Vec<f64> {
+    pub fn interpolation_error(&self, law: Law<D>) -> InterpolationError {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
         let rule = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
-        let mut residual = vec![0.0; space.dofs()];
-        for index in 0..space.cell_count() {
+        let mut error = InterpolationError { residual: vec![0.0; space.dofs()], cells: vec![0.0; space.cell_count()] };
+        for (index, energy) in error.cells.iter_mut().enumerate() {
             let x = space.cell_nodes(index);
             for (l, weight) in rule.iter() {
                 let Some((at, measure)) = At::new(space.order, self.cell(index), &x, l) else { continue };
-                let stress = law(index, at.x, &self.missed_slope(&at).strain());
-                self.add_stress(&at, -weight * measure * space.circle(&at.x), &stress, &mut residual);
+                let weight = weight * measure * space.circle(&at.x);
+                let strain = self.missed_slope(&at).strain();
+                let stress = law(index, at.x, &strain);
+                *energy += weight * dot(&stress, &strain);
+                self.add_stress(&at, -weight, &stress, &mut error.residual);
             }
         }
-        residual
+        error
     }
 
     /// Return the gradient of b at a point of a cell.
@@ -90,8 +95,13 @@ impl<const D: usize> Recovery<'_, D> {
         slope
     }
 
+    /// Return the gradient of the discrete displacement at a point of a cell.
+    pub(super) fn discrete_slope(&self, at: &At<D>) -> Slope<D> {
+        self.space.slope(at.cell, &at.x, &at.phi, &at.gradient, self.displacement)
+    }
+
     /// Add `weight sigma : grad v` for the shape functions v of a cell to `sum`.
-    fn add_stress(&self, at: &At<D>, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
+    pub(super) fn add_stress(&self, at: &At<D>, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
         let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
         for (a, &node) in at.cell.iter().enumerate() {
             let first = D * node as usize;
@@ -104,13 +114,22 @@ impl<const D: usize> Recovery<'_, D> {
     }
 }
 
+/// The error b of the nodal interpolant of a recovered displacement.
+pub struct InterpolationError {
+    /// Residual `-int sigma(b) : grad v` for every shape function v, one entry per dof.
+    pub residual: Vec<f64>,
+    /// Squared energy norm of b on each cell.
+    pub cells: Vec<f64>,
+}
+
 /// A point of a cell, with the shape functions there.
 pub(super) struct At<'a, const D: usize> {
     /// Nodes of the cell.
     cell: &'a [u32],
     /// Barycentric coordinates of the point.
     l: &'a [f64],
-    x: [f64; D],
+    /// Coordinates of the point.
+    pub x: [f64; D],
     phi: [f64; element::MOST],
     gradient: [[f64; D]; element::MOST],
 }

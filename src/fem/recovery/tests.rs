@@ -105,3 +105,31 @@ fn the_gradient_is_that_of_the_values_in_curved_cells() {
         }
     }
 }
+
+/// The load of a body that is softer by a quarter does a quarter of the energy as work, and none on a rigid motion.
+#[test]
+fn softening_does_the_work_that_stiffness_lacks() {
+    for order in [Order::P1, Order::P2] {
+        let space = block::<3>(3, order);
+        let u: Vec<f64> = space.nodes.iter().flat_map(|x| field::<3>(2, x)).collect();
+        let recovery = Recovery::new(&space, &u);
+        let law = |_, _, strain: &[f64; 6]| strain.map(|e| 2.0 * e);
+        let rule = quadrature::simplex(4, 2);
+        let energy = |index: usize| -> f64 {
+            let (x, cell) = (space.cell_nodes(index), recovery.cell(index));
+            let of_point = |(l, weight): (&[f64], f64)| {
+                let (at, measure) = blend::At::new(order, cell, &x, l).expect("a cell");
+                let strain = recovery.discrete_slope(&at).strain();
+                2.0 * weight * measure * crate::linalg::dot(&strain, &strain)
+            };
+            rule.iter().map(|(l, weight)| of_point((l, weight))).sum()
+        };
+        let energies: Vec<f64> = (0..space.cell_count()).map(energy).collect();
+        let errors: Vec<f64> = energies.iter().map(|energy| energy / 3.0).collect();
+        let load = recovery.softening(&law, &errors);
+        let (work, quarter) = (crate::linalg::dot(&load, &u), 0.25 * energies.iter().sum::<f64>());
+        assert!((work / quarter - 1.0).abs() < 1e-10, "{order:?}: {work} {quarter}");
+        let turned: f64 = space.nodes.iter().zip(load.chunks(3)).map(|(x, f)| x[0] * f[1] - x[1] * f[0]).sum();
+        assert!(turned.abs() < 1e-10 * quarter, "{order:?}: {turned}");
+    }
+}

@@ -16,23 +16,6 @@ use crate::solver::{CondensedBody, Krylov, Retained, SparseBody};
 use serde::{Deserialize, Serialize};
 
 impl Inner<'_> {
-    /// Return the decisions of the plan that the other ranks need.
-    fn decisions(&self) -> Decisions {
-        let of_body = |plan: &Plan| Decision {
-            name: plan.name.clone(),
-            preset: plan.preset,
-            dimension: plan.dimension,
-            order: plan.order,
-            dofs: plan.dofs,
-            retained: plan.retained.clone(),
-        };
-        Decisions {
-            linear: self.linear,
-            distributed: self.distributed.clone(),
-            bodies: self.plans.iter().map(of_body).collect(),
-        }
-    }
-
     /// Set the PETSc options of the plan.
     fn apply(&mut self) {
         let is_quadratic = self.is_quadratic();
@@ -60,18 +43,7 @@ pub struct Decisions {
     linear: Linear,
     /// Whether each body is distributed over the ranks, if sweeps solve linear steps.
     distributed: Vec<bool>,
-    bodies: Vec<Decision>,
-}
-
-/// The choice for a body; see [`Plan`].
-#[derive(Serialize, Deserialize)]
-struct Decision {
-    name: String,
-    preset: Preset,
-    dimension: usize,
-    order: Order,
-    dofs: usize,
-    retained: Option<Retained>,
+    bodies: Vec<Plan>,
 }
 
 impl Factory for Inner<'_> {
@@ -110,20 +82,16 @@ impl Factory for Inner<'_> {
         if self.linear == Linear::Sweeps {
             self.distributed = distributed_bodies(&self.plans, self.session.size());
         }
-        let decisions = self.decisions();
+        let (distributed, bodies) = (self.distributed.clone(), self.plans.clone());
         self.apply();
-        Ok(decisions)
+        Ok(Decisions { linear: self.linear, distributed, bodies })
     }
 
     fn adopt(&mut self, decisions: Decisions) -> Result<()> {
-        let Decisions { linear, distributed, bodies } = decisions;
-        (self.linear, self.distributed) = (linear, distributed);
-        for (index, body) in bodies.into_iter().enumerate() {
-            let Decision { name, preset, dimension, order, dofs, retained } = body;
-            let chosen = self.typed.of(&name);
-            self.places.insert(name.clone(), index);
-            let (reason, condensable) = (String::new(), retained.is_some());
-            self.plans.push(Plan { name, chosen, preset, reason, dimension, order, dofs, condensable, retained });
+        (self.linear, self.distributed, self.plans) = (decisions.linear, decisions.distributed, decisions.bodies);
+        for (index, plan) in self.plans.iter_mut().enumerate() {
+            plan.chosen = self.typed.of(&plan.name);
+            self.places.insert(plan.name.clone(), index);
         }
         self.apply();
         Ok(())

@@ -1,42 +1,39 @@
-//! The options of one solver, which PETSc sees only while that solver is made and set up.
+//! What the user wrote, and the options of one solver, which PETSc sees only while that solver works.
 
+use super::names::{looks, nest_of};
 use crate::error::Result;
-use crate::petsc::{Options, Session, is_of_family};
+use crate::petsc::{Entry, Session, is_of_family};
 use std::collections::BTreeMap;
 
-/// Words in the names of PETSc options that print or draw. All such options have one of them in their name, except for [`LOOKING_NAMES`].
-const LOOKING_WORDS: [&str; 6] = ["view", "monitor", "print", "printstat", "statprint", "log"];
+/// The options that the user wrote: on the command line, in files, and in the scene.
+#[derive(Default)]
+pub struct Typed(Vec<Entry>);
 
-/// Options that print and have no such word in their name.
-const LOOKING_NAMES: &str = "ksp_converged_reason ksp_converged_rate ksp_compute_singularvalues ksp_compute_eigenvalues \
-    ksp_compute_eigenvalues_explicitly ksp_final_residual mat_umfpack_prl";
+impl Typed {
+    /// Read PETSc's table.
+    pub fn read(session: &Session) -> Result<Self> {
+        session.options().all().map(Self)
+    }
 
-/// Return whether an option of a PETSc object only looks at a solver: it prints or draws, and does not change what is computed. The name is
-/// without dash and without the prefix of a body.
-///
-/// ```
-/// use winkler::solver::options::looks;
-/// for name in ["ksp_view", "ksp_monitor_true_residual", "mg_levels_1_ksp_view", "ksp_converged_reason", "mat_view_info"] {
-///     assert!(looks(name), "{name}");
-/// }
-/// for name in ["ksp_type", "ksp_rtol", "pc_type", "pc_hypre_type", "mat_type", "ksp_error_if_not_converged", "pc_gamg_threshold"] {
-///     assert!(!looks(name), "{name}");
-/// }
-/// ```
-pub fn looks(name: &str) -> bool {
-    name.split('_').any(|word| LOOKING_WORDS.contains(&word))
-        || LOOKING_NAMES.split_whitespace().any(|known| nest_of(name, known).is_some())
-}
-
-/// Return the prefix of the nested solver in an option name that ends in `leaf`: `sub_` for `sub_pc_type` with the leaf `pc_type`, and an empty
-/// prefix for the leaf itself. `None` for other names.
-pub(super) fn nest_of<'a>(name: &'a str, leaf: &str) -> Option<&'a str> {
-    name.strip_suffix(leaf).filter(|nest| nest.is_empty() || nest.ends_with('_'))
+    /// Return the options of the solver with a prefix: its own ones, and plain ones of PETSc's objects that it has not as its own.
+    pub fn of(&self, prefix: &str) -> Chosen {
+        let mut chosen = Chosen::new(prefix);
+        for (start, origin) in [(format!("-{prefix}_"), Origin::Own), ("-".to_owned(), Origin::Plain)] {
+            for (option, value) in &self.0 {
+                let name = option.to_ascii_lowercase();
+                // no name of a body has a word of a family in it
+                if let Some(name) = name.strip_prefix(&start).filter(|name| is_of_family(name)) {
+                    chosen.add(name, value.as_deref(), origin);
+                }
+            }
+        }
+        chosen
+    }
 }
 
 /// Why a solver has an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Origin {
+enum Origin {
     /// The user wrote it with the prefix of this solver, so that it stands in PETSc's table.
     Own,
     /// The user wrote it for all solvers.
@@ -57,42 +54,13 @@ impl Choice {
     fn value(&self) -> &str {
         self.value.as_deref().unwrap_or_default()
     }
-
-    fn is_typed(&self) -> bool {
-        self.origin != Origin::Default
-    }
 }
 
 /// The options of one solver: its own ones, plain ones that it has not as its own, and the program's choice where the user wrote
 /// nothing.
 ///
 /// PETSc's table holds only 512 options, so these are not kept there; they are [lent](Self::lend) to it.
-///
-/// ```
-/// use winkler::{petsc::{Ksp, Session}, solver::options::*};
-/// let words = ["-ksp_type", "cg", "-lower_ksp_type", "gmres"];
-/// let session = Session::start(&words.map(String::from))?;
-/// let typed = Typed::read(&session, &["upper", "lower"])?;
-/// let mut upper = typed.of("upper");
-/// upper.set_default("ksp_type", "minres");
-/// upper.set_default("ksp_max_it", "7");
-/// assert_eq!([upper.get("ksp_type"), upper.typed("ksp_type")], [Some("cg"); 2]);
-/// assert_eq!([upper.get("ksp_max_it"), upper.typed("ksp_max_it")], [Some("7"), None]);
-/// assert_eq!(typed.of("lower").get("ksp_type"), Some("gmres"));
-///
-/// // PETSc reads them, notes that the plain option was read, and forgets the copies
-/// let ksp = upper.lend(&session, || {
-///     let mut ksp = Ksp::new(&session, "upper_")?;
-///     ksp.set_from_options()?;
-///     Ok(ksp)
-/// })?;
-/// assert_eq!(ksp.ksp_type(), "cg");
-/// assert_eq!(session.options().all()?.len(), 2);
-/// assert_eq!(session.options().left()?.len(), 1);
-/// # session.options().mark_used("-lower_ksp_type")?;
-/// # Ok::<(), winkler::error::Error>(())
-/// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Chosen {
     prefix: String,
     /// Keys are names in small letters, because PETSc ignores the case of names.
@@ -106,14 +74,9 @@ impl Chosen {
     }
 
     /// Add an option, unless one of this name is there already. So own options are added first, then plain ones, then defaults.
-    pub(super) fn add(&mut self, name: &str, value: Option<&str>, origin: Origin) {
+    fn add(&mut self, name: &str, value: Option<&str>, origin: Origin) {
         let choice = || Choice { name: name.to_owned(), value: value.map(str::to_owned), origin };
-        self.choices.entry(name.to_lowercase()).or_insert_with(choice);
-    }
-
-    /// Return the word before the underscore of the solver's own options.
-    pub fn prefix(&self) -> &str {
-        &self.prefix
+        self.choices.entry(name.to_ascii_lowercase()).or_insert_with(choice);
     }
 
     /// Set an option that is not set yet, as the program's choice. It never counts as typed.
@@ -121,42 +84,47 @@ impl Chosen {
         self.add(name, Some(value), Origin::Default);
     }
 
-    fn choice(&self, name: &str) -> Option<&Choice> {
-        self.choices.get(&name.to_lowercase())
+    /// Choose MUMPS for `cholesky` and `lu`, in this solver and in those nested in it (`-sub_pc_type lu`), where
+    /// `-pc_factor_mat_solver_type` was not given. PETSc's own factorisation is over 20 times slower.
+    pub fn prefer_mumps(&mut self) {
+        let direct = self.choices.iter().filter(|(_, choice)| matches!(choice.value(), "cholesky" | "lu"));
+        let nests: Vec<String> = direct.filter_map(|(name, _)| nest_of(name, "pc_type")).map(str::to_owned).collect();
+        nests.iter().for_each(|nest| self.set_default(&format!("{nest}pc_factor_mat_solver_type"), "mumps"));
+    }
+
+    /// Return the word before the underscore of the solver's own options.
+    pub fn prefix(&self) -> &str {
+        &self.prefix
     }
 
     /// Return the value in force, empty for an option without one.
     pub fn get(&self, name: &str) -> Option<&str> {
-        self.choice(name).map(Choice::value)
+        self.choices.get(&name.to_ascii_lowercase()).map(Choice::value)
     }
 
     /// Return the value in force if the user wrote it.
     pub fn typed(&self, name: &str) -> Option<&str> {
-        self.choice(name).filter(|choice| choice.is_typed()).map(Choice::value)
+        let choice = self.choices.get(&name.to_ascii_lowercase())?;
+        (choice.origin != Origin::Default).then(|| choice.value())
     }
 
-    /// Return the options that the user wrote, each under its name in small letters.
-    fn all_typed(&self) -> impl Iterator<Item = (&str, &Choice)> {
-        self.choices.iter().filter(|(_, choice)| choice.is_typed()).map(|(name, choice)| (name.as_str(), choice))
+    /// Return name, in small letters, and value of each option that the user wrote.
+    pub fn all_typed(&self) -> impl Iterator<Item = (&str, &str)> {
+        let typed = self.choices.iter().filter(|(_, choice)| choice.origin != Origin::Default);
+        typed.map(|(name, choice)| (name.as_str(), choice.value()))
+    }
+
+    /// Return name and value of each option that chooses a type. The other options of a solver depend on these.
+    pub(super) fn types(&self) -> impl Iterator<Item = (&str, &str)> {
+        let types = self.choices.iter().filter(|(name, _)| name.ends_with("_type"));
+        types.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
     /// Return whether the user wrote an option that chooses or steers the solver or its matrix: then the user wants a KSP of PETSc. Controls of
     /// MUMPS and options that only [look](looks) at a solver do not count.
-    ///
-    /// ```
-    /// use winkler::{petsc::Session, solver::options::*};
-    /// let words = ["-up_pc_type", "icc", "-mat_mumps_icntl_14", "50", "-log_view", "-ksp_view"];
-    /// let session = Session::start(&words.map(String::from))?;
-    /// let typed = Typed::read(&session, &["up", "low"])?;
-    /// let mut low = typed.of("low");
-    /// low.set_default("pc_type", "gamg");
-    /// assert!(typed.of("up").asks_for_ksp() && !low.asks_for_ksp());
-    /// # session.options().clear("-log_view")?;
-    /// # Ok::<(), winkler::error::Error>(())
-    /// ```
     pub fn asks_for_ksp(&self) -> bool {
         let is_control = |name: &str| name.starts_with("mat_mumps_icntl_") || name.starts_with("mat_mumps_cntl_");
-        self.all_typed().any(|(_, Choice { name, .. })| is_of_family(name) && !looks(name) && !is_control(name))
+        self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control(name))
     }
 
     /// Return whether the user wrote an option for this solver alone.
@@ -169,36 +137,9 @@ impl Chosen {
         self.all_typed().any(|(name, _)| name.starts_with(family))
     }
 
-    /// Return the name and value of each option that the user wrote and whose name ends with `end`.
-    pub fn typed_that_end<'a>(&'a self, end: &'a str) -> impl Iterator<Item = (&'a str, &'a str)> {
-        self.all_typed().filter(move |(name, _)| name.ends_with(end)).map(|(name, choice)| (name, choice.value()))
-    }
-
     /// Return whether the user wrote an option that applies to this solver.
     pub fn has_typed(&self) -> bool {
         self.all_typed().next().is_some()
-    }
-
-    /// Choose MUMPS for `cholesky` and `lu`, in this solver and in those nested in it (`-sub_pc_type lu`), where
-    /// `-pc_factor_mat_solver_type` was not given. PETSc's own factorisation is over 20 times slower.
-    ///
-    /// ```
-    /// use winkler::{petsc::Session, solver::options::*};
-    /// let words = ["-pc_type", "asm", "-sub_pc_type", "lu", "-low_pc_type", "cholesky", "-low_pc_factor_mat_solver_type", "petsc"];
-    /// let session = Session::start(&words.map(String::from))?;
-    /// let typed = Typed::read(&session, &["up", "low"])?;
-    /// let [mut up, mut low] = ["up", "low"].map(|body| typed.of(body));
-    /// up.prefer_mumps();
-    /// low.prefer_mumps();
-    /// assert_eq!(up.get("sub_pc_factor_mat_solver_type"), Some("mumps"));
-    /// assert_eq!(up.get("pc_factor_mat_solver_type"), None);
-    /// assert_eq!(low.get("pc_factor_mat_solver_type"), Some("petsc"));
-    /// # Ok::<(), winkler::error::Error>(())
-    /// ```
-    pub fn prefer_mumps(&mut self) {
-        let direct = self.choices.iter().filter(|(_, choice)| matches!(choice.value(), "cholesky" | "lu"));
-        let nests: Vec<String> = direct.filter_map(|(name, _)| nest_of(name, "pc_type")).map(str::to_owned).collect();
-        nests.iter().for_each(|nest| self.set_default(&format!("{nest}pc_factor_mat_solver_type"), "mumps"));
     }
 
     /// Run `work` while the options of this solver stand in PETSc's table under its prefix, and take them out again. Plain options that
@@ -208,27 +149,21 @@ impl Chosen {
     /// Those of the work, and of PETSc's table, which is full at 512 options.
     pub fn lend<T>(&self, session: &Session, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let options = session.options();
+        let copy = |choice: &Choice| format!("-{}_{}", self.prefix, choice.name);
         // own options stand in the table already
         let lent = || self.choices.values().filter(|choice| choice.origin != Origin::Own);
-        let put = |choice: &Choice| options.set(&self.prefixed(choice), choice.value.as_deref());
-        let done = lent().try_for_each(put).and_then(|()| work());
+        let done =
+            lent().try_for_each(|choice| options.set(&copy(choice), choice.value.as_deref())).and_then(|()| work());
+        let take_back = |choice: &Choice| {
+            let (copy, plain) = (copy(choice), format!("-{}", choice.name));
+            if choice.origin == Origin::Plain && options.used(&copy) && !options.used(&plain) {
+                options.mark_used(&plain)?;
+            }
+            options.clear(&copy)
+        };
         // every option is taken back, even if taking back another one failed
-        let taken = lent().map(|choice| self.take_back(&options, choice)).fold(Ok(()), Result::and);
+        let taken = lent().map(take_back).fold(Ok(()), Result::and);
         done.and_then(|done| taken.map(|()| done))
-    }
-
-    /// Return the name of an option with dash and prefix, as it stands in PETSc's table while it is lent.
-    fn prefixed(&self, choice: &Choice) -> String {
-        format!("-{}_{}", self.prefix, choice.name)
-    }
-
-    /// Take a lent option out of PETSc's table. If it was read, the plain option that it is a copy of counts as read.
-    fn take_back(&self, options: &Options, choice: &Choice) -> Result<()> {
-        let (copy, plain) = (self.prefixed(choice), format!("-{}", choice.name));
-        if choice.origin == Origin::Plain && options.used(&copy) && !options.used(&plain) {
-            options.mark_used(&plain)?;
-        }
-        options.clear(&copy)
     }
 }
 
@@ -236,23 +171,44 @@ impl Chosen {
 mod tests {
     use super::*;
 
-    /// The option that is added first wins, whatever the case of its letters, and a default is added last.
+    fn typed(options: &[(&str, &str)]) -> Typed {
+        Typed(options.iter().map(|(name, value)| ((*name).to_owned(), Some((*value).to_owned()))).collect())
+    }
+
     #[test]
     fn own_options_win_over_those_of_all_and_over_defaults() {
-        let mut chosen = Chosen::new("b7");
-        chosen.add("ksp_type", Some("cg"), Origin::Own);
-        chosen.add("KSP_type", Some("gmres"), Origin::Plain);
-        chosen.add("pc_type", Some("lu"), Origin::Plain);
+        let typed =
+            typed(&[("-KSP_type", "gmres"), ("-b_1_pc_type", "icc"), ("-b_ksp_type", "cg"), ("-pc_type", "lu")]);
+        let mut chosen = typed.of("b");
         chosen.set_default("pc_type", "hypre");
         chosen.set_default("ksp_rtol", "1e-6");
+        let names = ["ksp_type", "PC_type", "ksp_rtol", "none"];
+        assert_eq!(names.map(|name| chosen.get(name)), [Some("cg"), Some("lu"), Some("1e-6"), None]);
+        assert_eq!(names.map(|name| chosen.typed(name)), [Some("cg"), Some("lu"), None, None]);
         assert_eq!(
-            ["ksp_type", "pc_type", "ksp_rtol"].map(|name| chosen.get(name)),
-            [Some("cg"), Some("lu"), Some("1e-6")]
+            ["ksp_type", "pc_type"].map(|name| typed.of("b_1").get(name).map(str::to_owned)),
+            ["gmres", "icc"].map(|value| Some(value.to_owned()))
         );
-        assert_eq!(["pc_type", "ksp_rtol", "none"].map(|name| chosen.typed(name)), [Some("lu"), None, None]);
-        assert!(chosen.has_own() && chosen.has_typed() && chosen.asks_for_ksp());
-        let mut plain = Chosen::new("b8");
-        plain.set_default("ksp_type", "cg");
-        assert!(!plain.has_typed() && !plain.asks_for_ksp());
+        assert!(chosen.has_own() && !typed.of("c").has_own() && typed.of("c").has_typed_of("pc_"));
+    }
+
+    /// Options that look and controls of MUMPS leave the choice of the solver to the program.
+    #[test]
+    fn some_options_ask_for_a_solver_of_petsc() {
+        for (name, asks) in
+            [("-mat_mumps_icntl_14", false), ("-log_view", false), ("-ksp_view", false), ("-b_ksp_rtol", true)]
+        {
+            let mut chosen = typed(&[(name, "1")]).of("b");
+            chosen.set_default("pc_type", "gamg");
+            assert_eq!(chosen.asks_for_ksp(), asks, "{name}");
+        }
+    }
+
+    #[test]
+    fn factorisations_are_those_of_mumps() {
+        let mut chosen = typed(&[("-pc_type", "asm"), ("-sub_pc_type", "lu")]).of("b");
+        chosen.prefer_mumps();
+        let package = |nest: &str| chosen.get(&format!("{nest}pc_factor_mat_solver_type"));
+        assert_eq!([package("sub_"), package("")], [Some("mumps"), None]);
     }
 }

@@ -10,14 +10,6 @@ use std::path::Path;
 ///
 /// A PETSc option has one dash and two or more letters. It takes the next word as its value unless that looks like an
 /// option. A scene file (`*.toml`) or a command is never a value, except of `-options_file`. All words after `--` belong to the program.
-///
-/// ```
-/// use winkler::solver::options::split;
-/// let words = ["solve", "-ksp_monitor", "scene.toml", "-ksp_rtol", "1e-9", "-o", "out", "-pc_shift", "-1e-3", "--set", "a=1"];
-/// let (program, petsc) = split(words.map(String::from));
-/// assert_eq!(program, ["solve", "scene.toml", "-o", "out", "--set", "a=1"]);
-/// assert_eq!(petsc, ["-ksp_monitor", "-ksp_rtol", "1e-9", "-pc_shift", "-1e-3"]);
-/// ```
 pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<String>) {
     let (mut program, mut petsc) = (Vec::new(), Vec::new());
     let mut words = words.into_iter().peekable();
@@ -88,14 +80,9 @@ pub fn refuse_traps(session: &Session) -> Result<()> {
 pub fn refuse_log(session: &Session) -> Result<()> {
     // the value has the form TYPE:FILE:FORMAT
     let log = session.options().get("-log_view").unwrap_or_default();
-    match log.split(':').nth(1).filter(|file| !file.is_empty() && session.rank() == 0) {
-        Some(file) => try_file(Path::new(file)),
-        None => Ok(()),
-    }
-}
-
-/// Check that a file can be written. A file that was created for the check is removed again.
-fn try_file(path: &Path) -> Result<()> {
+    let Some(path) = log.split(':').nth(1).filter(|file| !file.is_empty() && session.rank() == 0).map(Path::new) else {
+        return Ok(());
+    };
     let is_new = !path.exists();
     OpenOptions::new().append(true).create(true).open(path).map_err(|cause| {
         Error::file(path, "write", &cause).help("-log_view names this file: let it lie in a folder that is there")

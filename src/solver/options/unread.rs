@@ -1,109 +1,117 @@
 //! Options that nobody read: mistyped ones, and valid ones that have no effect.
 
-use super::chosen::nest_of;
-use super::probe::Names;
-use super::typed::{Prefixes, Typed, without_dash};
-use crate::error::{Result, nearest};
-use crate::petsc::{Entry, Session, is_global};
-use std::collections::BTreeSet;
+use super::Chosen;
+use super::names::{self, WHOLE, bare, looks, nest_of};
+use crate::error::{Error, Kind, Result};
+use crate::petsc::{Ksp, Matrix, Session, is_global, is_of_family, printed};
+use mpi::collective::SystemOperation;
+use mpi::traits::CommunicatorCollectives;
+use std::cell::Cell;
 
-/// An option that the user typed and nobody read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unread {
-    /// Its name as typed, with the dash.
-    pub name: String,
-    /// What it is.
-    pub kind: UnreadKind,
-    /// The most similar name that PETSc knows, with the dash, for an unknown one.
-    pub nearest: Option<String>,
-}
-
-/// What an unread option is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UnreadKind {
-    /// PETSc knows no such option: an error.
-    Unknown,
-    /// PETSc knows it, but no solver of this run has it: a warning.
-    NotInUse,
-}
-
-/// An option that a solver reads only when it solves.
-const LATE: &str = "ksp_converged_reason";
-
-/// Return the options that the user typed and that nobody has read on any rank. Call it on every rank with the same bodies,
-/// after all solvers are set up. `all_reduce` combines the flags of all ranks by "or". The returned options count as read
-/// from then on, so that PETSc does not report them again when it finalizes.
+/// Return the warnings of options that the user typed and that nobody has read on any rank. Collective; to be called after all solvers are set up,
+/// with the options of those that are PETSc's.
 ///
-/// ```
-/// use winkler::{petsc::{Ksp, Matrix, Session}, solver::options::*};
-/// let words = ["-ksp_tpye", "cg", "-pc_gamg_threshold", "0.1", "-ksp_max_it", "9", "-uper_pc_type", "icc", "-log"];
-/// let session = Session::start(&words.map(String::from))?;
-/// let mut upper = Typed::read(&session, &["upper"])?.of("upper");
-/// upper.set_default("pc_type", "jacobi");
-/// let matrix = Matrix::from_csr(&session, 1, vec![0, 1], vec![0], vec![2.0])?;
-/// upper.lend(&session, || {
-///     let mut ksp = Ksp::new(&session, "upper_")?;
-///     ksp.set_operator(&matrix)?;
-///     ksp.set_from_options()?;
-///     ksp.set_up()
-/// })?;
-/// let unread = unread(&session, &["upper"], &|_| ())?;
-/// let found: Vec<_> = unread.iter().map(|u| (u.name.as_str(), u.kind, u.nearest.as_deref())).collect();
-/// assert_eq!(found, [
-///     ("-ksp_tpye", UnreadKind::Unknown, Some("-ksp_type")),
-///     ("-pc_gamg_threshold", UnreadKind::NotInUse, None),
-///     ("-uper_pc_type", UnreadKind::Unknown, Some("-upper_pc_type")),
-/// ]);
-/// # Ok::<(), winkler::error::Error>(())
-/// ```
-pub fn unread(session: &Session, bodies: &[&str], all_reduce: &dyn Fn(&mut [u8])) -> Result<Vec<Unread>> {
-    let options = session.options();
-    let (prefixes, typed) = (Prefixes::new(bodies), Typed::read(session, bodies)?);
-    let all = options.all()?;
-    let candidates: Vec<&Entry> = all.iter().filter(|(name, _)| !is_late(name, &prefixes)).collect();
-    // a plain option serves no solver if every solver has an own option of that name; this is no mistake
-    let is_replaced =
-        |name: &str| prefixes.is_plain(name) && !bodies.is_empty() && typed.owners(without_dash(name)) == bodies.len();
-    let flag = |(name, _): &&Entry| u8::from(options.used(name) || is_replaced(name));
-    let mut read: Vec<u8> = candidates.iter().map(flag).collect();
-    all_reduce(&mut read);
-    let mut left: Vec<&str> = Vec::new();
-    for ((name, _), read) in candidates.into_iter().zip(read) {
-        // an option that another rank read is marked here, too: PETSc's -options_left knows only its own process
-        options.mark_used(name)?;
-        if read == 0 {
-            left.push(name);
-        }
-    }
+/// PETSc's own list `-options_left` at the end of the process has them, if the user asked for it.
+///
+/// # Errors
+/// PETSc knows no such option, as far as this program can tell.
+pub fn unread(session: &Session, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<String>> {
+    let left = left(session, bodies, solvers)?;
     if left.is_empty() {
         return Ok(Vec::new());
     }
-
-    let names = Names::collect(session, &typed.combinations())?;
-    let found = left.into_iter().map(|name| {
-        let (kind, nearest) = match names.contains(prefixes.bare(name)) {
-            true => (UnreadKind::NotInUse, None),
-            false => (UnreadKind::Unknown, most_similar(name, bodies, &names)),
-        };
-        Unread { name: name.to_owned(), kind, nearest }
-    });
-    Ok(found.collect())
+    let help = help_of(session, solvers.first())?;
+    let mut known: Vec<&str> = names::all();
+    known.extend(names_in(&help));
+    let is_known = |option: &&String| bare(option, bodies).any(|name| names::is_known(name, &known));
+    if let Some(option) = left.iter().find(|option| !is_known(option)) {
+        let error = Error::new(Kind::Solver, format!("PETSc knows no option {option}"));
+        let near = names::corrected(option, &known, &[bodies, &[WHOLE]].concat());
+        let help = || "`-help` lists the options of this run".to_owned();
+        return Err(error.help(near.map_or_else(help, |near| format!("did you mean -{near}?"))));
+    }
+    let is_watching = |name: &str| solvers.is_empty() && looks(name) && is_of_family(name);
+    let (watching, other): (Vec<String>, Vec<String>) =
+        left.into_iter().partition(|option| bare(option, bodies).any(is_watching));
+    let warning = |option: String| format!("option {option} was not used: no solver of this run reads it");
+    let mut warnings: Vec<String> = other.into_iter().map(warning).collect();
+    if !watching.is_empty() {
+        warnings.push(format!(
+            "nothing to show for {}: the bodies are condensed, so that PETSc has no solver here; --set solver=mumps gives each body one",
+            watching.join(" ")
+        ));
+    }
+    Ok(warnings)
 }
 
-/// Return the most similar name that PETSc knows, as a plain option or with the prefix of a body whose name resembles the beginning of `name`.
-fn most_similar(name: &str, bodies: &[&str], names: &Names) -> Option<String> {
-    let bare = without_dash(name);
-    let heads = bare.match_indices('_').map(|(at, _)| &bare[..at]);
-    let bodies: BTreeSet<&str> = heads.filter_map(|head| nearest(head, bodies.iter().copied())).collect();
-    let prefixes = std::iter::once(String::new()).chain(bodies.iter().map(|body| format!("{body}_")));
-    let known: Vec<String> =
-        prefixes.flat_map(|prefix| names.iter().map(move |name| format!("-{prefix}{name}"))).collect();
-    nearest(name, known.iter().map(String::as_str)).map(str::to_owned)
+/// Return the options of solvers that nobody has read on any rank. PETSc knows of the others that they are read.
+fn left(session: &Session, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<String>> {
+    let options = session.options();
+    let mut all: Vec<String> = options.all()?.into_iter().map(|(name, _)| name).collect();
+    // PETSc as a whole reads its options at any time
+    all.retain(|option| !is_global(&option[1..].to_ascii_lowercase()));
+    let prefixes: Vec<&str> = solvers.iter().map(Chosen::prefix).collect();
+    let own = |prefix: &&str, option: &str| {
+        let own = format!("-{prefix}_{}", &option[1..]);
+        all.iter().any(|option| option.eq_ignore_ascii_case(&own))
+    };
+    let is_read = |option: &String| {
+        // a solve reads this one
+        let is_late = !solvers.is_empty() && nest_of(&option[1..], "ksp_converged_reason").is_some();
+        // an option has no effect if every solver has an own one of this name; this is no mistake
+        let is_replaced =
+            [bodies, &prefixes].iter().any(|all| !all.is_empty() && all.iter().all(|prefix| own(prefix, option)));
+        u8::from(options.used(option) || is_late || is_replaced)
+    };
+    let mine: Vec<u8> = all.iter().map(is_read).collect();
+    let mut read = mine.clone();
+    if session.size() > 1 && !mine.is_empty() {
+        session.world().all_reduce_into(&mine[..], &mut read[..], SystemOperation::max());
+    }
+    // without -options_left PETSc would list what is left at its end once more
+    let is_listed = options.has("-options_left");
+    let mut marked = all.iter().zip(&read).filter(|(_, read)| **read == 1 || !is_listed);
+    marked.try_for_each(|(option, _)| options.mark_used(option))?;
+    Ok(all.into_iter().zip(read).filter(|(_, read)| *read == 0).map(|(option, _)| option).collect())
 }
 
-/// Return whether an option is not read by objects when they are set up. It belongs to PETSc as a whole, or a solver, which may be nested
-/// (`sub_ksp_converged_reason`), reads it later.
-fn is_late(name: &str, prefixes: &Prefixes) -> bool {
-    let is_of_petsc = prefixes.split(name).is_none() && is_global(without_dash(name));
-    is_of_petsc || nest_of(prefixes.bare(name), LATE).is_some()
+/// Return the help of a solver with the types of this one, without the prefix of its options. Without a solver it is that of PETSc's default.
+fn help_of(session: &Session, solver: Option<&Chosen>) -> Result<String> {
+    thread_local! {
+        /// PETSc prints the help of a prefix only once, so each solver has its own prefix.
+        static COUNT: Cell<usize> = const { Cell::new(0) };
+    }
+    COUNT.set(COUNT.get() + 1);
+    let mut chosen = Chosen::new(&format!("winklerprobe{}", COUNT.get()));
+    solver.into_iter().flat_map(Chosen::types).for_each(|(name, value)| chosen.set_default(name, value));
+    let prefix = format!("{}_", chosen.prefix());
+    let options = session.options();
+    let had_help = options.has("-help");
+    options.set("-help", None)?;
+    // a type that does not fit the small matrix prints its options all the same
+    let (_, help) = printed(session, || chosen.lend(session, || make(session, &prefix)));
+    if !had_help {
+        options.clear("-help")?;
+    }
+    Ok(help.replace(&prefix, ""))
+}
+
+/// Return the names in a help text: the words that begin its lines with a dash.
+fn names_in(help: &str) -> impl Iterator<Item = &str> {
+    let words = help.lines().filter_map(|line| line.trim_start().strip_prefix('-'));
+    words.filter_map(|word| word.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').next())
+}
+
+/// Print the options of a solver as `-help` does, for a run that makes no solver of PETSc.
+pub fn show_help(session: &Session) -> Result<()> {
+    make(session, "")
+}
+
+/// Set up a solver for a matrix of one entry, with options of this prefix. Nested objects (MUMPS, blocks) print their help only then.
+fn make(session: &Session, prefix: &str) -> Result<()> {
+    let matrix = Matrix::from_csr(session, 1, vec![0, 1], vec![0], vec![1.0])?;
+    let mut ksp = Ksp::new(session, prefix)?;
+    ksp.set_operator(&matrix)?;
+    ksp.set_from_options()?;
+    ksp.set_up()
 }

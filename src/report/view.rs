@@ -1,5 +1,6 @@
-//! The data of surfaces in space for the interactive view of the page.
+//! The data of bodies and contact surfaces for the interactive view of the page.
 
+use super::bands::{colors, hex, range};
 use super::body::Part;
 use crate::linalg::bounds;
 use base64::Engine;
@@ -13,18 +14,19 @@ const NONE: u16 = u16::MAX;
 ///
 /// Each part has points relative to the least coordinates and displacements (float32), triangles (uint32), and a value at each
 /// point (uint16). Values are scaled to the range of the parts; 65535 stands for none.
-pub fn view(bodies: &[Part], surfaces: &[Part], scale: f64) -> Value {
+pub fn data(bodies: &[Part], surfaces: &[Part], scale: f64, is_space: bool) -> Value {
     let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
     json!({
         "bodies": parts(bodies, low),
         "surfaces": parts(surfaces, low),
-        "travel": super::bands::range(bodies.iter().flat_map(Part::travel).collect::<Vec<_>>().iter()),
-        "stress": super::bands::range(bodies.iter().flat_map(|part| &part.value)),
-        "pressure": super::bands::range(surfaces.iter().flat_map(|part| &part.value)),
+        "travel": range(bodies.iter().flat_map(Part::travel).collect::<Vec<_>>().iter()),
+        "stress": range(bodies.iter().flat_map(|part| &part.value)),
+        "pressure": range(surfaces.iter().flat_map(|part| &part.value)),
         "low": [0.0, 0.0, 0.0],
         "high": relative(low, &high),
         "scale": scale,
-        "colors": super::bands::colors().to_vec(),
+        "space": is_space,
+        "colors": colors().map(hex).to_vec(),
     })
 }
 
@@ -35,8 +37,8 @@ fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
 
 /// Return the data of parts, with points relative to `low`.
 fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
-    let range = super::bands::range(parts.iter().flat_map(|part| &part.value));
-    parts.iter().map(|part| part_data(part, low, range)).collect()
+    let ends = range(parts.iter().flat_map(|part| &part.value));
+    parts.iter().map(|part| part_data(part, low, ends)).collect()
 }
 
 /// Return the data of a part; values are scaled to the range.

@@ -1,0 +1,228 @@
+//! Warnings of pairs of surfaces: what has no partner, how edges and facets of the meshes matter, and where layers and pairs end.
+
+use super::measure::peak;
+use super::preflight::coupling;
+use super::stages::{Built, Done};
+use super::verdict::is_solved;
+use crate::contact::{Chords, ContactPair, End, Left, LostPieces};
+use crate::discretize::ContactInfo;
+use crate::error::few;
+use crate::linalg::bounds;
+use crate::output::sci;
+use crate::problem::LayerSpec;
+use std::collections::BTreeMap;
+
+/// Return the names of the surfaces of a pair, in the order of the scene.
+fn names(contact: &ContactInfo) -> [&str; 2] {
+    contact.spec.between.each_ref().map(|name| name.value.as_str())
+}
+
+/// Return the warnings of the surfaces of all pairs.
+pub fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
+    let mut warnings = split_pairs(contacts);
+    for (pair, contact) in pairs.iter().zip(contacts) {
+        warnings.extend(left_out(pair, contact));
+        warnings.extend(lost(pair, contact));
+        let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
+        if overlap < 0.0 {
+            warnings.push(format!(
+                "{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
+                pair.surfaces[0], pair.surfaces[1], -overlap
+            ));
+        }
+        warnings.extend(contact.chords.map(|chords| overlap_of_facets(pair, chords)));
+    }
+    warnings
+}
+
+/// Return the warning of facets that a pair excludes, if any.
+fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let without: Vec<Left> =
+        pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
+    if without.is_empty() && contact.idle == 0 {
+        return None;
+    }
+    let [a, b] = names(contact);
+    let (all, count) = (pair.cover.len() + contact.idle, without.len() + contact.idle);
+    let mut text = format!("{a} - {b}: {count} of {all} facets have no partner");
+    if contact.idle > 0 {
+        text += &format!("; {} of them lie beyond edges (key `edge`)", contact.idle);
+    }
+    let steep = format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle);
+    let far = match contact.spec.distance {
+        Some(distance) => format!("are farther away from it than {distance} (key `distance`)"),
+        None => "are too far away from it".to_owned(),
+    };
+    for (reason, why) in [(Left::Steep, steep), (Left::Far, far)] {
+        let count = without.iter().filter(|&&left| left == reason).count();
+        if count > 0 {
+            text += &format!("; {count} of `{}` {why}", pair.surfaces[0]);
+        }
+    }
+    Some(text)
+}
+
+/// Return a line for each contact of the scene that is several pairs, since its surfaces have edges.
+fn split_pairs(contacts: &[ContactInfo]) -> Vec<String> {
+    let mut names_of: BTreeMap<usize, (f64, Vec<String>)> = BTreeMap::new();
+    for contact in contacts.iter().filter(|contact| contact.is_split) {
+        let ([a, b], spec) = (names(contact), &contact.spec);
+        names_of.entry(spec.table).or_insert((spec.edge, Vec::new())).1.push(format!("{a} - {b}"));
+    }
+    let line = |(table, (edge, names)): (usize, (f64, Vec<String>))| {
+        let names = few(names).join(", ");
+        format!(
+            "contact.{table}: surfaces have edges of more than {edge} degrees (key `edge`), and faces are pairs of their own: {names}"
+        )
+    };
+    names_of.into_iter().map(line).collect()
+}
+
+/// Return the warning of an overlap that facets make.
+fn overlap_of_facets(pair: &ContactPair, Chords { sagitta, deepest, mean }: Chords) -> String {
+    let mean = mean.map_or(String::new(), |mean| format!(" and {} on the mean", sci(mean, 2)));
+    format!(
+        "{} - {}: straight facets leave their curved surfaces by up to {}, and the overlap is {} at most{mean}: pressures are those of \
+         facets; write touching = true with the overlap as a negative `gap`, take order = 2, or a finer mesh",
+        pair.surfaces[0],
+        pair.surfaces[1],
+        sci(sagitta, 2),
+        sci(deepest, 2)
+    )
+}
+
+/// Return the warning of pieces of a pair that the search for common points has lost, if any.
+fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
+    let [a, b] = names(contact);
+    pair.lost.map(|LostPieces { pieces, share, at: [x, y, z] }| {
+        format!(
+            "{a} - {b}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near ({x}, {y}, {z}): they \
+             carry no pressure; look at the mesh there, and refine what is strongly curved",
+            pair.surfaces[0], share, pair.measure
+        )
+    })
+}
+
+/// Return a warning for each pair whose table is probably written as (p, c).
+pub fn swapped_tables(built: &Built) -> Vec<String> {
+    (0..built.discrete.model.pairs.len()).filter_map(|i| swapped_table(built, i)).collect()
+}
+
+/// Return the warning for pair `i`, if its layer is a table that makes sense the other way round alone.
+///
+/// Numbers have no units here, so that two facts of the bodies decide. The stiffness of the layer, p/c at the end of the table, is compared
+/// with that of the stiffer body against a uniform pressure, its modulus over its depth: c/p is nearer to it than p/c. And the table does not
+/// fit: its largest pressure is below the mean pressure of the loads, or without loads its largest compression exceeds the contact surface.
+/// A layer that is really as soft as that has a table which reaches to its loads.
+fn swapped_table(built: &Built, i: usize) -> Option<String> {
+    let (pair, contact) = (&built.discrete.model.pairs[i], &built.discrete.contacts[i]);
+    let LayerSpec::Table(points) = &contact.spec.layer else { return None };
+    let &[c, p] = points.last()?;
+    let stiffness = pair.bodies.map(|body| built.discrete.bodies[body].stiffness).into_iter().fold(0.0, f64::max);
+    let distance = |other: f64| (other / stiffness).ln().abs();
+    let load = coupling(built, i).pressure;
+    let fits = if load > 0.0 { load <= p } else { c <= extent(&pair.position) };
+    if stiffness == 0.0 || fits || distance(c / p) >= distance(p / c) {
+        return None;
+    }
+    let [a, b] = &pair.surfaces;
+    let loads =
+        if load > 0.0 { format!(", and the loads give a mean pressure of {}", sci(load, 2)) } else { String::new() };
+    Some(format!(
+        "{a} - {b}: the table of the layer ends at a compression of {} with a pressure of {}: its stiffness is {}, that of the bodies (modulus \
+         over depth) {}{loads}; points are [compression, pressure]: if these are [pressure, compression], swap the columns",
+        sci(c, 2),
+        sci(p, 2),
+        sci(p / c, 2),
+        sci(stiffness, 2)
+    ))
+}
+
+/// Return the diagonal of the box around all points.
+fn extent(points: &[[f64; 3]]) -> f64 {
+    let [low, high] = bounds(points.iter().copied());
+    (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt()
+}
+
+/// Return a warning for each pair whose layer is compressed beyond the end of its law, at the solution or in a load step. There the
+/// law is extrapolated by a straight line from the end of a table, or of an expression with `up_to`, without measured data.
+pub fn beyond_laws(done: &Done) -> Vec<String> {
+    (0..done.model().pairs.len()).filter_map(|i| beyond_law(done, i)).collect()
+}
+
+/// Return the warning for pair `i`, if its layer is beyond the end of its law.
+fn beyond_law(done: &Done, i: usize) -> Option<String> {
+    let pair = &done.model().pairs[i];
+    let end = (0..pair.len()).map(|q| pair.law.end(q)).fold(f64::INFINITY, f64::min);
+    let Compressed { most, pressure, step } = most_compressed(done, i)?;
+    let when = step.map_or(String::new(), |step| format!(" in load step {step}"));
+    let [a, b] = names(&done.built.discrete.contacts[i]);
+    (most > end).then(|| {
+        format!(
+            "{a} - {b}: the layer is compressed by {}{when}, under a pressure of {}, and its law ends at a compression of {}: beyond, the last \
+             slope goes on; give the law further points, or lower the load",
+            sci(most, 2),
+            sci(pressure, 2),
+            sci(end, 2)
+        )
+    })
+}
+
+/// The largest compression of the layer of a pair.
+struct Compressed {
+    most: f64,
+    pressure: f64,
+    /// Load step, counted from 1, if there are any.
+    step: Option<usize>,
+}
+
+/// Return the largest compression of a pair over all solutions of a run, none if the run has found no solution.
+fn most_compressed(done: &Done, i: usize) -> Option<Compressed> {
+    if done.steps.is_empty() {
+        let (layer, range) = (&done.outcome.layer, done.model().range(i));
+        let pressure = layer.pressure[range.clone()].iter().copied().fold(0.0, f64::max);
+        let found = Compressed { most: peak(&layer.compression[range]), pressure, step: None };
+        return done.outcome.status.is_solved().then_some(found);
+    }
+    let solved = done.steps.iter().enumerate().filter(|(_, step)| is_solved(step));
+    let compressed = solved.map(|(number, step)| {
+        let pair = &step.pairs[i];
+        Compressed { most: pair.peak_compression, pressure: pair.peak_pressure, step: Some(number + 1) }
+    });
+    compressed.max_by(|a, b| a.most.total_cmp(&b.most))
+}
+
+/// Add the warnings of contacts that reach the end of a pair, which the key `distance` has cut short. A pair has one warning, that of the first load step.
+pub fn note_ends(done: &mut Done) {
+    if !done.outcome.status.is_solved() {
+        return;
+    }
+    for i in 0..done.model().pairs.len() {
+        let reached = reached(done, i);
+        if reached == 0 {
+            continue;
+        }
+        let contact = &done.built.discrete.contacts[i];
+        let [a, b] = names(contact);
+        let title = format!("{a} - {b}: the contact reaches places");
+        if done.warnings.iter().any(|warning| warning.starts_with(&title)) {
+            continue;
+        }
+        let distance = contact.spec.distance.unwrap_or_default();
+        let step = if done.steps.is_empty() { String::new() } else { format!(" in load step {}", done.steps.len()) };
+        done.warnings.push(format!(
+            "{title}{step} where the surfaces are farther apart than {distance} (key `distance`), and the pair ends: {reached} contact points \
+             there are under pressure, and facets beyond them carry none; give a larger distance"
+        ));
+    }
+}
+
+/// Return the number of contact points under pressure from which the contact probably goes on beyond the end of pair `i`.
+fn reached(done: &Done, i: usize) -> usize {
+    let (layer, first) = (&done.outcome.layer, done.model().range(i).start);
+    let goes_on = |end: &&End| {
+        let q = first + end.point;
+        layer.pressure[q] > 0.0 && layer.compression[q] >= end.compression
+    };
+    done.built.discrete.contacts[i].ends.iter().filter(goes_on).count()
+}
