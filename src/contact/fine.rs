@@ -25,7 +25,7 @@ pub struct Fine<const D: usize> {
     /// Length (area) of each point.
     pub weight: Vec<f64>,
     /// Gap of each point: distance of the surfaces along the normal plus the gap that the scene adds. Over straight facets the surfaces rise, see
-    /// [`rise`].
+    /// `near::rise`.
     pub gap: Vec<f64>,
     /// Size of the facet of side a under each point: its length, or the side of the square that two such triangles make.
     pub size: Vec<f64>,
