@@ -19,7 +19,6 @@ const FUNCTIONS: &[&str] = &[
     "ISSort",
     "KSPBuildSolution",
     "KSPComputeExtremeSingularValues",
-    "KSPConvergedDefaultSetUIRNorm",
     "KSPCreate",
     "KSPDestroy",
     "KSPGetAndClearConvergenceTest",
@@ -36,7 +35,6 @@ const FUNCTIONS: &[&str] = &[
     "KSPSetConvergenceTest",
     "KSPSetErrorIfNotConverged",
     "KSPSetFromOptions",
-    "KSPSetNormType",
     "KSPSetOperators",
     "KSPSetOptionsPrefix",
     "KSPSetPC",
@@ -50,15 +48,21 @@ const FUNCTIONS: &[&str] = &[
     "MatCreate",
     "MatCreateMPIAIJWithSplitArrays",
     "MatCreateSeqAIJWithArrays",
+    "MatCreateSubMatrices",
+    "MatCreateSubMatrix",
     "MatDestroy",
+    "MatDestroySubMatrices",
+    "MatGetRow",
     "MatIncreaseOverlap",
     "MatMPIAIJGetSeqAIJ",
     "MatMPIAIJSetPreallocationCSR",
     "MatMult",
+    "MatMultTranspose",
     "MatMumpsGetInfog",
     "MatMumpsSetIcntl",
     "MatNullSpaceCreate",
     "MatNullSpaceDestroy",
+    "MatRestoreRow",
     "MatSeqAIJGetArray",
     "MatSeqAIJRestoreArray",
     "MatSeqAIJSetPreallocationCSR",
@@ -72,10 +76,6 @@ const FUNCTIONS: &[&str] = &[
     "MatViewFromOptions",
     "PCApply",
     "PCCreate",
-    "PCDeflationGetCoarseKSP",
-    "PCDeflationGetPC",
-    "PCDeflationSetReductionFactor",
-    "PCDeflationSetSpace",
     "PCDestroy",
     "PCFactorGetMatSolverType",
     "PCFactorGetMatrix",
@@ -90,14 +90,13 @@ const FUNCTIONS: &[&str] = &[
     "PCMGSetLevels",
     "PCReset",
     "PCSetOperators",
-    "PCSetOptionsPrefix",
     "PCSetType",
     "PCSetUp",
     "PCShellGetContext",
     "PCShellSetApply",
     "PCShellSetContext",
+    "PCShellSetName",
     "PCShellSetView",
-    "PCTelescopeGetKSP",
     "PCView",
     "PetscContainerCreate",
     "PetscContainerDestroy",
@@ -137,6 +136,10 @@ const FUNCTIONS: &[&str] = &[
     "VecResetArray",
     "VecRestoreArray",
     "VecRestoreArrayRead",
+    "VecScatterBegin",
+    "VecScatterCreate",
+    "VecScatterDestroy",
+    "VecScatterEnd",
     "VecSetBlockSize",
 ];
 
@@ -347,9 +350,7 @@ fn declare(folders: &[PathBuf], mpi: &build_probe_mpi::Library) {
         // the type of communicators in the whole crate is that of the `mpi` crate
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type(
-            "(KSPConvergedReason|KSPNormType|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool)",
-        )
+        .allowlist_type("(InsertMode|KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool|ScatterMode)")
         .allowlist_var(VERSIONS.join("|"))
         .dynamic_library_name("Library")
         .dynamic_link_require_all(true);

@@ -12,7 +12,7 @@ use crate::linalg::{Factor, axpy, dot, fit};
 use nalgebra::DVector;
 use std::rc::Rc;
 
-/// The matrix Z, in the states of the bodies on this rank.
+/// The matrix Z, in the vectors of an iterative solver on this rank.
 pub struct Space {
     /// Contact rows and motions of each body.
     bodies: Vec<(Vec<Segment>, Vec<Motion>)>,
@@ -23,19 +23,21 @@ pub struct Space {
     exchange: Rc<dyn Exchange>,
 }
 
-/// A column of Z: the entries of one rigid motion in the state of its body.
+/// A column of Z: the entries of one rigid motion in one vector.
 struct Column {
     /// Number of the motion among those of all bodies.
     motion: usize,
-    body: usize,
-    /// First entry in that state.
+    /// Number of the vector.
+    vector: usize,
+    /// First entry in that vector.
     first: usize,
     values: Vec<f64>,
 }
 
 impl Space {
-    /// Return the space for the bodies of a model, whose states end with rigid motions.
-    pub fn of(model: &Model) -> Self {
+    /// Return the space for the bodies of a model. Without an `offset`, there is one vector for each body: its state, whose last entries are rigid motions.
+    /// With one, there is a single vector, in which motions are displacements of nodes; `offset` is the first entry of each body, and the length.
+    pub fn of(model: &Model, offset: Option<&[usize]>) -> Self {
         let (mut columns, mut first_motion) = (Vec::new(), 0);
         for (body, slot) in model.bodies.iter().enumerate() {
             let numbers = first_motion..;
@@ -43,8 +45,15 @@ impl Space {
             let Some(local) = &slot.local else { continue };
             let Some(matrices) = local.matrices() else { continue };
             for (motion, Motion { trace, .. }) in numbers.zip(&slot.motions) {
-                let values = fit(matrices.traces, trace);
-                columns.push(Column { motion, body, first: local.len() - values.len(), values });
+                let amounts = fit(matrices.traces, trace);
+                columns.push(match offset {
+                    None => Column { motion, vector: body, first: local.len() - amounts.len(), values: amounts },
+                    Some(offset) => {
+                        let mut values = vec![0.0; offset[body + 1] - offset[body]];
+                        amounts.iter().zip(matrices.motions).for_each(|(a, shape)| axpy(*a, shape, &mut values));
+                        Column { motion, vector: 0, first: offset[body], values }
+                    }
+                });
             }
         }
         let bodies = model.bodies.iter().map(|slot| (slot.segments.clone(), slot.motions.clone())).collect();
@@ -60,24 +69,24 @@ impl Space {
 
 /// The coarse space for one set of springs D.
 pub struct Coarse {
-    space: Space,
+    space: Rc<Space>,
     springs: Vec<f64>,
     factor: Factor,
 }
 
 impl Coarse {
     /// Factor Z'HZ for `springs`, the diagonal of D, one entry a contact point.
-    pub fn new(space: Space, springs: &[f64]) -> Self {
+    pub fn new(space: Rc<Space>, springs: &[f64]) -> Self {
         let factor = space.motions().springs(springs).factor();
         Self { space, springs: springs.to_vec(), factor }
     }
 
     /// Return the amounts y of the solution in the space, with Z'HZ y = Z'r, and its squared energy norm. One message.
-    pub fn solve(&self, r: &[Vec<f64>]) -> (DVector<f64>, f64) {
+    pub fn solve(&self, r: &[impl AsRef<[f64]>]) -> (DVector<f64>, f64) {
         let motions = self.space.bodies.iter().map(|(_, motions)| motions.len()).sum();
         let mut work = DVector::zeros(motions);
-        for Column { motion, body, first, values } in &self.space.columns {
-            work[*motion] += dot(values, &r[*body][*first..]);
+        for Column { motion, vector, first, values } in &self.space.columns {
+            work[*motion] += dot(values, &r[*vector].as_ref()[*first..]);
         }
         self.space.exchange.sum(work.as_mut_slice());
         let y = self.factor.solve(&work);
@@ -85,10 +94,15 @@ impl Coarse {
         (y, energy)
     }
 
-    /// Return the amounts y of the part that a vector z has in the space, with Z'HZ y = Z'H z, from its closings B z at the points, n.
-    pub fn part(&self, closing: &[f64]) -> DVector<f64> {
+    /// Return the amounts y of the part that a vector z has in the space, with Z'HZ y = Z'H z, from its closings B z at the points, n. If the closings are
+    /// `shared`, each rank has one term of their sum over ranks; this takes a message.
+    pub fn part(&self, closing: &[f64], shared: bool) -> DVector<f64> {
         let force: Vec<f64> = self.springs.iter().zip(closing).map(|(spring, s)| spring * s).collect();
-        self.factor.solve(&self.space.motions().work(&force))
+        let mut work = self.space.motions().work(&force);
+        if shared {
+            self.space.exchange.sum(work.as_mut_slice());
+        }
+        self.factor.solve(&work)
     }
 
     /// Return D B Z y, the forces of the springs at the points.
@@ -97,9 +111,9 @@ impl Coarse {
     }
 
     /// Add s Z y to x.
-    pub fn add(&self, s: f64, y: &DVector<f64>, x: &mut [Vec<f64>]) {
-        for Column { motion, body, first, values } in &self.space.columns {
-            axpy(s * y[*motion], values, &mut x[*body][*first..]);
+    pub fn add(&self, s: f64, y: &DVector<f64>, x: &mut [impl AsMut<[f64]>]) {
+        for Column { motion, vector, first, values } in &self.space.columns {
+            axpy(s * y[*motion], values, &mut x[*vector].as_mut()[*first..]);
         }
     }
 }

@@ -8,9 +8,6 @@ use crate::error::{Error, Kind, Result};
 use std::cell::RefCell;
 use std::ffi::{CStr, c_char, c_int, c_void};
 
-/// PETSC_ERR_LIB: the code by which a callback says that a call inside failed.
-pub(super) const ERROR: ffi::PetscErrorCode = 76;
-
 /// PETSc's report of an error that is being passed up.
 #[derive(Default)]
 struct Trace {

@@ -1,7 +1,6 @@
 //! Preconditioners and factorisations that fail, and how a solver recovers.
 
 use super::library::petsc;
-use super::mumps::is_lack_of_space;
 use super::{Int, Ksp, ffi};
 use crate::error::Result;
 use std::ptr::null_mut;
@@ -58,7 +57,7 @@ impl Ksp {
     /// The need of several ranks depends on the order of their messages.
     pub(super) fn lacks_space(&self) -> bool {
         let info = || self.mumps_info(self.pc().ok()?);
-        self.failure().is_some() && info().is_some_and(|(first, _)| is_lack_of_space(first))
+        self.failure().is_some() && info().is_some_and(|(first, _)| matches!(first, -8 | -9 | -17 | -20))
     }
 
     /// Allow the next factorisation `percent` more space than MUMPS' analysis foresees. To be called before its set-up.

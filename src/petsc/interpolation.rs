@@ -2,8 +2,8 @@
 
 use super::integers::flag;
 use super::library::petsc;
-use super::matrix::tall;
 use super::rows::check;
+use super::vector::DETERMINE;
 use super::{Int, Ksp, Matrix, Scope, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::collective::SystemOperation;
@@ -54,10 +54,18 @@ impl Ksp {
             let message = format!("an interpolation of {} rows for a matrix of {rows}", row_ptr.len() - 1);
             return Err(Error::new(Kind::Solver, message));
         }
-        let (mut mat, pc) = (tall(matrix, [row_ptr, columns], values, own)?, self.pc()?);
-        // SAFETY: a matrix with the rows of A, and a preconditioner of A.
+        let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
+        let (comm, mut mat, pc) = (matrix.scope().comm(matrix.session()), null_mut(), self.pc()?);
+        // SAFETY: the new matrix.
+        unsafe { petsc!(MatCreate(comm, &mut mat)) }?;
+        // SAFETY: the three arrays were checked to be rows of this width; PETSc copies them.
         let made = (|| unsafe {
+            petsc!(MatSetSizes(mat, rows as Int, own as Int, DETERMINE, DETERMINE))?;
+            petsc!(MatSetType(mat, c"aij".as_ptr()))?;
             petsc!(MatSetBlockSizes(mat, block, block))?;
+            // one call is for matrices of one process and one for several; each ignores the other kind
+            petsc!(MatSeqAIJSetPreallocationCSR(mat, i, j, v))?;
+            petsc!(MatMPIAIJSetPreallocationCSR(mat, i, j, v))?;
             petsc!(PCSetType(pc, c"mg".as_ptr()))?;
             petsc!(PCMGSetLevels(pc, 2, null_mut()))?;
             petsc!(PCMGSetInterpolation(pc, 1, mat))?;

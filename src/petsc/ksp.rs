@@ -1,6 +1,6 @@
 //! Linear solvers (KSP with a preconditioner PC).
 
-use super::deflation::Deflation;
+use super::around::Wrapper;
 use super::error::text_from;
 use super::integers::{flag, is_set};
 use super::library::petsc;
@@ -66,8 +66,8 @@ pub struct Ksp {
     pub(super) failed_at: Cell<Option<u64>>,
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
-    /// The exact solve in a subspace around the preconditioner.
-    pub(super) deflation: Option<Deflation>,
+    /// The subspaces around the preconditioner, the innermost first.
+    pub(super) wrappers: Vec<Wrapper>,
     prefix: String,
     scope: Scope,
     session: Session,
@@ -96,7 +96,7 @@ impl Ksp {
             updates: Rc::default(),
             failed_at: Cell::new(None),
             writes_to_b: false,
-            deflation: None,
+            wrappers: Vec::new(),
             prefix: prefix.to_owned(),
             scope,
             session: session.clone(),
@@ -107,6 +107,28 @@ impl Ksp {
             petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))?;
             petsc!(KSPSetErrorIfNotConverged(ksp, flag(false)))?;
         }
+        Ok(solver)
+    }
+
+    /// Factor a symmetric positive definite matrix with `rows` rows on this process by MUMPS, whatever options say.
+    ///
+    /// [`failure`](Self::failure) reports whether the factorisation succeeded.
+    ///
+    /// # Errors
+    /// PETSc's.
+    pub(super) fn factored(session: &Session, scope: Scope, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
+        let mut solver = Self::of(session, scope, "")?;
+        let new = || Vector::new(session, scope, rows, 1);
+        solver.vectors = Some([new()?, new()?]);
+        let pc = solver.pc()?;
+        // SAFETY: solver and preconditioner of this wrapper, which take references to the matrix.
+        unsafe {
+            petsc!(KSPSetOperators(solver.ksp, matrix, matrix))?;
+            petsc!(KSPSetType(solver.ksp, c"preonly".as_ptr()))?;
+            petsc!(PCSetType(pc, c"cholesky".as_ptr()))?;
+            petsc!(PCFactorSetMatSolverType(pc, c"mumps".as_ptr()))?;
+        }
+        solver.set_up()?;
         Ok(solver)
     }
 
@@ -260,13 +282,15 @@ impl Ksp {
         let mut guess = flag(false);
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPGetInitialGuessNonzero(self.ksp, &mut guess)) }?;
-        if is_set(guess) || self.deflation.is_some() {
+        if is_set(guess) {
             x.fill(0.0);
         }
         self.recover()?;
         // SAFETY: the solver reads `b` (a copy where it is written to) and writes to `x`.
         let solve = |b, x| unsafe { petsc!(KSPSolve(self.ksp, b, x)) };
-        right.map(("b", b), left, ("x", x), solve)?;
+        right
+            .map(("b", b), left, ("x", x), solve)
+            .map_err(|error| self.wrappers.iter().find_map(Wrapper::failure).unwrap_or(error))?;
         self.note_failure()?;
         let (mut iterations, mut reason, mut residual) = (0, 0, 0.0);
         // SAFETY: the solver of this wrapper.
@@ -291,15 +315,9 @@ impl Ksp {
         };
         self.set_up()?;
         let copy = self.writes_to_b.then(|| r.to_vec());
-        let r = copy.as_deref().unwrap_or(r);
-        if let Some(deflation) = &self.deflation {
-            z.fill(0.0);
-            // SAFETY: as in `solve`.
-            return right.map(("r", r), left, ("z", z), |r, z| unsafe { petsc!(KSPSolve(deflation.once, r, z)) });
-        }
-        let pc = self.pc()?;
+        let pc = self.outermost_pc()?;
         // SAFETY: as in `solve`.
-        right.map(("r", r), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
+        right.map(("r", copy.as_deref().unwrap_or(r)), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
     }
 
     /// Set the relative tolerance.
@@ -367,12 +385,15 @@ impl Ksp {
         format!("-{}", self.prefix)
     }
 
-    /// Return the preconditioner that options chose, without the subspace around it.
+    /// Return the preconditioner that options chose, without the subspaces around it.
     pub(super) fn pc(&self) -> Result<ffi::PC> {
-        self.deflation.as_ref().map_or_else(|| self.outermost_pc(), |deflation| Ok(deflation.inner))
+        match self.wrappers.first() {
+            Some(innermost) => Ok(innermost.inner()),
+            None => self.outermost_pc(),
+        }
     }
 
-    /// Return the preconditioner with the subspace around it.
+    /// Return the preconditioner with all subspaces around it.
     pub(super) fn outermost_pc(&self) -> Result<ffi::PC> {
         let mut pc = null_mut();
         // SAFETY: the solver of this wrapper, which owns its preconditioner.

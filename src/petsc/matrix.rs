@@ -3,7 +3,7 @@
 use super::integers::flag;
 use super::library::petsc;
 use super::rows::{Rows, attach, free};
-use super::vector::{DETERMINE, Vector, check_length};
+use super::vector::{Vector, check_length};
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::MPI_Comm;
@@ -307,24 +307,6 @@ unsafe fn create(comm: MPI_Comm, rows: *mut Rows) -> Result<(ffi::Mat, *mut f64)
         }
     }?;
     Ok((mat, values))
-}
-
-/// Return a matrix with the rows of `matrix` and `own` columns of this process, from compressed rows with global columns. Collective.
-///
-/// Row `i` has the columns `columns[row_ptr[i]..row_ptr[i + 1]]`, in increasing order, and the values at the same positions.
-pub(super) fn tall(matrix: &Matrix, [row_ptr, columns]: [&[Int]; 2], values: &[f64], own: usize) -> Result<ffi::Mat> {
-    let (i, j, v) = (row_ptr.as_ptr(), columns.as_ptr(), values.as_ptr());
-    let (comm, rows, mut mat) = (matrix.scope().comm(matrix.session()), matrix.rows() as Int, null_mut());
-    // SAFETY: a new matrix; PETSc copies the three arrays, which are rows of this width by the callers.
-    unsafe {
-        petsc!(MatCreate(comm, &mut mat))?;
-        petsc!(MatSetSizes(mat, rows, own as Int, DETERMINE, DETERMINE))?;
-        petsc!(MatSetType(mat, c"aij".as_ptr()))?;
-        // one call is for matrices of one process and one for several; each ignores the other kind
-        petsc!(MatSeqAIJSetPreallocationCSR(mat, i, j, v))?;
-        petsc!(MatMPIAIJSetPreallocationCSR(mat, i, j, v))?;
-    }
-    Ok(mat)
 }
 
 /// Return an orthonormal basis of the span of the vectors. Vectors that depend on others to rounding are left out. `sum` sums over

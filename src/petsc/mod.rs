@@ -23,15 +23,17 @@
 
 #![warn(clippy::undocumented_unsafe_blocks)]
 
+mod around;
 mod beside;
 mod blas;
-mod deflate;
-mod deflation;
 mod error;
+mod factor;
 mod failure;
 mod ffi;
 mod files;
+mod halves;
 mod heap;
+mod indices;
 mod integers;
 mod interpolation;
 mod ksp;
@@ -41,22 +43,26 @@ mod matrix;
 mod metis;
 mod mumps;
 mod options;
+mod patch;
 mod print;
 mod reason;
 #[cfg(test)]
 mod requirements;
 mod rows;
+mod scatter;
 mod scope;
 mod session;
 mod stage;
+mod substructures;
 mod table;
 mod until;
 mod vector;
 mod waiting;
 mod words;
+mod wrap;
 
+pub use around::Subspace;
 pub use blas::{cholesky, cholesky_solve};
-pub use deflation::{MotionPart, Motions};
 pub use ffi::Int;
 pub use heap::{Heap, keep_apart, keep_at_hand, leave};
 pub use ksp::{Ksp, Solved};

@@ -13,11 +13,6 @@ use std::ptr::null_mut;
 /// Space beyond the estimate of the analysis, in per cent; the values are tried one after the other.
 pub(super) const EXTRA_SPACE: [i32; 4] = [20, 60, 200, 1000];
 
-/// Return whether this INFOG(1) of MUMPS says that its work space or its message buffers are too small.
-pub(super) fn is_lack_of_space(info: super::Int) -> bool {
-    matches!(info, -8 | -9 | -17 | -20)
-}
-
 /// Values of ICNTL(7): the elimination order by MUMPS' approximate minimum degree, and a given one. With a Schur complement MUMPS replaces PORD by
 /// minimum degree. `groove3d` with n = 40 (237 636 dofs) takes 1226 MB with it, and 1032 MB with METIS.
 const MINIMUM_DEGREE: MumpsInt = 0;
@@ -158,6 +153,11 @@ impl Schur {
     /// Return the memory in megabytes that the factorisation will take, without S.
     pub fn expected_megabytes(&self) -> usize {
         self.mumps.head.infog[15].max(0) as usize
+    }
+
+    /// Return whether the last factorisation met a zero pivot.
+    pub(super) fn is_singular(&self) -> bool {
+        self.mumps.head.infog[0] == -10
     }
 
     /// Eliminate the interior. The functions below need that.

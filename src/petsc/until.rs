@@ -1,6 +1,6 @@
 //! A linear solve with a stopping test of the caller.
 
-use super::error::ERROR;
+use super::around::ERROR;
 use super::integers::{flag, is_set};
 use super::ksp::Solved;
 use super::library::petsc;
@@ -17,7 +17,7 @@ pub struct Iterate<'a> {
     pub x: &'a [f64],
     /// The norm of its residual, as the solver measures it (its `-ksp_norm_type`).
     pub residual: f64,
-    /// The norm of the residual of the first guess, which is zero or the exact solution in a subspace ([`Ksp::deflate`]).
+    /// The norm of the residual of the first guess, which is zero or the exact solution in a [`Subspace`](super::Subspace).
     pub first: f64,
     /// The least eigenvalue of the preconditioned matrix that conjugate gradients have found so far.
     pub least: Option<f64>,
@@ -77,6 +77,15 @@ impl Ksp {
     /// # Errors
     /// Those of [`solve`](Self::solve).
     pub fn solve_until(&self, b: &[f64], x: &mut [f64], enough: &mut Enough) -> Result<Solved> {
+        let (mut rest, mut start) = (b.to_vec(), vec![0.0; b.len()]);
+        let started = self.start(&mut rest, &mut start)?;
+        let mut whole = vec![0.0; b.len()];
+        // PETSc iterates on what is left after the exact solve in the subspace
+        let mut of_whole = |iterate: &Iterate| {
+            whole.iter_mut().zip(&start).zip(iterate.x).for_each(|((whole, start), x)| *whole = start + x);
+            enough(&Iterate { x: &whole, ..*iterate })
+        };
+        let enough: &mut Enough = if started.is_some() { &mut of_whole } else { enough };
         let (mut own, mut own_context, mut destroy) = (None, null_mut(), None);
         // SAFETY: the solver's own test is taken out with its context, and put back below whatever the outcome of the solve.
         unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut own, &mut own_context, &mut destroy)) }?;
@@ -84,9 +93,10 @@ impl Ksp {
         let context: *mut Test = &mut test;
         // SAFETY: the test reads this context, which lives until the test is replaced below.
         unsafe { petsc!(KSPSetConvergenceTest(self.ksp, Some(is_enough), context.cast(), None)) }?;
-        let solved = self.solve(b, x);
+        let solved = self.solve(&rest, x);
         // SAFETY: the test and the context that PETSc returned above.
         unsafe { petsc!(KSPSetConvergenceTest(self.ksp, own, own_context, destroy)) }?;
+        x.iter_mut().zip(&start).for_each(|(x, start)| *x += start);
         solved
     }
 }

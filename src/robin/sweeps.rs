@@ -14,6 +14,7 @@ use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
 use crate::model::linear::{Enough, Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use std::rc::Rc;
 
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
 const MOST: usize = 400;
@@ -163,7 +164,7 @@ struct Previous {
 impl<'a> Gradients<'a> {
     /// Start with the solution in the space of rigid motions.
     fn new(model: &Model, springs: &'a [f64], residual: &[Vec<f64>], least: f64) -> Self {
-        let coarse = Coarse::new(Space::of(model), springs);
+        let coarse = Coarse::new(Rc::new(Space::of(model, None)), springs);
         let (y, energy) = coarse.solve(residual);
         let (x, r) = (Field::zero(model), residual.to_vec());
         let lanczos = Lanczos { energy, least, ..Lanczos::default() };
@@ -177,7 +178,7 @@ impl<'a> Gradients<'a> {
     /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r - r_previous): with this
     /// flexible rule, the preconditioner may be an inexact solve.
     fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
-        let y = self.coarse.part(&correction.closing());
+        let y = self.coarse.part(&correction.closing(), false);
         add_motions(&self.coarse, model, -1.0, &y, &mut correction);
         match self.previous.take() {
             None => correction,

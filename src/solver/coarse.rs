@@ -1,35 +1,60 @@
-//! The rigid motions of all bodies, in which a matrix of all bodies is solved exactly around its preconditioner.
-//!
-//! Many bodies on each other are a frame whose joints are layers. No smoother reduces errors in which the frame moves as a whole, and coarse levels of
-//! multigrid do so only as far as they have the rigid motions of each body.
+//! The [coarse space](crate::model::coarse) of rigid motions, put around a preconditioner of the matrix of all bodies.
 
-use crate::linalg::{axpy, fit};
-use crate::model::{Model, Motion};
-use crate::petsc::{MotionPart, Motions};
+use crate::error::Result;
+use crate::linalg::Csr;
+use crate::model::Model;
+use crate::model::coarse::{Coarse, Space};
+use crate::petsc::Subspace;
+use std::rc::Rc;
 
-/// Return the rigid motions of all bodies, or `None` if no two bodies in contact can both move freely. Then no bodies move together, and the space would
-/// save nothing. `offset` is the first entry of each body in a vector of this rank, and its length.
-pub fn motions(model: &Model, offset: &[usize]) -> Option<Motions> {
-    let mut free_sides = vec![0; model.pairs.len()];
-    for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty()) {
-        slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
-    }
-    if !free_sides.contains(&2) {
-        return None;
-    }
-    let mut motions = Motions::default();
-    for (slot, part) in model.bodies.iter().zip(offset.windows(2)) {
-        let first_motion = motions.count;
-        motions.count += slot.motions.len();
-        let Some(matrices) = slot.local.as_ref().and_then(|body| body.matrices()) else { continue };
-        for (motion, Motion { trace, .. }) in (first_motion..).zip(&slot.motions) {
-            let mut values = vec![0.0; part[1] - part[0]];
-            fit(matrices.traces, trace)
-                .iter()
-                .zip(matrices.motions)
-                .for_each(|(a, shape)| axpy(*a, shape, &mut values));
-            motions.parts.push(MotionPart { motion, first: part[0], values });
+/// The rigid motions of all bodies, in the rows of the matrix that this rank owns.
+pub struct RigidSpace {
+    space: Rc<Space>,
+    /// The columns of B that this rank owns; one row a contact point.
+    rows: Csr,
+}
+
+impl RigidSpace {
+    /// Return the space for the bodies of a model, or `None` if no two bodies in contact can both move freely. Then no bodies move together, and the space
+    /// would save nothing. `offset` is the first entry of each body in a vector of this rank, and its length. `rows` are B of all
+    /// bodies together, and `first` is the number of the first row that this rank owns.
+    pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<Self> {
+        let mut free_sides = vec![0; model.pairs.len()];
+        for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty()) {
+            slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
         }
+        if !free_sides.contains(&2) {
+            return None;
+        }
+        let columns = offset[offset.len() - 1];
+        let owned = rows.of_columns(columns, |i| i.checked_sub(first).filter(|i| *i < columns));
+        Some(Self { space: Rc::new(Space::of(model, Some(offset))), rows: owned })
     }
-    Some(motions)
+
+    /// Return the space for these spring stiffnesses, one a contact point.
+    pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
+        Box::new(WithSprings { coarse: Coarse::new(self.space.clone(), springs), rigid: self.clone() })
+    }
+}
+
+/// The space of rigid motions for one set of springs.
+struct WithSprings {
+    coarse: Coarse,
+    rigid: Rc<RigidSpace>,
+}
+
+impl Subspace for WithSprings {
+    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
+        let (y, _) = self.coarse.solve(&[&*r]);
+        self.coarse.add(1.0, &y, &mut [x]);
+        self.rigid.rows.add_transpose(-1.0, &self.coarse.forces(&y), r);
+        Ok(())
+    }
+
+    fn project(&self, z: &mut [f64]) -> Result<()> {
+        let mut closing = vec![0.0; self.rigid.rows.rows()];
+        self.rigid.rows.multiply(z, &mut closing);
+        self.coarse.add(-1.0, &self.coarse.part(&closing, true), &mut [z]);
+        Ok(())
+    }
 }

@@ -7,12 +7,12 @@ use crate::fem::Interpolation;
 use crate::linalg::Csr;
 use crate::linalg::portable::log10;
 use crate::model::Solved;
-use crate::petsc::{Enough, Ksp, Matrix, Motions, Rows, Session};
+use crate::petsc::{Enough, Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 ///
 /// A multigrid preconditioner is kept while G changes, if the user has not decided this by `-ksp_reuse_preconditioner`. Dofs at which it is poor then are
-/// solved exactly around it, together with rigid motions of bodies.
+/// solved exactly around it. This local correction is called a patch.
 pub struct Krylov {
     session: Session,
     chosen: Chosen,
@@ -35,10 +35,10 @@ pub struct Krylov {
     fresh: Option<f64>,
     /// Relative residual that the last solve reached.
     reached: f64,
-    /// Number of exact solves on dofs that were set up.
+    /// Number of patches that were set up.
     patches: usize,
-    /// Whether G is solved exactly for rigid motions of bodies, too.
-    has_motions: bool,
+    /// Whether rigid motions of bodies have been put around the preconditioner.
+    has_rigid_space: bool,
 }
 
 /// Growth of the iterations, over those with a fresh preconditioner, at which a new one is set up.
@@ -99,7 +99,7 @@ impl Krylov {
             fresh: None,
             reached: 1.0,
             patches: 0,
-            has_motions: false,
+            has_rigid_space: false,
         })
     }
 
@@ -116,55 +116,47 @@ impl Krylov {
         })
     }
 
-    /// Return how many layers of the graph of G are added around the dofs that are solved exactly. hypre smooths with the matrix of its set-up, so it needs
-    /// one layer. The smoothers of two levels of multigrid use G itself, so they need none.
+    /// Return how many layers of the graph of G are added around the dofs of a patch. hypre smooths with the matrix of its set-up, so it needs one layer.
+    /// The smoothers of two levels of multigrid use G itself, so they need none.
     fn layers(&self) -> usize {
         usize::from(self.ksp.pc_type() != "mg")
     }
 
-    /// Keep the preconditioner, and solve exactly at the `dofs` where it is poor and for the `motions`. Return false if that would cost more than a new
-    /// preconditioner or cannot be made.
-    fn deflate(&mut self, dofs: &[usize], motions: Option<&Motions>) -> Result<bool> {
+    /// Keep the preconditioner and put a patch around it at the dofs where it is poor. Return false if the patch would cost more than a new preconditioner or
+    /// cannot be made.
+    fn patch(&mut self, dofs: &[usize]) -> Result<bool> {
         let layers = self.layers();
         if dofs.len() * (1 + layers) * SMALL > self.matrix.total() {
             return Ok(false);
         }
-        let is_needed = !dofs.is_empty() || motions.is_some();
-        let _stage = self.session.stage("set-up");
-        if is_needed && !self.ksp.deflate(&self.matrix, dofs, layers, motions)? {
-            return Ok(false);
+        self.ksp.set_reuse_preconditioner(true)?;
+        if !dofs.is_empty() {
+            let _stage = self.session.stage("set-up");
+            if !self.ksp.patch(&self.matrix, dofs, layers)? {
+                return Ok(false);
+            }
+            self.patches += 1;
         }
-        self.patches += usize::from(!dofs.is_empty());
-        self.has_motions = motions.is_some();
+        self.changed = false;
         Ok(true)
     }
 
-    /// Keep the preconditioner or set up a new one, after a change of G. Preconditioners other than multigrid stay as the user chose them.
+    /// Keep the preconditioner or set up a new one, after a change of G.
     fn renew(&mut self, change: &Change) -> Result<Seen> {
-        if self.keeps && !self.stale && self.set_ups > 0 {
-            self.ksp.set_reuse_preconditioner(true)?;
-            if self.deflate(&(change.changed)(), change.motions)? {
-                self.changed = false;
-                if self.ksp.pc_type() == "mg" {
-                    // PETSc's smoothers use the new G, but their bounds of eigenvalues are those of their set-up
-                    self.chosen.lend(&self.session, || self.ksp.renew_smoother(&self.matrix))?;
-                }
-                return Ok(Seen::Older);
-            }
-        }
-        if !self.keeps && change.motions.is_none() || !self.multigrid {
+        if !self.keeps {
             return Ok(Seen::Whole);
+        }
+        self.stale |= self.set_ups == 0;
+        if !self.stale && self.patch(&(change.changed)())? {
+            if self.ksp.pc_type() == "mg" {
+                // PETSc's smoothers use the new G, but their bounds of eigenvalues are those of their set-up
+                self.chosen.lend(&self.session, || self.ksp.renew_smoother(&self.matrix))?;
+            }
+            return Ok(Seen::Older);
         }
         self.stale = true;
         self.set_up()?;
-        if self.keeps {
-            self.ksp.set_reuse_preconditioner(true)?;
-            if self.deflate(&(change.stiff)(), change.motions)? {
-                return Ok(Seen::Patched);
-            }
-        }
-        self.deflate(&[], change.motions)?;
-        Ok(Seen::Whole)
+        Ok(if self.patch(&(change.stiff)())? { Seen::Patched } else { Seen::Whole })
     }
 
     /// Compare the iterations per digit of a solve with those of the first solve. The next change of G gets a new preconditioner if they have grown too much.
@@ -190,10 +182,19 @@ impl InnerSolver for Krylov {
     }
 
     fn update(&mut self, change: Change) -> Result<Seen> {
-        self.ksp.undeflate()?;
+        self.ksp.unwrap()?;
         self.matrix.update(change.write)?;
         self.changed = true;
-        self.renew(&change)
+        let seen = self.renew(&change)?;
+        // other preconditioners stay as the user chose them
+        if self.multigrid
+            && let Some(coarse) = (change.coarse)()
+        {
+            self.set_up()?;
+            self.has_rigid_space = true;
+            self.ksp.wrap(&self.matrix, c"rigid motions of bodies around the preconditioner", coarse)?;
+        }
+        Ok(seen)
     }
 
     fn set_up(&mut self) -> Result<()> {
@@ -268,7 +269,7 @@ impl InnerSolver for Krylov {
     fn describe(&self) -> String {
         let coarse = || self.chosen.get("mg_coarse_pc_type").map(str::to_owned);
         let inside = self.ksp.factor_package().or_else(coarse).map_or(String::new(), |name| format!(" by {name}"));
-        let around = if self.has_motions { " with rigid motions of all bodies" } else { "" };
+        let around = if self.has_rigid_space { " with rigid motions of all bodies" } else { "" };
         format!("{} + {}{inside}{around}", self.ksp.ksp_type(), self.ksp.pc_type())
     }
 }

@@ -22,6 +22,7 @@ pub mod speed;
 mod split;
 mod union;
 
+pub use coarse::RigidSpace;
 pub use condensed::CondensedBody;
 pub use dense::Dense;
 pub use krylov::Krylov;
@@ -35,7 +36,7 @@ pub use union::Union;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Enough, Int, Matrix, Motions, Rows};
+use crate::petsc::{Enough, Int, Matrix, Rows, Subspace};
 
 /// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
 fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
@@ -60,8 +61,8 @@ pub struct Change<'a> {
     pub changed: &'a dyn Fn() -> Vec<usize>,
     /// Returns the dofs of contact rows at which even a new preconditioner is poor: their springs are stiff.
     pub stiff: &'a dyn Fn() -> Vec<usize>,
-    /// The rigid motions of bodies, in which G is solved exactly around a preconditioner.
-    pub motions: Option<&'a Motions>,
+    /// Returns the rigid motions of bodies as a subspace to be put around a preconditioner, if there are any.
+    pub coarse: &'a dyn Fn() -> Option<Box<dyn Subspace>>,
 }
 
 /// What a solver works with after a change of G.

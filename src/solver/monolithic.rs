@@ -77,8 +77,8 @@ impl Joint for Joined<Krylov> {
 impl<S: InnerSolver> Monolithic<S> {
     /// Join bodies. `make` makes a solver of their K.
     pub fn new(union: Union, make: impl FnOnce(Rows) -> Result<S>) -> Result<Self> {
-        let Union { stiffness, rows, offset, start, row_stiffness, free_motions, is_redundant } = union;
-        let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, free_motions, make)?;
+        let Union { stiffness, rows, offset, start, row_stiffness, coarse, is_redundant } = union;
+        let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         Ok(Self {
             joined: Rc::new(RefCell::new(Joined { matrix, rows, offset, first: start.unwrap_or(0) })),
             is_redundant,

@@ -1,11 +1,12 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{Change, InnerSolver, Seen};
+use super::{Change, InnerSolver, RigidSpace, Seen};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::{BodyCounts, Solved};
-use crate::petsc::{Motions, Rows};
+use crate::petsc::Rows;
 use std::ops::Range;
+use std::rc::Rc;
 use std::time::Instant;
 
 /// G of one body, or of all bodies together.
@@ -22,7 +23,7 @@ pub struct RobinMatrix<S> {
     soft: Vec<f64>,
     coupling: Coupling,
     /// Rigid motions that are put around the preconditioner, if G is of several bodies.
-    motions: Option<Motions>,
+    coarse: Option<Rc<RigidSpace>>,
     counts: BodyCounts,
     /// Factorisations of the solver before the counters were last set to zero.
     before: [usize; 3],
@@ -30,13 +31,12 @@ pub struct RobinMatrix<S> {
 
 impl<S: InnerSolver> RobinMatrix<S> {
     /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
-    /// of all ranks. In the
-    /// rigid `motions` G is solved exactly around the preconditioner.
+    /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
         row_stiffness: Vec<f64>,
-        motions: Option<Motions>,
+        coarse: Option<RigidSpace>,
         make: impl FnOnce(Rows) -> Result<S>,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
@@ -47,7 +47,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
-            motions,
+            coarse: coarse.map(Rc::new),
             counts: BodyCounts::default(),
             before: [0; 3],
             solver: make(stiffness)?,
@@ -68,7 +68,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             write: &|g| coupling.write(rows, weight, g),
             changed: &|| poor_dofs(rows, soft, prepared, weight),
             stiff: &|| poor_dofs(rows, soft, &softened, weight),
-            motions: self.motions.as_ref(),
+            coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
         };
         let began = Instant::now();
         match self.solver.update(change)? {

@@ -1,10 +1,10 @@
 //! The matrices of all bodies joined in one: how bodies and contact rows are placed in it.
 
+use super::RigidSpace;
 use crate::error::Result;
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable};
 use crate::model::{BodySlot, Distribution, Matrices, Model};
-use crate::petsc::Motions;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -26,7 +26,7 @@ pub struct Union {
     /// b diag(K) b' of each row b.
     pub(super) row_stiffness: Vec<f64>,
     /// Rigid motions for the preconditioner, if v still contains them.
-    pub(super) free_motions: Option<Motions>,
+    pub(super) coarse: Option<RigidSpace>,
     /// Whether every rank has the whole matrix and some of the bodies.
     pub(super) is_redundant: bool,
 }
@@ -62,8 +62,8 @@ impl Union {
         let parts = parts.collect::<Option<Vec<_>>>();
         let Some(parts) = parts else { return Ok(None) };
         let union = Self::new(model, &parts)?;
-        let free_motions = super::coarse::motions(model, &union.offset);
-        Ok(Some(Self { free_motions, ..union }))
+        let coarse = RigidSpace::of(model, &union.offset, &union.rows, union.start.unwrap_or(0));
+        Ok(Some(Self { coarse, ..union }))
     }
 
     fn new(model: &Model, parts: &[Matrices]) -> Result<Self> {
@@ -75,7 +75,7 @@ impl Union {
         let (side_a, side_b) = sides.split_at(model.points());
         let row_stiffness = side_a.iter().zip(side_b).map(|(a, b)| a + b).collect();
         let Layout { offset, start, .. } = layout;
-        Ok(Self { stiffness, rows, offset, start, row_stiffness, free_motions: None, is_redundant: false })
+        Ok(Self { stiffness, rows, offset, start, row_stiffness, coarse: None, is_redundant: false })
     }
 
     /// Return the union with all entries of K stored, row by row.

@@ -206,17 +206,6 @@ fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
     }
 }
 
-/// Stiff layers between bodies that move: exact solves on the rigid motions, and on dofs at the layers, leave conjugate gradients positive definite.
-#[test]
-fn rigid_layers_between_blocks_are_solved() {
-    for stiffness in ["1e4", "1e6"] {
-        let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
-        let sets = ["--set", "solver=hypre", "--set", "output.plots=false", "--set", &layer];
-        let run = solve(case("blocks"), &sets).converged();
-        assert!(run.count("inner_iterations") <= 60, "{stiffness}: {}", run.said());
-    }
-}
-
 /// Rigid motions of all bodies around multigrid: iterations do not grow with the number of bodies (56, 150 and 223 without). Two bodies of
 /// which one is held have no use for them.
 #[test]
