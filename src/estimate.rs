@@ -11,6 +11,7 @@ mod layer;
 mod rim;
 mod sides;
 pub mod sizes;
+mod square;
 
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::{Meshes, Recovered};
@@ -24,6 +25,7 @@ pub use guess::{Cause, Guess};
 use held::HoldingSprings;
 use layer::LayerError;
 use rim::RimError;
+use square::square;
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
@@ -254,16 +256,17 @@ impl LocalErrors {
 
 /// Return the squared energy error of each cell of a body, and the load whose response is the error of its displacements, at all nodes.
 ///
-/// The discrete solution is the best in the space of the elements. So both its distance from the recovered one and that of any other
-/// discrete displacement are at least the error, if the recovered one is exact. The nodal interpolant is nearer where the solution is singular.
+/// The discrete solution is the best approximation. If the recovered displacement is exact, its distance from any discrete displacement bounds the error.
+/// The nodal interpolant is closer than the discrete solution where quadratic elements meet a singular one.
 ///
-/// The load of the interpolation error does the work eta^2 on `u`, the discrete displacement, except where the solution is singular. What it lacks
-/// is done by a part of [`Recovered::softening`], at most by the whole.
+/// The load of the interpolation error does the work eta^2 on `u`, the discrete displacement, except where the solution is singular. The missing work
+/// is done by a multiple, at most one, of [`Recovered::softening`].
 fn errors_and_loads(recovered: &dyn Recovered, u: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let InterpolationError { residual: mut loads, cells: of_interpolant } = recovered.interpolation_error();
     let of_solution = recovered.energy_errors();
     let total = |cells: &[f64]| cells.iter().sum::<f64>();
-    let cells = if total(&of_interpolant) < total(&of_solution) { of_interpolant } else { of_solution };
+    let is_closer = !of_interpolant.is_empty() && total(&of_interpolant) < total(&of_solution);
+    let cells = if is_closer { of_interpolant } else { of_solution };
     let softening = recovered.softening(&cells);
     let work = dot(&softening, u);
     if work > 0.0 {
@@ -335,11 +338,6 @@ fn relative_errors(model: &Model, layer: &Layer, error: &[f64], rims: &[RimError
         if errors == 0.0 { 0.0 } else { SAFETY * f64::sqrt(errors / square(model, pair, &layer.pressure)) }
     };
     rims.iter().enumerate().map(of_pair).collect()
-}
-
-/// Return the integral of the squares of values at all contact points over the surface of a pair.
-fn square(model: &Model, pair: usize, values: &[f64]) -> f64 {
-    model.range(pair).map(|q| model.weight[q] * values[q] * values[q]).sum()
 }
 
 /// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.

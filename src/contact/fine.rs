@@ -24,8 +24,8 @@ pub struct Fine<const D: usize> {
     pub bodies: [usize; 2],
     /// Length (area) of each point.
     pub weight: Vec<f64>,
-    /// Gap of each point: distance of the surfaces along the normal plus the gap that the scene adds. Over straight facets the surfaces rise, see
-    /// `near::rise`.
+    /// Gap of each point: distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces
+    /// that do not touch as wholes, it is less by the heights of both curved surfaces above their straight facets (`near::rise`).
     pub gap: Vec<f64>,
     /// Size of the facet of side a under each point: its length, or the side of the square that two such triangles make.
     pub size: Vec<f64>,

@@ -57,24 +57,27 @@ impl<const D: usize> Recovery<'_, D> {
         sum
     }
 
-    /// Compute the residual `-int sigma(b) : grad v` of the interpolation error b for every shape function v, and the squared energy norm of b on
-    /// each cell.
+    /// Compute the residual `-int sigma(b) : grad v` of the interpolation error b for every shape function v, and for quadratic elements the squared
+    /// energy norm of b on each cell. The quadrature of linear elements is too coarse for the latter.
     ///
     /// With b the error of the nodal interpolant, a displacement w with this residual is the error of the nodal values.
     pub fn interpolation_error(&self, law: Law<D>) -> InterpolationError {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
         let rule = quadrature::simplex(D + 1, if space.order == Order::P1 { 2 } else { 5 });
-        let mut error = InterpolationError { residual: vec![0.0; space.dofs()], cells: vec![0.0; space.cell_count()] };
-        for (index, energy) in error.cells.iter_mut().enumerate() {
-            let x = space.cell_nodes(index);
+        let mut error = InterpolationError { residual: vec![0.0; space.dofs()], cells: Vec::new() };
+        for index in 0..space.cell_count() {
+            let (x, mut energy) = (space.cell_nodes(index), 0.0);
             for (l, weight) in rule.iter() {
                 let Some((at, measure)) = At::new(space.order, self.cell(index), &x, l) else { continue };
                 let weight = weight * measure * space.circle(&at.x);
                 let strain = self.missed_slope(&at).strain();
                 let stress = law(index, at.x, &strain);
-                *energy += weight * dot(&stress, &strain);
+                energy += weight * dot(&stress, &strain);
                 self.add_stress(&at, -weight, &stress, &mut error.residual);
+            }
+            if space.order == Order::P2 {
+                error.cells.push(energy);
             }
         }
         error
@@ -118,7 +121,7 @@ impl<const D: usize> Recovery<'_, D> {
 pub struct InterpolationError {
     /// Residual `-int sigma(b) : grad v` for every shape function v, one entry per dof.
     pub residual: Vec<f64>,
-    /// Squared energy norm of b on each cell.
+    /// Squared energy norm of b on each cell; empty for linear elements.
     pub cells: Vec<f64>,
 }
 

@@ -184,7 +184,8 @@ pub(super) fn ends(name: &str) -> impl DoubleEndedIterator<Item = (&str, &str)> 
 
 /// Return the names that an option may have without its dash and the prefix of a solver: the whole name, and the rest behind the name of a body.
 pub(super) fn bare<'a>(option: &'a str, bodies: &[&str]) -> impl Iterator<Item = &'a str> {
-    let is_prefix = |head: &str| head.is_empty() || head == WHOLE || bodies.contains(&head);
+    let is_prefix =
+        |head: &str| head.is_empty() || bodies.iter().chain([&WHOLE]).any(|prefix| prefix.eq_ignore_ascii_case(head));
     ends(option.trim_start_matches('-')).filter(move |(head, _)| is_prefix(head)).map(|(_, name)| name)
 }
 

@@ -104,10 +104,11 @@ pub fn set_of_scene(session: &Session, bodies: &[&str], words: &[String]) -> Res
     withdraw(session)?;
     for (name, value) in pairs(words)? {
         check_of_scene(name, value)?;
-        let of_scene = |name: &str| OF_SCENE.with_borrow(|names| names.contains(&format!("-{name}")));
+        let of_scene =
+            |name: &str| OF_SCENE.with_borrow(|names| names.contains(&format!("-{name}").to_ascii_lowercase()));
         if !bare(name, bodies).any(|name| options.has(name) && !of_scene(name)) {
             options.set(name, value)?;
-            OF_SCENE.with_borrow_mut(|names| names.insert(name.to_owned()));
+            OF_SCENE.with_borrow_mut(|names| names.insert(name.to_ascii_lowercase()));
         }
     }
     Ok(())
