@@ -60,6 +60,36 @@ fn displacements_of_a_bolt() {
     }
 }
 
+/// A tongue that is pulled up in a groove. Both bodies are in contact along two flanks, and the groove is too stiff by its corners.
+const DOVETAIL: &str = "DefineConstant[ h = {1, Name \"h\"} ];\n\
+    Point(1) = {0, 0, 0}; Point(2) = {40, 0, 0}; Point(3) = {40, 20, 0}; Point(4) = {28, 20, 0}; Point(5) = {32, 12, 0};\n\
+    Point(6) = {8, 12, 0}; Point(7) = {12, 20, 0}; Point(8) = {0, 20, 0}; For i In {1 : 8}\n Line(i) = {i, i % 8 + 1};\nEndFor\n\
+    Point(21) = {9, 14, 0}; Point(22) = {31, 14, 0}; Point(23) = {27, 22, 0}; Point(24) = {27, 30, 0}; Point(25) = {13, 30, 0};\n\
+    Point(26) = {13, 22, 0}; For i In {21 : 26}\n Line(i) = {i, (i - 20) % 6 + 21};\nEndFor\n\
+    Curve Loop(1) = {1:8}; Plane Surface(1) = {1}; Curve Loop(2) = {21:26}; Plane Surface(2) = {2};\n\
+    Physical Surface(\"groove\") = {1}; Physical Surface(\"tongue\") = {2}; Physical Curve(\"base\") = {1};\n\
+    Physical Curve(\"inside\") = {4, 6}; Physical Curve(\"flanks\") = {22, 26}; Physical Curve(\"top\") = {24};\n\
+    Mesh.MeshSizeMax = h; Mesh.MeshSizeMin = h;\n";
+
+/// Without the work that singular corners lack, the estimate is a fifth of the error.
+#[test]
+fn displacements_of_a_dovetail() {
+    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\nyoung = 2.1e5\npoisson = 0.3\norder = 2\n");
+    let scene = Scene::new(format!(
+        "dimension = 2\nestimate = true\nmesh = {{ geo = \"dovetail.geo\" }}\n{}fix = [{{ on = \"base\", x = 0, y = 0 }}]\n\
+         {}load = [{{ on = \"top\", force = [0, 4000] }}]\n\
+         [[contact]]\nbetween = [\"inside\", \"flanks\"]\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
+        body("groove"),
+        body("tongue")
+    ));
+    std::fs::write(scene.path.with_file_name("dovetail.geo"), DOVETAIL).expect("a script");
+    let fine = solve(&scene, &["--set", "mesh.set.h=0.125"]).converged().contact();
+    let run = solve(&scene, &[]).converged();
+    let exact = difference(&run.contact(), &fine, &["u_n_groove", "u_n_tongue"]);
+    let told = run.number("discretization_error/displacement");
+    assert!((0.7..2.0).contains(&(told / exact)), "{told} {exact}");
+}
+
 /// Linear elements on cylinders under a soft layer: between the nodes, the gap is that of the cylinders, and not the larger one of the facets.
 #[test]
 fn pressures_of_cylinders_of_straight_facets() {
