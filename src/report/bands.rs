@@ -5,7 +5,8 @@ use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 /// Number of colours in a picture.
 pub const BANDS: usize = 12;
 
-/// Fraction of the largest pressure below which a contact is shown as open: that of the rounding in a pressure.
+/// Fraction of the largest pressure below which a contact is shown as open. Open points have no pressure, and sums of ten facets leave a rounding of
+/// 1e-15. The pressures of an iteration are known to 1e-8 of the largest by default, so that no smaller one means contact.
 const OPEN: f64 = 1e-9;
 
 /// Return the colours from the smallest to the largest value: viridis, which colour-blind readers can follow.

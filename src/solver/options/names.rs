@@ -240,6 +240,13 @@ mod tests {
     }
 
     #[test]
+    fn names_of_bodies_are_found_in_any_case() {
+        let names = |option| bare(option, &["upper"]).collect::<Vec<_>>();
+        assert_eq!(names("-UPPER_ksp_rtol"), ["UPPER_ksp_rtol", "ksp_rtol"]);
+        assert_eq!(names("-lower_ksp_rtol"), ["lower_ksp_rtol"]);
+    }
+
+    #[test]
     fn options_that_look_are_told_by_their_words() {
         let looking = "ksp_view ksp_monitor_true_residual mg_levels_1_ksp_view ksp_converged_reason mat_view_info";
         assert!(looking.split(' ').all(looks));
