@@ -1,25 +1,18 @@
 //! Expressions in the coordinates, with which the user gives gaps, loads, zones and laws of layers.
 
-mod dual;
 mod grammar;
-mod operators;
 mod program;
-mod scope;
 #[cfg(test)]
 mod tests;
-mod text;
-mod token;
-
-pub use scope::Scope;
+pub use grammar::Scope;
 
 use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result};
-use dual::Dual;
-use program::{MOST_VARIABLES, Program, Step, Values};
+use grammar::Text;
+use program::{Dual, MOST_VARIABLES, Program, Step, Values};
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
-use text::Text;
 
 /// An expression such as `5e-4 * max(0, 1 - (x - 4)^2)^1.5`, parsed once and cheap to clone.
 ///
@@ -275,5 +268,5 @@ fn full(values: &[f64]) -> Values<f64> {
 /// Return the names that have a meaning in some expression, which data must not have.
 pub fn names() -> impl Iterator<Item = &'static str> {
     // c is the compression in a layer's law
-    operators::functions().chain(COORDINATES).chain(["c", "pi"])
+    program::functions().chain(COORDINATES).chain(["c", "pi"])
 }

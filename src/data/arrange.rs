@@ -1,13 +1,14 @@
-//! The step from numbers in rows to a function of one coordinate or two.
+//! The step from numbers in rows to a function of one coordinate or two: points without a height are counted, a trend is subtracted, and
+//! gaps of grids are filled.
 
 use super::grid::{Axis, Grid};
-use super::knots::Knots;
-use super::rows::{Frame, Rows};
-use super::rule::{DataSpec, Interpolation, Outside};
-use super::scattered::Scattered;
-use super::trend::Trend;
-use super::{fill, gaps, trend};
-use crate::error::Result;
+use super::rule::{DataSpec, Detrend, Fill, Frame, Interpolation, Outside, Rows};
+use super::scattered::{Knots, Scattered};
+use crate::error::{Result, shown};
+use crate::linalg::bounds;
+use nalgebra::{DMatrix, DVector};
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
 
 /// A function of one coordinate or two, by the places of its points.
 #[derive(Debug, Clone)]
@@ -50,7 +51,7 @@ pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Arranged> {
             "a point is x and a height, or x, y and a height; for heights in rows and columns leave out `points`",
         ));
     }
-    let missing = gaps::count(spec, &rows)?;
+    let missing = count_missing(spec, &rows)?;
     let (shape, trend) = if spec.points { points(spec, &rows)? } else { matrix(spec, rows)? };
     Ok(Arranged { shape, missing, trend })
 }
@@ -73,7 +74,7 @@ fn matrix(spec: &DataSpec, rows: Rows) -> Result<(Shape, Option<Trend>)> {
         let index = [k % counts[0], k / counts[0]];
         [0, 1].map(|d| axes[d].origin + axes[d].spacing * index[d] as f64)
     };
-    let trend = trend::subtract(spec.detrend, place, &mut values);
+    let trend = subtract(spec.detrend, place, &mut values);
     Ok((grid(spec, axes, values)?, trend))
 }
 
@@ -83,7 +84,7 @@ fn grid(spec: &DataSpec, axes: [Axis; 2], mut values: Vec<f64>) -> Result<Shape>
     if spec.interpolation == Interpolation::Cubic && axes.iter().any(thin) {
         return Err(spec.refuse("has two points in a direction", "cubic interpolation needs three: take \"linear\""));
     }
-    fill::grid(spec.fill, &axes, &mut values);
+    fill_gaps(spec.fill, &axes, &mut values);
     Ok(Shape::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
 }
 
@@ -96,7 +97,7 @@ fn points(spec: &DataSpec, rows: &Rows) -> Result<(Shape, Option<Trend>)> {
     let mut points: Vec<[f64; 3]> = rows.values.chunks_exact(rows.columns).map(point).collect();
     refuse_twins(spec, &points, rows)?;
     let mut heights: Vec<f64> = points.iter().map(|point| point[2]).collect();
-    let trend = trend::subtract(spec.detrend, |k| [points[k][0], points[k][1]], &mut heights);
+    let trend = subtract(spec.detrend, |k| [points[k][0], points[k][1]], &mut heights);
     points.iter_mut().zip(heights).for_each(|(point, height)| point[2] = height);
     let shape = if rows.columns == 2 { profile(spec, points)? } else { surface(spec, points)? };
     Ok((shape, trend))
@@ -213,4 +214,288 @@ fn regular(coordinates: impl Iterator<Item = f64>) -> Option<Axis> {
 /// Return the index of the point of an axis that is nearest to a coordinate.
 fn nearest(axis: &Axis, x: f64) -> usize {
     ((x - axis.origin) / axis.spacing).round().clamp(0.0, (axis.count - 1) as f64) as usize
+}
+
+/// Return the number of points without a height.
+///
+/// # Errors
+/// Points without a height, if the scene does not say how to fill them; a suspicious height, if the scene does not name what stands for
+/// points without one.
+fn count_missing(spec: &DataSpec, rows: &Rows) -> Result<usize> {
+    let total = heights(spec, rows).count();
+    let missing = heights(spec, rows).filter(|height| height.is_nan()).count();
+    if missing > 0 && missing == total {
+        let what = format!("has no height at any of its {total} points");
+        return Err(spec.refuse(what, "look at `missing`, and at the file"));
+    }
+    if missing > 0 && spec.fill == Fill::Error {
+        let what =
+            format!("has no height at {missing} of {total} points, the first {}", place(spec, rows, f64::is_nan));
+        let help = "write fill = \"linear\" or \"nearest\", or fill the gaps with the program of the instrument";
+        return Err(spec.refuse(what, help));
+    }
+    let suspect = if spec.missing.is_none() { suspect(|| heights(spec, rows)) } else { None };
+    let Some(Suspect { value, count, others }) = suspect else { return Ok(missing) };
+    let [low, high, number] = [others[0], others[1], value].map(shown);
+    let first = place(spec, rows, |height| height == value);
+    let what =
+        format!("has {number} at {count} of {total} points, the first {first}; all others are from {low} to {high}");
+    let help = format!(
+        "if {number} stands for a point without a height, write missing = {number} and fill = \"linear\" or \"nearest\"; if it is a \
+         height, write missing = []"
+    );
+    Err(spec.refuse(what, &help))
+}
+
+/// Return all heights in the order of the file.
+fn heights<'a>(spec: &DataSpec, rows: &'a Rows) -> impl Iterator<Item = f64> + use<'a> {
+    let first = rows.first_height(spec.points);
+    rows.values.chunks(rows.columns.max(1)).flat_map(move |row| row[first..].iter().copied())
+}
+
+/// Return, as a text, where in the file the first such height is.
+fn place(spec: &DataSpec, rows: &Rows, is_such: impl Fn(f64) -> bool) -> String {
+    let wide = rows.columns.max(1) - rows.first_height(spec.points);
+    let at = heights(spec, rows).position(is_such).unwrap_or(0);
+    format!("in {}, column {} (from 0)", rows.line(at / wide), rows.first_height(spec.points) + at % wide)
+}
+
+/// A height that probably stands for no height.
+#[derive(Debug, PartialEq)]
+struct Suspect {
+    value: f64,
+    count: usize,
+    /// The least and the largest of all other heights.
+    others: [f64; 2],
+}
+
+/// Least number of different other heights in a file that is taken as measured: three bits, fewer than any instrument has. A step that is
+/// written by hand is a table of a few numbers.
+const LEVELS: usize = 8;
+
+/// How far a single height must be from all others, as a multiple of their range. A picture of the surface to three digits then shows this
+/// one spike and nothing else.
+const SPIKE: f64 = 1e3;
+
+/// Return a height that probably stands for points without one; none if there is none.
+///
+/// It is the least or the largest height, and it is farther from all others than these are from each other. A real step of this height would
+/// pass the whole gap between two neighbouring points, everywhere along its flank. Measured heights also do not repeat to the last digit,
+/// unless they have few digits, and then they do so close to each other. A height that occurs once must be [`SPIKE`] times as far away.
+fn suspect<I: Iterator<Item = f64>>(heights: impl Fn() -> I) -> Option<Suspect> {
+    let finite = || heights().filter(|height| !height.is_nan());
+    let [low, high] = range(finite());
+    [low, high].into_iter().find_map(|value| {
+        let others = || finite().filter(|&height| height != value);
+        let [least, largest] = range(others());
+        let count = finite().filter(|&height| height == value).count();
+        let distance = (least - value).max(value - largest);
+        let far = if count == 1 { SPIKE * (largest - least) } else { largest - least };
+        (distance > far && has_levels(others())).then_some(Suspect { value, count, others: [least, largest] })
+    })
+}
+
+/// Return the least and the largest number.
+fn range(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
+    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], number| [low.min(number), high.max(number)])
+}
+
+/// Return whether there are at least [`LEVELS`] different heights.
+fn has_levels(heights: impl Iterator<Item = f64>) -> bool {
+    let mut levels: Vec<f64> = Vec::new();
+    for height in heights {
+        if !levels.contains(&height) {
+            levels.push(height);
+        }
+        if levels.len() == LEVELS {
+            return true;
+        }
+    }
+    false
+}
+
+/// A polynomial that was subtracted, by its derivatives at the middle of the data, in the units of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trend {
+    /// First derivatives.
+    pub slope: [f64; 2],
+    /// Second derivatives by x, by x and y, and by y; zero for a plane.
+    pub second: [f64; 3],
+}
+
+/// Subtract from the heights the polynomial that is nearest to them in the mean square, and return it. `places` gives the place of each
+/// height. Heights that are NaN stay so, and do not count.
+fn subtract(detrend: Detrend, places: impl Fn(usize) -> [f64; 2], heights: &mut [f64]) -> Option<Trend> {
+    let terms = match detrend {
+        Detrend::None => return None,
+        Detrend::Plane => 3,
+        Detrend::Parabola => 6,
+    };
+    // places from -1 to 1 in each direction have powers of one size
+    let [low, high] = bounds((0..heights.len()).map(&places));
+    let half = [0, 1].map(|d| if high[d] > low[d] { 0.5 * (high[d] - low[d]) } else { 1.0 });
+    let powers = |k: usize| {
+        let [x, y] = [0, 1].map(|d| (places(k)[d] - 0.5 * (low[d] + high[d])) / half[d]);
+        [1.0, x, y, x * x, x * y, y * y]
+    };
+    let (mut matrix, mut right) = (DMatrix::zeros(terms, terms), DVector::zeros(terms));
+    for (k, height) in heights.iter().enumerate().filter(|(_, height)| !height.is_nan()) {
+        let powers = powers(k);
+        for i in 0..terms {
+            right[i] += powers[i] * height;
+            (0..terms).for_each(|j| matrix[(i, j)] += powers[i] * powers[j]);
+        }
+    }
+    // points on a line, or too few, leave terms undetermined: these become as small as possible
+    let least = f64::EPSILON * heights.len() as f64;
+    let found = matrix.svd(true, true).solve(&right, least).ok()?;
+    for (k, height) in heights.iter_mut().enumerate() {
+        let powers = powers(k);
+        *height -= (0..terms).map(|i| found[i] * powers[i]).sum::<f64>();
+    }
+    let term = |i: usize| if i < terms { found[i] } else { 0.0 };
+    let [a, b] = half;
+    let second = [2.0 * term(3) / (a * a), term(4) / (a * b), 2.0 * term(5) / (b * b)];
+    Some(Trend { slope: [term(1) / a, term(2) / b], second })
+}
+
+/// Replace the values of a grid that are NaN; at least one is not.
+///
+/// Only the points beside a gap are used. The nearest point of any place in the gap is among them, because one step further into the gap
+/// there is a point that is still nearer.
+fn fill_gaps(fill: Fill, axes: &[Axis; 2], values: &mut [f64]) {
+    let gaps: Vec<usize> = (0..values.len()).filter(|&k| values[k].is_nan()).collect();
+    if gaps.is_empty() {
+        return;
+    }
+    let place = |k: usize| {
+        let index = [k % axes[0].count, k / axes[0].count];
+        [0, 1].map(|d| axes[d].origin + axes[d].spacing * index[d] as f64)
+    };
+    let mut rim: Vec<usize> = gaps.iter().flat_map(|&k| around(axes, k)).filter(|&k| !values[k].is_nan()).collect();
+    rim.sort_unstable();
+    rim.dedup();
+    let is_profile = axes[1].count == 1;
+    let rim: Vec<[f64; 3]> = rim.iter().map(|&k| [place(k)[0], place(k)[1], values[k]]).collect();
+    let between = between(fill, is_profile, &rim);
+    gaps.iter().for_each(|&k| values[k] = between(place(k)));
+}
+
+/// Return a function that gives heights between points and beyond them.
+///
+/// Heights are linear between the points of a profile and on triangles of a surface. A single point has no line, and points on one line have
+/// no triangles. The nearest point is then as good, as no place is between them.
+fn between(fill: Fill, is_profile: bool, points: &[[f64; 3]]) -> Box<dyn Fn([f64; 2]) -> f64> {
+    if fill == Fill::Linear && is_profile && points.len() > 1 {
+        let knots = Knots(points.iter().map(|&[x, _, height]| [x, height]).collect());
+        return Box::new(move |place| knots.sample(place[0], true).value);
+    }
+    if fill == Fill::Linear
+        && !is_profile
+        && let Some(planes) = Scattered::new(points)
+    {
+        return Box::new(move |place| planes.sample(place, true).value);
+    }
+    let points = RTree::bulk_load(points.iter().map(|&[x, y, height]| GeomWithData::new([x, y], height)).collect());
+    Box::new(move |place| points.nearest_neighbor(place).map_or(f64::NAN, |point| point.data))
+}
+
+/// Return the points around a point of a grid: eight inside, fewer at the border.
+fn around(axes: &[Axis; 2], k: usize) -> Vec<usize> {
+    let [columns, rows] = [axes[0].count, axes[1].count];
+    let near = |at: usize, count: usize| at.saturating_sub(1)..=(at + 1).min(count - 1);
+    let row = |j: usize| near(k % columns, columns).map(move |i| i + columns * j);
+    near(k / columns, rows).flat_map(row).filter(|&other| other != k).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Waves of range 2, with some heights replaced.
+    fn waves(replaced: &[(usize, f64)]) -> Option<Suspect> {
+        let mut heights: Vec<f64> = (0..100).map(|k| (0.37 * f64::from(k)).sin()).collect();
+        replaced.iter().for_each(|&(at, height)| heights[at] = height);
+        suspect(|| heights.iter().copied())
+    }
+
+    #[test]
+    fn values_far_from_all_others_are_suspicious() {
+        for value in [-9999.0, 1e38, -32768.0, 4.0, -4.0] {
+            let found = waves(&[(3, value), (77, value)]).expect("suspicious");
+            assert_eq!((found.value, found.count), (value, 2));
+        }
+        assert_eq!(waves(&[(3, -9999.0)]).map(|found| found.count), Some(1));
+        // nearer than the others are to each other, or alone
+        assert_eq!(waves(&[]), None);
+        assert_eq!(waves(&[(3, 2.9), (77, 2.9)]), None);
+        assert_eq!(waves(&[(3, 50.0)]), None);
+        // a step by hand
+        let step = [0.0, 0.0, 0.0, 0.1, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0];
+        assert_eq!(suspect(|| step.into_iter()), None);
+        assert_eq!(waves(&[(3, f64::NAN), (77, f64::NAN)]), None);
+    }
+
+    #[test]
+    fn polynomials_are_found_and_subtracted() {
+        let place = |k: usize| [100.0 + 0.5 * (k % 7) as f64, -3.0 + 2.0 * (k / 7) as f64];
+        let parabola = |k: usize| {
+            let [x, y] = [place(k)[0] - 101.5, place(k)[1] - 2.0];
+            1.0 + 2.0 * x - 3.0 * y + 0.5 * x * x + 0.25 * x * y
+        };
+        let mut heights: Vec<f64> = (0..42).map(parabola).collect();
+        heights[17] = f64::NAN;
+        let found = subtract(Detrend::Parabola, place, &mut heights).expect("a trend");
+        let error = [
+            found.slope[0] - 2.0,
+            found.slope[1] + 3.0,
+            found.second[0] - 1.0,
+            found.second[1] - 0.25,
+            found.second[2],
+        ];
+        assert!(error.iter().all(|error| error.abs() < 1e-11), "{found:?}");
+        assert!(heights[17].is_nan());
+        assert!(heights.iter().filter(|height| !height.is_nan()).all(|height| height.abs() < 1e-11), "{heights:?}");
+        // a profile, whose second coordinate is the same everywhere
+        let mut line: Vec<f64> = (0..5).map(|k| 7.0 - 3.0 * f64::from(k)).collect();
+        let along = |k: usize| [k as f64, 0.0];
+        let found = subtract(Detrend::Plane, along, &mut line).expect("a trend");
+        assert!((found.slope[0] + 3.0).abs() < 1e-12 && line.iter().all(|height| height.abs() < 1e-12), "{line:?}");
+        assert_eq!(subtract(Detrend::None, along, &mut line), None);
+    }
+
+    fn axes(counts: [usize; 2]) -> [Axis; 2] {
+        let axis = |origin, spacing, count| Axis { origin, spacing, count };
+        [axis(5.0, 0.5, counts[0]), axis(-1.0, 2.0, counts[1])]
+    }
+
+    #[test]
+    fn gaps_are_filled_from_their_rims() {
+        let plane = |k: usize| 3.0 + (k % 6) as f64 - 10.0 * (k / 6) as f64;
+        let gaps = [7, 8, 13, 14, 15, 0, 29];
+        let holed: Vec<f64> = (0..30).map(|k| if gaps.contains(&k) { f64::NAN } else { plane(k) }).collect();
+        let mut linear = holed.clone();
+        fill_gaps(Fill::Linear, &axes([6, 5]), &mut linear);
+        for k in [8, 13, 14, 15] {
+            assert!((linear[k] - plane(k)).abs() < 1e-12, "{k}: {} {}", linear[k], plane(k));
+        }
+        // the corners are beyond all others
+        assert!(linear.iter().all(|height| height.is_finite()));
+        let mut nearest = holed;
+        fill_gaps(Fill::Nearest, &axes([6, 5]), &mut nearest);
+        // along a row points are 0.5 apart, from row to row 2
+        assert_eq!([nearest[7], nearest[8], nearest[15], nearest[0]], [plane(6), plane(9), plane(16), plane(1)]);
+    }
+
+    #[test]
+    fn profiles_and_rims_on_a_line() {
+        let gap = f64::NAN;
+        let mut profile = [gap, 1.0, gap, gap, 4.0, gap];
+        fill_gaps(Fill::Linear, &axes([6, 1]), &mut profile);
+        assert_eq!(profile, [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
+        // one row beside the gap is all that there is
+        let mut half: Vec<f64> = (0..12).map(|k| if k < 6 { f64::from(k) } else { gap }).collect();
+        fill_gaps(Fill::Linear, &axes([3, 4]), &mut half);
+        assert_eq!(half[6..], [3.0, 4.0, 5.0, 3.0, 4.0, 5.0]);
+    }
 }

@@ -2,8 +2,7 @@
 //!
 //! Origin and spacing of the header are in the lengths of the file. Those of the scene place and scale them, as they do with points.
 
-use super::rows::{Frame, Rows};
-use super::rule::DataSpec;
+use super::rule::{DataSpec, Frame, Rows};
 use crate::error::{Error, Result};
 use std::io::Read;
 use std::path::Path;

@@ -1,14 +1,10 @@
-//! The parser of expressions: operator precedence, function calls, and refusals with their place.
+//! The parser of expressions: tokens, operator precedence, function calls, and refusals with their place.
 //!
 //! Steps are written in postfix order while the tokens are read, so that the cost is proportional to the length of the text.
 
-use super::operators::{self, BINARY, Binary, COMPARISON, INFIX, POWER, SIGN, SIGNS, UNARY, Unary};
-use super::program::{Number, Step};
-use super::scope::Scope;
-use super::text::Text;
-use super::token::{self, Token};
-use crate::data::Data;
-use crate::error::{Error, Result, nearest};
+use super::program::{self, BINARY, Binary, COMPARISON, INFIX, Number, POWER, SIGN, SIGNS, Step, UNARY, Unary};
+use crate::data::{Data, Library};
+use crate::error::{Error, Place, Result, nearest};
 use std::ops::{Range, RangeInclusive};
 
 /// Largest depth of nesting, which bounds the recursion of the parser.
@@ -19,7 +15,7 @@ const DEEPEST: usize = 60;
 /// # Errors
 /// Texts that are no expression, and data that cannot be read.
 pub(super) fn parse(text: Text, scope: Scope) -> Result<Vec<Step>> {
-    let (token, span) = token::next(&text, 0)?;
+    let (token, span) = next(&text, 0)?;
     if token == Token::End {
         return Err(text.refuse(0..text.text.len(), "the expression is empty"));
     }
@@ -52,7 +48,7 @@ struct Parser<'a> {
 impl<'a> Parser<'a> {
     /// Read the next token. Return the token before it, with its bytes.
     fn step(&mut self) -> Result<(Token<'a>, Range<usize>)> {
-        let (token, span) = token::next(&self.text, self.span.end)?;
+        let (token, span) = next(&self.text, self.span.end)?;
         Ok((std::mem::replace(&mut self.token, token), std::mem::replace(&mut self.span, span)))
     }
 
@@ -253,7 +249,7 @@ impl<'a> Parser<'a> {
     /// Return the names of all functions.
     fn functions(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         let data = self.scope.data.keys().map(String::as_str);
-        operators::functions().map(|name| -> &'a str { name }).chain(data)
+        program::functions().map(|name| -> &'a str { name }).chain(data)
     }
 
     /// Return the refusal of a call with too few values, or too many.
@@ -276,5 +272,108 @@ impl<'a> Parser<'a> {
             }
             Some(_) => error.help("its file is a surface: write the places along a row of the file and down its rows"),
         }
+    }
+}
+
+/// A token of an expression.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Token<'a> {
+    Number(f64),
+    Name(&'a str),
+    /// A binary operator, or one of `( ) , !`.
+    Symbol(&'static str),
+    End,
+}
+
+/// Return the token at or after the byte `start`, and its bytes in the text.
+///
+/// # Errors
+/// Bytes that are no token.
+pub(super) fn next<'a>(whole: &Text<'a>, start: usize) -> Result<(Token<'a>, Range<usize>)> {
+    let text = whole.text;
+    let start = text.len() - text[start..].trim_start().len();
+    let rest = &text[start..];
+    let Some(first) = rest.chars().next() else {
+        return Ok((Token::End, start..start));
+    };
+    if first.is_ascii_digit() || first == '.' {
+        let span = start..start + number_length(rest);
+        return match text[span.clone()].parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok((Token::Number(value), span)),
+            Ok(_) => Err(whole.refuse(span, "the number is too large")),
+            Err(_) => Err(whole.refuse(span, "not a number").help("write numbers like 2, 0.5 or 1e-3")),
+        };
+    }
+    if first.is_alphabetic() || first == '_' {
+        let length = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        return Ok((Token::Name(&rest[..length]), start..start + length));
+    }
+    let symbols = INFIX.iter().map(|(_, operator)| operator.name).chain(["(", ")", ",", "!"]);
+    match symbols.filter(|symbol| rest.starts_with(symbol)).max_by_key(|symbol| symbol.len()) {
+        Some("*") if rest.starts_with("**") => {
+            Err(whole.refuse(start..start + 2, "unknown operator `**`").help("write a power as x^2"))
+        }
+        Some(symbol) => Ok((Token::Symbol(symbol), start..start + symbol.len())),
+        None => {
+            let error = whole.refuse(start..start + first.len_utf8(), format!("unexpected `{first}`"));
+            Err(match first {
+                '=' => error.help("compare with =="),
+                '&' => error.help("\"and\" is written &&"),
+                '|' => error.help("\"or\" is written ||, an absolute value abs(x)"),
+                _ => error,
+            })
+        }
+    }
+}
+
+/// Return the length in bytes of the number with which `rest` starts: digits, a point, an exponent.
+fn number_length(rest: &str) -> usize {
+    let digits = |from: usize| rest[from..].bytes().take_while(|b| b.is_ascii_digit() || *b == b'.').count();
+    let mantissa = digits(0);
+    let exponent = &rest[mantissa..];
+    if !exponent.starts_with(['e', 'E']) {
+        return mantissa;
+    }
+    let sign = usize::from(exponent[1..].starts_with(['+', '-']));
+    match exponent[1 + sign..].bytes().take_while(u8::is_ascii_digit).count() {
+        0 => mantissa,
+        count => mantissa + 1 + sign + count,
+    }
+}
+
+/// A text, and the place of the string that contains it.
+#[derive(Clone, Copy)]
+pub(super) struct Text<'a> {
+    pub text: &'a str,
+    pub place: &'a Place,
+}
+
+impl Text<'_> {
+    /// Return a refusal of some of its bytes. The caret is inside the string if the source has the text verbatim, without escapes.
+    pub fn refuse(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+        let Place { source, span: whole } = self.place;
+        let written = source.text.get(whole.clone()).unwrap_or_default();
+        let exact = written.find(self.text).filter(|_| !self.text.is_empty()).map(|offset| {
+            let start = whole.start + offset;
+            Place { source: source.clone(), span: start + span.start..start + span.end }
+        });
+        Error::scene(exact.as_ref().unwrap_or(self.place), message)
+    }
+}
+
+/// The names that an expression can use besides the common functions and `pi`.
+#[derive(Clone, Copy)]
+pub struct Scope<'a> {
+    /// Names of the variables, at most four.
+    pub variables: &'a [&'static str],
+    /// Functions from files.
+    pub data: &'a Library,
+}
+
+impl<'a> Scope<'a> {
+    /// Return a scope of variables alone.
+    pub fn of(variables: &'a [&'static str]) -> Self {
+        static NONE: Library = Library::new();
+        Self { variables, data: &NONE }
     }
 }

@@ -232,7 +232,7 @@ fn law(text: &str) -> Expression {
 
 #[test]
 fn derivatives_agree_with_differences() {
-    let functions = operators::UNARY.iter().map(|function| function.name).map(|name| format!("{name}(0.3*c*x) + c"));
+    let functions = program::UNARY.iter().map(|function| function.name).map(|name| format!("{name}(0.3*c*x) + c"));
     let others = [
         "3*c^2.5 + x*c",
         "2^c/(1 + c^x)",
