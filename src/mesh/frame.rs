@@ -1,4 +1,4 @@
-//! Local systems of coordinates in files of other programs.
+//! Local systems of coordinates and numbers in files of other programs.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -90,6 +90,15 @@ fn unit(v: Vector3<f64>) -> Option<Vector3<f64>> {
     v.try_normalize(1e-300).filter(|unit| unit.iter().all(|c| c.is_finite()))
 }
 
+/// Return a number whose exponent may begin with D, or with its sign alone; none if it is no finite number.
+pub fn real(word: &str) -> Option<f64> {
+    let mut text = word.trim().to_ascii_lowercase().replace('d', "e");
+    if let Some(at) = text.rfind(['+', '-']).filter(|&at| at > 0 && !text[..at].ends_with('e')) {
+        text.insert(at, 'e');
+    }
+    text.parse().ok().filter(|value: &f64| value.is_finite())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -105,5 +114,17 @@ mod tests {
         let frame = Frame::by_first_axis([1.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 0.0, 5.0]).unwrap();
         assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
         assert_eq!(Frame::by_third_axis([0.0; 3], [1.0; 3], [2.0; 3]), None);
+    }
+
+    #[test]
+    fn numbers_of_fortran() {
+        for (text, value) in
+            [("1.0D0", 1.0), ("1.5+3", 1500.0), ("-1.5-3", -0.0015), ("2.d-1", 0.2), ("1e+2", 100.0), ("+7.", 7.0)]
+        {
+            assert_eq!(real(text), Some(value), "{text}");
+        }
+        for text in ["one", "", "-", "inf", "nan", "1e999", "1.5+", "d"] {
+            assert_eq!(real(text), None, "{text}");
+        }
     }
 }

@@ -5,52 +5,36 @@
 //! Gmsh and cached, too. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
 
 mod abaqus;
-mod arrays;
-mod bisect;
 mod cache;
 mod check;
-mod contents;
 mod cursor;
 pub mod datum;
 mod elements;
 mod foreign;
-mod fortran;
 mod frame;
 mod gmsh;
 mod groups;
-mod guard;
-mod inputs;
 mod load;
 mod locality;
-mod middles;
 mod msh;
 mod nastran;
-mod nodes;
-mod numbering;
 mod old;
-mod orders;
 mod physical;
-mod quality;
 mod script;
 mod simplex;
-mod sizes;
 mod split;
-mod straighten;
 #[cfg(test)]
 mod tests;
-mod tokens;
 mod trust;
-mod unv;
-
-pub use bisect::bisect;
 pub use check::{Asked, Checked, Duty, Parts};
 pub use foreign::is_shape;
+pub use groups::Numbering;
 pub use groups::{Group, Groups};
 pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};
+pub use locality::bisect;
 pub use msh::{Maker, parse};
-pub use numbering::Numbering;
-pub use quality::Quality;
-pub use sizes::{unstructured, view};
+pub use script::{unstructured, view};
+pub use simplex::Quality;
 pub use trust::{Breach, breach};
 
 use crate::linalg::{bounds, pad};

@@ -1,10 +1,10 @@
 //! A reader of Gmsh's `.msh` 4.1, text and binary, that makes a [`Mesh`]. Formats 1 and 2 are rewritten as 4.1 first.
 
 use super::cursor::{Cursor, Source};
-use super::nodes::Nodes;
+use super::elements::{self, Nodes};
 use super::physical::Physical;
 use super::simplex::THINGS;
-use super::{Mesh, elements, groups, old};
+use super::{Mesh, groups, old};
 use crate::error::{Error, Result};
 use crate::problem::order::Order;
 use std::io::{Read, SeekFrom};

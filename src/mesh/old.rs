@@ -4,12 +4,13 @@
 //! groups to entities. Here the elements of the same groups become one entity, since other programs write one number for all
 //! entities. An element of several groups stands in an old file once for each of them. Elements of one type on the same nodes
 //! are therefore one element, which belongs to all of their groups.
+//!
+//! Files of other programs are handed to the reader in the same form: [`Contents`] writes the binary form of format 4.1.
 
-use super::contents::{Contents, Element};
 use super::cursor::{Cursor, Source};
-use super::simplex;
+use super::simplex::Kind;
 use crate::error::{Error, Result};
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
 /// Return whether bytes begin like a file of format 1 or 2.
@@ -223,6 +224,134 @@ impl File {
 
 /// Return the number of nodes of an element type of Gmsh.
 fn stride(cursor: &Cursor, start: usize, kind: i32) -> Result<usize> {
-    let known = simplex::type_name(kind).map(|(_, stride)| stride);
+    let known = Kind::of(kind).map(|kind| kind.nodes);
     known.ok_or_else(|| cursor.error_at(start, format!("elements of Gmsh's type {kind} cannot be used")))
+}
+
+/// An element.
+pub struct Element {
+    /// Its number.
+    pub number: u64,
+    /// Gmsh's number of the type.
+    pub kind: i32,
+    /// Number of the entity of the geometry.
+    pub entity: i32,
+    /// Tags of the physical groups, sorted.
+    pub groups: Vec<i32>,
+    /// Its nodes, by their numbers.
+    pub nodes: Vec<u64>,
+}
+
+/// An entity of format 4.1.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Entity {
+    dimension: usize,
+    /// Tags of its physical groups, sorted.
+    groups: Vec<i32>,
+    /// Number in the file if it belongs to no group, otherwise 0.
+    number: i32,
+}
+
+/// A mesh.
+#[derive(Default)]
+pub struct Contents {
+    /// Lines of the names of groups: dimension, tag, quoted name.
+    pub names: Vec<String>,
+    /// Number and place of each node.
+    pub nodes: Vec<(u64, [f64; 3])>,
+    /// The elements.
+    pub elements: Vec<Element>,
+}
+
+impl Contents {
+    /// Return the bytes of the file.
+    pub fn written(&self) -> Vec<u8> {
+        let mut entities: BTreeMap<Entity, BTreeMap<i32, Vec<&Element>>> = BTreeMap::new();
+        for element in &self.elements {
+            let number = if element.groups.is_empty() { element.entity } else { 0 };
+            let dimension = Kind::of(element.kind).map_or(0, |kind| kind.shape.dimension);
+            let entity = Entity { dimension, groups: element.groups.clone(), number };
+            entities.entry(entity).or_default().entry(element.kind).or_default().push(element);
+        }
+        let tags = tags(entities.keys());
+        let blocks = entities.values().map(BTreeMap::len).sum();
+        let mut to = Bytes(b"$MeshFormat\n4.1 1 8\n".to_vec());
+        to.int(1);
+        to.text("\n$EndMeshFormat\n");
+        if !self.names.is_empty() {
+            to.text(&format!("$PhysicalNames\n{}\n{}\n$EndPhysicalNames\n", self.names.len(), self.names.join("\n")));
+        }
+        write_entities(&mut to, entities.keys().zip(&tags));
+        to.text("$Nodes\n");
+        [1, self.nodes.len(), 0, 0].iter().for_each(|&size| to.size(size as u64));
+        [0, 1, 0].iter().for_each(|&head| to.int(head));
+        to.size(self.nodes.len() as u64);
+        self.nodes.iter().for_each(|(tag, _)| to.size(*tag));
+        self.nodes.iter().flat_map(|(_, x)| x).for_each(|x| to.0.extend(x.to_le_bytes()));
+        to.text("\n$EndNodes\n$Elements\n");
+        [blocks, self.elements.len(), 0, 0].iter().for_each(|&size| to.size(size as u64));
+        for ((entity, kinds), tag) in entities.iter().zip(&tags) {
+            for (kind, elements) in kinds {
+                [entity.dimension as i32, *tag, *kind].iter().for_each(|&head| to.int(head));
+                to.size(elements.len() as u64);
+                for element in elements {
+                    to.size(element.number);
+                    element.nodes.iter().for_each(|&node| to.size(node));
+                }
+            }
+        }
+        to.text("\n$EndElements\n");
+        to.0
+    }
+}
+
+/// Return the tag of each entity: its number in the file if it has no group, otherwise the next free one of its dimension.
+fn tags<'a>(entities: impl Iterator<Item = &'a Entity> + Clone) -> Vec<i32> {
+    let own = |entity: &Entity| (entity.dimension, entity.number);
+    let taken: BTreeSet<(usize, i32)> = entities.clone().filter(|entity| entity.groups.is_empty()).map(own).collect();
+    let mut next = [0; 4];
+    let mut free = |dimension: usize| {
+        next[dimension] += 1;
+        while taken.contains(&(dimension, next[dimension])) {
+            next[dimension] += 1;
+        }
+        next[dimension]
+    };
+    entities.map(|e| if e.groups.is_empty() { e.number } else { free(e.dimension) }).collect()
+}
+
+fn write_entities<'a>(to: &mut Bytes, entities: impl Iterator<Item = (&'a Entity, &'a i32)> + Clone) {
+    to.text("$Entities\n");
+    for dimension in 0..4 {
+        to.size(entities.clone().filter(|(entity, _)| entity.dimension == dimension).count() as u64);
+    }
+    for (entity, tag) in entities {
+        to.int(*tag);
+        // These are the place of a point, or the box around another entity, which nobody reads.
+        let numbers = if entity.dimension == 0 { 3 } else { 6 };
+        to.0.extend(std::iter::repeat_n(0, 8 * numbers));
+        to.size(entity.groups.len() as u64);
+        entity.groups.iter().for_each(|&group| to.int(group));
+        if entity.dimension > 0 {
+            to.size(0);
+        }
+    }
+    to.text("\n$EndEntities\n");
+}
+
+/// Bytes to which numbers are appended.
+struct Bytes(Vec<u8>);
+
+impl Bytes {
+    fn int(&mut self, value: i32) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn size(&mut self, value: u64) {
+        self.0.extend(value.to_le_bytes());
+    }
+
+    fn text(&mut self, text: &str) {
+        self.0.extend(text.as_bytes());
+    }
 }

@@ -1,11 +1,11 @@
-//! The facts about a `.geo` script that matter before Gmsh runs it: which files it reads, and which numbers can be set from
-//! outside.
+//! The facts about a `.geo` script that matter before Gmsh runs it: which files and other inputs it reads, and which numbers can be set
+//! from outside. Scripts that follow a field of sizes are made here, too.
 //!
-//! This is a search through its text, not an interpreter: a file whose name the script computes is not seen.
+//! This is a search through its text, not an interpreter: a file whose name the script computes is not seen. The values of environment
+//! variables belong to the key of its mesh in the cache. Other inputs besides files are unknown before Gmsh runs, so a mesh that depends
+//! on them cannot be cached.
 
-use super::inputs::Inputs;
-use super::tokens::{Token, tokens};
-use super::trust;
+use super::trust::{self, READ, RUN, Token, tokens};
 use crate::error::{Error, Kind, Located, Place, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -199,9 +199,132 @@ fn options_of(path: &Path) -> PathBuf {
     name.into()
 }
 
+/// Words of Gmsh whose values differ between runs or places. They stand for the clock, the memory, random numbers, whether a
+/// file exists, and the paths of the script and the program.
+const CHANGING: [&str; 11] = [
+    "Cpu",
+    "Memory",
+    "TotalMemory",
+    "Today",
+    "Rand",
+    "FileExists",
+    "CurrentDirectory",
+    "CurrentDir",
+    "CurrentFileName",
+    "AbsolutePath",
+    "GmshExecutableName",
+];
+
+/// The variable that this program sets for Gmsh, to another value each time.
+const HOME: &str = "GMSH_HOME";
+
+/// The inputs of a script besides files.
+#[derive(Debug, Default)]
+pub struct Inputs {
+    /// Names of the environment variables that the script reads.
+    pub variables: BTreeSet<String>,
+    /// The first word whose value is unknown before Gmsh runs, if there is one.
+    pub unknown: Option<String>,
+}
+
+impl Inputs {
+    /// Add the inputs of a part of the script.
+    pub fn note(&mut self, tokens: &[Token]) {
+        use Token::{Name, Sign, Text};
+        for (at, token) in tokens.iter().enumerate() {
+            let Name(name) = *token else { continue };
+            let after = &tokens[at + 1..];
+            let is_unknown = match (name, after) {
+                ("GetEnv", [Sign('(' | '['), Text(variable), Sign(')' | ']'), ..]) if *variable != HOME => {
+                    self.variables.insert((*variable).to_owned());
+                    false
+                }
+                ("GetEnv", _) => true,
+                (_, [Sign('='), ..]) => false,
+                (_, [Text(_), Sign(';'), ..]) if READ.contains(&name) => false,
+                _ => CHANGING.contains(&name) || RUN.contains(&name) || READ.contains(&name),
+            };
+            if is_unknown {
+                self.unknown.get_or_insert_with(|| name.to_owned());
+            }
+        }
+    }
+
+    /// Return the variables with their values.
+    pub fn environment(&self) -> Vec<(&str, Option<Vec<u8>>)> {
+        let value = |name: &str| std::env::var_os(name).map(|value| value.as_encoded_bytes().to_vec());
+        self.variables.iter().map(|name| (name.as_str(), value(name))).collect()
+    }
+}
+
+/// Write a script into the folder `work` that meshes another script to a field of sizes, and return its path.
+///
+/// `field` is a view of Gmsh (`.pos`). Where a point is in none of the view's cells, Gmsh would make cells as large as the
+/// part, so the script limits sizes to the largest of the view. Structured meshes cannot follow sizes, so their commands are
+/// removed in a copy.
+///
+/// # Errors
+/// A structured script reads other files, which a copy would not find. The folder cannot be written.
+pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: &Path) -> Result<PathBuf> {
+    let write = |name: &str, text: &str| {
+        let path = work.join(name);
+        std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause)).map(|()| path)
+    };
+    let own = read.files.first().map_or(String::new(), |bytes| String::from_utf8_lossy(bytes).into_owned());
+    let free = unstructured(&own);
+    let mut script = std::path::absolute(&file.value).map_err(|cause| Error::file(&file.value, "find", &cause))?;
+    if free != own {
+        if read.files.len() > 1 {
+            let message = format!("{} makes a structured mesh and reads other files", file.value.display());
+            return Err(Error::scene(&file.place, message)
+                .help("take `Transfinite` and `Recombine` out of it: such a mesh cannot follow sizes"));
+        }
+        script = write("free.geo", &free)?;
+    }
+    let sizes = write("sizes.pos", field)?;
+    let text = format!(
+        "Include {};\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
+         Merge {};\nBackground Mesh View[PostProcessing.NbViews - 1];\n\
+         Mesh.MeshSizeMax = View[PostProcessing.NbViews - 1].Max;\n",
+        quoted(&script)?,
+        quoted(&sizes)?
+    );
+    write("sized.geo", &text)
+}
+
+/// Return the script without the commands that ask for structured meshes, from the word to the semicolon.
+pub fn unstructured(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    let mut from = 0;
+    for (span, token) in tokens(text) {
+        let structured = matches!(token, Token::Name("Transfinite" | "TransfQuadTri" | "Recombine"));
+        if structured && span.start >= from {
+            kept.push_str(&text[from..span.start]);
+            from = text[span.end..].find(';').map_or(text.len(), |end| span.end + end + 1);
+        }
+    }
+    kept + &text[from..]
+}
+
+/// Return a field of sizes on simplices as a view of Gmsh. `corners` holds the corners of all simplices, `stride` of them each,
+/// and `sizes` the size at each corner.
+pub fn view(stride: usize, corners: &[[f64; 3]], sizes: &[f64]) -> String {
+    use std::fmt::Write;
+    let mut text = String::from("View \"sizes\" {\n");
+    let list = |values: &mut dyn Iterator<Item = f64>| values.map(|v| format!("{v:e}")).collect::<Vec<_>>().join(",");
+    for (x, size) in corners.chunks_exact(stride).zip(sizes.chunks_exact(stride)) {
+        let at = list(&mut x.iter().flatten().copied());
+        let size = list(&mut size.iter().copied());
+        // Writing to a String cannot fail.
+        let _ = writeln!(text, "S{}({at}){{{size}}};", if stride == 3 { "T" } else { "S" });
+    }
+    text + "};\n"
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::trust::tokens;
 
     fn verdict(text: &str, name: &str) -> Option<String> {
         let folder = tempfile::tempdir().unwrap();
@@ -302,5 +425,50 @@ mod tests {
         std::os::unix::fs::symlink("../real/e.geo", folder.path().join("sub/e.geo")).unwrap();
         assert_eq!(breach("real/e.geo"), None);
         assert!(breach("sub/e.geo").is_some_and(|path| path.ends_with("sub/f.geo")));
+    }
+
+    fn of(text: &str) -> (Vec<String>, Option<String>) {
+        let mut inputs = Inputs::default();
+        inputs.note(&tokens(text).into_iter().map(|(_, token)| token).collect::<Vec<_>>());
+        (inputs.variables.into_iter().collect(), inputs.unknown)
+    }
+
+    #[test]
+    fn what_a_script_depends_on_is_seen() {
+        let names = |list: &[&str]| list.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+        for (text, variables, unknown) in [
+            ("n = 3; Include \"a.geo\"; // Rand(1)", &[][..], None),
+            ("Printf(GetEnv(\"N\")); s = Str(GetEnv[\"M\"]);", &["M", "N"], None),
+            ("s = GetEnv(StrCat(\"N\", \"M\"));", &[], Some("GetEnv")),
+            ("s = GetEnv(\"GMSH_HOME\");", &[], Some("GetEnv")),
+            ("x = 1 + Rand(0.5);", &[], Some("Rand")),
+            ("x = Cpu;", &[], Some("Cpu")),
+            ("If (FileExists(\"a.step\")) n = 2; EndIf", &[], Some("FileExists")),
+            ("s = Str(CurrentDirectory, \"x\");", &[], Some("CurrentDirectory")),
+            ("Merge StrCat(s, \"x\");", &[], Some("Merge")),
+            ("Merge \"a.step\"; Merge 'b.pos';", &[], None),
+            ("SystemCall \"id\";", &[], Some("SystemCall")),
+            ("System = 3; y = GetNumber(\"x\", 3);", &[], None),
+        ] {
+            assert_eq!(of(text), (names(variables), unknown.map(str::to_owned)), "{text}");
+        }
+    }
+
+    #[test]
+    fn structured_commands_go_and_nothing_else() {
+        let text = "n = 3; // Transfinite;\nTransfinite Curve {1, 2} = n + 1 Using Progression 1.1;\n\
+                    Recombine Surface{1};\nPhysical Surface(\"Transfinite;\") = {1};\nmyTransfinite = 2;\n";
+        let expected = "n = 3; // Transfinite;\n\n\nPhysical Surface(\"Transfinite;\") = {1};\nmyTransfinite = 2;\n";
+        assert_eq!(unstructured(text), expected);
+        assert_eq!(unstructured("a = 'x"), "a = 'x");
+    }
+
+    #[test]
+    fn a_view_has_a_line_for_each_simplex() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        assert_eq!(
+            view(3, &corners, &[0.5, 0.25, 1.0]),
+            "View \"sizes\" {\nST(0e0,0e0,0e0,1e0,0e0,0e0,0e0,1e0,0e0){5e-1,2.5e-1,1e0};\n};\n"
+        );
     }
 }

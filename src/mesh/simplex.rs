@@ -1,70 +1,164 @@
-//! Properties of single simplices: sizes, orientation, Gmsh's numbering.
+//! Single simplices: measure, orientation, and quality of shape.
 
+use super::{Group, Mesh};
 use crate::problem::order::Order;
 use nalgebra::Vector3;
 
 /// Gmsh's words for entities of dimension 0 to 3, as in `Physical Surface`.
 pub const THINGS: [&str; 4] = ["Point", "Curve", "Surface", "Volume"];
 
-/// A simplex type of Gmsh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Kind {
+/// Edges of a simplex in the order of its mid-edge nodes, which follow the corners.
+pub const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
+
+/// A shape of elements, with corners numbered by Gmsh.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Gmsh's name.
+    pub name: &'static str,
     /// Dimension, 0 to 3.
     pub dimension: usize,
-    /// Order; `None` for points, which have none.
-    pub order: Option<Order>,
-    /// Points per simplex.
-    pub stride: usize,
+    /// Number of corners.
+    pub corners: usize,
+    /// Ends of the edges in Gmsh's order of mid-edge nodes.
+    pub edges: &'static [[usize; 2]],
+    /// Corners of the faces of shapes that are divided, with quadrangles in Gmsh's order of the nodes in their middle. Those of a
+    /// quadrangle are its edges.
+    pub faces: &'static [&'static [usize]],
+}
+
+const POINT: Shape = Shape { name: "point", dimension: 0, corners: 1, edges: &[], faces: &[] };
+/// The line.
+pub const LINE: Shape = Shape { name: "line", dimension: 1, corners: 2, edges: &[[0, 1]], faces: &[] };
+/// The triangle.
+pub const TRIANGLE: Shape =
+    Shape { name: "triangle", dimension: 2, corners: 3, edges: &[[0, 1], [1, 2], [2, 0]], faces: &[] };
+/// The quadrangle.
+pub const QUADRANGLE: Shape = Shape {
+    name: "quadrangle",
+    dimension: 2,
+    corners: 4,
+    edges: &[[0, 1], [1, 2], [2, 3], [3, 0]],
+    faces: &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]],
+};
+/// The tetrahedron.
+pub const TETRAHEDRON: Shape = Shape {
+    name: "tetrahedron",
+    dimension: 3,
+    corners: 4,
+    edges: &[[0, 1], [1, 2], [2, 0], [0, 3], [2, 3], [1, 3]],
+    faces: &[],
+};
+/// The hexahedron.
+pub const HEXAHEDRON: Shape = Shape {
+    name: "hexahedron",
+    dimension: 3,
+    corners: 8,
+    edges: &[[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]],
+    faces: &[&[0, 3, 2, 1], &[0, 1, 5, 4], &[0, 4, 7, 3], &[1, 2, 6, 5], &[2, 3, 7, 6], &[4, 5, 6, 7]],
+};
+/// The prism.
+pub const PRISM: Shape = Shape {
+    name: "prism",
+    dimension: 3,
+    corners: 6,
+    edges: &[[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]],
+    faces: &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[0, 3, 5, 2], &[1, 2, 5, 4]],
+};
+/// The pyramid.
+pub const PYRAMID: Shape = Shape {
+    name: "pyramid",
+    dimension: 3,
+    corners: 5,
+    edges: &[[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]],
+    faces: &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
+};
+
+/// Gmsh's types of elements in the order of their numbers, which begin with 1: shape and number of nodes.
+const TYPES: [(&Shape, usize); 31] = [
+    (&LINE, 2),
+    (&TRIANGLE, 3),
+    (&QUADRANGLE, 4),
+    (&TETRAHEDRON, 4),
+    (&HEXAHEDRON, 8),
+    (&PRISM, 6),
+    (&PYRAMID, 5),
+    (&LINE, 3),
+    (&TRIANGLE, 6),
+    (&QUADRANGLE, 9),
+    (&TETRAHEDRON, 10),
+    (&HEXAHEDRON, 27),
+    (&PRISM, 18),
+    (&PYRAMID, 14),
+    (&POINT, 1),
+    (&QUADRANGLE, 8),
+    (&HEXAHEDRON, 20),
+    (&PRISM, 15),
+    (&PYRAMID, 13),
+    (&TRIANGLE, 9),
+    (&TRIANGLE, 10),
+    (&TRIANGLE, 12),
+    (&TRIANGLE, 15),
+    (&TRIANGLE, 15),
+    (&TRIANGLE, 21),
+    (&LINE, 4),
+    (&LINE, 5),
+    (&LINE, 6),
+    (&TETRAHEDRON, 20),
+    (&TETRAHEDRON, 35),
+    (&TETRAHEDRON, 56),
+];
+
+/// Gmsh's number of the type of points.
+pub const POINTS: i32 = 15;
+
+/// A type of elements of Gmsh.
+#[derive(Debug, Clone, Copy)]
+pub struct Kind {
+    /// Gmsh's number.
+    pub number: i32,
+    /// The shape.
+    pub shape: &'static Shape,
+    /// Number of nodes: corners, then those of edges, then those of quadrangular faces, then that of the cell.
+    pub nodes: usize,
 }
 
 impl Kind {
-    /// Return the simplex that an element type number of Gmsh stands for, if this program computes with it.
-    pub fn of_type(number: i32) -> Option<Kind> {
-        let (dimension, order, stride) = match number {
-            15 => (0, None, 1),
-            1 => (1, Some(Order::P1), 2),
-            8 => (1, Some(Order::P2), 3),
-            2 => (2, Some(Order::P1), 3),
-            9 => (2, Some(Order::P2), 6),
-            4 => (3, Some(Order::P1), 4),
-            11 => (3, Some(Order::P2), 10),
-            _ => return None,
-        };
-        Some(Kind { dimension, order, stride })
+    /// Return the type with this number of Gmsh.
+    pub fn of(number: i32) -> Option<Kind> {
+        let &(shape, nodes) = TYPES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
+        Some(Kind { number, shape, nodes })
     }
 
-    /// Return the simplex of a dimension from 1 on and an order.
-    pub fn simplex(dimension: usize, order: Order) -> Kind {
-        let middles = if order == Order::P1 { 0 } else { dimension * (dimension + 1) / 2 };
-        Kind { dimension, order: Some(order), stride: dimension + 1 + middles }
+    /// Return Gmsh's number of the type with this shape and number of nodes.
+    pub fn number(shape: &Shape, nodes: usize) -> i32 {
+        let place = TYPES.iter().position(|&(other, count)| other == shape && count == nodes);
+        place.map_or(0, |place| place as i32 + 1)
     }
-}
 
-/// Return Gmsh's name of an element type and its number of nodes, for types 1 to 31.
-pub fn type_name(number: i32) -> Option<(&'static str, usize)> {
-    const NODES: [usize; 31] =
-        [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56];
-    let nodes = *NODES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
-    let name = match number {
-        1 | 8 | 26..=28 => "line",
-        2 | 9 | 20..=25 => "triangle",
-        3 | 10 | 16 => "quadrangle",
-        4 | 11 | 29..=31 => "tetrahedron",
-        5 | 12 | 17 => "hexahedron",
-        6 | 13 | 18 => "prism",
-        7 | 14 | 19 => "pyramid",
-        _ => "point",
-    };
-    Some((name, nodes))
-}
+    /// Return whether this program computes with it: it is a point, or of order 1 or 2.
+    pub fn is_known(&self) -> bool {
+        self.number < 20
+    }
 
-/// Return the dimension of elements with a name from [`type_name`].
-pub fn dimension(name: &str) -> usize {
-    match name {
-        "point" => 0,
-        "line" => 1,
-        "triangle" | "quadrangle" => 2,
-        _ => 3,
+    /// Return the order of a known type; points have none.
+    pub fn order(&self) -> Option<Order> {
+        match self.number {
+            POINTS => None,
+            ..8 => Some(Order::P1),
+            _ => Some(Order::P2),
+        }
+    }
+
+    /// Return whether the elements are no simplices and must be divided.
+    pub fn is_divided(&self) -> bool {
+        !self.shape.faces.is_empty()
+    }
+
+    /// Return the number of nodes of a simplex of this dimension and order.
+    pub fn stride(&self) -> usize {
+        let dimension = self.shape.dimension;
+        let edges = if self.order() == Some(Order::P2) { dimension * (dimension + 1) / 2 } else { 0 };
+        dimension + 1 + edges
     }
 }
 
@@ -151,6 +245,48 @@ fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
     !measure.is_finite() || measure.abs() <= smallest
 }
 
+/// The shape of the cells of a group by their mean ratio, which is 1 for an equilateral simplex and near 0 for a flat one.
+///
+/// In the plane the mean ratio is 4 sqrt(3) area / (sum of squared edges), in space 12 (3 volume)^(2/3) / (sum of squared
+/// edges). It uses the vertices only, so curved edges count as straight.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Mean ratio of the worst cell.
+    pub least: f64,
+    /// Mean over all cells.
+    pub mean: f64,
+}
+
+impl<const D: usize> Mesh<D> {
+    /// Return the shape of the cells of a group. The result is meaningless for groups of lower dimension.
+    pub fn quality(&self, group: &Group) -> Quality {
+        let (mut least, mut sum) = (f64::INFINITY, 0.0);
+        for cell in group.simplices() {
+            let ratio = mean_ratio::<D>(&std::array::from_fn::<_, 4, _>(|i| self.points[cell[i.min(D)] as usize]));
+            least = least.min(ratio);
+            sum += ratio;
+        }
+        Quality { least, mean: sum / group.len() as f64 }
+    }
+}
+
+/// Return the mean ratio of the simplex given by the first D + 1 vertices.
+fn mean_ratio<const D: usize>(vertices: &[[f64; D]; 4]) -> f64 {
+    let edge = |i: usize, j: usize| -> [f64; D] { std::array::from_fn(|c| vertices[j][c] - vertices[i][c]) };
+    let mut squares = 0.0;
+    for j in 1..=D {
+        for i in 0..j {
+            squares += edge(i, j).iter().map(|x| x * x).sum::<f64>();
+        }
+    }
+    // The determinant of the edges from the first vertex is D! times the measure.
+    let jacobian = nalgebra::DMatrix::from_fn(D, D, |row, column| edge(0, row + 1)[column]).determinant().abs();
+    match D {
+        2 => 2.0 * 3f64.sqrt() * jacobian / squares,
+        _ => 12.0 * (jacobian / 2.0).powf(2.0 / 3.0) / squares,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -197,5 +333,17 @@ mod tests {
                 assert_eq!(cell[vertices + k], cell[*a] + cell[*b]);
             }
         }
+    }
+
+    #[test]
+    fn shapes_in_closed_form() {
+        let h = 0.75f64.sqrt();
+        assert!((mean_ratio(&[[0.0, 0.0], [1.0, 0.0], [0.5, h], [0.0; 2]]) - 1.0).abs() < 1e-14);
+        assert!((mean_ratio(&[[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [0.0; 2]]) - h).abs() < 1e-14);
+        let regular = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
+        assert!((mean_ratio(&regular) - 1.0).abs() < 1e-14);
+        let corner = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assert!((mean_ratio(&corner) - 12.0 / 9.0 * 0.25f64.cbrt()).abs() < 1e-14);
+        assert!(mean_ratio(&[[0.0, 0.0], [1.0, 0.0], [0.5, 1e-9], [0.0; 2]]) < 1e-8);
     }
 }

@@ -4,83 +4,27 @@
 //! from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the numbers of its
 //! vertices alone, so that cells of any kind agree on common faces.
 //!
-//! Only vertices are divided here. [`middles`](super::middles) adds the mid-edge nodes of quadratic cells.
+//! Quadratic cells get nodes in the middle of the diagonals. A diagonal of a face has its node where the map of the face takes the
+//! centre of the reference square, and a diagonal through a cell where the map of the cell takes the centre of the reference cube.
+//! The boundary of the simplices is thus interpolated from that of the cells.
 
-use super::simplex;
+use super::simplex::{EDGES, Kind, QUADRANGLE, Shape};
 use crate::problem::order::Order;
+use std::collections::HashMap;
 
-/// The vertices of a face, or of an edge of a quadrangle.
-type Face = &'static [usize];
-
-/// A kind of cell that is divided into simplices.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Split {
-    /// Dimension, 2 or 3.
-    pub dimension: usize,
-    /// Number of vertices.
-    pub vertices: usize,
-    /// Number of nodes: vertices, then those of `edges`, then those of quadrangular faces, then that of the cell.
-    pub stride: usize,
-    /// The vertices of each edge, in Gmsh's order of mid-edge nodes. Linear cells have none here.
-    pub edges: &'static [[usize; 2]],
-    /// The faces, with quadrangles in Gmsh's order of the nodes in their middle.
-    faces: &'static [Face],
+/// Return the quadrangular faces of a shape. A quadrangle has one, itself.
+fn quadrangles(shape: &Shape) -> impl Iterator<Item = &'static [usize]> {
+    let faces: &[&[usize]] = if shape.dimension == 2 { &[&[0, 1, 2, 3]] } else { shape.faces };
+    faces.iter().copied().filter(|face| face.len() == 4)
 }
 
-const EDGES: [Face; 4] = [&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
-
-const HEXAHEDRON: [Face; 6] =
-    [&[0, 3, 2, 1], &[0, 1, 5, 4], &[0, 4, 7, 3], &[1, 2, 6, 5], &[2, 3, 7, 6], &[4, 5, 6, 7]];
-
-const PRISM: [Face; 5] = [&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[0, 3, 5, 2], &[1, 2, 5, 4]];
-
-const PYRAMID: [Face; 5] = [&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]];
-
-/// The quadrangle as a face of itself.
-const WHOLE: [Face; 1] = [&[0, 1, 2, 3]];
-
-const EDGES_OF_QUADRANGLE: [[usize; 2]; 4] = [[0, 1], [1, 2], [2, 3], [3, 0]];
-
-const EDGES_OF_HEXAHEDRON: [[usize; 2]; 12] =
-    [[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]];
-
-const EDGES_OF_PRISM: [[usize; 2]; 9] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]];
-
-const EDGES_OF_PYRAMID: [[usize; 2]; 8] = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]];
-
-impl Split {
-    /// Return the kind of cell that an element type number of Gmsh stands for, if it is of order 1 or 2 and not a simplex.
-    pub fn of_type(number: i32) -> Option<Split> {
-        let (dimension, vertices, faces, edges): (_, _, &[Face], &'static [[usize; 2]]) = match number {
-            3 | 10 | 16 => (2, 4, &EDGES, &EDGES_OF_QUADRANGLE),
-            5 | 12 | 17 => (3, 8, &HEXAHEDRON, &EDGES_OF_HEXAHEDRON),
-            6 | 13 | 18 => (3, 6, &PRISM, &EDGES_OF_PRISM),
-            7 | 14 | 19 => (3, 5, &PYRAMID, &EDGES_OF_PYRAMID),
-            _ => return None,
-        };
-        let stride = simplex::type_name(number)?.1;
-        let edges = if stride == vertices { &[] } else { edges };
-        Some(Split { dimension, vertices, stride, edges, faces })
-    }
-
-    /// Return the order of the cells.
-    pub fn order(&self) -> Order {
-        if self.edges.is_empty() { Order::P1 } else { Order::P2 }
-    }
-
-    /// Return the quadrangular faces. A quadrangle has one, itself.
-    pub fn quadrangles(&self) -> impl Iterator<Item = &'static [usize]> {
-        let faces: &[Face] = if self.dimension == 2 { &WHOLE } else { self.faces };
-        faces.iter().copied().filter(|face| face.len() == 4)
-    }
-
-    /// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. The vertices are the first nodes of
-    /// `cell`. Simplices in which a vertex occurs twice, since an edge was drawn into a point, are omitted.
-    pub fn simplices(&self, cell: &[u32]) -> Vec<u32> {
-        let corners: Vec<Vec<u32>> = self.faces.iter().map(|face| face.iter().map(|&at| cell[at]).collect()).collect();
-        let simplices = cone(&cell[..self.vertices], &corners);
-        simplices.into_iter().filter(|simplex| all_differ(simplex)).flatten().collect()
-    }
+/// Return the simplices of a cell, `dimension + 1` vertices each, with any orientation. The vertices are the first nodes of
+/// `cell`. Simplices in which a vertex occurs twice, since an edge was drawn into a point, are omitted.
+fn divided(shape: &Shape, cell: &[u32]) -> Vec<u32> {
+    let faces: Vec<Vec<u32>> = shape.faces.iter().map(|face| face.iter().map(|&at| cell[at]).collect()).collect();
+    let all_differ =
+        |simplex: &Vec<u32>| simplex.iter().enumerate().all(|(at, vertex)| !simplex[..at].contains(vertex));
+    cone(&cell[..shape.corners], &faces).into_iter().filter(all_differ).flatten().collect()
 }
 
 /// Return the cone from the smallest vertex of a cell over its faces without this vertex.
@@ -89,7 +33,7 @@ fn cone(cell: &[u32], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     let mut simplices = Vec::new();
     for face in faces.iter().filter(|face| !face.contains(&apex)) {
         let parts = if face.len() == 4 {
-            let edges: Vec<Vec<u32>> = EDGES.iter().map(|edge| edge.iter().map(|&at| face[at]).collect()).collect();
+            let edges: Vec<Vec<u32>> = QUADRANGLE.edges.iter().map(|edge| edge.map(|at| face[at]).to_vec()).collect();
             cone(face, &edges)
         } else {
             vec![face.clone()]
@@ -99,33 +43,100 @@ fn cone(cell: &[u32], faces: &[Vec<u32>]) -> Vec<Vec<u32>> {
     simplices
 }
 
-fn all_differ(simplex: &[u32]) -> bool {
-    simplex.iter().enumerate().all(|(at, vertex)| !simplex[..at].contains(vertex))
+/// The vertices of a hexahedron.
+const CELL: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
+
+/// The maker of the nodes in the middle of diagonals. Faces are known by their vertices, so that all cells and facets at a face
+/// share its node. So do copies of a cell in several groups.
+pub struct Middles<'a> {
+    /// Coordinates of all points, to which new ones are appended.
+    pub points: &'a mut Vec<[f64; 3]>,
+    /// The node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its diagonal, each
+    /// twice.
+    pub known: &'a mut HashMap<[u32; 4], u32>,
 }
 
-/// Corners of the unit cube in Gmsh's order, for tests.
-#[cfg(test)]
-pub(super) const CUBE: [[f64; 3]; 8] = [
-    [0.0, 0.0, 0.0],
-    [1.0, 0.0, 0.0],
-    [1.0, 1.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [1.0, 0.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [0.0, 1.0, 1.0],
-];
+impl Middles<'_> {
+    /// Return the simplices of a cell with the nodes `cell`, with any orientation, each with vertices before mid-edge nodes.
+    pub fn simplices(&mut self, kind: Kind, cell: &[u32]) -> Vec<u32> {
+        let Shape { dimension, .. } = *kind.shape;
+        let vertices = divided(kind.shape, cell);
+        if kind.order() == Some(Order::P1) {
+            return vertices;
+        }
+        let mut simplices = Vec::new();
+        for simplex in vertices.chunks_exact(dimension + 1) {
+            simplices.extend_from_slice(simplex);
+            for [a, b] in &EDGES[..dimension * (dimension + 1) / 2] {
+                simplices.push(self.middle(kind.shape, cell, [simplex[*a], simplex[*b]]));
+            }
+        }
+        simplices
+    }
+
+    /// Return the node in the middle between two vertices of a quadratic cell with the nodes `cell`.
+    ///
+    /// Edges come first, since a diagonal of a face is an edge of the cell where another edge of the face was drawn into a
+    /// point. For the same reason faces come before the cell.
+    fn middle(&mut self, shape: &Shape, cell: &[u32], ends: [u32; 2]) -> u32 {
+        let is_edge = |[a, b]: &[usize; 2]| [[cell[*a], cell[*b]], [cell[*b], cell[*a]]].contains(&ends);
+        if let Some(edge) = shape.edges.iter().position(is_edge) {
+            return cell[shape.corners + edge];
+        }
+        let in_middle = shape.corners + shape.edges.len();
+        let has_ends = |face: &&[usize]| ends.iter().all(|end| face.iter().any(|at| cell[*at] == *end));
+        let (key, vertices, given) = match quadrangles(shape).enumerate().find(|(_, face)| has_ends(face)) {
+            Some((number, face)) => ([0, 1, 2, 3].map(|at| cell[face[at]]), face, cell.get(in_middle + number)),
+            None => ([ends[0], ends[0], ends[1], ends[1]], &CELL[..], cell[in_middle..].last()),
+        };
+        let mut key = key;
+        key.sort_unstable();
+        let known = self.known.get(&key).or(given).copied();
+        let middle = known.unwrap_or_else(|| self.make(shape, cell, vertices));
+        self.known.insert(key, middle);
+        middle
+    }
+
+    /// Make the node in the centre of a face of a cell, or of a hexahedron, given by its vertices.
+    ///
+    /// In the centre the function of each vertex is -1/4. Those of the mid-edge nodes are equal and make the sum one: they are
+    /// 1/2 on a face of four edges and 1/4 in a hexahedron of twelve.
+    fn make(&mut self, shape: &Shape, cell: &[u32], vertices: &[usize]) -> u32 {
+        let edges = shape.edges.iter().zip(&cell[shape.corners..]);
+        let middles = edges.filter(|(ends, _)| ends.iter().all(|end| vertices.contains(end))).map(|(_, middle)| middle);
+        let sum = |nodes: &mut dyn Iterator<Item = &u32>| {
+            nodes.fold([0.0; 3], |sum, node| std::array::from_fn(|c| sum[c] + self.points[*node as usize][c]))
+        };
+        let (corners, middles) = (sum(&mut vertices.iter().map(|at| &cell[*at])), sum(&mut middles.into_iter()));
+        let weight = if vertices.len() == 4 { 0.5 } else { 0.25 };
+        self.points.push(std::array::from_fn(|c| weight * middles[c] - 0.25 * corners[c]));
+        (self.points.len() - 1) as u32
+    }
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::simplex::measure;
+    use crate::mesh::simplex::{HEXAHEDRON, PRISM, PYRAMID, measure};
+    use nalgebra::{Matrix3, Vector3};
     use std::collections::BTreeMap;
 
+    /// Corners of the unit cube in Gmsh's order.
+    const CUBE: [[f64; 3]; 8] = [
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, 1.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 0.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [0.0, 1.0, 1.0],
+    ];
+
     /// Return six times the volume of the pieces of a cell, and the number of pieces that have each triangle as a face.
-    fn pieces(kind: i32, cell: &[u32], points: &[[f64; 3]]) -> (f64, BTreeMap<Vec<u32>, usize>) {
+    fn pieces(kind: &Shape, cell: &[u32], points: &[[f64; 3]]) -> (f64, BTreeMap<Vec<u32>, usize>) {
         let (mut volume, mut faces) = (0.0, BTreeMap::new());
-        for tetrahedron in Split::of_type(kind).unwrap().simplices(cell).chunks_exact(4) {
+        for tetrahedron in divided(kind, cell).chunks_exact(4) {
             volume += measure(&[0, 1, 2, 3].map(|at| points[tetrahedron[at] as usize]), 3).abs();
             for left in 0..4 {
                 let mut face: Vec<u32> = tetrahedron.iter().copied().filter(|v| *v != tetrahedron[left]).collect();
@@ -152,11 +163,11 @@ mod tests {
             let named = [&CUBE[..], &[[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [3.0, 0.5, 0.5], [0.0; 3]]].concat();
             order.iter().zip(named).for_each(|(&at, x)| points[at as usize] = x);
             let of = |vertices: &[usize]| vertices.iter().map(|&v| order[v]).collect::<Vec<_>>();
-            let (cube, of_cube) = pieces(5, &of(&[0, 1, 2, 3, 4, 5, 6, 7]), &points);
+            let (cube, of_cube) = pieces(&HEXAHEDRON, &of(&[0, 1, 2, 3, 4, 5, 6, 7]), &points);
             assert!((cube - 6.0).abs() < 1e-12);
-            let (prism, of_prism) = pieces(6, &of(&[2, 9, 6, 1, 8, 5]), &points);
+            let (prism, of_prism) = pieces(&PRISM, &of(&[2, 9, 6, 1, 8, 5]), &points);
             assert!((prism - 3.0).abs() < 1e-12);
-            let (pyramid, of_pyramid) = pieces(7, &of(&[2, 6, 5, 1, 10]), &points);
+            let (pyramid, of_pyramid) = pieces(&PYRAMID, &of(&[2, 6, 5, 1, 10]), &points);
             assert!((pyramid - 4.0).abs() < 1e-12);
             let common = of(&[1, 2, 5, 6]);
             let shared = |faces: &BTreeMap<Vec<u32>, usize>| -> Vec<Vec<u32>> {
@@ -169,7 +180,7 @@ mod tests {
             assert_eq!(of_cube.values().filter(|&&count| count == 1).count(), 12);
             assert!(of_cube.values().all(|&count| count <= 2));
             // A quadrangle of the surface has the same diagonal.
-            let triangles = Split::of_type(3).unwrap().simplices(&of(&[1, 2, 6, 5]));
+            let triangles = divided(&QUADRANGLE, &of(&[1, 2, 6, 5]));
             for triangle in triangles.chunks_exact(3) {
                 let mut triangle = triangle.to_vec();
                 triangle.sort_unstable();
@@ -181,7 +192,112 @@ mod tests {
     #[test]
     fn a_hexahedron_with_an_edge_drawn_into_a_point_is_a_prism() {
         let points = [&CUBE[..]].concat();
-        let (volume, _) = pieces(5, &[0, 1, 2, 2, 4, 5, 6, 6], &points);
+        let (volume, _) = pieces(&HEXAHEDRON, &[0, 1, 2, 2, 4, 5, 6, 6], &points);
         assert!((volume - 3.0).abs() < 1e-12);
+    }
+
+    fn hexahedron() -> Kind {
+        Kind::of(17).expect("a kind")
+    }
+
+    /// Return the nodes of a hexahedron that a map takes from the unit cube, at the numbers `order`.
+    fn placed(order: &[u32], map: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
+        let middle = |[a, b]: &[usize; 2]| [0, 1, 2].map(|c| 0.5 * (CUBE[*a][c] + CUBE[*b][c]));
+        let mut points = vec![[0.0; 3]; 20];
+        let all = CUBE.into_iter().chain(HEXAHEDRON.edges.iter().map(middle));
+        order.iter().zip(all).for_each(|(&at, x)| points[at as usize] = map(x));
+        points
+    }
+
+    /// Return the volume of quadratic tetrahedra by Keast's rule, which is exact for their Jacobians of degree 3. Each is
+    /// positive once its vertices are in order.
+    fn volume(simplices: &[u32], points: &[[f64; 3]]) -> f64 {
+        let mut sum = 0.0;
+        for simplex in simplices.chunks_exact(10) {
+            let mut own = 0.0;
+            for k in 0..5 {
+                let (l, weight) = match k {
+                    4 => ([0.25; 4], -0.8),
+                    _ => (std::array::from_fn(|i| if i == k { 0.5 } else { 1.0 / 6.0 }), 0.45),
+                };
+                // The derivatives along the barycentric coordinates.
+                let mut along = [Vector3::zeros(); 4];
+                for (along, (node, l)) in along.iter_mut().zip(simplex.iter().zip(&l)) {
+                    *along += Vector3::from(points[*node as usize]) * (4.0 * l - 1.0);
+                }
+                for ([a, b], node) in EDGES.iter().zip(&simplex[4..]) {
+                    let x = Vector3::from(points[*node as usize]) * 4.0;
+                    along[*a] += x * l[*b];
+                    along[*b] += x * l[*a];
+                }
+                let jacobian = Matrix3::from_columns(&[along[1] - along[0], along[2] - along[0], along[3] - along[0]]);
+                own += weight * jacobian.determinant() / 6.0;
+            }
+            sum += own.abs();
+        }
+        sum
+    }
+
+    /// A piece of a spherical shell: all of its six faces are curved or on planes through the axis. The map of the cell has an
+    /// error of fourth order, and so have the simplices, whatever the numbers of the nodes.
+    #[test]
+    fn curved_hexahedra_keep_their_volume() {
+        let error = |angle: f64, turn: u32| {
+            let order: Vec<u32> = (0..20).map(|k| (7 * k + turn) % 20).collect();
+            let mut points = placed(&order, |[a, b, c]| {
+                let (r, longitude, latitude) = (1.0 + 0.5 * angle * a, angle * b, angle * c);
+                [longitude.cos() * latitude.cos(), longitude.sin() * latitude.cos(), latitude.sin()].map(|x| r * x)
+            });
+            let mut middles = Middles { points: &mut points, known: &mut HashMap::new() };
+            let simplices = middles.simplices(hexahedron(), &order);
+            let exact = angle * angle.sin() * ((1.0 + 0.5 * angle).powi(3) - 1.0) / 3.0;
+            (volume(&simplices, &points) / exact - 1.0).abs()
+        };
+        for turn in 0..8 {
+            let [coarse, fine] = [0.4, 0.2].map(|angle| error(angle, turn));
+            assert!(fine < 1e-4 && fine < coarse / 10.0, "{turn}: {coarse} {fine}");
+        }
+    }
+
+    /// Cells of all kinds use the same node on a common face, which a full kind has among its own.
+    #[test]
+    fn faces_have_one_node() {
+        let order: Vec<u32> = (0..20).collect();
+        let mut points = placed(&order, |[a, b, c]| [a + 0.3 * b * c, b, c + 0.2 * a * b]);
+        let mut known = HashMap::new();
+        let mut middles = Middles { points: &mut points, known: &mut known };
+        let cell = middles.simplices(hexahedron(), &order);
+        assert_eq!(cell, middles.simplices(hexahedron(), &order), "a copy in another group");
+        assert_eq!(middles.points.len(), 27, "six faces and the cell");
+        // The face 0 3 2 1 has the mid-edge nodes 9 13 11 8.
+        let facet = middles.simplices(Kind::of(16).expect("a kind"), &[0, 3, 2, 1, 9, 13, 11, 8]);
+        let node = middles.known[&[0, 1, 2, 3]];
+        assert_eq!(facet.iter().filter(|number| **number == node).count(), 2);
+        let [x, y, z] = middles.points[node as usize];
+        assert!((x - 0.5).abs() + (y - 0.5).abs() + (z - 0.05).abs() < 1e-15);
+        let full = middles.simplices(Kind::of(10).expect("a kind"), &[2, 3, 7, 6, 13, 15, 19, 14, 99]);
+        assert!(!full.contains(&99), "the node that the hexahedron has made");
+        let full = middles.simplices(Kind::of(10).expect("a kind"), &[30, 31, 32, 33, 34, 35, 36, 37, 38]);
+        assert_eq!(full.iter().filter(|number| **number == 38).count(), 2);
+    }
+
+    #[test]
+    fn a_quadratic_hexahedron_with_an_edge_drawn_into_a_point_is_a_prism() {
+        let order: Vec<u32> = (0..20).collect();
+        let mut points = placed(&order, |x| x);
+        let mut middles = Middles { points: &mut points, known: &mut HashMap::new() };
+        // The vertices 3 and 7 are 2 and 6 here. With them go the mid-edge nodes of 0 3, 2 3, 3 7, 4 7 and 6 7.
+        let hexahedron =
+            middles.simplices(hexahedron(), &[0, 1, 2, 2, 4, 5, 6, 6, 8, 9, 10, 11, 12, 2, 14, 14, 16, 17, 18, 6]);
+        let prism =
+            middles.simplices(Kind::of(18).expect("a kind"), &[0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 12, 14, 16, 17, 18]);
+        let sorted = |simplices: &[u32]| {
+            let mut all: Vec<Vec<u32>> = simplices.chunks_exact(10).map(<[u32]>::to_vec).collect();
+            all.iter_mut().for_each(|simplex| simplex.sort_unstable());
+            all.sort_unstable();
+            all
+        };
+        assert_eq!(sorted(&hexahedron), sorted(&prism));
+        assert_eq!(prism.len(), 30);
     }
 }

@@ -1,14 +1,18 @@
 //! Tests on meshes that the real Gmsh makes.
+//!
+//! Tests on the geometries in `meshes/`.
+//!
+//! Tests on files that are not valid meshes.
+//!
+//! Tests of the way from scripts and files to meshes, with the cache.
 
-mod cases;
-mod damage;
-mod loading;
 mod mutations;
 
-use super::load::from_script;
-use super::{Group, Loaded, Mesh, msh, simplex};
+use super::load::{load, made_from, meshed as from_script};
+use super::{Group, Loaded, Mesh, Origin, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
+use crate::problem::mesh::MeshSource;
 use crate::problem::{Guard, Order};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -181,4 +185,362 @@ fn inverted_cells_are_turned_and_order_two_with_them() {
             assert_mid_edges(&cube);
         }
     }
+}
+
+fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes").join(script);
+    let set: Vec<(String, f64)> = set.iter().map(|(name, value)| (name.to_string(), *value)).collect();
+    meshed(&file, &set, Order::P1, &[folder.path().to_owned()]).unwrap().mesh
+}
+
+/// Accuracy with which Gmsh places the nodes of a transfinite line.
+const PLACES: f64 = 1e-10;
+
+/// Return the vertices of the triangles of a group on a fine grid, sorted. They are reflected about y = `reflect`, if it is
+/// given.
+fn triangles(mesh: &Mesh<2>, group: &str, reflect: Option<f64>) -> Vec<[[i64; 2]; 3]> {
+    let place = |point: &u32| {
+        let [x, y] = mesh.points[*point as usize];
+        let y = reflect.map_or(y, |middle| 2.0 * middle - y);
+        [x, y].map(|coordinate| (coordinate * 1e6).round() as i64)
+    };
+    let mut all: Vec<[[i64; 2]; 3]> = mesh
+        .group(group)
+        .unwrap()
+        .simplices()
+        .map(|simplex| {
+            let mut vertices = [place(&simplex[0]), place(&simplex[1]), place(&simplex[2])];
+            vertices.sort();
+            vertices
+        })
+        .collect();
+    all.sort();
+    all
+}
+
+/// Assert that the upper body mirrors the lower one, and that they share no point.
+fn assert_mirrored(mesh: &Mesh<2>, middle: f64) {
+    let lower = mesh.group("lower").unwrap();
+    let upper = mesh.group("upper").unwrap();
+    assert!(triangles(mesh, "lower", None) == triangles(mesh, "upper", Some(middle)));
+    assert!(triangles(mesh, "lower", None) != triangles(mesh, "upper", None));
+    assert!(!lower.connectivity.iter().any(|point| upper.connectivity.contains(point)));
+}
+
+fn count(mesh: &Mesh<2>, group: &str) -> usize {
+    mesh.group(group).unwrap().len()
+}
+
+fn area(mesh: &Mesh<2>, group: &str) -> f64 {
+    0.5 * extent(mesh, mesh.group(group).unwrap())
+}
+
+#[test]
+fn the_groove_has_the_papers_triangles() {
+    let mesh = case("groove/groove.geo", &[]);
+    assert_eq!([count(&mesh, "lower"), count(&mesh, "upper")], [8192, 8192]);
+    let mesh = case("groove/groove.geo", &[("n", 8.0)]);
+    assert_eq!(count(&mesh, "lower"), 2 * 4 * 8 * 8);
+    assert_eq!([count(&mesh, "lower_top"), count(&mesh, "upper_bottom"), count(&mesh, "upper_axis")], [32, 32, 8]);
+    assert!((area(&mesh, "lower") - 4.0).abs() < PLACES && (area(&mesh, "upper") - 4.0).abs() < PLACES);
+    assert_mirrored(&mesh, 1.0);
+    let at = |group: &str, k: usize, value: f64| {
+        let points = &mesh.group(group).unwrap().connectivity;
+        assert!(points.iter().all(|point| (mesh.points[*point as usize][k] - value).abs() < PLACES), "{group}");
+    };
+    at("lower_top", 1, 1.0);
+    at("upper_bottom", 1, 1.0);
+    at("lower_face", 1, 0.0);
+    at("upper_face", 1, 2.0);
+    for body in ["lower", "upper"] {
+        at(&format!("{body}_axis"), 0, 4.0);
+        at(&format!("{body}_end"), 0, 0.0);
+    }
+}
+
+#[test]
+fn the_patch_takes_any_two_meshes() {
+    let mesh = case("patch/patch.geo", &[("nl", 2.0), ("nu", 3.0)]);
+    assert_eq!([count(&mesh, "lower"), count(&mesh, "upper")], [8, 18]);
+    assert_eq!([count(&mesh, "lower_top"), count(&mesh, "upper_bottom")], [2, 3]);
+    let pin = |name: &str| mesh.points[mesh.group(name).unwrap().connectivity[0] as usize];
+    assert_eq!([pin("lower_pin"), pin("upper_pin")], [[0.0, 0.0], [0.0, 2.0]]);
+    assert_mirrored(&case("patch/patch.geo", &[]), 1.0);
+}
+
+#[test]
+fn waves_of_any_length_keep_their_triangles_in_shape() {
+    for (length, rows) in [(2.0, 8), (8.0, 2)] {
+        let mesh = case("wavy/wavy.geo", &[("L", length), ("n", 8.0)]);
+        assert_eq!([count(&mesh, "lower_top"), count(&mesh, "lower_sides")], [8, 2 * rows]);
+        assert!((area(&mesh, "upper") - 0.5 * length).abs() < PLACES);
+        assert_mirrored(&mesh, 1.0);
+    }
+}
+
+#[test]
+fn half_planes_are_fine_at_the_groove_and_coarse_far_away() {
+    let mesh = case("half-planes/half-planes.geo", &[("n", 16.0)]);
+    assert!((area(&mesh, "lower") - 256.0).abs() < 1e-8);
+    assert_mirrored(&mesh, 16.0);
+    // These are the distance from the axis and the length of each edge of the contact surface.
+    let edges: Vec<(f64, f64)> = mesh
+        .group("lower_top")
+        .unwrap()
+        .simplices()
+        .map(|edge| {
+            let [a, b] = [edge[0], edge[1]].map(|point| mesh.points[point as usize][0]);
+            (16.0 - a.max(b), (a - b).abs())
+        })
+        .collect();
+    assert!(edges.iter().filter(|(from, _)| *from < 1.99).all(|(_, length)| (length - 1.0 / 16.0).abs() < PLACES));
+    let longest = edges.iter().map(|(_, length)| *length).fold(0.0, f64::max);
+    assert!((0.9..1.1).contains(&longest), "{longest}");
+    // The edge of the groove, where the pressure has a kink, is a node.
+    assert!(edges.iter().any(|(from, _)| (from - 1.0).abs() < PLACES));
+}
+
+fn message(bytes: &[u8]) -> String {
+    parse::<2>(bytes).map(|_| ()).expect_err("this mesh is bad").to_string()
+}
+
+/// No byte makes the reader panic or allocate without end. Whatever it accepts satisfies the invariants of a mesh.
+#[test]
+fn damaged_files_are_meshes_or_errors() {
+    for form in [&[][..], &["-bin"], &["-order", "2", "-bin"]] {
+        let good = gmsh(SQUARE, &[&["-2", "-setnumber", "n", "1"], form].concat());
+        for end in 0..good.len() {
+            let read = parse::<2>(&good[..end]);
+            // Only the end of line after the last section may be missing.
+            assert!(read.is_err() || end + 1 == good.len(), "{end} of {}", good.len());
+        }
+        for position in 0..good.len() {
+            for value in [0, 0xff, b'\n', b'9', b'-', good[position] ^ 0x80, good[position] ^ 1] {
+                let mut bad = good.clone();
+                bad[position] = value;
+                let Ok(mesh) = parse::<2>(&bad) else { continue };
+                assert!(mesh.points.iter().flatten().all(|coordinate| coordinate.is_finite()));
+                for group in mesh.groups.iter() {
+                    assert!(!group.is_empty() && extent(&mesh, group) > 0.0);
+                    assert!(group.connectivity.iter().all(|point| (*point as usize) < mesh.points.len()));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn bad_meshes_are_refused_by_name_and_line() {
+    let square = |more: &str, arguments: &[&str]| gmsh(&format!("{SQUARE}{more}"), arguments);
+    for (bytes, expected) in [
+        (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
+        (square("", &["-2", "-order", "3"]), "elements of 4 nodes (Gmsh's type 26)"),
+        (square("Physical Curve(77) = {3};", &["-2"]), "physical curve 77 has no name"),
+        (square("Physical Curve(\"gone\") = {99};", &["-2"]), "the physical curve `gone` has no elements"),
+        (square("Physical Curve(\"steel\") = {7};", &["-2"]), "two physical groups are named `steel`"),
+        (square("Physical Volume(\"rock\") = {1};", &["-2"]), "group `rock` is made of volumes"),
+        (gmsh("Point(1) = {0, 0, 0};\n", &["-2"]), "the mesh has no physical groups"),
+        (gmsh("Point(1) = {0, 0, 0}; Physical Point(\"pin\") = {1};\n", &["-2"]), "no physical group holds surfaces"),
+        (gmsh(CUBE, &["-3"]), "is made of volumes, but the scene has dimension = 2"),
+        (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2"]), "has z = "),
+        (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2", "-bin"]), "in $Nodes, at byte "),
+        (square("", &["-2", "-part", "2"]), "the mesh is partitioned"),
+        (b"solid cube".to_vec(), "a.msh:1: this is not a mesh file of Gmsh"),
+        (Vec::new(), "this is not a mesh file of Gmsh"),
+    ] {
+        let message = message(&bytes);
+        assert!(message.contains(expected), "expected {expected}\n{message}");
+        assert!(message.contains("help: "), "{message}");
+    }
+}
+
+const SMALL: &str =
+    "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n0 1 \"pin\"\n2 1 \"body\"\n$EndPhysicalNames
+$Entities\n1 0 1 0\n1 0 0 0 1 1 \n1 0 0 0 1 1 0 1 1 0 \n$EndEntities
+$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes
+$Elements\n2 2 1 2\n0 1 15 1\n1 1 \n2 1 2 1\n2 1 2 3 \n$EndElements\n";
+
+#[test]
+fn small_mistakes_in_text_are_refused_at_their_line() {
+    assert_eq!(parse::<2>(SMALL.as_bytes()).unwrap().points.len(), 3);
+    for (from, to, expected) in [
+        ("2 1 2 3 \n$EndE", "2 1 2 4 \n$EndE", "a.msh:29: element 2 of group `body` uses node 4, which does not exist"),
+        ("2 1 2 3 \n$EndE", "2 1 2 2 \n$EndE", "a.msh:29: element 2 of group `body` has zero area"),
+        ("2 1 2 3 \n$EndE", "2 1 2\n$EndE", "a.msh:29: this line has too few entries"),
+        ("2 1 2 3 \n$EndE", "2 1 2 3 4\n$EndE", "a.msh:29: this line has more entries"),
+        ("2 1 2 3 \n$EndE", "2 1 x 3\n$EndE", "a.msh:29: `x` should be a whole number"),
+        ("\n1 0 0\n0 1 0\n", "\n1 0 0\n2 1e-13 0\n", "has zero area"),
+        ("\n1 0 0\n0 1 0\n", "\n1 0 inf\n0 1 0\n", "a.msh:21: a coordinate is inf"),
+        ("\n1 0 0\n0 1 0\n", "\n1 0 0\n0 1 1e-9\n", "a.msh:22: a node of group `body` has z = 0.000000001"),
+        ("2 1 2 1\n", "2 7 2 1\n", "a.msh:28: elements of surface 7, which $Entities does not list"),
+        ("2 1 2 1\n", "2 1 2 987654321\n", "a.msh:28: the file is too short for a count of 987654321"),
+        ("2 2 1 2\n", "2 3 1 2\n", "a.msh:25: $Elements announces 3 elements and holds 2"),
+        ("$EndElements\n", "", "`$EndElements` should stand here"),
+        ("$EndNodes\n", "$EndNodes\n$Nodes\n", "the section $Nodes stands twice"),
+        ("\"body\"", "\"\"", "a.msh:7: physical surface 1 has an empty name"),
+        ("2 1 \"body\"", "2 1 body", "a.msh:7: dimension, tag and \"name\""),
+        ("0 1 \"pin\"", "2 1 \"pin\"", "two names for physical surface 1"),
+    ] {
+        let bad = SMALL.replacen(from, to, 1);
+        assert_ne!(bad, SMALL, "{from}");
+        let message = message(bad.as_bytes());
+        assert!(message.contains(expected), "expected {expected}\n{message}");
+    }
+}
+
+#[test]
+fn sections_of_no_use_are_skipped() {
+    let more = "$Comments\nmade by hand $End\n$EndComments\n";
+    let bytes = [more, SMALL, "$Periodic\n0\n$EndPeriodic\n", more, more].concat();
+    assert_eq!(parse::<2>(bytes.as_bytes()).unwrap().points, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+}
+
+#[test]
+fn scripts_are_meshed_once_for_each_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("main.geo");
+    let part = folder.path().join("part.geo");
+    std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
+    std::fs::write(&part, SQUARE).unwrap();
+    let run = |n: f64, order| meshed::<2>(&geo, &[("n".into(), n)], order, &cache).unwrap();
+
+    let first = run(4.0, Order::P1);
+    assert_eq!(first.origin, Origin::Gmsh);
+    assert_eq!(first.mesh.group("left").unwrap().len(), 4);
+    assert_eq!(first.mesh.path, geo);
+    let again = run(4.0, Order::P1);
+    assert_eq!((again.origin, &again.file), (Origin::Cache, &first.file));
+    assert_eq!((again.mesh.points, &again.mesh.groups), (first.mesh.points, &first.mesh.groups));
+    assert_eq!(run(3.0, Order::P1).origin, Origin::Gmsh);
+    let quadratic = run(4.0, Order::P2);
+    assert_eq!((quadratic.origin, quadratic.mesh.order), (Origin::Gmsh, Order::P2));
+
+    // A damaged file is made anew.
+    let whole = std::fs::read(&first.file).unwrap();
+    std::fs::write(&first.file, &whole[..whole.len() / 2]).unwrap();
+    assert_eq!(run(4.0, Order::P1).origin, Origin::Gmsh);
+    assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
+    // A change of an included file is seen, and its reversal is remembered.
+    std::fs::write(&part, SQUARE.replace("1/4", "1/2")).unwrap();
+    let moved = run(4.0, Order::P1);
+    assert_eq!(moved.origin, Origin::Gmsh);
+    assert!((extent(&moved.mesh, moved.mesh.group("steel").unwrap()) - 1.0).abs() < 1e-9);
+    std::fs::write(&part, SQUARE).unwrap();
+    assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
+    // Only meshes are left: n = 4, n = 3, order 2, and the one of the changed file.
+    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
+}
+
+/// Gmsh omits the last command of a script whose last line is not ended.
+#[test]
+fn the_last_line_of_a_script_need_not_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("main.geo");
+    std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
+    let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
+    let sizes = view(3, &corners, &[0.5; 3]);
+    for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
+        std::fs::write(&geo, script).unwrap();
+        for sizes in [None, Some(&sizes[..])].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
+            let guard = (&Guard::default(), &Interrupt::default());
+            let loaded = from_script::<2>(&located(geo.clone()), (&[], &[]), sizes, Order::P1, guard, &cache).unwrap();
+            assert!(loaded.mesh.group("outside").is_some(), "{script}");
+        }
+    }
+}
+
+#[test]
+fn scripts_in_error_are_refused_with_what_gmsh_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let refuse = |script: &str, set: &[(String, f64)], order| {
+        let geo = folder.path().join("a.geo");
+        std::fs::write(&geo, script).unwrap();
+        meshed::<2>(&geo, set, order, &cache).unwrap_err().to_string()
+    };
+    let message = refuse("Line(1) = {1, 7};", &[], Order::P1);
+    assert!(message.contains("a.geo: Gmsh cannot mesh this script"), "{message}");
+    assert!(message.contains("Unknown control point"), "{message}");
+    let message = refuse(SQUARE, &[("m".into(), 1.0)], Order::P1);
+    assert!(message.contains("did you mean `n`?") && message.contains("scene.toml"), "{message}");
+    let message = refuse(&format!("{SQUARE}Mesh.ElementOrder = 1;"), &[], Order::P2);
+    assert!(message.contains("remove `Mesh.ElementOrder`"), "{message}");
+    // Lines and bytes of the mesh mean nothing to someone who wrote a script.
+    let message = refuse(&format!("{SQUARE}Physical Curve(\"gone\") = {{99}};"), &[], Order::P1);
+    assert!(message.contains("a.geo: ") && message.contains("`gone`") && !message.contains("byte"), "{message}");
+    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 0);
+}
+
+#[test]
+fn mesh_files_serve_lower_orders_but_not_higher_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = |name: &str| MeshSource::Msh { file: located(folder.path().join(name)) };
+    for order in ["1", "2"] {
+        std::fs::write(folder.path().join(order), gmsh(SQUARE, &["-2", "-order", order])).unwrap();
+    }
+    let load = |name: &str, order| load::<2>(&source(name), order, &Interrupt::default());
+    let loaded = load("2", Order::P1).unwrap();
+    assert_eq!((loaded.origin, loaded.mesh.order, loaded.mesh.points.len()), (Origin::File, Order::P1, 15));
+    assert_eq!(load("2", Order::P2).unwrap().mesh.order, Order::P2);
+    let message = load("1", Order::P2).unwrap_err().to_string();
+    assert!(message.contains("the mesh is of order 1") && message.contains("scene.toml"), "{message}");
+    let message = load("3", Order::P2).unwrap_err().to_string();
+    assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
+}
+
+/// A mesh that Gmsh converts depends on Gmsh, and one that is read directly does not.
+#[test]
+fn converted_meshes_are_made_by_gmsh() {
+    let folder = tempfile::tempdir().unwrap();
+    let made_from = |name: &str| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, "$MeshFormat\n4.1 0 8\n").unwrap();
+        made_from(&MeshSource::Msh { file: located(file) }, 2, Order::P1).unwrap()
+    };
+    let [direct, converted] = ["a.msh", "a.unv"].map(made_from);
+    assert_ne!(direct, converted);
+}
+
+#[test]
+fn loads_at_the_same_time_do_not_meet() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("a.geo");
+    std::fs::write(&geo, SQUARE).unwrap();
+    let load = || meshed::<2>(&geo, &[], Order::P1, &cache).unwrap();
+    std::thread::scope(|scope| {
+        let threads = [(); 4].map(|()| scope.spawn(load));
+        for thread in threads {
+            assert_eq!(thread.join().unwrap().mesh.points.len(), 15);
+        }
+    });
+    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 1);
+    assert_eq!(load().origin, Origin::Cache);
+}
+
+/// Gmsh's parallel algorithm makes another mesh of the same cube. This mesh has its own file in the cache, and it does not
+/// depend on the number of threads.
+#[test]
+fn free_meshes_in_space_by_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = [folder.path().join("cache")];
+    let geo = folder.path().join("cube.geo");
+    let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nMeshSize{:} = 0.2;\n\
+                Physical Volume(\"all\") = {1};\nPhysical Surface(\"bottom\") = {5};\n";
+    std::fs::write(&geo, cube).unwrap();
+    let run = |threads: Option<usize>| {
+        let guard = Guard { threads, ..Guard::default() };
+        let limits = (&guard, &Interrupt::default());
+        let loaded = from_script::<3>(&located(geo.clone()), (&[], &[]), None, Order::P1, limits, &cache).unwrap();
+        (loaded.origin, loaded.mesh.points)
+    };
+    let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
+    assert_eq!(origin, Origin::Gmsh);
+    // The numbers of points may be equal, but the points differ.
+    let counts = [&usual, &parallel].map(Vec::len);
+    assert!(usual != parallel && counts[0].abs_diff(counts[1]) < counts[0] / 4, "{counts:?}");
+    assert_eq!((run(Some(2)), run(None)), ((Origin::Cache, parallel), (Origin::Cache, usual)));
 }

@@ -3,19 +3,24 @@
 //! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of cells
 //! that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are placed. Names are
 //! written in lower case. Characters that no name can have become `_`. Other keywords are skipped.
+//!
+//! From the sets and surfaces of an input file to groups of cells, facets, edges and points.
+//!
+//! Faces and edges of cells by their corners, to find those that shells, membranes and trusses lie on.
+//!
+//! Groups as a mesh in Gmsh's format 4.1.
 
-mod faces;
-mod groups;
-mod kinds;
 mod lines;
 mod model;
 mod read;
-mod words;
-mod write;
 
+use super::old::{self, Contents};
+use super::simplex;
 use crate::error::{Error, Result};
-use groups::{Groups, LeftOut};
+use lines::Lines;
+use model::{Element, Face, Kind, Missing, Model, members};
 use read::Reader;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
 /// A converted file.
@@ -45,7 +50,28 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
         let help = if dimension == 3 { "for plane elements set `dimension = 2`" } else { help };
         return Err(Error::mesh(path, None, message).help(help));
     }
-    Ok(Converted { mesh: write::mesh(&reader.model, &groups.list), notes: notes(path, &reader, &groups.left_out) })
+    Ok(Converted {
+        mesh: contents(&reader.model, &groups.list).written(),
+        notes: notes(path, &reader, &groups.left_out),
+    })
+}
+
+/// Return the mesh. Each group is a physical one on an entity of its own, so that an element of several groups is written once for
+/// each.
+fn contents(model: &Model, groups: &[Group]) -> Contents {
+    let mut contents =
+        Contents { nodes: model.nodes.iter().map(|(tag, node)| (*tag, node.x)).collect(), ..Contents::default() };
+    for (tag, Group { dimension, name, elements, points }) in (1..).zip(groups) {
+        contents.names.push(format!("{dimension} {tag} \"{name}\""));
+        let mut add = |number: u64, kind: i32, nodes: &[u64]| {
+            contents.elements.push(old::Element { number, kind, entity: 0, groups: vec![tag], nodes: nodes.to_vec() });
+        };
+        for (number, (kind, nodes)) in elements {
+            add(*number, simplex::Kind::number(kind.shape, kind.nodes()), nodes);
+        }
+        points.iter().for_each(|node| add(*node, simplex::POINTS, &[*node]));
+    }
+    contents
 }
 
 /// Return what was left out, or is not as the user may think.
@@ -87,4 +113,335 @@ fn notes(path: &Path, reader: &Reader, left_out: &LeftOut) -> Vec<String> {
         ));
     }
     notes
+}
+
+/// A group.
+struct Group {
+    dimension: usize,
+    name: String,
+    /// Cells, facets and edges, each with the number of its element.
+    elements: Vec<(u64, Piece)>,
+    /// Nodes, if it is a group of points.
+    points: Vec<u64>,
+}
+
+/// What was left out, or has another name.
+#[derive(Default)]
+struct LeftOut {
+    /// Number of elements by their type.
+    elements: BTreeMap<String, usize>,
+    /// Faces in surfaces that belong to elements that were left out.
+    faces: usize,
+    /// Nodes in sets that belong to no cell.
+    nodes: usize,
+    /// New names of surfaces.
+    renamed: Vec<String>,
+}
+
+/// The groups of a file.
+struct Groups<'a> {
+    model: &'a Model,
+    lines: &'a Lines,
+    dimension: usize,
+    faces: Faces<'a>,
+    list: Vec<Group>,
+    left_out: LeftOut,
+}
+
+/// Families of elements without stiffness of their own, which Gmsh and others write for surfaces and curves.
+const MARKERS: [&str; 5] = ["T3D", "T2D", "CPS", "CPE", "SFM3D"];
+
+impl<'a> Groups<'a> {
+    /// Make the groups for a scene of this dimension.
+    ///
+    /// # Errors
+    /// A set or surface has a member that does not exist.
+    fn new(model: &'a Model, lines: &'a Lines, dimension: usize) -> Result<Self> {
+        let lower = || {
+            model.elements.values().filter_map(|element| element.kind).filter(|kind| kind.shape.dimension < dimension)
+        };
+        let is_free = |surface: &model::Surface| {
+            surface.faces.iter().any(|(_, face)| *face == Face::Free)
+                || surface.of_sets.iter().any(|(_, face)| *face == Face::Free)
+        };
+        let faces = match lower().next().is_some() || model.surfaces.values().any(is_free) {
+            true => Faces::new(model, dimension, lower().any(|kind| kind.shape.dimension == 1)),
+            false => Faces::new(model, 0, false),
+        };
+        let mut groups = Self { model, lines, dimension, faces, list: Vec::new(), left_out: LeftOut::default() };
+        groups.element_sets()?;
+        groups.unnamed();
+        groups.surfaces()?;
+        groups.facets_of_sets()?;
+        groups.node_sets()?;
+        groups.count_left_out();
+        Ok(groups)
+    }
+
+    /// Return the kind of an element if it is a cell. In a plane scene solids are, too: the reader of the mesh refuses them.
+    fn cell(&self, element: &Element) -> Option<Kind> {
+        element.kind.filter(|kind| kind.shape.dimension >= self.dimension)
+    }
+
+    /// Return the face or edge of a cell that an element of lower dimension lies on.
+    fn under(&self, element: &Element) -> Option<Piece> {
+        let kind = element.kind.filter(|kind| kind.shape.dimension < self.dimension)?;
+        self.faces.under(kind, &element.nodes)
+    }
+
+    fn members(&self, name: &'a str) -> Result<BTreeSet<u64>> {
+        members(&self.model.element_sets, name, &self.model.elements)
+            .map_err(|missing| self.missing(missing, "an element"))
+    }
+
+    fn missing(&self, Missing { set, tag }: Missing, what: &str) -> crate::error::Error {
+        let message = format!("`{}` has {what} {tag}, which is not there", set.label.spelling);
+        self.lines.refuse(set.label.at, message)
+    }
+
+    /// Make a group of the cells of each element set.
+    fn element_sets(&mut self) -> Result<()> {
+        for name in self.model.element_sets.keys() {
+            let tags = self.members(name)?;
+            self.list.extend(self.cells(name, tags.iter()));
+        }
+        Ok(())
+    }
+
+    /// Return the group of the cells with these numbers, if there are any.
+    fn cells<'t>(&self, name: &str, tags: impl Iterator<Item = &'t u64>) -> Option<Group> {
+        let mut of_dimension: BTreeMap<usize, Vec<(u64, Piece)>> = BTreeMap::new();
+        for &tag in tags {
+            let element = &self.model.elements[&tag];
+            if let Some(kind) = self.cell(element) {
+                let nodes = kind.in_gmsh_order(&element.nodes);
+                of_dimension.entry(kind.shape.dimension).or_default().push((tag, (kind, nodes)));
+            }
+        }
+        let (dimension, elements) = of_dimension.pop_last()?;
+        Some(Group { dimension, name: name.to_owned(), elements, points: Vec::new() })
+    }
+
+    /// Make a group of the cells in no element set. It has the name of a section without a set, or else `solids`.
+    fn unnamed(&mut self) {
+        let named: HashSet<u64> = self.list.iter().flat_map(|group| &group.elements).map(|(tag, _)| *tag).collect();
+        let rest: Vec<u64> = self.model.elements.keys().copied().filter(|tag| !named.contains(tag)).collect();
+        let section = self.model.sections.iter().find(|name| !self.model.element_sets.contains_key(*name));
+        let group = self.cells(section.map_or("solids", String::as_str), rest.iter());
+        group.into_iter().for_each(|group| self.add(group, "elements"));
+    }
+
+    /// Make a group of the faces of each surface.
+    fn surfaces(&mut self) -> Result<()> {
+        for (name, surface) in &self.model.surfaces {
+            let mut faces = surface.faces.clone();
+            for (set, face) in &surface.of_sets {
+                faces.extend(self.members(set)?.into_iter().map(|tag| (tag, *face)));
+            }
+            let mut group =
+                Group { dimension: self.dimension - 1, name: name.clone(), elements: Vec::new(), points: Vec::new() };
+            for (tag, face) in faces {
+                let spelling = &surface.label.spelling;
+                let refuse = |message: String| self.lines.refuse(surface.label.at, message);
+                let element = self.model.elements.get(&tag);
+                let element = element
+                    .ok_or_else(|| refuse(format!("`{spelling}` has a face of element {tag}, which is not there")))?;
+                let pieces = match (self.cell(element), face) {
+                    (Some(_), Face::Free) => self.faces.free(tag),
+                    (Some(kind), Face::Number(number)) => {
+                        let piece = kind.face(&element.nodes, number);
+                        vec![piece.ok_or_else(|| {
+                            refuse(format!("element {tag} in `{spelling}` has no face S{}", number + 1))
+                        })?]
+                    }
+                    (Some(_), Face::Itself) => {
+                        return Err(refuse(format!(
+                            "element {tag} in `{spelling}` is no shell with sides SPOS and SNEG"
+                        )));
+                    }
+                    (None, _) => self.under(element).into_iter().collect(),
+                };
+                self.left_out.faces += usize::from(pieces.is_empty() && face != Face::Free);
+                group.elements.extend(pieces.into_iter().map(|piece| (tag, piece)));
+            }
+            self.add(group, "surface");
+        }
+        Ok(())
+    }
+
+    /// Make a group of the facets, or else of the edges, that the elements of each set lie on, where the set has no cells.
+    fn facets_of_sets(&mut self) -> Result<()> {
+        for name in self.model.element_sets.keys() {
+            let mut of_dimension: BTreeMap<usize, Vec<(u64, Piece)>> = BTreeMap::new();
+            for tag in self.members(name)? {
+                let element = &self.model.elements[&tag];
+                if self.cell(element).is_some() {
+                    of_dimension.clear();
+                    break;
+                }
+                if let Some(piece) = self.under(element) {
+                    of_dimension.entry(piece.0.shape.dimension).or_default().push((tag, piece));
+                }
+            }
+            if let Some((dimension, elements)) = of_dimension.pop_last() {
+                self.add(Group { dimension, name: name.clone(), elements, points: Vec::new() }, "elements");
+            }
+        }
+        Ok(())
+    }
+
+    /// Make a group of the nodes of each node set that belong to cells.
+    fn node_sets(&mut self) -> Result<()> {
+        let cells = self.model.elements.values().filter(|element| self.cell(element).is_some());
+        let used: HashSet<u64> = cells.flat_map(|element| &element.nodes).copied().collect();
+        for name in self.model.node_sets.keys() {
+            let all = members(&self.model.node_sets, name, &self.model.nodes);
+            let all = all.map_err(|missing| self.missing(missing, "a node"))?;
+            let points: Vec<u64> = all.iter().copied().filter(|node| used.contains(node)).collect();
+            self.left_out.nodes += all.len() - points.len();
+            self.add(Group { dimension: 0, name: name.clone(), elements: Vec::new(), points }, "nodes");
+        }
+        Ok(())
+    }
+
+    /// Add a group without repeated elements. If another group has its name, it gets a suffix.
+    fn add(&mut self, mut group: Group, suffix: &str) {
+        let mut seen = HashSet::new();
+        group.elements.retain(|(_, piece)| seen.insert(sorted(piece)));
+        if group.elements.is_empty() && group.points.is_empty() {
+            return;
+        }
+        let namesake = self.list.iter().find(|other| other.name == group.name);
+        if let Some(other) = namesake {
+            let is_same = other.elements.len() == seen.len()
+                && other.elements.iter().all(|(_, piece)| seen.contains(&sorted(piece)));
+            if is_same && other.dimension == group.dimension {
+                return;
+            }
+            let name = format!("{}_{suffix}", group.name);
+            if suffix != "nodes" {
+                self.left_out.renamed.push(format!("the surface `{}` is `{name}` here", group.name));
+            }
+            group.name = name;
+        }
+        self.list.push(group);
+    }
+
+    /// Count the elements that are neither cells nor mark surfaces.
+    fn count_left_out(&mut self) {
+        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+        for element in self.model.elements.values().filter(|element| self.cell(element).is_none()) {
+            let is_marker = MARKERS.iter().any(|family| element.name.starts_with(family));
+            if !is_marker || self.under(element).is_none() {
+                *counts.entry(element.name.to_string()).or_default() += 1;
+            }
+        }
+        self.left_out.elements = counts;
+    }
+
+    /// Refuse cells with nodes that do not exist.
+    ///
+    /// # Errors
+    /// There is one. The error names its line.
+    fn check_nodes(&self) -> Result<()> {
+        for (tag, element) in self.model.elements.iter().filter(|(_, element)| self.cell(element).is_some()) {
+            if let Some(node) = element.nodes.iter().find(|node| !self.model.nodes.contains_key(node)) {
+                let message = format!("element {tag} has the node {node}, which is not there");
+                return Err(self.lines.refuse(element.at, message));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Return the corners of a piece in ascending order.
+fn sorted((kind, nodes): &Piece) -> Vec<u64> {
+    let mut corners = nodes[..kind.shape.corners].to_vec();
+    corners.sort_unstable();
+    corners
+}
+
+/// A facet or edge in the form of a mesh: its kind and nodes, in the order of Gmsh.
+type Piece = (Kind, Vec<u64>);
+
+/// Corners in ascending order, with zeros before them.
+type Corners = [u64; 4];
+
+/// A face of a cell.
+struct Place {
+    cell: u64,
+    face: usize,
+    /// Number of cells that have the face.
+    cells: usize,
+}
+
+/// The faces of all cells, and in space their edges where these are asked for.
+struct Faces<'a> {
+    model: &'a Model,
+    places: HashMap<Corners, Place>,
+    edges: HashMap<Corners, Vec<u64>>,
+}
+
+impl<'a> Faces<'a> {
+    /// Collect the faces of the cells of a dimension. Edges are collected in space if `with_edges`.
+    fn new(model: &'a Model, dimension: usize, with_edges: bool) -> Self {
+        let mut faces = Self { model, places: HashMap::new(), edges: HashMap::new() };
+        for (&cell, element) in &model.elements {
+            let Some(kind) = element.kind.filter(|kind| kind.shape.dimension == dimension) else { continue };
+            for face in 0..kind.own.faces.len() {
+                let Some((piece, nodes)) = kind.face(&element.nodes, face) else { continue };
+                let key = corners(&nodes[..piece.shape.corners]);
+                faces.places.entry(key).or_insert(Place { cell, face, cells: 0 }).cells += 1;
+            }
+            if with_edges && dimension == 3 {
+                let edges = kind.edges(&element.nodes);
+                faces.edges.extend(edges.into_iter().map(|nodes| (corners(&nodes[..2]), nodes)));
+            }
+        }
+        faces
+    }
+
+    /// Return the faces of a cell that no other cell has.
+    fn free(&self, cell: u64) -> Vec<Piece> {
+        let Some((kind, element)) = self.model.elements.get(&cell).and_then(|element| Some((element.kind?, element)))
+        else {
+            return Vec::new();
+        };
+        let faces = (0..kind.own.faces.len()).filter_map(|face| kind.face(&element.nodes, face));
+        let is_free = |(piece, nodes): &Piece| {
+            self.places.get(&corners(&nodes[..piece.shape.corners])).is_some_and(|place| place.cells == 1)
+        };
+        faces.filter(is_free).collect()
+    }
+
+    /// Return the face or edge of a cell that an element of lower dimension lies on, if there is one. Its nodes are those of
+    /// the cell, which may have middle nodes that the element does not have.
+    fn under(&self, kind: Kind, nodes: &[u64]) -> Option<Piece> {
+        match nodes {
+            // Programs do not agree on the place of the middle node of a line.
+            [a, b, c, ..] if kind.shape.dimension == 1 && kind.is_quadratic => {
+                let ends = [([a, b], c), ([a, c], b), ([b, c], a)];
+                ends.into_iter().find_map(|([a, b], middle)| {
+                    self.piece(corners(&[*a, *b])).filter(|(_, nodes)| nodes.get(2) == Some(middle))
+                })
+            }
+            _ => self.piece(corners(&nodes[..kind.shape.corners])),
+        }
+    }
+
+    fn piece(&self, key: Corners) -> Option<Piece> {
+        if let Some(nodes) = self.edges.get(&key) {
+            return Kind::of(1, 2, nodes.len() == 3).map(|kind| (kind, nodes.clone()));
+        }
+        let place = self.places.get(&key)?;
+        let element = &self.model.elements[&place.cell];
+        element.kind?.face(&element.nodes, place.face)
+    }
+}
+
+fn corners(nodes: &[u64]) -> Corners {
+    let mut key = [0; 4];
+    key.iter_mut().zip(nodes).for_each(|(key, node)| *key = *node);
+    key.sort_unstable();
+    key
 }

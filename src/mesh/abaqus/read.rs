@@ -1,9 +1,7 @@
 //! From the lines of a file to its contents.
 
-use super::kinds::{Kind, Role};
-use super::lines::{At, Line, Lines};
-use super::model::{Element, Face, Label, Model, Node, Rotation, Set, Surface, members, normal};
-use super::words::{Keyword, TextResult, coordinates, count, generated, reals, spelled};
+use super::lines::{At, Keyword, Line, Lines, TextResult, coordinates, count, generated, reals, spelled};
+use super::model::{Element, Face, Kind, Label, Model, Node, Role, Rotation, Set, Surface, members, normal};
 use crate::error::Result;
 use crate::mesh::frame::{Coordinates, Frame};
 use std::collections::BTreeMap;

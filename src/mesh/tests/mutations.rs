@@ -2,7 +2,7 @@
 //! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed. `scripts/fuzz` runs this
 //! test, too, with more of them.
 
-use super::super::{Asked, Duty, Maker, Mesh, abaqus, nastran, parse, unv};
+use crate::mesh::{Asked, Duty, Maker, Mesh, abaqus, foreign, nastran, parse};
 use std::path::Path;
 
 /// Valid files: their names tell which reader they are for.
@@ -99,7 +99,7 @@ fn read_any(name: &str, bytes: &[u8]) {
             }
         }
         "bdf" => drop(nastran::readable(Path::new(name), &String::from_utf8_lossy(bytes))),
-        _ => drop(unv::readable(&String::from_utf8_lossy(bytes))),
+        _ => drop(foreign::readable(&String::from_utf8_lossy(bytes))),
     }
 }
 
