@@ -1,43 +1,31 @@
 //! The step from a scene and its mesh to a [`Model`]. Geometry ends here: nothing below knows the space dimension.
 
-mod apart;
 mod approach;
 mod assembler;
 mod auto;
-mod balance;
-mod carried;
-mod couplings;
 mod distribute;
-mod elastic;
-mod factory;
-mod facts;
-mod find;
-mod gauge;
-mod info;
-mod interface;
+mod local;
 mod mechanism;
 pub mod meshes;
-mod missed;
-mod moment;
-mod moving;
-mod node_sets;
-mod owned;
 mod pairs;
 mod part;
-mod parts;
-mod plan;
 mod post;
 mod prepare;
-pub mod resolution;
 mod roster;
-mod round;
-mod split;
-mod springs;
 mod supports;
 mod surface;
 mod unassembled;
-mod unbalanced;
 mod verify;
+
+pub use assembler::{Assembled, Factory, Outline};
+pub use local::BodyInfo;
+pub use mechanism::Balanced;
+pub use pairs::ContactInfo;
+pub use post::{Balance, Post, Resultant, Unbalanced};
+pub use roster::point;
+pub use surface::{ContactSurface, Resolution, resolution};
+pub use unassembled::Gauged;
+pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};
 use crate::error::Result;
@@ -46,19 +34,11 @@ use crate::linalg::axpy;
 use crate::model::{Mechanism, Model};
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
-use assembler::{Assembler, Counts, Finished};
-pub use balance::{Balance, Resultant};
-pub use factory::{Assembled, Factory, Outline};
-pub use find::point;
-pub use info::{Balanced, BodyInfo, ContactInfo, Gauged};
+use assembler::Assembler;
+use local::LocalBody;
 use meshes::{Kept, Meshes};
-pub use post::Post;
-use prepare::{Locals, Shared, Whole, prepare};
+use prepare::{Shared, Whole, prepare};
 use std::rc::Rc;
-pub use surface::ContactSurface;
-use unassembled::LocalBody;
-pub use unbalanced::Unbalanced;
-pub use verify::{Verified, verify};
 
 /// The discrete problem, with the facts of its origin that reports need.
 pub struct Discrete {
@@ -124,14 +104,15 @@ where
         }
     }
     let carried: Vec<Vec<f64>> = shared.iter().map(|body| body.carried.clone()).collect();
-    let (mut slots, mut infos, mut shapes, mut counts) = (Vec::new(), Vec::new(), Vec::new(), Counts::default());
-    for ((spec, shared), (local, graph)) in bodies.iter().zip(shared).zip(locals) {
-        let body = Assembler { spec, plane: scene.plane, shared, local, graph };
-        let Finished { slot, info, shape } = body.make(&verified.mesh, exchange.rank(), factory, &mut counts)?;
+    let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
+    let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
+    let (mut slots, mut infos) = (Vec::new(), Vec::new());
+    for ((spec, shared), local) in bodies.iter().zip(shared).zip(locals) {
+        let (slot, info) = assembler.make(spec, shared, local)?;
         slots.push(slot);
         infos.push(info);
-        shapes.extend(shape);
     }
+    let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
@@ -144,13 +125,13 @@ where
         balanced,
         carried,
         meshes,
-        assemblies: counts.assemblies,
-        assemblies_avoided: counts.avoided,
+        assemblies,
+        assemblies_avoided,
     })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
-fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Locals<D>>
+fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Vec<Option<LocalBody<D>>>>
 where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
@@ -164,7 +145,7 @@ where
     for share in locals.iter_mut().flatten().filter_map(|local| local.share.as_mut()) {
         share.distribution.exchange = exchange.clone();
     }
-    Ok(locals.into_iter().map(|local| (local, None)).collect())
+    Ok(locals)
 }
 
 /// Impose on the bodies of a model the rigid motions of their supports. `each` holds the traces of these motions on the contact

@@ -1,7 +1,7 @@
 //! What `check` prints and draws of measured surfaces and of the layers made from them.
 
 use crate::data::{Data, Detrend, Fill, Roughness, Trend};
-use crate::discretize::resolution::{Resolution, resolution};
+use crate::discretize::{Resolution, resolution};
 use crate::error::Result;
 use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, sci};
 use crate::problem::{AsperitySpec, ContactSpec, Depths, LayerSpec, label, name_of};

@@ -1,7 +1,6 @@
 //! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
 
-use super::find::find_group;
-use super::roster::load_dimensions;
+use super::roster::{find_group, load_dimensions};
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};

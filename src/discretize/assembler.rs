@@ -1,47 +1,39 @@
-//! The step from what one rank has of a body to its matrix and its solver.
+//! The step from what one rank has of a body to its matrix and its solver, which a factory makes.
 
-use super::balance::Forces;
-use super::carried::Supported;
 use super::distribute::Share;
-use super::elastic;
-use super::factory::{Assembled, Factory};
-use super::info::BodyInfo;
-use super::interface::Unconstrained;
+use super::local::{BodyInfo, LocalBody, SharedBody};
 use super::meshes::Shape;
-use super::owned::OwnedPart;
-use super::part::Part;
+use super::part::{Part, elasticity_of};
 use super::post::{OnPart, Post};
 use super::supports::Constraints;
-use super::unassembled::{LocalBody, SharedBody};
+use super::unassembled::{Supported, Unconstrained};
 use crate::error::Result;
-use crate::fem::{FreeMotion, NodalForces, NodeGraph, RigidMotion, Space, rigid};
+use crate::exchange::Plain;
+use crate::fem::rigid::{self, AtDofs};
+use crate::fem::{ElasticBody, FreeMotion, Interpolation, NodalForces, NodeGraph, RigidMotion, Space};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Loads};
+use crate::model::{Body, BodySlot, Distribution, Loads};
+use crate::problem::order::Order;
 use crate::problem::{BodySpec, Plane};
 use std::rc::Rc;
 
-/// A body on one rank before its matrix is assembled.
-pub struct Assembler<'a, const D: usize> {
-    /// Description in the scene.
-    pub spec: &'a BodySpec,
+/// The assembly of all bodies on one rank.
+pub struct Assembler<'a, const D: usize, F> {
+    /// The mesh.
+    pub mesh: &'a Mesh<D>,
     /// Kind of a plane problem.
     pub plane: Plane,
-    /// What all ranks have of the body.
-    pub shared: SharedBody<D>,
-    /// What this rank has of the body, if anything.
-    pub local: Option<LocalBody<D>>,
-    /// Coupling of nodes by K, if it was computed on this rank.
-    pub graph: Option<NodeGraph>,
-}
-
-/// Counters of matrices that were assembled on a rank, and of those reused from an earlier scene.
-#[derive(Default)]
-pub struct Counts {
+    /// This rank.
+    pub rank: usize,
+    /// The maker of solvers.
+    pub factory: &'a mut F,
     /// Number of assembled matrices.
     pub assemblies: usize,
-    /// Number of reused matrices.
+    /// Number of matrices reused from an earlier scene.
     pub avoided: usize,
+    /// Meshes of the bodies that this rank has.
+    pub shapes: Vec<Shape<D>>,
 }
 
 /// What only the ranks with a part of a body have of it, until [`Discrete::share`](super::Discrete::share).
@@ -52,67 +44,100 @@ struct Made {
     row_stiffness: Vec<f64>,
 }
 
-impl<const D: usize> Assembler<'_, D> {
-    /// Assemble the body and give it a solver, with its mesh if this rank has it. Its report receives the evaluation of
-    /// displacements.
+impl<const D: usize, F: Factory> Assembler<'_, D, F> {
+    /// Assemble a body and give it a solver, from what all ranks have of it and what this rank has, if anything. The facts for reports
+    /// receive the evaluation of displacements.
     ///
     /// # Errors
-    /// The scene contradicts its mesh in a way that shows when K is assembled, or `factory` fails.
+    /// The scene contradicts its mesh in a way that shows when K is assembled, or the factory fails.
     pub fn make(
-        self,
-        mesh: &Mesh<D>,
-        rank: usize,
-        factory: &mut impl Factory,
-        counts: &mut Counts,
-    ) -> Result<Finished<D>> {
-        let Self { spec, plane, shared, local, graph } = self;
+        &mut self,
+        spec: &BodySpec,
+        shared: SharedBody<D>,
+        local: Option<LocalBody<D>>,
+    ) -> Result<(BodySlot, BodyInfo)> {
         let SharedBody { mut info, segments, unconstrained, modulus, depth, .. } = shared;
         let Unconstrained { left, motions, sprung, unsupported, .. } = unconstrained;
-        let (mut made, mut shape) = (Made::default(), None);
+        let mut made = Made::default();
         if let Some(local) = local {
-            let elasticity = Rc::new(elastic::of_regions(spec, local.regions, D, plane)?);
-            let LocalBody { space, held, springs, facts, .. } = local;
+            let elasticity = Rc::new(elasticity_of(spec, local.regions, D, self.plane)?);
+            let LocalBody { space, held, springs, facts, share, load, .. } = local;
             let part = Part { spec, space, held, springs, elasticity: elasticity.clone(), facts };
-            let (unloaded, motions) = (local.unloaded, unsupported);
             let (space, held) = match local.is_owned {
                 false => (Rc::new(part.space), Rc::new(part.held)),
                 true => {
-                    let own = own_nodes(&part, local.share.as_ref());
-                    let (loads, free) = loads(&part, &local.load, local.supported, left, local.works);
-                    let kept = factory.kept(&info.name).filter(|_| local.share.is_none());
+                    let is_own =
+                        |node| share.as_ref().is_none_or(|s| s.is_own::<D>(part.held.frame.node(node) as usize));
+                    let own = (0..part.space.nodes.len() as u32).map(is_own).collect();
+                    let (loads, free) = loads(&part, &load, local.supported, left, local.works);
+                    let kept = self.factory.kept(&info.name).filter(|_| share.is_none());
                     made = match reload(kept, &loads)? {
                         Some(before) => {
-                            counts.avoided += 1;
+                            self.avoided += 1;
                             before
                         }
                         None => {
-                            let is_first = info.rank == rank;
-                            counts.assemblies += usize::from(is_first);
-                            let (part, rows, share) = (&part, local.rows, local.share);
-                            Assembly { name: &info.name, part, rows, graph, share, left: free, is_first }
-                                .make(mesh, loads, factory)?
+                            self.assemblies += usize::from(info.rank == self.rank);
+                            self.assemble(&part, local.rows, local.graph, share, free, loads)?
                         }
                     };
-                    tell_displacements(&mut info, part, local.nodal_rows, &local.load, own)?
+                    if info.rank != self.rank {
+                        made.scale = 0.0;
+                    }
+                    evaluate(&mut info, part, local.nodal_rows, &load, own)?
                 }
             };
-            shape = Some(Shape { space, held, elasticity, modulus, unloaded, motions });
+            let (unloaded, motions) = (local.unloaded, unsupported);
+            self.shapes.push(Shape { space, held, elasticity, modulus, unloaded, motions });
         }
         let Made { local, scale, row_stiffness } = made;
         let name = info.name.clone();
         let slot = BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness };
-        Ok(Finished { slot, info, shape })
+        Ok((slot, info))
     }
-}
 
-/// A body with its solver.
-pub struct Finished<const D: usize> {
-    /// The body as the method uses it.
-    pub slot: BodySlot,
-    /// Facts for reports.
-    pub info: BodyInfo,
-    /// Mesh of the body, if this rank has it.
-    pub shape: Option<Shape<D>>,
+    /// Assemble the matrix of a body on its rows, or on those of this rank, and make its solver.
+    fn assemble(
+        &mut self,
+        part: &Part<D>,
+        rows: Csr,
+        graph: Option<NodeGraph>,
+        share: Option<Share>,
+        left: Vec<FreeMotion>,
+        loads: Loads,
+    ) -> Result<Made> {
+        let name = &part.spec.name.value;
+        let mut graph = graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
+        if let Some(share) = &share {
+            graph = graph.of(|node| share.is_own::<D>(node));
+        }
+        let Loads { force, prescribed, carried, .. } = loads;
+        let mut body = part.assemble(self.mesh, &graph, force, prescribed, carried)?;
+        drop(graph);
+        let scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+        let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+        if let Some(share) = &share {
+            body = share.own::<D>(body);
+        }
+        let interpolation = self.factory.wants_interpolation(name).then(|| match &share {
+            Some(share) => share.interpolation::<D>(|coarse| part.interpolation(coarse)),
+            None => part.interpolation(&part.coarse_nodes()),
+        });
+        // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
+        // displacements and rotations of its section as a plane body.
+        let smooth = || rigid::modes(&part.facts.extent).iter().map(|motion| part.dofs_of(motion)).collect();
+        let local = self.factory.make(Assembled {
+            name: name.clone(),
+            dimension: D,
+            body,
+            distribution: share.map(|share| share.distribution),
+            rows,
+            motions: &smooth,
+            left,
+            interpolation,
+        })?;
+        Ok(Made { local: Some(local), scale, row_stiffness })
+    }
 }
 
 /// Return the loads of a body on the dofs of this rank, and the motions that supports leave. If this rank has only some of the
@@ -137,7 +162,7 @@ fn loads<const D: usize>(
 
 /// Give `info` the evaluation of displacements and forces of a body at the nodes that this rank has. `own` marks the nodes that
 /// belong to this rank. Return the space and the supports of the body.
-fn tell_displacements<const D: usize>(
+fn evaluate<const D: usize>(
     info: &mut BodyInfo,
     part: Part<D>,
     rows: Csr,
@@ -147,12 +172,10 @@ fn tell_displacements<const D: usize>(
     let rigid = part.rigid_forces().collect();
     let (space, held) = (Rc::new(part.space), Rc::new(part.held));
     let is_whole = info.ranks.len() == 1 && !own.contains(&false);
-    let here = OwnedPart { space: space.clone(), own };
-    info.points = match is_whole {
-        true => part.facts.points,
-        false => space.part(here.owned()).1.iter().map(|&node| part.facts.points[node as usize]).collect(),
-    };
-    let forces = Forces {
+    let post = OnPart {
+        name: info.name.clone(),
+        exact: part.spec.exact.clone(),
+        outer: part.facts.outer,
         rows,
         springs: part.springs,
         supports: part.spec.fix.len(),
@@ -162,16 +185,16 @@ fn tell_displacements<const D: usize>(
         nodes: info.nodes,
         held: held.clone(),
         elasticity: part.elasticity,
-        part: here,
+        space: space.clone(),
+        own,
     };
-    info.post = Some(Box::new(OnPart::new(part.spec, part.facts.outer, forces)?) as Box<dyn Post>);
+    post.check_exact()?;
+    info.points = match is_whole {
+        true => part.facts.points,
+        false => space.part(post.owned()).1.iter().map(|&node| part.facts.points[node as usize]).collect(),
+    };
+    info.post = Some(Box::new(post) as Box<dyn Post>);
     Ok((space, held))
-}
-
-/// Return, for each node of a body on this rank, whether the rank owns it.
-fn own_nodes<const D: usize>(part: &Part<D>, share: Option<&Share>) -> Vec<bool> {
-    let is_own = |node| share.is_none_or(|share| share.is_own::<D>(part.held.frame.node(node) as usize));
-    (0..part.space.nodes.len() as u32).map(is_own).collect()
 }
 
 /// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
@@ -185,51 +208,77 @@ fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
     Ok(serves.then_some(made))
 }
 
-/// A body whose matrix is to be assembled.
-struct Assembly<'p, 'a, const D: usize> {
-    name: &'p str,
-    part: &'p Part<'a, D>,
-    rows: Csr,
-    graph: Option<NodeGraph>,
-    share: Option<Share>,
-    left: Vec<FreeMotion>,
-    /// Whether this rank owns most of the body.
-    is_first: bool,
+/// What the first rank has of a body before it is assembled.
+pub struct Outline<'a> {
+    /// Name in the scene.
+    pub name: &'a str,
+    /// Space dimension, which is the number of dofs of a node.
+    pub dimension: usize,
+    /// Order of the elements.
+    pub order: Order,
+    /// All contact rows of the body, pair by pair, with its dofs as columns.
+    pub rows: &'a Csr,
+    /// Prescribed (dof, value), sorted by dof.
+    pub prescribed: &'a [(usize, f64)],
+    /// Rigid motions of the free body.
+    pub motions: AtDofs<'a>,
+    /// Coupling of nodes by K. It is computed when it is first requested.
+    pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
-impl<const D: usize> Assembly<'_, '_, D> {
-    fn make(self, mesh: &Mesh<D>, loads: Loads, factory: &mut impl Factory) -> Result<Made> {
-        let Self { name, part, rows, share, left, is_first, .. } = self;
-        let mut graph = self.graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
-        if let Some(share) = &share {
-            graph = graph.of(|node| share.is_own::<D>(node));
-        }
-        let Loads { force, prescribed, carried, .. } = loads;
-        let mut body = part.assemble(mesh, &graph, force, prescribed, carried)?;
-        drop(graph);
-        let diagonal = (0..body.load.len()).map(|i| body.stiffness.diagonal(i));
-        let scale = if is_first { diagonal.fold(0.0, f64::max) } else { 0.0 };
-        let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
-        if let Some(share) = &share {
-            body = share.own::<D>(body);
-        }
-        let interpolation = factory.wants_interpolation(name).then(|| match &share {
-            Some(share) => share.interpolation::<D>(|coarse| part.interpolation(coarse)),
-            None => part.interpolation(&part.coarse_nodes()),
-        });
-        // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
-        // displacements and rotations of its section as a plane body.
-        let smooth = || rigid::modes(&part.facts.extent).iter().map(|motion| part.dofs_of(motion)).collect();
-        let local = factory.make(Assembled {
-            name: name.to_owned(),
-            dimension: D,
-            body,
-            distribution: share.map(|share| share.distribution),
-            rows,
-            motions: &smooth,
-            left,
-            interpolation,
-        })?;
-        Ok(Made { local: Some(local), scale, row_stiffness })
-    }
+/// A maker of the inner solvers of bodies.
+pub trait Factory {
+    /// The choice of solvers of all bodies.
+    type Plan: Plain;
+
+    /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
+    ///
+    /// # Errors
+    /// PETSc refuses an option.
+    fn plan(&mut self, outlines: &[Outline]) -> Result<Self::Plan>;
+
+    /// Follow the plan of the first rank on another rank.
+    ///
+    /// # Errors
+    /// PETSc refuses an option.
+    fn adopt(&mut self, plan: Self::Plan) -> Result<()>;
+
+    /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
+    /// are in increasing order. Bodies that stay whole are in no set.
+    fn distributed(&self) -> Vec<Vec<usize>>;
+
+    /// Return whether the plan needs the interpolation of a body from linear displacements.
+    fn wants_interpolation(&self, name: &str) -> bool;
+
+    /// Make the solver of a body by its plan, on each rank that owns the body or a part of it.
+    ///
+    /// # Errors
+    /// PETSc refuses a matrix or the value of an option.
+    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
+
+    /// Return a body of this name with the same K and contact rows that an earlier scene or leg has left. It is on the rank that
+    /// owns the body.
+    fn kept(&mut self, name: &str) -> Option<BodySlot>;
+}
+
+/// A body that is ready for its inner solver.
+pub struct Assembled<'a> {
+    /// Name in the scene.
+    pub name: String,
+    /// Space dimension, which is the block size of the matrix.
+    pub dimension: usize,
+    /// K, f and supports on all dofs, or on those of this rank.
+    pub body: ElasticBody,
+    /// Distribution of the dofs, if the body is distributed.
+    pub distribution: Option<Distribution>,
+    /// All contact rows of the body, pair by pair. The columns are its dofs, or those of the nodes that this rank has.
+    pub rows: Csr,
+    /// Motions with hardly any strain in a few cells, for the near-null space of multigrid. They are the rigid motions of the
+    /// free body, in a body of revolution those of its meridian. Each is one vector over these dofs.
+    pub motions: &'a dyn Fn() -> Vec<Vec<f64>>,
+    /// Rigid motions that the supports leave, on these dofs.
+    pub left: Vec<FreeMotion>,
+    /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The columns belong
+    /// to this body alone, or to all bodies of the matrix if the dofs are distributed.
+    pub interpolation: Option<Interpolation>,
 }

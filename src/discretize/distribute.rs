@@ -1,8 +1,9 @@
 //! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a number in that
-//! matrix.
+//! matrix. The coupling of the nodes determines the work and the memory of each.
 
-use super::interface::Interface;
 use super::part::Part;
+use super::unassembled::Unassembled;
+use crate::contact::ContactPair;
 use crate::exchange::Serial;
 use crate::fem::{Couplings, ElasticBody, Interpolation, Space};
 use crate::linalg::Csr;
@@ -10,6 +11,7 @@ use crate::mesh::bisect;
 use crate::model::Distribution;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::rc::Rc;
 
 /// Bodies whose rows of K are in one matrix, with the owner of each of their nodes. It exists on the first rank.
@@ -72,30 +74,32 @@ impl Numbers {
 }
 
 impl Partition {
-    /// Distribute the nodes of `bodies` by recursive bisection. The pole of a rigid surface that turns gets the owner of the master. `couplings` has, for one body after the other, the number of
-    /// nodes with which each node is coupled in the matrix; this is the weight of the node. `wants_coarse(body)` returns whether
+    /// Distribute the nodes of the bodies in `set` by recursive bisection. The weight of a node is the number of nodes with which it is
+    /// coupled in the matrix. The pole of a rigid surface that turns gets the owner of the master. `wants_coarse(body)` returns whether
     /// a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
-        bodies: Vec<usize>,
-        parts: &[Part<D>],
-        couplings: &[u32],
+        set: Vec<usize>,
+        bodies: &[Unassembled<D>],
+        pairs: &[ContactPair],
         ranks: usize,
         wants_coarse: &dyn Fn(usize) -> bool,
     ) -> Self {
-        let places: Vec<[f64; D]> = bodies.iter().flat_map(|&body| parts[body].space.nodes.iter().copied()).collect();
-        let mut all = bisect(&places, couplings, ranks).into_iter();
-        let of_body = |&body: &usize| all.by_ref().take(parts[body].space.nodes.len()).collect();
-        let mut owner: Vec<Vec<u32>> = bodies.iter().map(of_body).collect();
-        for (owner, &body) in owner.iter_mut().zip(&bodies) {
-            for (&master, levers) in &parts[body].held.frame.levers {
+        let nodes_of = |body: usize| &bodies[body].part.space.nodes;
+        let places: Vec<[f64; D]> = set.iter().flat_map(|&body| nodes_of(body).iter().copied()).collect();
+        let mut all = bisect(&places, &couplings(bodies, &set, pairs), ranks).into_iter();
+        let of_body = |&body: &usize| all.by_ref().take(nodes_of(body).len()).collect();
+        let mut owner: Vec<Vec<u32>> = set.iter().map(of_body).collect();
+        for (owner, &body) in owner.iter_mut().zip(&set) {
+            for (&master, levers) in &bodies[body].part.held.frame.levers {
                 owner[levers.pole as usize] = owner[master as usize];
             }
         }
-        let coarse_nodes = |&body: &usize| if wants_coarse(body) { parts[body].coarse_nodes() } else { Vec::new() };
-        let coarse: Vec<Vec<u32>> = bodies.iter().map(coarse_nodes).collect();
+        let coarse_nodes =
+            |&body: &usize| if wants_coarse(body) { bodies[body].part.coarse_nodes() } else { Vec::new() };
+        let coarse: Vec<Vec<u32>> = set.iter().map(coarse_nodes).collect();
         let nodes = Numbers::new(&owner, ranks, |_, _| true);
         let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
-        Self { bodies, ranks, owner, nodes, coarse }
+        Self { bodies: set, ranks, owner, nodes, coarse }
     }
 
     /// Return the rank that owns a node. `number` is the index of the body among those of the matrix.
@@ -133,15 +137,14 @@ impl Partition {
     pub fn nodes<const D: usize>(
         &self,
         number: usize,
-        part: &Part<D>,
-        interface: &Interface<D>,
+        body: &Unassembled<D>,
         cells: &[usize],
         rank: usize,
     ) -> Vec<u32> {
-        let Part { space, held, .. } = part;
+        let Part { space, held, .. } = &body.part;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
         let of_cells = space.corners(cells).into_iter();
-        let of_rows = [&interface.rows, &interface.nodal_rows].into_iter().flat_map(|rows| &rows.col);
+        let of_rows = [&body.rows, &body.nodal_rows].into_iter().flat_map(|rows| &rows.col);
         let of_rows = of_rows.map(|&dof| dof as u32 / D as u32);
         Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(held.frame.leaders()))
     }
@@ -276,4 +279,25 @@ impl Share {
             ..body
         }
     }
+}
+
+/// Return, for each node of the bodies in `set`, the number of nodes with which it is coupled in a matrix of all of them, itself
+/// included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body after the other.
+fn couplings<const D: usize>(bodies: &[Unassembled<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
+    let (mut first, mut all) = (HashMap::new(), Vec::new());
+    for &body in set {
+        first.insert(body, all.len());
+        all.extend(bodies[body].graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
+    }
+    for pair in pairs.iter().filter(|pair| pair.bodies.iter().all(|body| first.contains_key(body))) {
+        let nodes = |side: usize, q: usize| pair.rows[side].row(q).map(|(dof, _)| (dof / D) as u32);
+        let both = |q: usize| nodes(0, q).flat_map(move |i| nodes(1, q).map(move |j| [i, j]));
+        let mut across: Vec<[u32; 2]> = (0..pair.len()).flat_map(both).collect();
+        across.sort_unstable();
+        across.dedup();
+        for nodes in across {
+            (0..2).for_each(|side| all[first[&pair.bodies[side]] + nodes[side] as usize] += 1);
+        }
+    }
+    all
 }

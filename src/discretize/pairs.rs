@@ -1,51 +1,78 @@
-//! Contacts of the scene on the mesh: the body that each surface bounds, and the side that carries the points.
+//! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two surfaces do not face
+//! each other.
 
-use super::apart;
-use super::auto::{self, Found};
-use super::find::{find_group, point};
+use super::auto::{self, Found, Piece, Split};
 use super::part::Part;
-use super::split::{Piece, Split};
+use super::roster::{find_group, point};
 use super::surface::{ContactSurface, Surface};
 use crate::contact::law::{self, OwnLaws};
-use crate::contact::pieces::{Cut, Reach};
-use crate::contact::{self, Chords, ContactPair, End, Faces, Fault, Fine, Side};
+use crate::contact::pieces::{Common, Cut, Reach};
+use crate::contact::{self, Chords, ContactPair, End, Faces, Fault, Fine, ROUNDING, Side, unit};
 use crate::error::{Error, Located, Result};
-use crate::fem::Facets;
+use crate::fem::{Facets, assemble, element};
+use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
-    /// Place of the pair in the scene.
-    pub origin: Origin,
     /// Arrays on which the method works.
     pub pair: ContactPair,
     /// Integration points, if they were requested.
     pub fine: Option<Fine<D>>,
-    /// Whether side a, which carries the points, is the second of the two surfaces that the scene names.
-    pub swapped: bool,
-    /// Number of facets of side a, on other faces of its surface, that belong to no pair.
+    /// What all ranks have of its origin.
+    pub facts: ContactFacts,
+}
+
+/// What all ranks have of the origin of a pair; see [`ContactInfo`].
+#[derive(Serialize, Deserialize)]
+pub struct ContactFacts {
+    origin: Origin,
+    swapped: bool,
+    idle: usize,
+    chords: Option<Chords>,
+    ends: Vec<End>,
+    surface: ContactSurface,
+}
+
+impl ContactFacts {
+    /// Return the facts of the pair, including its description in the scene.
+    pub fn info(self, scene: &Scene) -> ContactInfo {
+        let Self { origin, swapped, idle, chords, ends, surface } = self;
+        ContactInfo { spec: origin.spec(scene), is_split: origin.is_split, swapped, idle, chords, ends, surface }
+    }
+}
+
+/// Facts of a pair besides its arrays.
+pub struct ContactInfo {
+    /// Description in the scene. `between` names the bodies if the pair was found.
+    pub spec: ContactSpec,
+    /// Whether the pair is one of several into which edges split two surfaces.
+    pub is_split: bool,
+    /// Number of facets of side a that belong to no pair, on faces beyond edges. One pair of two surfaces counts them.
     pub idle: usize,
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
     pub ends: Vec<End>,
+    /// Whether side a, which carries the points, is the second of `spec.between`.
+    pub swapped: bool,
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
 }
 
 /// The entry of the scene that a pair comes from.
-#[derive(Clone, Serialize, Deserialize)]
-pub struct Origin {
+#[derive(Serialize, Deserialize)]
+struct Origin {
     entry: Entry,
     /// Names of the two surfaces, which are those of the bodies if the pair was found. A face of a split surface has its number behind
     /// the name.
     names: [String; 2],
     /// Whether the pair is one of several into which edges split two surfaces.
-    pub is_split: bool,
+    is_split: bool,
 }
 
 /// A table of the scene.
@@ -68,7 +95,7 @@ impl Origin {
     }
 
     /// Return the scene's description of the pair. `between` has the names of the pair.
-    pub fn spec(&self, scene: &Scene) -> ContactSpec {
+    fn spec(&self, scene: &Scene) -> ContactSpec {
         let mut spec = match self.entry {
             Entry::Named(number) => scene.contacts[number].clone(),
             Entry::Found(rule) => scene.auto[rule].contact.clone(),
@@ -231,7 +258,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let Self { origin, spec, bodies, a, b, swapped, idle, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
-        let refuse = |fault| refuse(&spec, fault, || apart::why(&a, &b, cut, &spec));
+        let refuse = |fault| refuse(&spec, fault, || why(&a, &b, cut, &spec));
         let mut pair = contact::assemble(&a, &b, bodies, &common, &gap, &law).map_err(refuse)?;
         pair.surfaces = spec.between.each_ref().map(|name| name.value.clone());
         if swapped {
@@ -254,7 +281,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
         let ends = spec.distance.map_or(Vec::new(), |distance| End::all(&a, &common, &pair, &far, distance, drawn));
-        Ok(Contact { origin, pair, fine, swapped, idle, chords, ends, surface })
+        Ok(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } })
     }
 }
 
@@ -344,4 +371,84 @@ impl Owners {
             }
         }
     }
+}
+
+/// Largest angle, in degrees, between the normals of facets that can have common pieces at all.
+const RIGHT: f64 = 90.0;
+
+/// Return why two surfaces do not face each other within the limits of their contact, and what to do.
+pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &ContactSpec) -> [String; 2] {
+    let ContactSpec { angle, distance, .. } = *spec;
+    let [names_a, names_b] = [a.name, b.name];
+    let anywhere = |angle: f64| cut(a, b, &Reach::anywhere(a, b, angle));
+    if let Some(Nearest { gap, at }) = Nearest::of(a, &anywhere(angle)) {
+        return match distance.filter(|_| gap > 0.0) {
+            Some(distance) => [
+                format!("the gap is {gap:.6} where they are nearest, at {at}, and `distance` = {distance} ends before"),
+                "give a larger distance, or none: surfaces with names are found at any distance".to_owned(),
+            ],
+            None if gap > 0.0 => [format!("the gap is {gap:.6} where they are nearest, at {at}"), String::new()],
+            None => [
+                format!(
+                    "at {at} `{names_b}` lies {:.6} behind `{names_a}`, deeper than an overlap can be: the surfaces look away from each other",
+                    -gap
+                ),
+                "name the sides of the bodies that look at each other, or move a body".to_owned(),
+            ],
+        };
+    }
+    if Nearest::of(a, &anywhere(RIGHT)).is_some() {
+        return [
+            format!("where they lie before each other their normals stand at more than {angle} degrees (key `angle`)"),
+            "give a larger angle, up to 90 degrees, or name other surfaces".to_owned(),
+        ];
+    }
+    if closest(a, b) <= ROUNDING {
+        return [
+            "their outer normals nowhere point at each other".to_owned(),
+            "name the sides of the bodies that look at each other; `winkler mesh` has their places".to_owned(),
+        ];
+    }
+    [
+        "no facet of one lies before a facet of the other along its normal".to_owned(),
+        "move a body, or name surfaces that lie opposite each other; `winkler mesh` has their places".to_owned(),
+    ]
+}
+
+/// Where two surfaces are nearest to each other.
+struct Nearest {
+    /// Signed distance, negative where one is behind the other.
+    gap: f64,
+    /// The point as a text.
+    at: String,
+}
+
+impl Nearest {
+    /// Return the nearest of common points, those in front first; `None` if there are none.
+    fn of<const D: usize>(a: &Side<D>, common: &Common<D>) -> Option<Self> {
+        let key = |gap: f64| (gap < 0.0, gap.abs());
+        let less = |p: f64, q: f64| {
+            let ((behind, p), (other, q)) = (key(p), key(q));
+            behind.cmp(&other).then(p.total_cmp(&q))
+        };
+        let nearest = common.points.iter().min_by(|p, q| less(p.gap, q.gap))?;
+        let x = a.facets.coordinates(nearest.facet_a, a.space);
+        let at = assemble::interpolate(&x, &element::values(a.facets.order, &nearest.at_a));
+        Some(Self { gap: nearest.gap, at: point(a.space.in_scene(at)) })
+    }
+}
+
+/// Return the largest cosine of the angle between the normal of a facet of one side and minus that of a facet of the other.
+///
+/// One normal stands for all that differ from it by less than a twentieth in each component, since large curved surfaces have too many
+/// to compare each two. On plane facets it is exact.
+fn closest<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
+    let normals = |side: &Side<D>| -> Vec<[f64; D]> {
+        let all = (0..side.facets.count()).map(|i| unit(side.area(i)));
+        let rounded = all.map(|normal| (normal.map(|n| (20.0 * n).round() as i64), normal));
+        rounded.collect::<BTreeMap<_, _>>().into_values().collect()
+    };
+    let (ours, others) = (normals(a), normals(b));
+    let facing = |n: &[f64; D]| others.iter().map(|m| -dot(n, m)).fold(-1.0, f64::max);
+    ours.iter().map(facing).fold(-1.0, f64::max)
 }

@@ -1,23 +1,29 @@
-//! One body of the scene on its mesh: space, supports, loads, stiffness.
+//! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
-use super::facts::BodyFacts;
-use super::find::{Values, find_group, not_on_body, point, without_area};
-use super::roster::load_dimensions;
-use super::supports::Constraints;
-use super::{elastic, moment, springs};
+use super::approach::Outer;
+use super::roster::{Values, find_group, load_dimensions, not_on_body, of_body, point, without_area};
+use super::supports::{Constraints, moment_load, spring_blocks};
+use super::verify::Verified;
 use crate::contact::{self, Side};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shown};
 use crate::expression::Field;
+use crate::fem::elasticity::Flaw;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Facets, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion, Space,
-    assemble, rigid, support, surface,
+    ElasticBody, Elasticity, Extent, Facets, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion,
+    Space, assemble, rigid, support, surface,
 };
-use crate::linalg::{axpy, countable, dot};
-use crate::mesh::{Group, Mesh};
-use crate::problem::body::{BodySpec, Load, LoadKind};
+use crate::linalg::{Total, axpy, countable, dot};
+use crate::mesh::{self, Group, Mesh};
+use crate::problem::body::{Load, LoadKind};
+use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
+use crate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 use std::rc::Rc;
+
+/// Poisson's ratio above which linear elements lock.
+const LOCKING: f64 = 0.49;
 
 /// A body of the scene with its space, supports and springs.
 #[derive(Clone)]
@@ -36,32 +42,7 @@ pub struct Part<'a, const D: usize> {
     pub facts: BodyFacts,
 }
 
-/// A dof that can be fixed against a motion.
-pub struct Candidate {
-    /// Index of the dof.
-    pub dof: usize,
-    /// Magnitude of the motion there.
-    pub size: f64,
-}
-
 impl<'a, const D: usize> Part<'a, D> {
-    /// Apply the supports and springs of a body.
-    ///
-    /// # Errors
-    /// The scene contradicts its mesh.
-    pub fn new(
-        spec: &'a BodySpec,
-        mesh: &Mesh<D>,
-        space: Space<D>,
-        elasticity: Rc<Elasticity>,
-        facts: BodyFacts,
-    ) -> Result<Self> {
-        let held = Constraints::new(spec, &space, mesh)?;
-        let springs =
-            spec.spring.iter().map(|spring| springs::blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        Ok(Self { spec, space, held, springs, elasticity, facts })
-    }
-
     /// Return the displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
         self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
@@ -113,22 +94,6 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Return the displacement of a node in a rigid motion.
     fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
         motion.at(&self.space.nodes[node as usize])
-    }
-
-    /// Return the coordinates of all nodes in the scene.
-    pub fn places(&self) -> impl Iterator<Item = [f64; 3]> + Clone {
-        self.space.nodes.iter().map(|&x| self.space.in_scene(x))
-    }
-
-    /// Return the dof with the largest value, the last one of equal values. `size` is `None` for dofs that are excluded.
-    pub fn largest(&self, size: impl Fn(usize) -> Option<f64>) -> Option<Candidate> {
-        let all = (0..self.space.dofs()).filter_map(|dof| Some(Candidate { dof, size: size(dof)? }));
-        all.max_by(|a, b| a.size.total_cmp(&b.size))
-    }
-
-    /// Fix a dof.
-    pub fn fix(&mut self, found: &Candidate) {
-        self.held.prescribed.insert(found.dof, 0.0);
     }
 
     /// Return the prescribed (dof, value), sorted by dof.
@@ -232,7 +197,7 @@ impl<'a, const D: usize> Part<'a, D> {
             return Err(without_area(&spec.on, self.spec));
         }
         if let LoadKind::Moment(moment) = spec.kind {
-            let load = moment::load(&self.space, &facets, parts, moment.map(|component| factor * component));
+            let load = moment_load(&self.space, &facets, parts, moment.map(|component| factor * component));
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
         let values = Values::of("this load", &name.value);
@@ -310,6 +275,72 @@ impl<'a, const D: usize> Part<'a, D> {
         load
     }
 
+    /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane stress. There the
+    /// volume can hardly change.
+    pub fn locking(&self, plane: Plane) -> Option<String> {
+        if self.spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
+            return None;
+        }
+        let places = || self.space.nodes.iter().map(|&x| self.space.in_scene(x));
+        let largest = |spec: &ElasticitySpec| match &spec.constants {
+            Constants::Isotropic { poisson, .. } => places().map(|x| poisson.eval(x)).fold(0.0, f64::max),
+            _ => 0.0,
+        };
+        let poisson = constants(self.spec).map(largest).fold(0.0, f64::max);
+        let name = &self.spec.name.value;
+        (poisson > LOCKING).then(|| {
+            format!("body {name}: Poisson's ratio is {poisson}: linear elements are far too stiff there; set order = 2")
+        })
+    }
+
+    /// Check a body in several unconnected parts. Supports and springs must leave it no more rigid motions than a connected body
+    /// would have. The reason is that contact and loads treat its rigid motions as those of one body.
+    ///
+    /// # Errors
+    /// Supports and springs leave more. The error names the place of a free part.
+    fn check_held(&self, parts: &mesh::Parts, mesh: &Mesh<D>) -> Result<()> {
+        if parts.count == 1 {
+            return Ok(());
+        }
+        let space = &self.space;
+        let part_of = |node: u32| parts.of_node[node as usize] as usize;
+        let mut extents = vec![Extent::default(); parts.count];
+        let mut first: Vec<Option<[f64; D]>> = vec![None; parts.count];
+        for (node, x) in (0..).zip(&space.nodes) {
+            extents[part_of(node)].add(*x);
+            first[part_of(node)].get_or_insert(*x);
+        }
+        let motions: Vec<Vec<RigidMotion<D>>> =
+            extents.iter().map(|extent| rigid::of(extent, space.axisymmetric)).collect();
+        // In each of these motions one part moves and the others stay at rest.
+        let each: Vec<(usize, &RigidMotion<D>)> = motions
+            .iter()
+            .enumerate()
+            .flat_map(|(number, own)| own.iter().map(move |motion| (number, motion)))
+            .collect();
+        let left = |moving: &[(usize, &RigidMotion<D>)]| {
+            let at = |k: usize, node: u32| match moving[k].0 == part_of(node) {
+                true => moving[k].1.at(&space.nodes[node as usize]),
+                false => [0.0; D],
+            };
+            self.left(moving.len(), &at).len()
+        };
+        let free = self.free();
+        let whole = self.left(free.len(), &|k, node| free[k].at(&space.nodes[node as usize])).len();
+        if left(&each) <= whole {
+            return Ok(());
+        }
+        // Contact may resist a part to which supports leave some motions. The part with the most free motions is reported.
+        let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
+        let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
+        let at = first[most].map_or([0.0; 3], |x| space.in_scene(x));
+        let (name, count) = (&self.spec.name.value, parts.count);
+        let message =
+            format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));
+        Err(Error::mesh(&mesh.path, None, message)
+            .help("make a body of each part (`split = true` in its table), support each of them, or let them share facets (in the script: `Coherence;`)"))
+    }
+
     /// Return the nodes of linear displacements, sorted.
     pub fn coarse_nodes(&self) -> Vec<u32> {
         coarse_nodes(&self.space, &self.held.frame)
@@ -339,7 +370,7 @@ impl<'a, const D: usize> Part<'a, D> {
                     let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
                     Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
                 }
-                assemble::Defect::Elasticity(number, x, flaw) => elastic::refusal(self.spec, number, Some(x), &flaw),
+                assemble::Defect::Elasticity(number, x, flaw) => refusal(self.spec, number, Some(x), &flaw),
             },
         )?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
@@ -379,4 +410,174 @@ fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -
 fn too_large(spec: &BodySpec) -> Error {
     Error::scene(&spec.name.place, format!("body `{}`: its loads together are too large", spec.name.value))
         .label("their forces are beyond the range of numbers")
+}
+
+/// Facts of a whole body, and the points of the mesh that its nodes come from.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct BodyFacts {
+    /// Point of the mesh of each node.
+    pub points: Vec<u32>,
+    /// Number of nodes of the body and their extent.
+    pub extent: Extent,
+    /// Number of cells.
+    pub cells: usize,
+    /// Area (volume) of the body; in a body of revolution the volume of the rings.
+    pub volume: f64,
+    /// Means over the body of the moduli along x, y, z ([`Elasticity::moduli`]).
+    pub moduli: [f64; 3],
+    /// Nodes at which the body is loaded or constrained.
+    pub outer: Outer,
+}
+
+impl BodyFacts {
+    /// Restrict the facts to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        Self {
+            points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
+            outer: self.outer.on(nodes),
+            ..*self
+        }
+    }
+}
+
+/// Return the bodies with their spaces, elasticity, supports and springs.
+///
+/// # Errors
+/// The scene contradicts its mesh.
+pub fn parts<'a, const D: usize>(
+    scene: &Scene,
+    verified: &Verified<D>,
+    bodies: &'a [BodySpec],
+) -> Result<Vec<Part<'a, D>>> {
+    let Verified { mesh, checked, .. } = verified;
+    let mut parts = Vec::new();
+    for (index, spec) in bodies.iter().enumerate() {
+        let space = space(spec, mesh, scene.plane)?;
+        let checked = &checked[index];
+        let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
+        let facts = facts(spec, &space, &elasticity, checked.points.clone());
+        let held = Constraints::new(spec, &space, mesh)?;
+        let springs =
+            spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
+        let mut part = Part { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
+        let resultant = |load: &_| part.resultant(load, mesh);
+        part.facts.outer = Outer::new(spec, &part.space, mesh, &resultant)?;
+        part.check_held(&checked.parts, mesh)?;
+        parts.push(part);
+    }
+    Ok(parts)
+}
+
+/// Return the space of a body.
+///
+/// # Errors
+/// The mesh lacks the cells of the body, or a body of revolution has points of negative radius.
+fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Result<Space<D>> {
+    let space = Space::new(mesh, find_group(mesh, &spec.name, &[D], "body")?, spec.order);
+    if plane != Plane::Axisymmetric {
+        return Ok(space);
+    }
+    let space = space.revolved();
+    let Some(&negative) = space.nodes.iter().find(|x| x[0] < 0.0) else { return Ok(space) };
+    let x = point(space.in_scene(negative));
+    let message = format!("body `{}` has a negative radius at {x}", spec.name.value);
+    let help = "axisymmetric bodies are drawn as meridians, x >= 0 with the axis at x = 0: leave out one half";
+    Err(Error::mesh(&mesh.path, None, message).help(help))
+}
+
+/// Return the facts of a body whose nodes are these `points` of the mesh.
+fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> BodyFacts {
+    let cells = space.cell_count();
+    let volume = (0..cells).map(|cell| space.share(cell)).collect::<Total>().value();
+    let moduli = match spec.regions.is_empty() && elasticity.is_constant() {
+        true => elasticity.moduli(0, [0.0; 3]).unwrap_or_default(),
+        false => moduli(space, elasticity, 0..cells).map(|sum| sum / volume),
+    };
+    let extent = Extent::of(space.nodes.iter().copied());
+    BodyFacts { points, extent, cells, volume, moduli, outer: Outer::default() }
+}
+
+/// Return the elasticity of the cells of a body.
+///
+/// # Errors
+/// A region is missing, lies on another body or overlaps another one, or constants make no material.
+fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
+    let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
+    for (number, region) in spec.regions.iter().enumerate() {
+        let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);
+        if cells.is_empty() {
+            return Err(not_on_body(&region.on, &spec.name.value));
+        }
+        for cell in cells {
+            if of_cell[cell] != 0 {
+                let (first, second) = (&spec.regions[of_cell[cell] - 1].on.value, &region.on.value);
+                let at = point(space.in_scene(space.centroid(cell)));
+                let message = format!("the regions `{first}` and `{second}` share the cell at {at}");
+                return Err(Error::scene(&region.on.place, message).help("let each cell be in one region at most"));
+            }
+            of_cell[cell] = number + 1;
+        }
+    }
+    elasticity_of(spec, of_cell, D, plane)
+}
+
+/// Return the elasticity of some cells of a body. `of_cell` is the index of the constants of each cell; it is empty if the body
+/// has no regions.
+///
+/// # Errors
+/// Constants make no material.
+pub fn elasticity_of(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
+    let constants: Vec<&ElasticitySpec> = constants(spec).collect();
+    Elasticity::new(&constants, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
+}
+
+/// Return the constants of a body and of its regions.
+fn constants(spec: &BodySpec) -> impl Iterator<Item = &ElasticitySpec> {
+    std::iter::once(&spec.elasticity).chain(spec.regions.iter().map(|region| &region.elasticity))
+}
+
+/// Return the error of the constants of a body (`number` 0) or of one of its regions. The point is given if the constants depend
+/// on it.
+fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
+    let elasticity = constants(spec).nth(number).unwrap_or(&spec.elasticity);
+    let place = &elasticity.place;
+    let fields = elasticity.fields();
+    // A value that does not exist causes every other flaw, so it is reported first.
+    if let Some(error) = x.and_then(|x| fields.iter().find_map(|(name, field)| field.eval_finite(name, x).err())) {
+        return error.because(of_body(&spec.name.value));
+    }
+    let at = x.map(|x| format!(" at {}", point(x))).unwrap_or_default();
+    let name = &spec.name.value;
+    match flaw {
+        Flaw::Constant(constant, value, rule) => {
+            let own = fields.iter().find(|(name, _)| name == constant).and_then(|(_, field)| field.place());
+            Error::scene(own.unwrap_or(place), format!("body `{name}`: {constant} is {}{at}", shown(*value)))
+                .label(*rule)
+        }
+        Flaw::Axes(what) => Error::scene(place, format!("body `{name}`: axes{at}: {what}")),
+        Flaw::NotCoercive(eigenvalue) => {
+            let value = if eigenvalue.is_finite() {
+                format!("the least eigenvalue of C is {eigenvalue:.6e}")
+            } else {
+                "C is not finite".to_owned()
+            };
+            Error::scene(place, format!("body `{name}`: the elasticity tensor is not positive definite{at}"))
+                .label(value)
+                .help("a strain must cost energy, whatever its direction: look for a slip among the constants")
+        }
+        Flaw::Twists => Error::scene(place, format!("body `{name}`: a body of revolution would twist{at}"))
+            .label("strains of the meridian cause shear stresses along the circles")
+            .help("in axisymmetric scenes one axis of the material runs along the circles: turn axes 1 and 2 alone"),
+    }
+}
+
+/// Return the moduli against pressure along x, y, z, integrated over some cells. A cell whose constants make no material at its
+/// middle contributes zero; assembly refuses it.
+fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity, cells: impl Iterator<Item = usize>) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for cell in cells {
+        let moduli = elasticity.moduli(cell, space.in_scene(space.centroid(cell))).unwrap_or_default();
+        crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
+    }
+    sum
 }

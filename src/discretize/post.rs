@@ -1,16 +1,18 @@
-//! Evaluation of the displacements of a body: fields for output, forces, errors against a known solution. Each rank evaluates its
-//! part.
+//! Evaluation of the displacements of a body: fields for output, forces and their balance, unbalanced forces and the energy in
+//! them, errors against a known solution. Each rank evaluates its part.
 
 use super::approach::Outer;
-use super::balance::{Balance, Forces};
-use super::find::point;
-use super::unbalanced::Unbalanced;
-use crate::contact::pad;
+use super::roster::point;
+use super::supports::Constraints;
+use crate::contact::{add, pad};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
-use crate::fem::{norms, strain, strain::Strained, stress};
+use crate::fem::internal::{self, Internal};
+use crate::fem::strain::{self, Strained};
+use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble, norms, stress};
+use crate::linalg::{Csr, dot};
 use crate::output::{BodyField, CellKind};
-use crate::problem::BodySpec;
+use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
 pub trait Post {
@@ -28,19 +30,22 @@ pub trait Post {
     /// [`Post::field`]. `springs` are the stiffnesses omega kappa of these rows.
     fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced;
 
-    /// See `Forces::rough`.
+    /// Return the displacement of each node under its unbalanced force alone, one entry per dof. It is valid at owned nodes.
     fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64>;
 
-    /// See `Forces::on_hats`.
+    /// Return the contribution of owned nodes to the forces on the hats of all grids over the body, and to the stiffnesses of the
+    /// hats. There are D + 2 numbers per hat.
     fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64>;
 
-    /// See `Forces::smooth`.
+    /// Return the displacement under the forces on all hats as if each hat were alone, one entry per dof. `sums` is the sum over
+    /// ranks of [`Post::on_hats`]; contact springs are included if `with_springs`.
     fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64>;
 
-    /// See `Forces::products`.
+    /// Return the products v_i'K v_j over the cells that this rank writes, with springs to the ground at owned nodes. Each field
+    /// has one entry per dof.
     fn products(&self, fields: &[Vec<f64>]) -> Vec<f64>;
 
-    /// See `Forces::trace`.
+    /// Return the contribution of owned nodes to B v, one entry per contact row, for a field v with one entry per dof.
     fn trace(&self, field: &[f64]) -> Vec<f64>;
 
     /// Return the contribution of the owned nodes to the mean displacement (x, y, z) of the outer part of the body. The outer
@@ -53,24 +58,49 @@ pub trait Post {
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
 
-/// The implementation of [`Post`] in `D` dimensions.
+/// The implementation of [`Post`] in `D` dimensions: the cells that one rank has of a body, with their nodes in local numbers.
+///
+/// The cells around owned nodes are complete, and so are those around the cells that touch owned nodes. Nodes of contact rows and
+/// masters of tied nodes are included.
 pub struct OnPart<const D: usize> {
-    name: String,
+    /// Name of the body.
+    pub name: String,
     /// Known displacements, if the scene has them.
-    exact: Option<Vec<Expression>>,
-    outer: Outer,
-    forces: Forces<D>,
+    pub exact: Option<Vec<Expression>>,
+    /// Where the body is loaded or constrained.
+    pub outer: Outer,
+    /// Cells and nodes.
+    pub space: Rc<Space<D>>,
+    /// Whether this rank owns each node.
+    pub own: Vec<bool>,
+    /// Elasticity of the cells.
+    pub elasticity: Rc<Elasticity>,
+    /// Supports and rigid surfaces.
+    pub held: Rc<Constraints<D>>,
+    /// Springs.
+    pub springs: Vec<Vec<NodalBlock<D>>>,
+    /// Number of supports in the scene.
+    pub supports: usize,
+    /// Nodal forces of the loads.
+    pub load: Vec<f64>,
+    /// Forces on rigid surfaces, at few nodes of each, all of which have one owner.
+    pub rigid: Vec<(u32, [f64; D])>,
+    /// Contact rows with displacements of nodes as columns.
+    pub rows: Csr,
+    /// Extent of the whole body.
+    pub extent: Extent,
+    /// Number of nodes of the whole body.
+    pub nodes: usize,
 }
 
 impl<const D: usize> OnPart<D> {
-    /// Make the evaluation of a part of a body.
+    /// Check that the known displacements are finite at all nodes.
     ///
     /// # Errors
-    /// A known displacement is not finite at a node.
-    pub fn new(spec: &BodySpec, outer: Outer, forces: Forces<D>) -> Result<Self> {
-        let space = &forces.part.space;
-        let places = || space.nodes.iter().map(|&x| space.in_scene(x));
-        for (component, x) in spec.exact.iter().flatten().flat_map(|u| places().map(move |x| (u, x))) {
+    /// One is not.
+    pub fn check_exact(&self) -> Result<()> {
+        let places = || self.space.nodes.iter().map(|&x| self.space.in_scene(x));
+        for (component, x) in self.exact.iter().flatten().flat_map(|u| places().map(move |x| (u, x))) {
             let value = component.eval(&x[..D]);
             if !value.is_finite() {
                 let message = format!("the known displacement is {value} at {}", point(x));
@@ -78,21 +108,57 @@ impl<const D: usize> OnPart<D> {
                     .help("look for roots of negative numbers and divisions by zero in the expression"));
             }
         }
-        Ok(Self { name: spec.name.value.clone(), exact: spec.exact.clone(), outer, forces })
+        Ok(())
+    }
+
+    /// Return the indices of the cells that this rank writes and measures. Each cell of the body belongs to the rank that owns
+    /// its first node.
+    pub fn owned(&self) -> impl Iterator<Item = usize> {
+        let is_own = |cell: &[u32]| cell.iter().min().is_some_and(|&first| self.own[first as usize]);
+        let cells = self.space.cells.chunks_exact(self.space.stride).enumerate();
+        cells.filter(move |(_, cell)| is_own(cell)).map(|(number, _)| number)
     }
 
     /// Return the displacements of the nodes of the part.
     fn nodal(&self, v: &[f64]) -> Vec<f64> {
-        self.forces.held.frame.displacements(v)
+        self.held.frame.displacements(v)
+    }
+
+    /// Return the reactions at the owned nodes of supports and rigid surfaces, in increasing order of the nodes.
+    fn reactions(&self, u: &[f64], known: &[f64]) -> Vec<(u32, [f64; D])> {
+        let Self { space, own, .. } = self;
+        let mut held = vec![false; own.len()];
+        let nodes = self.held.nodes().filter(|&node| own[node as usize]);
+        nodes.for_each(|node| held[node as usize] = true);
+        let touched = |cell: &[u32]| cell.iter().any(|&node| held[node as usize]);
+        let cells = space.cells.chunks_exact(space.stride).enumerate().filter(|(_, cell)| touched(cell));
+        let cells: Vec<usize> = cells.map(|(number, _)| number).collect();
+        let (around, nodes) = space.part(cells.iter().copied());
+        let elasticity = self.elasticity.of_cells(&cells);
+        let frame = Frame::default();
+        let graph = NodeGraph::new(&around, &[], &frame);
+        let Ok(stiffness) = assemble::stiffness(&around, &graph, &frame, &elasticity) else { return Vec::new() };
+        let dof = |row: usize| D * nodes[row / D] as usize + row % D;
+        let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[dof(j)]).sum::<f64>() - known[dof(row)];
+        let at = |place: usize| (nodes[place], std::array::from_fn(|c| force(D * place + c)));
+        (0..nodes.len()).filter(|&place| held[nodes[place] as usize]).map(at).collect()
+    }
+
+    fn own_dofs(&self) -> impl Iterator<Item = usize> {
+        (0..self.load.len()).filter(|dof| self.own[dof / D])
+    }
+
+    /// Set the entries at dofs that supports prescribe to zero.
+    fn clear(&self, field: &mut [f64]) {
+        self.held.prescribed.keys().for_each(|&dof| field[dof] = 0.0);
     }
 }
 
 impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
-        let Forces { part, elasticity, .. } = &self.forces;
-        let (u, space) = (self.nodal(v), &part.space);
-        let (owned, shown) = space.part(part.owned());
-        let stress = stress::nodal(space, elasticity, &self.nodal(bent));
+        let (u, space) = (self.nodal(v), &self.space);
+        let (owned, shown) = space.part(self.owned());
+        let stress = stress::nodal(space, &self.elasticity, &self.nodal(bent));
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
@@ -108,52 +174,315 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn strain(&self, bent: &[f64]) -> Strained {
-        let part = &self.forces.part;
-        strain::largest(&part.space, part.owned(), &self.nodal(bent))
+        strain::largest(&self.space, self.owned(), &self.nodal(bent))
     }
 
+    /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
-        self.forces.balance(&self.nodal(v), force)
+        let u = self.nodal(v);
+        let mut contact = vec![0.0; u.len()];
+        self.rows.add_transpose(-1.0, force, &mut contact);
+        let space = &*self.space;
+        let mut sum = Resultants { size: [0.0; 2], part: self };
+        let parts = vec![sum.of(&self.load), sum.of(&contact)];
+        let mut known: Vec<f64> = self.load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
+        let mut springs = Vec::new();
+        for blocks in &self.springs {
+            let mut pull = vec![0.0; u.len()];
+            for NodalBlock { nodes: [a, b], block } in blocks {
+                for (i, row) in block.iter().enumerate() {
+                    let at = D * *b as usize;
+                    pull[D * *a as usize + i] -= (0..D).map(|j| row[j] * u[at + j]).sum::<f64>();
+                }
+            }
+            springs.push(sum.of(&pull));
+            crate::linalg::axpy(1.0, &pull, &mut known);
+        }
+        let mut supports = vec![Resultant::default(); self.supports];
+        let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
+        for (node, reaction) in self.reactions(&u, &known) {
+            sum.grow(node, reaction);
+            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
+                Some(surface) => rigid[surface].add(space, node, reaction),
+                None => {
+                    for (support, part) in self.held.split(node, reaction) {
+                        supports[support].add(space, node, part);
+                    }
+                }
+            }
+        }
+        Balance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
     }
 
     fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
-        self.forces.unbalanced(&self.nodal(bent), force, springs)
+        let u = self.nodal(bent);
+        let space = &*self.space;
+        let Internal { force: inner, rounding, mut diagonal, bulk } =
+            internal::forces(space, &self.elasticity, 0..space.cell_count(), &u);
+        let mut sum = Sum { force: self.load.clone(), size: rounding };
+        let mut resisting = vec![0.0; bulk.len()];
+        for (row, (force, spring)) in force.iter().zip(springs).enumerate() {
+            let whole: f64 = self.rows.row(row).map(|(_, b)| b.abs()).sum();
+            for (dof, b) in self.rows.row(row) {
+                sum.add(dof, -b * force, D);
+                resisting[dof / D] += spring * b.abs() * whole;
+            }
+        }
+        let mut strain = self.own_dofs().map(|dof| u[dof] * inner[dof]).sum::<f64>();
+        inner.iter().enumerate().for_each(|(dof, inner)| sum.force[dof] -= inner);
+        for block in self.springs.iter().flatten() {
+            let [a, b] = block.nodes.map(|node| D * node as usize);
+            for (i, row) in block.block.iter().enumerate() {
+                let pull = dot(row, &u[b..b + D]);
+                sum.add(a + i, -pull, D);
+                strain += if self.own[a / D] { u[a + i] * pull } else { 0.0 };
+                diagonal[a / D] += if a == b { row[i].abs() } else { 0.0 };
+            }
+        }
+        for (node, total) in &self.rigid {
+            (0..D).for_each(|c| sum.add(D * *node as usize + c, total[c], D));
+        }
+        for per_node in [&mut sum.size, &mut diagonal, &mut resisting] {
+            self.held.frame.sum(per_node);
+        }
+        let Sum { mut force, size } = sum;
+        self.held.frame.forces(&mut force);
+        self.clear(&mut force);
+        for (dof, force) in force.iter_mut().enumerate() {
+            let counts = if self.own[dof / D] { (force.abs() - size[dof / D]).max(0.0) } else { 0.0 };
+            *force = counts.copysign(*force);
+        }
+        Unbalanced { force, strain, diagonal, springs: resisting, bulk }
     }
 
     fn rough(&self, unbalanced: &Unbalanced) -> Vec<f64> {
-        self.forces.rough(unbalanced)
+        let Unbalanced { force, diagonal, springs, .. } = unbalanced;
+        let divided = |(dof, force): (usize, &f64)| match force {
+            0.0 => 0.0,
+            force => force / (diagonal[dof / D] + springs[dof / D]),
+        };
+        force.iter().enumerate().map(divided).collect()
     }
 
     fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64> {
-        self.forces.on_hats(unbalanced)
+        let mut sums = Vec::new();
+        let force = self.held.frame.displacements(&unbalanced.force);
+        let nodes = (0..unbalanced.bulk.len()).filter(|&node| self.own[node]);
+        let nodes: Vec<usize> = nodes.filter(|node| !self.held.frame.master.contains_key(&(*node as u32))).collect();
+        for grid in grids::<D>(&self.extent, self.nodes) {
+            let begin = sums.len();
+            sums.resize(begin + (D + 2) * grid.len(), 0.0);
+            for &node in &nodes {
+                let (force, bulk) = (&force[D * node..][..D], unbalanced.bulk[node] / grid.step.powi(2));
+                for (hat, value) in grid.hats(&self.space.nodes[node]) {
+                    let sums = &mut sums[begin + (D + 2) * hat..][..D + 2];
+                    (0..D).for_each(|c| sums[c] += value * force[c]);
+                    sums[D] += value * bulk;
+                    sums[D + 1] += value * value * unbalanced.springs[node];
+                }
+            }
+        }
+        sums
     }
 
     fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64> {
-        self.forces.smooth(sums, with_springs)
+        let space = &*self.space;
+        let mut field = vec![0.0; self.load.len()];
+        let mut rest = sums;
+        for grid in grids::<D>(&self.extent, self.nodes) {
+            let of_grid;
+            (of_grid, rest) = rest.split_at((D + 2) * grid.len());
+            let moved: Vec<[f64; D]> = of_grid
+                .chunks_exact(D + 2)
+                .map(|sums| {
+                    let stiffness = sums[D] + if with_springs { sums[D + 1] } else { 0.0 };
+                    std::array::from_fn(|c| if sums[c] == 0.0 { 0.0 } else { sums[c] / stiffness })
+                })
+                .collect();
+            for (u, x) in field.chunks_exact_mut(D).zip(space.nodes.iter()) {
+                grid.hats(x).for_each(|(hat, value)| (0..D).for_each(|c| u[c] += value * moved[hat][c]));
+            }
+        }
+        let mut field = self.held.frame.dofs(&field);
+        self.clear(&mut field);
+        field
     }
 
     fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
-        self.forces.products(fields)
+        let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.held.frame.displacements(field)).collect();
+        let n = fields.len();
+        let mut products = internal::products(&self.space, &self.elasticity, self.owned(), &nodal);
+        for block in self.springs.iter().flatten().filter(|block| self.own[block.nodes[0] as usize]) {
+            let [a, b] = block.nodes.map(|node| D * node as usize);
+            for (i, row) in block.block.iter().enumerate() {
+                for (place, product) in products.iter_mut().enumerate() {
+                    *product += nodal[place / n][a + i] * dot(row, &nodal[place % n][b..b + D]);
+                }
+            }
+        }
+        products
     }
 
     fn trace(&self, field: &[f64]) -> Vec<f64> {
-        self.forces.trace(field)
+        let nodal = self.held.frame.displacements(field);
+        let own = |row: usize| self.rows.row(row).filter(|(dof, _)| self.own[dof / D]);
+        (0..self.rows.rows()).map(|row| own(row).map(|(dof, b)| b * nodal[dof]).sum()).collect()
     }
 
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
-        self.outer.mean::<D>(&self.nodal(v), &self.forces.part.own, direction)
+        self.outer.mean::<D>(&self.nodal(v), &self.own, direction)
     }
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {
-        let (exact, Forces { part, elasticity, .. }) = (self.exact.as_ref()?, &self.forces);
+        let exact = self.exact.as_ref()?;
         let at = |x: [f64; D]| {
-            let x = &part.space.in_scene(x)[..D];
+            let x = &self.space.in_scene(x)[..D];
             norms::Exact {
                 value: std::array::from_fn(|i| exact[i].eval(x)),
                 gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
             }
         };
-        let norms = norms::error(&part.space, part.owned(), elasticity, &self.nodal(v), &at);
+        let norms = norms::error(&self.space, self.owned(), &self.elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
+    }
+}
+
+/// A force and its moment about the datum (x, y, z).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Resultant {
+    /// Force.
+    pub force: [f64; 3],
+    /// Moment.
+    pub moment: [f64; 3],
+}
+
+impl Resultant {
+    /// Add a force at a node.
+    fn add<const D: usize>(&mut self, space: &Space<D>, node: u32, force: [f64; D]) {
+        add(&mut self.force, space.net_force(force));
+        add(&mut self.moment, space.net_moment(node, force));
+    }
+}
+
+/// All external forces on a body. In equilibrium their sum is zero.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Balance {
+    /// Loads without those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
+    pub parts: Vec<Resultant>,
+    /// Sum of the magnitudes of all nodal forces, and of these times their distances from the datum. They are the scale of the
+    /// sum of all parts. About a distant origin, moments would be little else than that of the sum of forces.
+    pub size: [f64; 2],
+}
+
+/// A sum of forces at owned nodes.
+struct Resultants<'a, const D: usize> {
+    size: [f64; 2],
+    part: &'a OnPart<D>,
+}
+
+impl<const D: usize> Resultants<'_, D> {
+    fn of(&mut self, forces: &[f64]) -> Resultant {
+        let mut resultant = Resultant::default();
+        for (node, force) in forces.chunks_exact(D).enumerate().filter(|(node, _)| self.part.own[*node]) {
+            let force: [f64; D] = std::array::from_fn(|c| force[c]);
+            resultant.add(&self.part.space, node as u32, force);
+            self.grow(node as u32, force);
+        }
+        resultant
+    }
+
+    fn grow(&mut self, node: u32, force: [f64; D]) {
+        let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let size = length(self.part.space.net_force(force));
+        self.size[0] += size;
+        self.size[1] += size * length(pad(self.part.space.nodes[node as usize]));
+    }
+}
+
+/// The unbalanced forces on the nodes of a part of a body.
+#[derive(Debug, Clone, Default)]
+pub struct Unbalanced {
+    /// r = f - K u - B' omega p without its rounding, one entry per dof of the nodes of the part. Entries are zero at dofs that
+    /// supports prescribe, and at nodes of other ranks.
+    pub force: Vec<f64>,
+    /// Energy product u'Ku of owned nodes, with springs to the ground.
+    pub strain: f64,
+    /// Stiffness of each node: a bound of the diagonal of K here, and of what contact springs add to it in `springs`.
+    diagonal: Vec<f64>,
+    springs: Vec<f64>,
+    /// See [`Internal::bulk`].
+    bulk: Vec<f64>,
+}
+
+impl Unbalanced {
+    /// Return what stands for a body whose displacements are unknown.
+    pub fn unknown() -> Self {
+        Self { strain: f64::NAN, ..Self::default() }
+    }
+}
+
+/// Largest number of hats of a grid. Their sums are a message between ranks, which stays short beside one of all contact points.
+const HATS: usize = 5000;
+
+/// Nodes of a body per hat. Finer hats would resemble those of the elements, which the diagonal of K covers.
+const NODES: usize = 4;
+
+/// Return grids over a body, each twice as fine as the one before.
+fn grids<const D: usize>(extent: &Extent, nodes: usize) -> Vec<Grid<D>> {
+    let corners: Vec<[f64; D]> = extent.corners().collect();
+    let (low, high) = (corners[0], corners[corners.len() - 1]);
+    let of_level = |level: u32| {
+        let step = extent.size() / f64::from(1u32 << level);
+        let count = std::array::from_fn(|c| 1 + (((high[c] - low[c]) / step).ceil() as usize).max(1));
+        Grid { low, step, count }
+    };
+    let fits = |grid: &Grid<D>| grid.len() == 1 << D || grid.len() <= HATS.min(nodes / NODES);
+    (0..20).map(of_level).take_while(fits).collect()
+}
+
+/// A grid of cubes with multilinear hat functions.
+struct Grid<const D: usize> {
+    low: [f64; D],
+    step: f64,
+    count: [usize; D],
+}
+
+impl<const D: usize> Grid<D> {
+    fn len(&self) -> usize {
+        self.count.iter().product()
+    }
+
+    /// Return the hats at a point with their values.
+    fn hats(&self, x: &[f64; D]) -> impl Iterator<Item = (usize, f64)> {
+        let (mut first, mut share) = ([0; D], [0.0; D]);
+        for c in 0..D {
+            let at = ((x[c] - self.low[c]) / self.step).max(0.0);
+            first[c] = (at as usize).min(self.count[c] - 2);
+            share[c] = (at - first[c] as f64).min(1.0);
+        }
+        let count = self.count;
+        (0..1 << D).map(move |corner: usize| {
+            let (mut number, mut value) = (0, 1.0);
+            for c in (0..D).rev() {
+                let next = corner >> c & 1;
+                number = number * count[c] + first[c] + next;
+                value *= if next == 1 { share[c] } else { 1.0 - share[c] };
+            }
+            (number, value)
+        })
+    }
+}
+
+/// Forces at dofs with bounds of their rounding at nodes.
+struct Sum {
+    force: Vec<f64>,
+    size: Vec<f64>,
+}
+
+impl Sum {
+    /// Add a force that is a product of two numbers. Product and sum contribute one rounding each.
+    fn add(&mut self, dof: usize, force: f64, dimension: usize) {
+        self.force[dof] += force;
+        self.size[dof / dimension] += 2.0 * f64::EPSILON * (force.abs() + self.force[dof].abs());
     }
 }

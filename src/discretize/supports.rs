@@ -1,16 +1,17 @@
-//! Supports of a body: conditions on its nodes, the axes in which they are prescribed dofs, and rigid surfaces.
+//! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on surfaces are here, too,
+//! since rigid surfaces turn about the same centre.
 
-use super::find::{earlier, find_group, not_on_body, of_body, point, without_area};
-use super::moment;
-use crate::contact::pad;
-use crate::error::{Error, Located, Place, Result};
+use super::roster::{earlier, find_group, not_on_body, of_body, point, without_area};
+use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
-use crate::fem::{Facets, Frame, Levers, Parts, Space, place, surface};
-use crate::linalg::dot;
+use crate::expression::Field;
+use crate::fem::{Facets, Frame, Levers, NodalBlock, NodalForces, Parts, Space, cross, place, surface};
+use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
-use crate::problem::body::{BodySpec, Load, LoadKind};
-use nalgebra::{DMatrix, DVector};
+use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 
 /// One condition n.u = value at a node, with the direction n.
@@ -156,7 +157,7 @@ impl<const D: usize> Constraints<D> {
         if surface::measure(space, facets) == 0.0 {
             return Err(without_area(&load.on, spec));
         }
-        let centre = moment::centre(space, facets, Parts::Whole);
+        let centre = centre(space, facets, Parts::Whole);
         let levers = Levers::new(nodes, |node| space.nodes[node as usize], std::array::from_fn(|c| centre[c]));
         for component in 0..if D == 2 { 1 } else { D } {
             self.prescribed.remove(&(D * levers.pole as usize + component));
@@ -327,4 +328,120 @@ fn contradiction<const D: usize>(
         Some(_) => error.because("bodies of revolution have no radial displacement on the axis and on rigid surfaces"),
         None => error,
     }
+}
+
+/// Return the stiffness blocks between nodes that a spring of the scene adds to K.
+///
+/// # Errors
+/// The group is missing or not on the body, or the stiffness is negative or not finite somewhere.
+pub fn spring_blocks<const D: usize>(
+    spring: &SpringSpec,
+    spec: &BodySpec,
+    space: &Space<D>,
+    mesh: &Mesh<D>,
+) -> Result<Vec<NodalBlock<D>>> {
+    let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+    let fault = RefCell::new(None);
+    let value = |field: &Field, x: [f64; D]| match stiffness(field, spring, space.in_scene(x)) {
+        Ok(value) => value,
+        Err(error) => {
+            fault.borrow_mut().get_or_insert(error.because(of_body(&spec.name.value)));
+            0.0
+        }
+    };
+    let at = |x: [f64; D], n: [f64; D]| -> [[f64; D]; D] {
+        match &spring.kind {
+            SpringKind::Vector(fields) => {
+                std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value(&fields[i], x) } else { 0.0 }))
+            }
+            SpringKind::Normal(field) => {
+                let k = value(field, x);
+                n.map(|a| n.map(|b| k * a * b))
+            }
+        }
+    };
+    let blocks = if group.dimension == 0 {
+        if matches!(spring.kind, SpringKind::Normal(_)) {
+            return Err(Error::scene(&spring.on.place, format!("points such as `{}` have no normal", spring.on.value))
+                .help("give stiffness = [kx, ky]"));
+        }
+        let node = |node: u32| NodalBlock { nodes: [node; 2], block: at(space.nodes[node as usize], [0.0; D]) };
+        space.nodes_on(group).into_iter().map(node).collect()
+    } else {
+        let facets = space.facets(group);
+        if facets.count() > 0 && surface::measure(space, &facets) == 0.0 {
+            return Err(without_area(&spring.on, spec));
+        }
+        surface::foundation(space, &facets, &at)
+    };
+    match fault.into_inner() {
+        Some(error) => Err(error),
+        None if blocks.is_empty() => Err(not_on_body(&spring.on, &spec.name.value)),
+        None => Ok(blocks),
+    }
+}
+
+/// Return the stiffness at a point.
+///
+/// # Errors
+/// The stiffness is negative or not finite.
+fn stiffness(field: &Field, spring: &SpringSpec, x: [f64; 3]) -> Result<f64> {
+    match field.eval_finite("the stiffness of this spring", x)? {
+        k if k >= 0.0 => Ok(k),
+        k => {
+            let message = format!(
+                "the stiffness of the spring on `{}` is {} at {}",
+                spring.on.value,
+                shown(k),
+                super::roster::point(x)
+            );
+            Err(Error::scene(field.place().unwrap_or(&spring.on.place), message).label("must not be negative"))
+        }
+    }
+}
+
+/// Return the centre of a surface: the mean place over its area.
+pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts) -> [f64; 3] {
+    let sum =
+        |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
+    let area = sum(&|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }))[0];
+    sum(&|x| x).map(|sum| sum / area)
+}
+
+/// Return nodal forces with a moment (x, y, z; force times length) and without a resultant. In the plane the moment has a z component
+/// alone.
+///
+/// The traction is theta x r with r = x - c, where c is the centre of the surface: stresses of a beam in bending. Its moment is
+/// J theta with J = int |r|^2 I - r r^T over the surface. All integrals are those of the quadrature of loads, so that the nodal forces
+/// have the moment to rounding on curved facets, too.
+pub fn moment_load<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    parts: Parts,
+    moment: [f64; 3],
+) -> NodalForces<D> {
+    let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| traction(x));
+    let centre = centre(space, facets, parts);
+    let from_centre = |x: [f64; D]| {
+        let x = pad(x);
+        std::array::from_fn(|c| x[c] - centre[c])
+    };
+    let turn = |theta: [f64; 3]| {
+        of(&|x| {
+            let traction = cross(theta, from_centre(x));
+            std::array::from_fn(|c| traction[c])
+        })
+    };
+    let moment_of = |load: &NodalForces<D>| {
+        let of_node = |(node, force)| Vector3::from(cross(from_centre(space.nodes[node as usize]), pad(force)));
+        load.iter().map(of_node).sum::<Vector3<f64>>()
+    };
+    // In the plane bodies turn about z alone. The other axes keep a one on the diagonal.
+    let mut inertia = Matrix3::identity();
+    for axis in if D == 2 { 2..3 } else { 0..3 } {
+        let unit = std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 });
+        inertia.set_column(axis, &moment_of(&turn(unit)));
+    }
+    let theta = inertia.lu().solve(&Vector3::from(moment)).unwrap_or(Vector3::repeat(f64::NAN));
+    turn(theta.into())
 }

@@ -1,48 +1,90 @@
-//! A body that is ready for assembly: the whole body on the first rank, what all ranks have of it, and what one rank has.
+//! A body before its matrix is assembled, on the first rank: its contact rows, its loads, the rigid motions that supports leave, and that by
+//! which they move it.
 
-use super::carried::Supported;
-use super::distribute::{Partition, Share};
-use super::facts::BodyFacts;
-use super::info::{BodyInfo, Gauged};
-use super::interface::{Interface, NO_WORK, Unconstrained};
 use super::part::Part;
-use super::supports::Constraints;
-use crate::contact::{self, ContactPair};
+use crate::contact::ContactPair;
+use crate::error::Result;
 use crate::exchange::Plain;
-use crate::fem::{NodalBlock, NodalForces, NodeGraph, Space, place};
-use crate::linalg::{Csr, dot};
-use crate::mesh::Checked;
-use crate::model::Segment;
-use nalgebra::DMatrix;
+use crate::fem::{NodalForces, NodeGraph, RigidMotion, rigid};
+use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
+use crate::mesh::Mesh;
+use crate::model::{Motion, Segment, Sprung, rigid as joint};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
+use std::collections::HashSet;
 
-/// A whole body before its matrix is assembled, on the first rank.
+/// Share of the largest possible work below which the work of the loads is rounding.
+pub const NO_WORK: f64 = 1e-9;
+
+/// A whole body before its matrix is assembled.
 #[derive(Clone)]
 pub struct Unassembled<'a, const D: usize> {
     /// Space, supports and springs.
     pub part: Part<'a, D>,
-    /// Contact rows and loads.
-    pub interface: Interface<D>,
+    /// Contact rows of the body, pair by pair.
+    pub segments: Vec<Segment>,
+    /// These rows with dofs as columns.
+    pub rows: Csr,
+    /// The same rows with displacements of nodes as columns.
+    pub nodal_rows: Csr,
+    /// Rigid motions of the free body.
+    pub free: Vec<RigidMotion<D>>,
+    /// Nodal forces of the loads, without those on rigid surfaces.
+    pub nodal_load: NodalForces<D>,
+    /// Forces of all loads at dofs.
+    pub load: NodalForces<D>,
+    /// Rigid motions that supports and springs leave at present.
+    pub unconstrained: Unconstrained<D>,
+    /// Rigid motions that only the mesh resists.
+    pub gauged: Gauged,
     /// Displacements that the supports prescribe.
     pub supported: Supported<D>,
-    /// Coupling of nodes by K, if the choice of solvers has requested it.
-    pub graph: Option<NodeGraph>,
+    /// Coupling of nodes by K, once it was requested.
+    pub graph: OnceCell<NodeGraph>,
     /// Rank that owns the body or, if it is distributed, most of it.
     pub owner: usize,
     /// Ranks that own nodes of the body.
     pub ranks: Vec<usize>,
-    /// Sum of the loads without those on rigid surfaces.
-    pub load: [f64; 3],
-    /// Warning for the user about the elasticity.
-    pub warning: Option<String>,
-    /// Rigid motions that only the mesh resists.
-    pub gauged: Gauged,
-    /// Rigid motions that supports and springs leave.
-    pub unconstrained: Unconstrained<D>,
     /// Nodal forces that the quadrature of the loads misses, if an estimate of the error needs them.
     pub unloaded: Vec<f64>,
-    /// The same rigid motions on all dofs, if the dofs are distributed.
+    /// The unconstrained motions on all dofs, if the dofs are distributed.
     pub on_dofs: Option<OnDofs>,
+}
+
+/// The rigid motions that supports and springs leave to a body.
+#[derive(Clone, Default, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct Unconstrained<const D: usize> {
+    /// Combinations of the motions of the free body.
+    pub left: Vec<RigidMotion<D>>,
+    /// The same motions as traces on the contact rows and works of the loads.
+    pub motions: Vec<Motion>,
+    /// Motions that supports alone leave, if springs resist some of them.
+    pub sprung: Option<Sprung>,
+    /// Combinations of the motions of the free body that supports alone leave.
+    pub unsupported: Vec<RigidMotion<D>>,
+    /// Combinations of `left` that no contact row resists: name and weights.
+    pub unresisted: Vec<(String, DVector<f64>)>,
+}
+
+/// Names of the rigid motions of a body that neither supports nor smooth surfaces resist.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Gauged {
+    /// Motions without work of the loads, which are fixed at one node each.
+    pub fixed: Vec<String>,
+    /// Motions on which loads work. Only the facets of the mesh resist them.
+    pub spinning: Vec<String>,
+}
+
+/// The displacements that supports prescribe.
+#[derive(Clone, Default, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct Supported<const D: usize> {
+    /// Rigid motion by which the supports move the body as one.
+    pub carried: Option<RigidMotion<D>>,
+    /// Prescribed (dof, value) relative to this motion, sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
 }
 
 /// The rigid motions that supports and springs leave a body, on all of its dofs.
@@ -54,217 +96,200 @@ pub struct OnDofs {
     pub works: Vec<f64>,
 }
 
-impl OnDofs {
-    /// Compute the products and works of the motions in `unconstrained` for a body under its loads.
-    pub fn new<const D: usize>(
-        part: &Part<D>,
-        interface: &Interface<D>,
-        supported: &Supported<D>,
-        unconstrained: &Unconstrained<D>,
-    ) -> Self {
-        let load = part.load_vector(&interface.nodal_load);
-        let (products, works) = part.products(&unconstrained.left, &supported.prescribed, &load);
-        Self { products, works }
-    }
+/// A dof that can be fixed against a motion.
+pub struct Candidate {
+    /// Index of the dof.
+    dof: usize,
+    /// Magnitude of the motion there.
+    pub size: f64,
 }
 
-/// What all ranks have of a body.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct SharedBody<const D: usize> {
-    /// Facts for reports.
-    pub info: BodyInfo,
-    /// Contact rows, pair by pair.
-    pub segments: Vec<Segment>,
-    /// Rigid motions that supports and springs leave.
-    pub unconstrained: Unconstrained<D>,
-    /// Modulus along the normals of the contact surfaces.
-    pub modulus: f64,
-    /// Depth of the body behind its contact surfaces.
-    pub depth: f64,
-    /// Trace on the contact rows of the rigid motion that supports impose.
-    pub carried: Vec<f64>,
-}
-
-/// What one rank has of a body: all of it, or the part on the nodes that this rank needs, with local numbers.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
-pub struct LocalBody<const D: usize> {
-    /// Nodes and cells.
-    pub space: Space<D>,
-    /// Index of the elastic constants of each cell; empty if the body has no regions.
-    pub regions: Vec<usize>,
-    /// Supports and rigid surfaces.
-    pub held: Constraints<D>,
-    /// Springs.
-    pub springs: Vec<Vec<NodalBlock<D>>>,
-    /// Facts of the whole body, and the points of the mesh that these nodes come from.
-    pub facts: BodyFacts,
-    /// Contact rows with dofs as columns.
-    pub rows: Csr,
-    /// Contact rows with displacements of nodes as columns.
-    pub nodal_rows: Csr,
-    /// Nodal forces of the loads at owned nodes, and at nodes tied to these.
-    pub load: NodalForces<D>,
-    /// Displacements that the supports prescribe.
-    pub supported: Supported<D>,
-    /// Work of all loads on each rigid motion that supports and springs leave; `None` if this rank has all loads.
-    pub works: Option<Vec<f64>>,
-    /// Dofs of this rank, if the body is distributed.
-    pub share: Option<Share>,
-    /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
-    pub is_owned: bool,
-    /// See [`Unassembled::unloaded`].
-    pub unloaded: Vec<f64>,
-}
-
-impl<const D: usize> LocalBody<D> {
-    /// Take the whole body.
-    pub fn whole(body: Unassembled<D>, is_owned: bool) -> Self {
-        let Unassembled { part, interface, supported, unloaded, .. } = body;
-        let cells = if part.spec.regions.is_empty() { 0 } else { part.space.cell_count() };
-        Self {
-            regions: (0..cells).map(|cell| part.elasticity.region(cell)).collect(),
-            space: part.space,
-            held: part.held,
-            springs: part.springs,
-            facts: part.facts,
-            rows: interface.rows,
-            nodal_rows: interface.nodal_rows,
-            load: interface.nodal_load,
-            supported,
-            works: None,
-            share: None,
-            is_owned,
-            unloaded,
+impl<'a, const D: usize> Unassembled<'a, D> {
+    /// Collect the contact rows and loads of all bodies.
+    ///
+    /// # Errors
+    /// See [`Part::load`].
+    pub fn all(parts: Vec<Part<'a, D>>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Self>> {
+        let mut segments = vec![Vec::new(); parts.len()];
+        for (pair, sides) in pairs.iter().enumerate() {
+            (0..2).for_each(|side| segments[sides.bodies[side]].push(Segment { pair, side }));
         }
+        parts.into_iter().zip(segments).map(|(part, segments)| Self::new(part, segments, pairs, mesh)).collect()
     }
 
-    /// Restrict a body to the nodes that a rank needs, or keep all nodes if `wants_all`. `number` is the index of the body in its
-    /// matrix.
-    pub fn restrict(body: &Unassembled<D>, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
-        let Unassembled { part, interface, supported, .. } = body;
-        let cells = match wants_all {
-            true => (0..part.space.cell_count()).collect(),
-            false => partition.cells(number, part, rank),
+    fn new(part: Part<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
+        let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
+            let mut all = Csr::new(part.space.dofs());
+            for &Segment { pair, side } in &segments {
+                (0..pairs[pair].len()).for_each(|q| all.push_row(rows(&pairs[pair])[side].row(q)));
+            }
+            all
         };
-        let nodes = partition.nodes(number, part, interface, &cells, rank);
-        let here = |node: u32| place(&nodes, node);
-        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
-        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
-        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
-        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
-            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
+        let nodal_load = part.load(mesh)?;
+        let mut body = Self {
+            rows: all(|pair| &pair.rows),
+            nodal_rows: all(|pair| &pair.nodal),
+            free: part.free(),
+            load: part.load_on_dofs(&nodal_load),
+            nodal_load,
+            part,
+            segments,
+            unconstrained: Unconstrained::default(),
+            gauged: Gauged::default(),
+            supported: Supported::default(),
+            graph: OnceCell::new(),
+            owner: 0,
+            ranks: Vec::new(),
+            unloaded: Vec::new(),
+            on_dofs: None,
         };
-        let springs = part.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
-        let regions = cells.iter().filter(|_| !part.spec.regions.is_empty()).map(|&cell| part.elasticity.region(cell));
-        let is_assembled = |node: u32| partition.owner(number, part.held.frame.node(node)) == rank;
-        let on_dofs = body.on_dofs.as_ref();
-        let products = on_dofs.map_or_else(|| DMatrix::zeros(0, 0), |on| on.products.clone());
-        Self {
-            space: part.space.on(&part.space.corners(&cells), &nodes),
-            regions: regions.collect(),
-            held: part.held.on(&nodes),
-            springs: springs.collect(),
-            facts: part.facts.on(&nodes),
-            rows: rows_here(&interface.rows),
-            nodal_rows: rows_here(&interface.nodal_rows),
-            load: interface.nodal_load.only(is_assembled).on(&nodes),
-            supported: Supported {
-                carried: supported.carried.clone(),
-                prescribed: supported.prescribed.iter().filter_map(prescribed_here).collect(),
-            },
-            works: on_dofs.map(|on| on.works.clone()),
-            is_owned: true,
-            unloaded: body.unloaded.clone(),
-            share: Some(partition.share::<D>(number, nodes, &interface.rows, products, rank)),
-        }
+        body.find_motions();
+        Ok(body)
+    }
+
+    /// Return the coupling of the nodes by K, which is computed when it is first requested.
+    pub fn graph(&self) -> &NodeGraph {
+        let Part { space, held, .. } = &self.part;
+        self.graph.get_or_init(|| NodeGraph::with_rows(space, &self.rows, &held.frame))
+    }
+
+    /// Return the traces of motions on the contact rows, with the work of the loads on each.
+    pub fn motions(&self, all: &[RigidMotion<D>]) -> Vec<Motion> {
+        let of = |(motion, work): (&RigidMotion<D>, f64)| Motion {
+            name: motion.name.clone(),
+            trace: self.trace(motion),
+            work,
+        };
+        all.iter().zip(self.works(all)).map(of).collect()
+    }
+
+    /// Return the trace of a motion on the contact rows.
+    pub fn trace(&self, motion: &RigidMotion<D>) -> Vec<f64> {
+        let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * self.part.dof_of(motion, dof)).sum();
+        (0..self.rows.rows()).map(row).collect()
+    }
+
+    /// Return the work of the loads on motions. It is exactly zero where it is rounding.
+    fn works(&self, all: &[RigidMotion<D>]) -> Vec<f64> {
+        let of = |motion: &RigidMotion<D>| self.load.works(|node| self.part.at_dofs(motion, node));
+        let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
+        all.iter().map(of).map(work).collect()
+    }
+
+    /// Change each nodal force f by -|f| u, where u is the vector at the position of its node.
+    pub fn change_loads(&mut self, u: impl Fn(&[f64; D]) -> [f64; D]) {
+        let change = |(node, force): (u32, [f64; D])| {
+            let (size, u) = (dot(&force, &force).sqrt(), u(&self.part.space.nodes[node as usize]));
+            (node, std::array::from_fn(|c| force[c] - size * u[c]))
+        };
+        self.nodal_load = self.nodal_load.iter().map(change).collect();
+        self.load = self.part.load_on_dofs(&self.nodal_load);
+    }
+
+    /// Find the motions that supports and springs leave to the body at present.
+    pub fn find_motions(&mut self) {
+        let at = |k: usize, node: u32| self.free[k].at(&self.part.space.nodes[node as usize]);
+        let left = self.part.left(self.free.len(), &at);
+        let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
+        let motions = self.motions(&left);
+        let unresisted = unresisted(&motions);
+        let sprung = self.part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
+        let unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
+        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(&all), stiffness });
+        self.unconstrained = Unconstrained { left, motions, sprung, unsupported, unresisted };
+    }
+
+    /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the
+    /// contact rows so that these do not change. The result is `None` if that displacement is small.
+    pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<Candidate> {
+        let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
+        let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.held.prescribed.contains_key(dof);
+        let all = (0..self.part.space.dofs()).filter(is_free);
+        let sizes = all.map(|dof| Candidate { dof, size: self.part.dof_of(motion, dof).abs() });
+        sizes.max_by(|a, b| a.size.total_cmp(&b.size)).filter(|found| found.size > 1e-3)
+    }
+
+    /// Fix a dof.
+    pub fn fix(&mut self, found: &Candidate) {
+        self.part.held.prescribed.insert(found.dof, 0.0);
+        self.find_motions();
+    }
+
+    /// Find the displacements that the supports prescribe.
+    pub fn support(&mut self) {
+        let prescribed = self.part.prescribed_sorted();
+        let value = |k: usize, dof: usize| self.part.dof_of(&self.free[k], dof);
+        let carried = carried(self.free.len(), &value, &prescribed).filter(|_| self.part.springs.is_empty());
+        self.supported = match carried {
+            None => Supported { carried: None, prescribed },
+            Some((weights, rest)) => Supported { carried: Some(rigid::sum(&self.free, &weights)), prescribed: rest },
+        };
+    }
+
+    /// Return the unconstrained motions on all dofs.
+    pub fn on_dofs(&self) -> OnDofs {
+        let load = self.part.load_vector(&self.nodal_load);
+        let (products, works) = self.part.products(&self.unconstrained.left, &self.supported.prescribed, &load);
+        OnDofs { products, works }
     }
 }
 
-/// Modulus and depth of a body behind its contact surfaces.
-struct Scales {
-    /// Modulus along the normals of the surfaces.
-    modulus: f64,
-    /// Area (volume) of the body over the length (area) of the surfaces; infinite without contact.
-    depth: f64,
+/// Return the combinations of motions that no contact row resists: name and weights.
+fn unresisted(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
+    let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
+    let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
+    let names = || motions.iter().map(|motion| motion.name.as_str());
+    let named = |weights: DVector<f64>| (joint::combined(names(), weights.iter().copied()), weights);
+    Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
 }
 
-impl<const D: usize> Unassembled<'_, D> {
-    fn scales(&self, pairs: &[ContactPair]) -> Scales {
-        let of_body = || self.interface.segments.iter().map(|segment| &pairs[segment.pair]);
-        let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
-        Scales {
-            modulus: dot(&self.part.facts.moduli, &along_axes(of_body())),
-            depth: self.part.facts.volume / surface,
-        }
-    }
+/// Share of the largest prescribed displacement up to which supports agree with a rigid motion.
+const AGREES: f64 = 1e-9;
 
-    /// Return what all ranks have of the body. `checked` is the result of the check of its mesh.
-    pub fn shared(&self, pairs: &[ContactPair], checked: &Checked) -> SharedBody<D> {
-        let Scales { modulus, depth } = self.scales(pairs);
-        SharedBody {
-            info: self.info(checked, modulus, depth),
-            segments: self.interface.segments.clone(),
-            unconstrained: self.unconstrained.clone(),
-            modulus,
-            depth,
-            carried: self.carried(),
-        }
-    }
+/// Prescribed (dof, value).
+type Prescribed = Vec<(usize, f64)>;
 
-    /// Return the trace on the contact rows of the rigid motion that supports impose.
-    fn carried(&self) -> Vec<f64> {
-        let rows = &self.interface.rows;
-        let Some(motion) = &self.supported.carried else { return vec![0.0; rows.rows()] };
-        let at = |q: usize| rows.row(q).map(|(dof, b)| b * self.part.dof_of(motion, dof)).sum();
-        (0..rows.rows()).map(at).collect()
+/// Return the weights of the `count` motions whose sum the supports prescribe, and the prescribed values relative to this sum.
+/// `value(k, dof)` is the displacement of motion k at a dof. The result is `None` if the supports prescribe zero or deform the
+/// body.
+fn carried(
+    count: usize,
+    value: &dyn Fn(usize, usize) -> f64,
+    prescribed: &[(usize, f64)],
+) -> Option<(DVector<f64>, Prescribed)> {
+    let largest = prescribed.iter().fold(0.0f64, |max, (_, u)| max.max(u.abs()));
+    if largest == 0.0 {
+        return None;
     }
-
-    fn info(&self, checked: &Checked, modulus: f64, depth: f64) -> BodyInfo {
-        let Self { part, unconstrained, .. } = self;
-        let spec = part.spec;
-        let is_held = unconstrained.motions.len() == unconstrained.unresisted.len() && depth.is_finite();
-        // Loads that balance, as a pressure in a closed ring does, leave rounding, which counts as zero.
-        let mut load = self.load;
-        for (c, sum) in load.iter_mut().enumerate().take(D) {
-            let [work, largest] = self.interface.nodal_load.works(|_| std::array::from_fn(|k| f64::from(k == c)));
-            *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
-        }
-        part.rigid_forces().for_each(|(_, force)| contact::add(&mut load, contact::pad(force)));
-        BodyInfo {
-            name: spec.name.value.clone(),
-            datum: contact::pad(part.space.datum),
-            nodes: part.space.nodes.len(),
-            points: Vec::new(),
-            cells: part.facts.cells,
-            facets: Checked { points: Vec::new(), ..checked.clone() },
-            dofs: part.space.dofs(),
-            supported: part.held.supported(),
-            left_by_supports: unconstrained.left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: unconstrained.unresisted.iter().map(|(name, _)| name.clone()).collect(),
-            gauged: self.gauged.clone(),
-            warning: self.warning.clone(),
-            stiffness: if is_held { modulus / depth } else { 0.0 },
-            load,
-            rank: self.owner,
-            ranks: self.ranks.clone(),
-            supports: spec.fix.iter().map(|support| support.on.value.clone()).collect(),
-            springs: spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
-            rigid: part.held.rigid.iter().map(|(load, _)| spec.load[*load].on.value.clone()).collect(),
-            post: None,
-        }
-    }
+    let at = DMatrix::from_fn(prescribed.len(), count, |i, j| value(j, prescribed[i].0));
+    let values = DVector::from_fn(prescribed.len(), |i, _| prescribed[i].1);
+    let factors = at.clone().svd(true, true);
+    let mut weights = factors.solve(&values, 1e-7).ok()?;
+    // The weights are refined, since every lost digit is a digit of the strains.
+    weights += factors.solve(&(&values - &at * &weights), 1e-7).ok()?;
+    let noise = 1e-14 * weights.amax();
+    weights.iter_mut().filter(|weight| weight.abs() < noise).for_each(|weight| *weight = 0.0);
+    let moved = at * &weights;
+    let rest: Prescribed = prescribed.iter().zip(&moved).map(|(&(dof, u), moved)| (dof, u - moved)).collect();
+    rest.iter().all(|(_, u)| u.abs() <= AGREES * largest).then_some((weights, rest))
 }
 
-/// Return the mean squared components of the normals on the contact surfaces of a body.
-fn along_axes<'p>(pairs: impl Iterator<Item = &'p ContactPair>) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for pair in pairs {
-        for (weight, normal) in pair.weight.iter().zip(&pair.normal) {
-            (0..3).for_each(|c| sum[c] += weight * normal[c] * normal[c]);
-        }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::Extent;
+    use crate::fem::rigid::modes;
+
+    #[test]
+    fn supports_carry_a_body_or_deform_it() {
+        let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
+        let all = modes(&Extent::of(nodes.into_iter()));
+        let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
+        // The upper edge moves down by 0.3, and one node is constrained along x.
+        let (weights, rest) = carried(3, &value, &[(0, 0.0), (5, -0.3), (7, -0.3)]).expect("a translation");
+        assert!(weights[0].abs() < 1e-15 && (weights[1] + 0.3).abs() < 1e-15 && weights[2].abs() < 1e-15);
+        assert!(rest.iter().all(|(_, u)| u.abs() < 1e-15));
+        assert!(carried(3, &value, &[(1, 0.0), (3, 0.0), (5, -0.3), (7, -0.3)]).is_none());
+        assert!(carried(3, &value, &[(1, 0.0), (3, 0.0)]).is_none());
     }
-    let total: f64 = sum.iter().sum();
-    if total > 0.0 { sum.map(|sum| sum / total) } else { sum }
 }

@@ -34,7 +34,7 @@ pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
 pub use msh::{Maker, parse};
 pub use script::{unstructured, view};
-pub use simplex::Quality;
+pub use simplex::{EDGES, Quality};
 pub use trust::{Breach, breach};
 
 use crate::linalg::{bounds, pad};
