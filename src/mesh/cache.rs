@@ -82,6 +82,14 @@ pub fn open(path: &Path) -> Option<File> {
     file.metadata().ok().filter(|data| !is_of_others(data)).map(|_| file)
 }
 
+/// Write a file.
+///
+/// # Errors
+/// The file system refuses.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|cause| Error::file(path, "write", &cause))
+}
+
 /// Bytes that the disk must still accept after a mesh failed; otherwise it was full. They are some pages, more than the end of
 /// a file leaves free.
 const ROOM: usize = 1 << 16;

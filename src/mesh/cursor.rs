@@ -22,7 +22,9 @@ pub struct Cursor<'a> {
     /// Whether numbers are binary, as the `$MeshFormat` section says.
     pub binary: bool,
     /// Name of the section being read, without `$`; empty between sections.
-    pub section: String,
+    section: String,
+    /// Names of the needed sections so far.
+    seen: Vec<String>,
     /// Whether the bytes were made from the file at `path`, so that lines in them mean nothing to the user.
     made: bool,
     /// The reason why the file cannot be read any more, if there is one.
@@ -49,8 +51,19 @@ impl<'a> Cursor<'a> {
             Ok(length) => (length as usize, None),
             Err(cause) => (0, Some(cause)),
         };
-        let (source, section) = (RefCell::new(source), String::new());
-        Cursor { path, source, length, window: Vec::new(), first: 0, at: 0, binary: false, section, made, failed }
+        Cursor {
+            path,
+            source: RefCell::new(source),
+            length,
+            window: Vec::new(),
+            first: 0,
+            at: 0,
+            binary: false,
+            section: String::new(),
+            seen: Vec::new(),
+            made,
+            failed,
+        }
     }
 
     /// Return the position in the file at which the next number starts.
@@ -75,14 +88,6 @@ impl<'a> Cursor<'a> {
             }
         }
         &self.window[self.at..]
-    }
-
-    /// Check that no read has failed.
-    ///
-    /// # Errors
-    /// The file could not be read to its end.
-    pub fn intact(&mut self) -> Result<()> {
-        self.failed.take().map_or(Ok(()), |cause| Err(Error::file(self.path, "read", &cause)))
     }
 
     /// Return an error at a position. It names the line of a text file, or the section and byte of a binary one.
@@ -145,6 +150,48 @@ impl<'a> Cursor<'a> {
         let line = line.trim().to_owned();
         self.at += length.min(end + 1);
         Ok(line)
+    }
+
+    /// Enter the next section that is one of `needed`, each of which may occur once, and skip others before it. Return its position and
+    /// name, or `None` at the end of the file.
+    pub fn next_section(&mut self, needed: &[&str]) -> Result<Option<(usize, String)>> {
+        while !self.at_end() {
+            let start = self.position();
+            let line = self.line()?;
+            let Some(section) = line.strip_prefix('$') else {
+                return Err(self
+                    .error_at(start, "a section such as `$Nodes` should begin here")
+                    .help("the file is damaged, or has something behind its end: save the mesh again with Gmsh"));
+            };
+            self.enter(section);
+            if !needed.contains(&section) {
+                self.skip_section()?;
+                continue;
+            }
+            if self.has(section) {
+                return Err(self.error_at(start, format!("the section ${section} stands twice")));
+            }
+            self.seen.push(section.to_owned());
+            return Ok(Some((start, section.to_owned())));
+        }
+        self.failed.take().map_or(Ok(None), |cause| Err(Error::file(self.path, "read", &cause)))
+    }
+
+    /// Return whether a needed section of this name was found.
+    pub fn has(&self, section: &str) -> bool {
+        self.seen.iter().any(|seen| seen == section)
+    }
+
+    /// Begin binary numbers, the first of which is a one.
+    pub fn begin_binary(&mut self) -> Result<()> {
+        self.binary = true;
+        let start = self.position();
+        match self.int()? {
+            1 => Ok(()),
+            _ => Err(self
+                .error_at(start, "the bytes of the numbers are not in this machine's order")
+                .help("save the mesh as text on the machine that made it")),
+        }
     }
 
     /// Enter the section of this name.

@@ -1,8 +1,9 @@
 //! Files of other programs: shapes that Gmsh meshes, and meshes that it converts.
 
+use super::cache::write;
 use super::nastran;
 use super::trust::is_kind;
-use crate::error::{Error, Located, Result};
+use crate::error::{Located, Result};
 use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -57,7 +58,7 @@ pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, wo
         );
     }
     let made = work.join("shape.geo");
-    write(&made, text.as_bytes()).map(|()| made)
+    write(&made, text).map(|()| made)
 }
 
 /// Return whether a file is one of Abaqus or CalculiX, which [`super::abaqus`] reads without Gmsh.
@@ -78,18 +79,14 @@ pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBu
     };
     let made = work.join(format!("mesh.{kind}"));
     let written = match kind.as_str() {
-        "unv" => write(&made, readable(&String::from_utf8_lossy(bytes)).as_bytes()),
+        "unv" => write(&made, readable(&String::from_utf8_lossy(bytes))),
         "bdf" | "nas" => {
             let text = nastran::readable(path, &String::from_utf8_lossy(bytes));
-            write(&made, text.map_err(|error| error.at(&file.place))?.as_bytes())
+            write(&made, text.map_err(|error| error.at(&file.place))?)
         }
         _ => write(&made, bytes),
     };
     written.map(|()| made)
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|cause| Error::file(path, "write", &cause))
 }
 
 /// Datasets of groups with four numbers per member. Gmsh reads groups from the second one, 2477.

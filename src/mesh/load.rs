@@ -1,6 +1,6 @@
 //! The way from the scene's mesh source to a mesh: by Gmsh, from the cache, from a file, or from arrays.
 
-use super::cache::{self, Workshop, file_name, folders};
+use super::cache::{self, Workshop, file_name, folders, write};
 use super::gmsh::{Gmsh, Task};
 use super::msh::{self, Maker};
 use super::script::{Script, quoted};
@@ -29,6 +29,12 @@ pub struct Loaded<const D: usize> {
     pub unkept: Option<String>,
     /// What of the file was left out, or is not as the user may think.
     pub notes: Vec<String>,
+}
+
+impl<const D: usize> Loaded<D> {
+    fn new(mesh: Mesh<D>, origin: Origin, file: PathBuf, digest: String) -> Self {
+        Self { mesh, origin, file, digest, unkept: None, notes: Vec::new() }
+    }
 }
 
 /// The origin of a mesh.
@@ -62,14 +68,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => {
             let mesh = of_arrays(arrays, order)?;
-            Ok(Loaded {
-                mesh,
-                origin: Origin::File,
-                file: PathBuf::new(),
-                digest: String::new(),
-                unkept: None,
-                notes: Vec::new(),
-            })
+            Ok(Loaded::new(mesh, Origin::File, PathBuf::new(), String::new()))
         }
     }?;
     loaded.mesh.straighten();
@@ -98,14 +97,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
         false => {
             let mut source = Digested::new(source);
             let mesh = msh::read(path, Box::new(&mut source), Maker::User)?;
-            Loaded {
-                mesh,
-                origin: Origin::File,
-                file: path.clone(),
-                digest: source.digest(),
-                unkept: None,
-                notes: Vec::new(),
-            }
+            Loaded::new(mesh, Origin::File, path.clone(), source.digest())
         }
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -139,7 +131,7 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
 fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
     let abaqus::Converted { mesh: bytes, notes } = abaqus::convert(path, bytes, D)?;
     let name = file_name(("input file", digest_of_bytes(&bytes)), path);
-    let make = |_: &Path, made: &Path| std::fs::write(made, &bytes).map_err(|cause| Error::file(made, "write", &cause));
+    let make = |_: &Path, made: &Path| write(made, &bytes);
     let place = |cache: &Path| cache.join(&name);
     let loaded = made_anew(&name, &folders(), |file| read_converted(path, file), make, place)?;
     Ok(Loaded { origin: Origin::File, notes, ..loaded })
@@ -189,7 +181,7 @@ fn kept<const D: usize>(
     // A file of the cache that cannot be read or is damaged counts as absent.
     for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
         if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| digested(file, &mut parse).ok()) {
-            return Ok(Loaded { mesh, origin: Origin::Cache, file: cached, digest, unkept, notes: Vec::new() });
+            return Ok(Loaded::new(mesh, Origin::Cache, cached, digest));
         }
     }
     let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
@@ -223,7 +215,7 @@ fn made_anew<const D: usize>(
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
     let file = workshop.publish(&made, place)?;
-    Ok(Loaded { mesh, origin: Origin::Gmsh, file, digest, unkept: None, notes: Vec::new() })
+    Ok(Loaded::new(mesh, Origin::Gmsh, file, digest))
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
@@ -320,8 +312,7 @@ fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
     }
     let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;
     let made = work.join("ended.geo");
-    let text = format!("Include {};\n", quoted(&whole)?);
-    std::fs::write(&made, text).map_err(|cause| Error::file(&made, "write", &cause)).map(|()| Some(made))
+    write(&made, format!("Include {};\n", quoted(&whole)?)).map(|()| Some(made))
 }
 
 /// Keep the final sizes of an adaptation in the cache. `purpose` identifies all that the mesh was made for, scene and error.
@@ -332,7 +323,7 @@ pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
     let workshop = Workshop::open(&folders())?;
     let name = final_name(purpose);
     let made = workshop.path().join(&name);
-    std::fs::write(&made, sizes).map_err(|cause| Error::file(&made, "write", &cause))?;
+    write(&made, sizes)?;
     workshop.publish(&made, |cache| cache.join(&name)).map(|_| ())
 }
 

@@ -51,20 +51,17 @@ pub fn read<const D: usize>(path: &Path, mut source: Box<dyn Source + '_>, maker
     let mut physical = Physical::new(maker == Maker::Other);
     let mut nodes: Option<Nodes> = None;
     let (mut order, mut split) = (None, 0);
-    let mut seen: Vec<String> = Vec::new();
-    let has = |seen: &[String], section: &str| seen.iter().any(|before| before == section);
-    while !cursor.at_end() {
-        let start = cursor.position();
-        let line = cursor.line()?;
-        let Some(section) = enter(cursor, start, &line, &mut seen)? else {
-            cursor.skip_section()?;
-            continue;
-        };
-        match (section, &mut nodes) {
+    let needed = ["PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "Elements"];
+    while let Some((start, section)) = cursor.next_section(&needed)? {
+        match (section.as_str(), &mut nodes) {
             ("PhysicalNames", _) => physical.read_names(cursor, D)?,
             ("Entities", _) => physical.read_entities(cursor)?,
             ("Nodes", _) => nodes = Some(Nodes::read(cursor)?),
-            (_, Some(nodes)) if has(&seen, "Entities") => {
+            ("PartitionedEntities", _) => {
+                let error = cursor.error_at(start, "the mesh is partitioned");
+                return Err(error.help("save it in one piece: the program divides it among the ranks itself"));
+            }
+            (_, Some(nodes)) if cursor.has("Entities") => {
                 (order, split) = elements::read::<D>(cursor, nodes, &mut physical)?;
             }
             _ => {
@@ -74,38 +71,12 @@ pub fn read<const D: usize>(path: &Path, mut source: Box<dyn Source + '_>, maker
         }
         cursor.leave()?;
     }
-    cursor.intact()?;
     match nodes {
-        Some(nodes) if has(&seen, "Elements") => finish(path, physical, nodes, order, split),
+        Some(nodes) if cursor.has("Elements") => finish(path, physical, nodes, order, split),
         _ => {
             let error = Error::mesh(path, None, "there are no elements");
             Err(error.help("the file was cut short, or nothing was meshed"))
         }
-    }
-}
-
-/// Enter the section that the line at `start` begins. Return its name, or `None` if nothing in it is needed. `seen` collects
-/// the sections in use, each of which may occur once.
-fn enter<'l>(cursor: &mut Cursor, start: usize, line: &'l str, seen: &mut Vec<String>) -> Result<Option<&'l str>> {
-    let Some(section) = line.strip_prefix('$') else {
-        return Err(cursor
-            .error_at(start, "a section such as `$Nodes` should begin here")
-            .help("the file is damaged, or has something behind its end: save the mesh again with Gmsh"));
-    };
-    cursor.enter(section);
-    match section {
-        "PhysicalNames" | "Entities" | "Nodes" | "Elements" => {
-            if seen.iter().any(|before| before == section) {
-                return Err(cursor.error_at(start, format!("the section ${section} stands twice")));
-            }
-            seen.push(section.to_owned());
-            Ok(Some(section))
-        }
-        "PartitionedEntities" => {
-            let error = cursor.error_at(start, "the mesh is partitioned");
-            Err(error.help("save it in one piece: the program divides it among the ranks itself"))
-        }
-        _ => Ok(None),
     }
 }
 
@@ -146,14 +117,7 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
     }
     match (form, size) {
         ("0", _) => {}
-        ("1", "8") => {
-            cursor.binary = true;
-            let start = cursor.position();
-            if cursor.int()? != 1 {
-                let error = cursor.error_at(start, "the bytes of the numbers are not in this machine's order");
-                return Err(error.help("save the mesh as text on the machine that made it"));
-            }
-        }
+        ("1", "8") => cursor.begin_binary()?,
         _ => {
             let message = format!("`{form} {size}` is neither text (`0 8`) nor binary (`1 8`)");
             return Err(save_again(cursor.error_at(start, message), cursor.path));

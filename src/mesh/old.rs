@@ -26,36 +26,21 @@ pub fn is_old(start: &[u8]) -> bool {
 pub fn convert(path: &Path, source: Box<dyn Source + '_>, made: bool) -> Result<Vec<u8>> {
     let cursor = &mut Cursor::new(path, source, made);
     let mut file = File::default();
-    let mut seen = BTreeSet::new();
-    while !cursor.at_end() {
-        let start = cursor.position();
-        let line = cursor.line()?;
-        let Some(section) = line.strip_prefix('$') else {
-            return Err(cursor.error_at(start, "a section such as `$Nodes` should begin here"));
-        };
-        cursor.enter(section);
-        let is_needed = ["MeshFormat", "PhysicalNames", "Nodes", "NOD", "Elements", "ELM"].contains(&section);
-        if is_needed && !seen.insert(section.to_owned()) {
-            return Err(cursor.error_at(start, format!("the section ${section} stands twice")));
-        }
-        match section {
+    let needed = ["MeshFormat", "PhysicalNames", "Nodes", "NOD", "ParametricNodes", "Elements", "ELM"];
+    while let Some((start, section)) = cursor.next_section(&needed)? {
+        match section.as_str() {
             "MeshFormat" => read_format(cursor)?,
             "PhysicalNames" => file.read_names(cursor)?,
             "Nodes" | "NOD" => file.read_nodes(cursor)?,
             "Elements" => file.read_elements(cursor)?,
             "ELM" => file.read_first_elements(cursor)?,
-            "ParametricNodes" => {
+            _ => {
                 let error = cursor.error_at(start, "nodes with parameters on their surfaces are not read");
                 return Err(error.help("save the mesh without them, or in format 4.1"));
             }
-            _ => {
-                cursor.skip_section()?;
-                continue;
-            }
         }
-        leave(cursor, section)?;
+        leave(cursor, &section)?;
     }
-    cursor.intact()?;
     if file.contents.elements.is_empty() {
         return Err(
             Error::mesh(path, None, "there are no elements").help("the file was cut short, or nothing was meshed")
@@ -83,16 +68,7 @@ fn read_format(cursor: &mut Cursor) -> Result<()> {
     let words: Vec<&str> = line.split_whitespace().collect();
     match words[..] {
         [version, "0", _] if version.starts_with('2') => Ok(()),
-        [version, "1", "8"] if version.starts_with('2') => {
-            cursor.binary = true;
-            let start = cursor.position();
-            match cursor.int()? {
-                1 => Ok(()),
-                _ => Err(cursor
-                    .error_at(start, "the bytes of the numbers are not in this machine's order")
-                    .help("save the mesh as text on the machine that made it")),
-            }
-        }
+        [version, "1", "8"] if version.starts_with('2') => cursor.begin_binary(),
         _ => Err(cursor.error_at(start, "a format such as `2.2 0 8` should stand here")),
     }
 }

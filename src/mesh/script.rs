@@ -5,6 +5,7 @@
 //! variables belong to the key of its mesh in the cache. Other inputs besides files are unknown before Gmsh runs, so a mesh that depends
 //! on them cannot be cached.
 
+use super::cache::write;
 use super::trust::{self, READ, RUN, Token, tokens};
 use crate::error::{Error, Kind, Located, Place, Result};
 use std::collections::BTreeSet;
@@ -266,10 +267,6 @@ impl Inputs {
 /// # Errors
 /// A structured script reads other files, which a copy would not find. The folder cannot be written.
 pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: &Path) -> Result<PathBuf> {
-    let write = |name: &str, text: &str| {
-        let path = work.join(name);
-        std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause)).map(|()| path)
-    };
     let own = read.files.first().map_or(String::new(), |bytes| String::from_utf8_lossy(bytes).into_owned());
     let free = unstructured(&own);
     let mut script = std::path::absolute(&file.value).map_err(|cause| Error::file(&file.value, "find", &cause))?;
@@ -279,9 +276,11 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
             return Err(Error::scene(&file.place, message)
                 .help("take `Transfinite` and `Recombine` out of it: such a mesh cannot follow sizes"));
         }
-        script = write("free.geo", &free)?;
+        script = work.join("free.geo");
+        write(&script, free)?;
     }
-    let sizes = write("sizes.pos", field)?;
+    let sizes = work.join("sizes.pos");
+    write(&sizes, field)?;
     let text = format!(
         "Include {};\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
          Merge {};\nBackground Mesh View[PostProcessing.NbViews - 1];\n\
@@ -289,7 +288,8 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
         quoted(&script)?,
         quoted(&sizes)?
     );
-    write("sized.geo", &text)
+    let made = work.join("sized.geo");
+    write(&made, text).map(|()| made)
 }
 
 /// Return the script without the commands that ask for structured meshes, from the word to the semicolon.

@@ -210,16 +210,11 @@ impl<'a> Groups<'a> {
 
     /// Return the group of the cells with these numbers, if there are any.
     fn cells<'t>(&self, name: &str, tags: impl Iterator<Item = &'t u64>) -> Option<Group> {
-        let mut of_dimension: BTreeMap<usize, Vec<(u64, Piece)>> = BTreeMap::new();
-        for &tag in tags {
+        let cell = |&tag: &u64| {
             let element = &self.model.elements[&tag];
-            if let Some(kind) = self.cell(element) {
-                let nodes = kind.in_gmsh_order(&element.nodes);
-                of_dimension.entry(kind.shape.dimension).or_default().push((tag, (kind, nodes)));
-            }
-        }
-        let (dimension, elements) = of_dimension.pop_last()?;
-        Some(Group { dimension, name: name.to_owned(), elements, points: Vec::new() })
+            self.cell(element).map(|kind| (tag, (kind, kind.in_gmsh_order(&element.nodes))))
+        };
+        of_highest(name, tags.filter_map(cell))
     }
 
     /// Make a group of the cells in no element set. It has the name of a section without a set, or else `solids`.
@@ -272,19 +267,11 @@ impl<'a> Groups<'a> {
     /// Make a group of the facets, or else of the edges, that the elements of each set lie on, where the set has no cells.
     fn facets_of_sets(&mut self) -> Result<()> {
         for name in self.model.element_sets.keys() {
-            let mut of_dimension: BTreeMap<usize, Vec<(u64, Piece)>> = BTreeMap::new();
-            for tag in self.members(name)? {
-                let element = &self.model.elements[&tag];
-                if self.cell(element).is_some() {
-                    of_dimension.clear();
-                    break;
-                }
-                if let Some(piece) = self.under(element) {
-                    of_dimension.entry(piece.0.shape.dimension).or_default().push((tag, piece));
-                }
-            }
-            if let Some((dimension, elements)) = of_dimension.pop_last() {
-                self.add(Group { dimension, name: name.clone(), elements, points: Vec::new() }, "elements");
+            let tags = self.members(name)?;
+            let elements = || tags.iter().map(|tag| (*tag, &self.model.elements[tag]));
+            if !elements().any(|(_, element)| self.cell(element).is_some()) {
+                let group = of_highest(name, elements().filter_map(|(tag, element)| Some((tag, self.under(element)?))));
+                group.into_iter().for_each(|group| self.add(group, "elements"));
             }
         }
         Ok(())
@@ -352,6 +339,14 @@ impl<'a> Groups<'a> {
         }
         Ok(())
     }
+}
+
+/// Return the group of the pieces of the highest dimension, if there are any.
+fn of_highest(name: &str, pieces: impl Iterator<Item = (u64, Piece)>) -> Option<Group> {
+    let mut of_dimension: BTreeMap<usize, Vec<(u64, Piece)>> = BTreeMap::new();
+    pieces.for_each(|piece| of_dimension.entry(piece.1.0.shape.dimension).or_default().push(piece));
+    let (dimension, elements) = of_dimension.pop_last()?;
+    Some(Group { dimension, name: name.to_owned(), elements, points: Vec::new() })
 }
 
 /// Return the corners of a piece in ascending order.

@@ -1,7 +1,6 @@
 //! The contents of an input file: nodes, elements with the types of Abaqus and CalculiX, and named sets of them.
 
 use super::lines::At;
-use crate::mesh::frame::Frame;
 use crate::mesh::simplex::{HEXAHEDRON, LINE, PRISM, PYRAMID, QUADRANGLE, Shape, TETRAHEDRON, TRIANGLE};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
@@ -53,33 +52,12 @@ pub struct Label {
 #[derive(Clone, Default)]
 pub struct Set {
     pub label: Label,
-    members: BTreeSet<u64>,
+    /// Members, which must exist.
+    pub members: BTreeSet<u64>,
     /// First and last number, and step. Numbers between them that do not exist are no members.
-    ranges: BTreeSet<[u64; 3]>,
+    pub ranges: BTreeSet<[u64; 3]>,
     /// Names of sets whose members belong to this one.
-    sets: BTreeSet<String>,
-}
-
-impl Set {
-    /// Make an empty set.
-    pub fn new(label: Label) -> Self {
-        Self { label, ..Self::default() }
-    }
-
-    /// Add a member, which must exist.
-    pub fn add(&mut self, tag: u64) {
-        self.members.insert(tag);
-    }
-
-    /// Add all members that exist from `first` to `last`.
-    pub fn add_range(&mut self, first: u64, last: u64, step: u64) {
-        self.ranges.insert([first, last, step]);
-    }
-
-    /// Add the members of another set.
-    pub fn add_set(&mut self, name: String) {
-        self.sets.insert(name);
-    }
+    pub sets: BTreeSet<String>,
 }
 
 /// A surface: faces of elements, and of the elements of sets.
@@ -173,15 +151,10 @@ impl Model {
         self.sections.extend(part.sections.iter().map(name));
     }
 
-    /// Move the nodes with numbers above `shift` by a translation, and then by a rotation about the axis from point `a` to
-    /// point `b`, whose angle is in degrees.
-    pub fn place(&mut self, shift: u64, translation: [f64; 3], rotation: Option<Rotation>) {
-        let frame = Frame::at(translation);
-        for node in self.nodes.iter_mut().filter(|(tag, _)| **tag > shift).map(|(_, node)| node) {
-            node.x = frame.place(node.x);
-            if let Some(rotation) = &rotation {
-                node.x = rotation.turned(node.x);
-            }
+    /// Move the nodes with numbers above `shift`.
+    pub fn place(&mut self, shift: u64, moved: impl Fn([f64; 3]) -> [f64; 3]) {
+        for (_, node) in self.nodes.iter_mut().filter(|(tag, _)| **tag > shift) {
+            node.x = moved(node.x);
         }
     }
 }
@@ -189,26 +162,6 @@ impl Model {
 /// Return a name in the form that groups have.
 pub fn normal(spelling: &str) -> String {
     spelling.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
-}
-
-/// A rotation about an axis.
-pub struct Rotation {
-    a: nalgebra::Point3<f64>,
-    rotation: nalgebra::Rotation3<f64>,
-}
-
-impl Rotation {
-    /// Return the rotation about the axis from `a` to `b`, or none if they are one point.
-    pub fn new(a: [f64; 3], b: [f64; 3], degrees: f64) -> Option<Self> {
-        let axis = nalgebra::Vector3::from(b) - nalgebra::Vector3::from(a);
-        let axis = nalgebra::Unit::try_new(axis, 1e-300)?;
-        Some(Self { a: a.into(), rotation: nalgebra::Rotation3::from_axis_angle(&axis, degrees.to_radians()) })
-    }
-
-    fn turned(&self, x: [f64; 3]) -> [f64; 3] {
-        let x = self.a + self.rotation * (nalgebra::Point3::from(x) - self.a);
-        [x.x, x.y, x.z]
-    }
 }
 
 /// The numbering of a shape by Abaqus. Corners are those of Gmsh.

@@ -1,9 +1,10 @@
 //! From the lines of a file to its contents.
 
 use super::lines::{At, Keyword, Line, Lines, TextResult, coordinates, count, generated, reals, spelled};
-use super::model::{Element, Face, Kind, Label, Model, Node, Role, Rotation, Set, Surface, members, normal};
+use super::model::{Element, Face, Kind, Label, Model, Node, Role, Set, Surface, members, normal};
 use crate::error::Result;
 use crate::mesh::frame::{Coordinates, Frame};
+use nalgebra::{Point3, Rotation3, Unit};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
@@ -62,7 +63,7 @@ pub struct Reader {
 /// # Errors
 /// Another name becomes the same.
 fn entry<'a>(sets: &'a mut BTreeMap<String, Set>, spelling: &str, at: At) -> TextResult<&'a mut Set> {
-    let new = || Set::new(Label { spelling: spelling.to_owned(), at });
+    let new = || Set { label: Label { spelling: spelling.to_owned(), at }, ..Set::default() };
     let set = sets.entry(normal(spelling)).or_insert_with(new);
     same(&set.label, spelling)?;
     Ok(set)
@@ -185,7 +186,7 @@ impl Reader {
                 let tags = members(element_sets, &name, elements);
                 let tags = tags.map_err(|missing| format!("element {} is not there", missing.tag))?;
                 let set = entry(node_sets, &spelling, keyword.at)?;
-                tags.iter().flat_map(|tag| &elements[tag].nodes).for_each(|&node| set.add(node));
+                set.members.extend(tags.iter().flat_map(|tag| &elements[tag].nodes));
             }
             None => {
                 entry(if nodes { node_sets } else { element_sets }, &spelling, keyword.at)?;
@@ -251,17 +252,23 @@ impl Reader {
         let vector = |line: &[f64], from: usize| std::array::from_fn(|c| line.get(from + c).copied().unwrap_or(0.0));
         let translation = moves.first().map_or([0.0; 3], |line| vector(line, 0));
         let rotation = match moves.get(1) {
-            Some(line) if line.len() == 7 => Some(
-                Rotation::new(vector(line, 0), vector(line, 3), line[6]).ok_or("the axis of a rotation is a point")?,
-            ),
+            Some(line) if line.len() == 7 => {
+                let [a, b] = [0, 3].map(|from| Point3::from(vector(line, from)));
+                let axis = Unit::try_new(b - a, 1e-300).ok_or("the axis of a rotation is a point")?;
+                Some((a, Rotation3::from_axis_angle(&axis, line[6].to_radians())))
+            }
             Some(_) => return Err("a rotation has two points of its axis and an angle, seven numbers".into()),
             None => None,
         };
-        self.model.place(shift, translation, rotation);
+        let frame = Frame::at(translation);
+        self.model.place(shift, |x| match rotation {
+            Some((a, rotation)) => (a + rotation * (Point3::from(frame.place(x)) - a)).into(),
+            None => frame.place(x),
+        });
         let name = self.scope.prefix.trim_end_matches('.').to_owned();
         let elements: Vec<u64> = self.model.elements.range(shift.saturating_add(1)..).map(|(tag, _)| *tag).collect();
         let set = entry(&mut self.model.element_sets, &name, at)?;
-        elements.into_iter().for_each(|tag| set.add(tag));
+        set.members.extend(elements);
         self.scope = Scope { prefix: String::new(), shift: self.model.largest(), frame: Frame::default() };
         Ok(())
     }
@@ -310,10 +317,10 @@ impl Reader {
         if let Some(old) = self.model.nodes.insert(tag, Node { x, at }).filter(|old| old.x != x) {
             self.twice.push(Twice { tag, lines: [old.at, at] });
         }
-        match set {
-            Some(set) => entry(&mut self.model.node_sets, set, at).map(|set| set.add(tag)),
-            None => Ok(()),
+        if let Some(set) = set {
+            entry(&mut self.model.node_sets, set, at)?.members.insert(tag);
         }
+        Ok(())
     }
 
     /// Read an element, or a part of it.
@@ -339,7 +346,7 @@ impl Reader {
         let shifted = |tag: &u64| tag.saturating_add(self.scope.shift);
         let (tag, nodes) = (shifted(tag), nodes.iter().map(shifted).collect());
         if let Some(set) = &set {
-            entry(&mut self.model.element_sets, set, at)?.add(tag);
+            entry(&mut self.model.element_sets, set, at)?.members.insert(tag);
         }
         let element = Element { name: name.clone(), kind, nodes, at };
         if let Some(old) = self.model.elements.insert(tag, element) {
@@ -356,16 +363,16 @@ impl Reader {
             match word.parse::<u64>() {
                 Ok(tag) => {
                     let set = sets.get_mut(name).ok_or("there is no such set")?;
-                    set.add(tag.saturating_add(shift));
+                    set.members.insert(tag.saturating_add(shift));
                 }
                 Err(_) => others.push(known(sets, &self.scope.prefix, word)?),
             }
         }
         let set = sets.get_mut(name).ok_or("there is no such set")?;
-        others.into_iter().for_each(|other| set.add_set(other));
+        set.sets.extend(others);
         if generate {
             let [first, last, step] = generated(name, words, self.lines.bytes)?;
-            set.add_range(first.saturating_add(shift), last.saturating_add(shift), step);
+            set.ranges.insert([first.saturating_add(shift), last.saturating_add(shift), step]);
         }
         Ok(())
     }
