@@ -4,7 +4,7 @@
 //! Some programs write the boundary of quadratic cells as linear lines and facets. These get the mid-edge nodes of the cells.
 
 use super::cursor::Cursor;
-use super::groups::Group;
+use super::groups::{Group, Numbering};
 use super::physical::Physical;
 use super::simplex::{self, EDGES, Kind, THINGS};
 use super::split::Middles;
@@ -306,7 +306,8 @@ pub struct Nodes {
     pub points: Vec<[f64; 3]>,
     /// Largest |z| of a point that counts as in the plane z = 0: 1e-12 times the size of the mesh.
     pub flat: f64,
-    numbers: Numbers,
+    /// Our number of each tag. Gmsh's tags are nearly contiguous; other programs may write any.
+    numbers: Numbering,
     blocks: Vec<Block>,
 }
 
@@ -317,13 +318,8 @@ struct Block {
     bytes: usize,
 }
 
-/// A map from tags to numbers. Gmsh's tags are nearly contiguous; other programs may write any.
-enum Numbers {
-    Dense { least: u64, number: Vec<u32> },
-    Sparse(HashMap<u64, u32>),
-}
-
-const NONE: u32 = u32::MAX;
+/// Most nodes that 32-bit numbers count.
+const MOST: usize = u32::MAX as usize;
 
 impl Nodes {
     /// Read the contents of the section.
@@ -338,7 +334,7 @@ impl Nodes {
         cursor.size()?;
         cursor.size()?;
         cursor.end()?;
-        if total >= NONE as usize {
+        if total >= MOST {
             return Err(cursor.error_at(start, format!("{total} nodes are too many: 32-bit numbers count them")));
         }
 
@@ -376,9 +372,10 @@ impl Nodes {
             let message = format!("$Nodes announces {total} nodes and holds {}", points.len());
             return Err(cursor.error_at(start, message));
         }
-        let mut nodes = Nodes { flat: 1e-12 * size(&points), points, numbers: Numbers::empty(&tags), blocks };
+        let mut nodes =
+            Nodes { flat: 1e-12 * size(&points), points, numbers: Numbering::new(tags.iter().copied()), blocks };
         for (number, tag) in tags.iter().enumerate() {
-            if nodes.numbers.insert(*tag, number as u32) {
+            if !nodes.numbers.number(*tag, number as u32).1 {
                 return Err(nodes.error_at(cursor, number, format!("node tag {tag} stands twice")));
             }
         }
@@ -386,14 +383,8 @@ impl Nodes {
     }
 
     /// Return our number of the node with this tag.
-    pub fn number(&self, tag: u64) -> Option<u32> {
-        match &self.numbers {
-            Numbers::Dense { least, number } => {
-                let slot = usize::try_from(tag.checked_sub(*least)?).ok()?;
-                number.get(slot).copied().filter(|number| *number != NONE)
-            }
-            Numbers::Sparse(number) => number.get(&tag).copied(),
-        }
+    fn number(&self, tag: u64) -> Option<u32> {
+        self.numbers.get(tag)
     }
 
     /// Return an error that names the position of a node's coordinates in the file.
@@ -406,31 +397,6 @@ impl Nodes {
         }
         cursor.begin();
         cursor.error(message)
-    }
-}
-
-impl Numbers {
-    /// Return a map without entries, in the form that suits these tags.
-    fn empty(tags: &[u64]) -> Numbers {
-        let least = tags.iter().copied().min().unwrap_or(0);
-        let span = tags.iter().copied().max().unwrap_or(0) - least;
-        // A table with at most four slots per node is faster and smaller than a map.
-        if span < 4 * tags.len() as u64 + 1024 {
-            Numbers::Dense { least, number: vec![NONE; span as usize + 1] }
-        } else {
-            Numbers::Sparse(HashMap::with_capacity(tags.len()))
-        }
-    }
-
-    /// Set the number of a tag, one of those given to `empty`. Return whether it already had one.
-    fn insert(&mut self, tag: u64, new: u32) -> bool {
-        match self {
-            Numbers::Dense { least, number } => {
-                let slot = &mut number[(tag - *least) as usize];
-                std::mem::replace(slot, new) != NONE
-            }
-            Numbers::Sparse(number) => number.insert(tag, new).is_some(),
-        }
     }
 }
 

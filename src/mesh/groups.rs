@@ -127,41 +127,24 @@ pub fn twice(groups: &[Group]) -> Option<&str> {
     groups.iter().map(|group| group.name.as_str()).find(|name| !names.insert(*name))
 }
 
-/// Return for each of `count` points whether a group uses it. Every point number in the groups is below `count`.
-pub fn used(groups: &[Group], count: usize) -> Vec<bool> {
-    let mut used = vec![false; count];
-    groups.iter().flat_map(|group| &group.connectivity).for_each(|&point| used[point as usize] = true);
-    used
-}
-
-/// Return the number of each used point among all used points. The entries of other points are meaningless.
-fn compact(used: &[bool]) -> Vec<u32> {
-    let mut next = 0;
-    let number = |used: &bool| {
-        next += u32::from(*used);
-        next.wrapping_sub(1)
-    };
-    used.iter().map(number).collect()
-}
-
-/// Renumber the used points in their old order, and return the old number of each new one.
-pub fn renumber(groups: &mut [Group], used: Vec<bool>) -> impl Iterator<Item = usize> + use<> {
-    let number = compact(&used);
+/// Renumber the points that groups use in their old order, and return the old number of each new one.
+pub fn renumber(groups: &mut [Group]) -> Vec<u32> {
+    let number = Numbering::in_order(groups.iter().flat_map(|group| &group.connectivity).copied());
     for point in groups.iter_mut().flat_map(|group| &mut group.connectivity) {
-        *point = number[*point as usize];
+        *point = number.get(*point).unwrap_or(ABSENT);
     }
-    (0..used.len()).filter(move |old| used[*old])
+    number.points().collect()
 }
 
 /// The entry of a point that is not a node.
 const ABSENT: u32 = u32::MAX;
 
-/// The node of each point of a body.
+/// The node of each point of a body, or our number of each tag of a file.
 #[derive(Debug, Clone, Default)]
 pub struct Numbering {
     /// Points of the body, sorted. The list is empty if `node` has an entry for every point from `first` on.
-    points: Vec<u32>,
-    first: u32,
+    points: Vec<u64>,
+    first: u64,
     node: Vec<u32>,
 }
 
@@ -172,17 +155,17 @@ const SPARSE: usize = 2;
 
 impl Numbering {
     /// Make a numbering for the points that cells name, with any repetitions. No point has a node yet.
-    pub fn new(named: impl Iterator<Item = u32> + Clone) -> Self {
-        let (count, first, last) =
-            named.clone().fold((0, u32::MAX, 0), |(count, low, high), p| (count + 1, low.min(p), high.max(p)));
+    pub fn new(named: impl Iterator<Item = impl Into<u64>> + Clone) -> Self {
+        let named = named.map(Into::into);
+        let (count, first, last): (usize, u64, u64) =
+            named.clone().fold((0, u64::MAX, 0), |(count, low, high), p| (count + 1, low.min(p), high.max(p)));
         if count == 0 {
             return Self::default();
         }
-        let wide = (last - first) as usize + 1;
-        if wide <= SPARSE * count {
-            return Self { points: Vec::new(), first, node: vec![ABSENT; wide] };
+        if last - first < (SPARSE * count) as u64 {
+            return Self { points: Vec::new(), first, node: vec![ABSENT; (last - first) as usize + 1] };
         }
-        let mut points: Vec<u32> = named.collect();
+        let mut points: Vec<u64> = named.collect();
         points.sort_unstable();
         points.dedup();
         Self { node: vec![ABSENT; points.len()], points, first }
@@ -198,21 +181,21 @@ impl Numbering {
         numbering
     }
 
-    fn place(&self, point: u32) -> Option<usize> {
+    fn place(&self, point: u64) -> Option<usize> {
         if self.points.is_empty() {
-            return Some(point.checked_sub(self.first)? as usize).filter(|&place| place < self.node.len());
+            return usize::try_from(point.checked_sub(self.first)?).ok().filter(|&place| place < self.node.len());
         }
         self.points.binary_search(&point).ok()
     }
 
     /// Return the node of a point, if it is one of the body.
-    pub fn get(&self, point: u32) -> Option<u32> {
-        self.place(point).map(|place| self.node[place]).filter(|&node| node != ABSENT)
+    pub fn get(&self, point: impl Into<u64>) -> Option<u32> {
+        self.place(point.into()).map(|place| self.node[place]).filter(|&node| node != ABSENT)
     }
 
     /// Return the node of a point that cells name, and whether it is new. A point without a node gets the node `next`.
-    pub fn number(&mut self, point: u32, next: u32) -> (u32, bool) {
-        let Some(place) = self.place(point) else { return (ABSENT, false) };
+    pub fn number(&mut self, point: impl Into<u64>, next: u32) -> (u32, bool) {
+        let Some(place) = self.place(point.into()) else { return (ABSENT, false) };
         let node = &mut self.node[place];
         let is_new = *node == ABSENT;
         if is_new {
@@ -223,8 +206,8 @@ impl Numbering {
 
     /// Return the points of the body, in the order of the mesh.
     pub fn points(&self) -> impl Iterator<Item = u32> {
-        let at = |place: usize| self.points.get(place).copied().unwrap_or(self.first + place as u32);
-        (0..self.node.len()).filter(|&place| self.node[place] != ABSENT).map(at)
+        let at = |place: usize| self.points.get(place).copied().unwrap_or(self.first + place as u64);
+        (0..self.node.len()).filter(|&place| self.node[place] != ABSENT).map(move |place| at(place) as u32)
     }
 }
 
@@ -234,9 +217,9 @@ mod tests {
 
     #[test]
     fn near_points_and_far_ones_have_nodes() {
-        for named in [vec![7, 9, 8, 7], vec![1_000_000, 9, 8, 1_000_000]] {
+        for named in [vec![7_u32, 9, 8, 7], vec![1_000_000, 9, 8, 1_000_000]] {
             let mut numbering = Numbering::new(named.iter().copied());
-            assert_eq!(numbering.get(9), None);
+            assert_eq!(numbering.get(9_u32), None);
             let nodes: Vec<(u32, bool)> = (0..).zip(&named).map(|(k, &point)| numbering.number(point, k)).collect();
             assert_eq!(nodes, [(0, true), (1, true), (2, true), (0, false)]);
             assert_eq!(named.iter().map(|&point| numbering.get(point)).collect::<Vec<_>>(), [0, 1, 2, 0].map(Some));
@@ -249,6 +232,6 @@ mod tests {
             assert!(ordered.points().zip(0..).all(|(point, number)| ordered.get(point) == Some(number)));
             assert_eq!(ordered.points().count(), 3);
         }
-        assert!(Numbering::new([].into_iter()).points().next().is_none());
+        assert!(Numbering::new(std::iter::empty::<u32>()).points().next().is_none());
     }
 }

@@ -132,8 +132,7 @@ impl<const D: usize> Mesh<D> {
         }
         groups.retain(|group| !group.is_empty());
         let mut groups: Groups = groups.into();
-        let used = groups::used(&groups, self.points.len());
-        let points = groups::renumber(&mut groups, used).map(|old| self.points[old]).collect();
+        let points = groups::renumber(&mut groups).into_iter().map(|old| self.points[old as usize]).collect();
         Mesh { points, order: Order::P1, groups, path: self.path.clone(), ..*self }
     }
 }

@@ -155,7 +155,6 @@ fn finish<const D: usize>(
         return Err(fail(format!("no physical group holds {cells}s, and dimension = {D}")).help(example));
     };
     let point = |x: [f64; 3]| std::array::from_fn(|k| x[k]);
-    let used = groups::used(&groups, nodes.points.len());
-    let points = groups::renumber(&mut groups, used).map(|old| point(nodes.points[old])).collect();
+    let points = groups::renumber(&mut groups).into_iter().map(|old| point(nodes.points[old as usize])).collect();
     Ok(Mesh { path: path.to_owned(), points, datum: [0.0; D], order, groups: groups.into(), split, straightened: 0 })
 }

@@ -6,7 +6,7 @@
 //! on them cannot be cached.
 
 use super::cache::write;
-use super::trust::{self, READ, RUN, Token, tokens};
+use super::trust::{self, READ, Token, runs, tokens};
 use crate::error::{Error, Kind, Located, Place, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -202,19 +202,8 @@ fn options_of(path: &Path) -> PathBuf {
 
 /// Words of Gmsh whose values differ between runs or places. They stand for the clock, the memory, random numbers, whether a
 /// file exists, and the paths of the script and the program.
-const CHANGING: [&str; 11] = [
-    "Cpu",
-    "Memory",
-    "TotalMemory",
-    "Today",
-    "Rand",
-    "FileExists",
-    "CurrentDirectory",
-    "CurrentDir",
-    "CurrentFileName",
-    "AbsolutePath",
-    "GmshExecutableName",
-];
+const CHANGING: &str = "Cpu Memory TotalMemory Today Rand FileExists CurrentDirectory CurrentDir CurrentFileName AbsolutePath \
+                        GmshExecutableName";
 
 /// The variable that this program sets for Gmsh, to another value each time.
 const HOME: &str = "GMSH_HOME";
@@ -243,7 +232,7 @@ impl Inputs {
                 ("GetEnv", _) => true,
                 (_, [Sign('='), ..]) => false,
                 (_, [Text(_), Sign(';'), ..]) if READ.contains(&name) => false,
-                _ => CHANGING.contains(&name) || RUN.contains(&name) || READ.contains(&name),
+                _ => CHANGING.split(' ').any(|word| word == name) || runs(name) || READ.contains(&name),
             };
             if is_unknown {
                 self.unknown.get_or_insert_with(|| name.to_owned());

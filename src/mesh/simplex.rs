@@ -73,40 +73,9 @@ pub const PYRAMID: Shape = Shape {
     faces: &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
 };
 
-/// Gmsh's types of elements in the order of their numbers, which begin with 1: shape and number of nodes.
-const TYPES: [(&Shape, usize); 31] = [
-    (&LINE, 2),
-    (&TRIANGLE, 3),
-    (&QUADRANGLE, 4),
-    (&TETRAHEDRON, 4),
-    (&HEXAHEDRON, 8),
-    (&PRISM, 6),
-    (&PYRAMID, 5),
-    (&LINE, 3),
-    (&TRIANGLE, 6),
-    (&QUADRANGLE, 9),
-    (&TETRAHEDRON, 10),
-    (&HEXAHEDRON, 27),
-    (&PRISM, 18),
-    (&PYRAMID, 14),
-    (&POINT, 1),
-    (&QUADRANGLE, 8),
-    (&HEXAHEDRON, 20),
-    (&PRISM, 15),
-    (&PYRAMID, 13),
-    (&TRIANGLE, 9),
-    (&TRIANGLE, 10),
-    (&TRIANGLE, 12),
-    (&TRIANGLE, 15),
-    (&TRIANGLE, 15),
-    (&TRIANGLE, 21),
-    (&LINE, 4),
-    (&LINE, 5),
-    (&LINE, 6),
-    (&TETRAHEDRON, 20),
-    (&TETRAHEDRON, 35),
-    (&TETRAHEDRON, 56),
-];
+/// Numbers of nodes of Gmsh's types of elements in the order of their numbers, which begin with 1.
+const NODES: [usize; 31] =
+    [2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56];
 
 /// Gmsh's number of the type of points.
 pub const POINTS: i32 = 15;
@@ -125,14 +94,23 @@ pub struct Kind {
 impl Kind {
     /// Return the type with this number of Gmsh.
     pub fn of(number: i32) -> Option<Kind> {
-        let &(shape, nodes) = TYPES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
+        let nodes = *NODES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
+        let shape = match number {
+            1 | 8 | 26..=28 => &LINE,
+            2 | 9 | 20..=25 => &TRIANGLE,
+            3 | 10 | 16 => &QUADRANGLE,
+            4 | 11 | 29..=31 => &TETRAHEDRON,
+            5 | 12 | 17 => &HEXAHEDRON,
+            6 | 13 | 18 => &PRISM,
+            7 | 14 | 19 => &PYRAMID,
+            _ => &POINT,
+        };
         Some(Kind { number, shape, nodes })
     }
 
     /// Return Gmsh's number of the type with this shape and number of nodes.
     pub fn number(shape: &Shape, nodes: usize) -> i32 {
-        let place = TYPES.iter().position(|&(other, count)| other == shape && count == nodes);
-        place.map_or(0, |place| place as i32 + 1)
+        (1..).map_while(Kind::of).find(|kind| kind.shape == shape && kind.nodes == nodes).map_or(0, |kind| kind.number)
     }
 
     /// Return whether this program computes with it: it is a point, or of order 1 or 2.

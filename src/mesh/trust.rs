@@ -16,21 +16,12 @@ pub struct Breach {
     pub what: String,
 }
 
-/// Commands that run other programs, or text that the script makes up.
-pub const RUN: [&str; 11] = [
-    "SystemCall",
-    "System",
-    "NonBlockingSystemCall",
-    "NonBlockingSystem",
-    "OnelabRun",
-    "OnelabAction",
-    "ExternalProcess",
-    "Parse",
-    "Plugin",
-    // These two turn a text into the name of a command.
-    "StringToName",
-    "S2N",
-];
+/// Return whether a command runs other programs, or text that the script makes up. The last two turn a text into the name of a command.
+pub fn runs(name: &str) -> bool {
+    const ALL: &str = "SystemCall System NonBlockingSystemCall NonBlockingSystem OnelabRun OnelabAction ExternalProcess Parse Plugin \
+                       StringToName S2N";
+    ALL.split(' ').any(|known| known == name)
+}
 
 /// Commands that write a file or a folder. `Print.Background` and the like are numbers.
 const WRITE: [&str; 5] = ["Save", "Print", "CreateDir", "RenameFile", "DeleteFile"];
@@ -70,7 +61,7 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
             }
             // A variable of this name is not a command.
             Token::Name(_) if matches!(next, Some(Token::Sign('='))) => None,
-            Token::Name(name) if RUN.contains(&name) => Some(format!("runs other programs or made-up text: `{name}`")),
+            Token::Name(name) if runs(name) => Some(format!("runs other programs or made-up text: `{name}`")),
             Token::Name(name) if WRITE.contains(&name) && next != Some(Token::Sign('.')) => {
                 Some(format!("writes files: `{name}`"))
             }

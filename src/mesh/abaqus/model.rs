@@ -277,33 +277,9 @@ impl Kind {
     }
 }
 
-/// Families of elements by the beginning of their names, with their dimension. The number of nodes follows.
-const FAMILIES: [(&str, usize); 24] = [
-    ("C3D", 3),
-    ("DC3D", 3),
-    ("SC", 3),
-    ("CPS", 2),
-    ("CPE", 2),
-    ("CPEG", 2),
-    ("CAX", 2),
-    ("CGAX", 2),
-    ("DC2D", 2),
-    ("DCAX", 2),
-    ("S", 2),
-    ("DS", 2),
-    ("STRI", 2),
-    ("M3D", 2),
-    ("SFM3D", 2),
-    ("R3D", 2),
-    ("T2D", 1),
-    ("T3D", 1),
-    ("R2D", 1),
-    ("RAX", 1),
-    ("B2", 1),
-    ("B3", 1),
-    ("SAX", 1),
-    ("MAX", 1),
-];
+/// Families of elements of dimension 1 to 3 by the beginning of their names. The number of nodes follows.
+const FAMILIES: [&str; 3] =
+    ["T2D T3D R2D RAX B2 B3 SAX MAX", "CPS CPE CPEG CAX CGAX DC2D DCAX S DS STRI M3D SFM3D R3D", "C3D DC3D SC"];
 
 impl Role {
     /// Return what the elements of a type are.
@@ -311,7 +287,9 @@ impl Role {
         let name = name.to_ascii_uppercase();
         let begins =
             |family: &str| name.strip_prefix(family).filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()));
-        let matching = FAMILIES.iter().filter_map(|&(family, dimension)| Some((family, dimension, begins(family)?)));
+        let families =
+            (1..).zip(FAMILIES).flat_map(|(dimension, all)| all.split(' ').map(move |family| (family, dimension)));
+        let matching = families.filter_map(|(family, dimension)| Some((family, dimension, begins(family)?)));
         let Some((family, dimension, rest)) = matching.max_by_key(|(family, ..)| family.len()) else {
             return Role::LeftOut;
         };
