@@ -9,14 +9,26 @@ use crate::error::{Error, Place, Result, few};
 use crate::fem::Facets;
 use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-/// Two bodies that form pairs, or parts of a body's surface that do.
-pub struct Found<const D: usize> {
-    /// Index of the rule.
-    pub rule: usize,
-    /// Indices of the bodies, the smaller one first.
+/// A table of the scene.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub enum Entry {
+    /// Index of a contact that names its surfaces.
+    Named(usize),
+    /// Index of the rule by which the pair was found.
+    Found(usize),
+}
+
+/// Two surfaces that form pairs.
+pub struct Found<'a, const D: usize> {
+    /// The table of the scene.
+    pub entry: Entry,
+    /// Indices of the bodies.
     pub bodies: [usize; 2],
+    /// Names of the surfaces; those of the bodies if the pair was found.
+    pub names: [&'a str; 2],
     /// The pairs: one, or several where surfaces have edges.
     pub pieces: Vec<Piece<D>>,
 }
@@ -29,12 +41,12 @@ pub struct Found<const D: usize> {
 ///
 /// # Errors
 /// A rule finds nothing, a pattern matches no body, or two rules match a pair equally well.
-pub fn find<const D: usize>(
+pub fn find<'a, const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
-    parts: &[Part<D>],
+    parts: &'a [Part<D>],
     named: &HashSet<[usize; 2]>,
-) -> Result<Vec<Found<D>>> {
+) -> Result<Vec<Found<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
     }
@@ -98,7 +110,12 @@ fn possible<const D: usize>(
 }
 
 /// Return the pairs that two possible bodies form, which are none if their facets have no common piece.
-fn meeting<const D: usize>(rules: &[AutoContact], cut: Cut<D>, whole: &[Side<D>], possible: &Possible<D>) -> Found<D> {
+fn meeting<'a, const D: usize>(
+    rules: &[AutoContact],
+    cut: Cut<D>,
+    whole: &[Side<'a, D>],
+    possible: &Possible<D>,
+) -> Found<'a, D> {
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
         Side::new(name, space, possible.near[k].clone(), prescribed, frame)
@@ -107,7 +124,8 @@ fn meeting<const D: usize>(rules: &[AutoContact], cut: Cut<D>, whole: &[Side<D>]
     let reach = Reach::between(&a, &b, spec.angle, spec.distance);
     let mut pieces = Split::new([&a, &b], spec.edge, cut, &reach).into_pieces();
     pieces.sort_by_key(|piece| piece.face);
-    Found { rule: possible.rule, bodies: possible.bodies, pieces }
+    let names = possible.bodies.map(|body| whole[body].name);
+    Found { entry: Entry::Found(possible.rule), bodies: possible.bodies, names, pieces }
 }
 
 /// Check that every rule found a pair.
@@ -115,7 +133,8 @@ fn meeting<const D: usize>(rules: &[AutoContact], cut: Cut<D>, whole: &[Side<D>]
 /// # Errors
 /// A rule found no pair; the first such rule is reported.
 fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> Result<()> {
-    let is_fruitless = |rule: &usize| found.iter().all(|found| found.rule != *rule);
+    let is_fruitless =
+        |rule: &usize| found.iter().all(|found| !matches!(found.entry, Entry::Found(other) if other == *rule));
     let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };
     let (bodies, place) = title(&rules[rule]);
     let message = format!("no facets of {bodies} face each other within {}", distance(&rules[rule]));

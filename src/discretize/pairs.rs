@@ -1,10 +1,10 @@
 //! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two surfaces do not face
 //! each other.
 
-use super::auto::{self, Found, Piece, Split};
+use super::auto::{self, Entry, Found, Piece, Split};
 use super::part::Part;
-use super::roster::{find_group, point};
-use super::surface::{ContactSurface, Surface};
+use super::roster::{Owners, find_group, point};
+use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Common, Cut, Reach};
 use crate::contact::{self, Chords, ContactPair, End, Faces, Fault, Fine, ROUNDING, Side, unit};
@@ -75,15 +75,6 @@ struct Origin {
     is_split: bool,
 }
 
-/// A table of the scene.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-enum Entry {
-    /// Index of a contact that names its surfaces.
-    Named(usize),
-    /// Index of the rule by which the pair was found.
-    Found(usize),
-}
-
 impl Origin {
     /// Describe a pair of faces of two surfaces with these names.
     fn new(entry: Entry, names: [&str; 2], face: [Option<usize>; 2]) -> Self {
@@ -117,63 +108,44 @@ pub fn all<const D: usize>(
     parts: &[Part<D>],
     fine: bool,
 ) -> Result<Vec<Contact<D>>> {
+    let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
+    let owners =
+        Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
+    let named = scene.contacts.iter().enumerate();
+    let mut found = named.map(|named| self::named(named, mesh, cut, &owners, parts)).collect::<Result<Vec<_>>>()?;
+    let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
+    let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
+    found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
     let mut opposite = Vec::new();
-    let mut named = HashSet::new();
-    let owners = if scene.contacts.is_empty() { Owners::default() } else { Owners::new(parts) };
-    for (number, spec) in scene.contacts.iter().enumerate() {
-        let surfaces = named_surfaces(spec, mesh, &owners, parts)?;
-        let [a, b] = surfaces.each_ref().map(|surface| surface.body);
-        named.insert([a.min(b), a.max(b)]);
-        let names = surfaces.each_ref().map(|surface| surface.name);
-        for piece in named_pieces(spec, cut, parts, surfaces) {
-            let origin = Origin::new(Entry::Named(number), names, piece.face);
-            opposite.push(Opposite::new(origin, scene, parts, [a, b], names, piece));
-        }
-    }
-    for Found { rule, bodies, pieces } in auto::find(&scene.auto, cut, parts, &named)? {
-        let names = bodies.map(|body| parts[body].spec.name.value.as_str());
-        for piece in pieces {
-            let origin = Origin::new(Entry::Found(rule), names, piece.face);
-            opposite.push(Opposite::new(origin, scene, parts, bodies, names, piece));
-        }
+    for Found { entry, bodies, names, pieces } in found {
+        opposite.extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece)));
     }
     opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
 }
 
-/// Return the two surfaces that a contact names.
+/// Return the pairs of the two surfaces that a contact names: one, or several where they have edges.
 ///
 /// # Errors
 /// A surface is missing, or bounds no body or several. Both belong to one body.
-fn named_surfaces<'a, const D: usize>(
-    spec: &'a ContactSpec,
+fn named<'a, const D: usize>(
+    (number, spec): (usize, &'a ContactSpec),
     mesh: &Mesh<D>,
+    cut: Cut<D>,
     owners: &Owners,
     parts: &[Part<D>],
-) -> Result<[Surface<'a, D>; 2]> {
+) -> Result<Found<'a, D>> {
     let surface = |k: usize| {
-        let name = &spec.between[k];
-        let group = find_group(mesh, name, &[D - 1], "contact surface")?;
-        let (body, facets) = owners.of(name, group, parts)?;
-        Ok(Surface { body, name: &name.value, facets })
+        let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
+        bounded(&spec.between[k], group, owners, parts)
     };
-    let surfaces = [surface(0)?, surface(1)?];
-    if surfaces[0].body == surfaces[1].body {
-        let body = &parts[surfaces[0].body].spec.name.value;
-        let message = format!("both surfaces belong to body `{body}`");
+    let [(first, on_first), (second, on_second)] = [surface(0)?, surface(1)?];
+    if first == second {
+        let message = format!("both surfaces belong to body `{}`", parts[first].spec.name.value);
         return Err(Error::scene(&spec.between[1].place, message)
             .help("contact of a body with itself is out of scope; make two bodies of it"));
     }
-    Ok(surfaces)
-}
-
-/// Return the pairs of two named surfaces: one, or several where they have edges.
-fn named_pieces<const D: usize>(
-    spec: &ContactSpec,
-    cut: Cut<D>,
-    parts: &[Part<D>],
-    surfaces: [Surface<D>; 2],
-) -> Vec<Piece<D>> {
-    let sides = surfaces.map(|Surface { body, name, facets }| parts[body].side(name, facets));
+    let names = spec.between.each_ref().map(|name| name.value.as_str());
+    let sides = [parts[first].side(names[0], on_first), parts[second].side(names[1], on_second)];
     let is_smooth = |side: &Side<D>| {
         let all = vec![true; side.facets.count()];
         !Faces::new(side, spec.edge).meet(side, &all)
@@ -192,14 +164,10 @@ fn named_pieces<const D: usize>(
     }
     // Surfaces without edges stay as they are, and so do those that do not face each other, which are refused later.
     if pieces.is_empty() {
-        pieces.push(Piece {
-            facets: sides.map(|side| side.facets),
-            face: [None; 2],
-            idle: [0; 2],
-            far: Default::default(),
-        });
+        let facets = sides.map(|side| side.facets);
+        pieces.push(Piece { facets, face: [None; 2], idle: [0; 2], far: Default::default() });
     }
-    pieces
+    Ok(Found { entry: Entry::Named(number), bodies: [first, second], names, pieces })
 }
 
 /// Return whether the second of two surfaces carries the contact points of their pair: the finer one does, whatever the order in the
@@ -229,13 +197,14 @@ struct Opposite<'a, const D: usize> {
 impl<'a, const D: usize> Opposite<'a, D> {
     /// Make the sides of a pair from a piece of two surfaces with these bodies and names.
     fn new(
-        origin: Origin,
+        entry: Entry,
         scene: &Scene,
         parts: &'a [Part<D>],
         bodies: [usize; 2],
         names: [&'a str; 2],
         piece: Piece<D>,
     ) -> Self {
+        let origin = Origin::new(entry, names, piece.face);
         let spec = origin.spec(scene);
         let Piece { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
         let first = parts[bodies[0]].side(names[0], on_first);
@@ -310,65 +279,38 @@ fn refuse(spec: &ContactSpec, fault: Fault, why: impl Fn() -> [String; 2]) -> Er
     }
 }
 
-/// The bodies of every point of the mesh: (point, body), sorted.
-#[derive(Default)]
-struct Owners(Vec<(u32, usize)>);
-
-impl Owners {
-    fn new<const D: usize>(parts: &[Part<D>]) -> Self {
-        let of_body = |(body, part): (usize, &Part<D>)| {
-            part.space.mesh_points().map(move |point| (point, body)).collect::<Vec<_>>()
-        };
-        let mut all: Vec<(u32, usize)> = parts.iter().enumerate().flat_map(of_body).collect();
-        all.sort_unstable();
-        Self(all)
-    }
-
-    /// Return the bodies with points of a group.
-    fn touching(&self, group: &Group) -> BTreeSet<usize> {
-        let at = |&point: &u32| {
-            let first = self.0.partition_point(|entry| entry.0 < point);
-            self.0[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
-        };
-        group.connectivity.iter().flat_map(at).collect()
-    }
-
-    /// Return the body that a contact surface bounds, with its facets there.
-    ///
-    /// # Errors
-    /// The surface bounds no body or several, or only some of its facets bound the body.
-    fn of<const D: usize>(
-        &self,
-        name: &Located<String>,
-        group: &Group,
-        parts: &[Part<D>],
-    ) -> Result<(usize, Facets<D>)> {
-        let mut found: Vec<(usize, Facets<D>)> = self
-            .touching(group)
-            .into_iter()
-            .map(|body| (body, parts[body].space.facets(group)))
-            .filter(|(_, facets)| facets.count() > 0)
-            .collect();
-        let all = group.connectivity.len() / group.stride;
-        match (found.pop(), found.len()) {
-            (Some((body, facets)), 0) if facets.count() == all => Ok((body, facets)),
-            (Some((body, facets)), 0) => {
-                let body = &parts[body].spec.name.value;
-                let message =
-                    format!("only {} of {all} facets of `{}` bound body `{body}`", facets.count(), name.value);
-                Err(Error::scene(&name.place, message)
-                    .help("a contact surface must lie on one body as a whole: split the physical group"))
-            }
-            (None, _) => {
-                Err(Error::scene(&name.place, format!("surface `{}` bounds no body of the scene", name.value))
-                    .help("add the body it belongs to, or name another surface"))
-            }
-            (Some((last, _)), _) => {
-                let bodies = [found[0].0, last].map(|body| parts[body].spec.name.value.clone());
-                let message = format!("surface `{}` bounds both `{}` and `{}`", name.value, bodies[0], bodies[1]);
-                Err(Error::scene(&name.place, message)
-                    .help("give each body a group of its own there (bodies share no nodes), or let contacts be found: between = \"auto\""))
-            }
+/// Return the body that a contact surface bounds, with its facets there.
+///
+/// # Errors
+/// The surface bounds no body or several, or only some of its facets bound the body.
+fn bounded<const D: usize>(
+    name: &Located<String>,
+    group: &Group,
+    owners: &Owners,
+    parts: &[Part<D>],
+) -> Result<(usize, Facets<D>)> {
+    let touching: BTreeSet<usize> = group.connectivity.iter().flat_map(|&point| owners.of(point)).collect();
+    let mut found: Vec<(usize, Facets<D>)> = touching
+        .into_iter()
+        .map(|body| (body, parts[body].space.facets(group)))
+        .filter(|(_, facets)| facets.count() > 0)
+        .collect();
+    let all = group.connectivity.len() / group.stride;
+    match (found.pop(), found.len()) {
+        (Some((body, facets)), 0) if facets.count() == all => Ok((body, facets)),
+        (Some((body, facets)), 0) => {
+            let body = &parts[body].spec.name.value;
+            let message = format!("only {} of {all} facets of `{}` bound body `{body}`", facets.count(), name.value);
+            Err(Error::scene(&name.place, message)
+                .help("a contact surface must lie on one body as a whole: split the physical group"))
+        }
+        (None, _) => Err(Error::scene(&name.place, format!("surface `{}` bounds no body of the scene", name.value))
+            .help("add the body it belongs to, or name another surface")),
+        (Some((last, _)), _) => {
+            let bodies = [found[0].0, last].map(|body| parts[body].spec.name.value.clone());
+            let message = format!("surface `{}` bounds both `{}` and `{}`", name.value, bodies[0], bodies[1]);
+            Err(Error::scene(&name.place, message)
+                .help("give each body a group of its own there (bodies share no nodes), or let contacts be found: between = \"auto\""))
         }
     }
 }

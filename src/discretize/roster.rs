@@ -77,7 +77,13 @@ impl<'a> Values<'a> {
 
     /// Return the value of a field at a point of the scene, or zero where the field has none.
     pub fn at(&self, field: &Field, x: [f64; 3]) -> f64 {
-        field.eval_finite(self.what, x).unwrap_or_else(|error| {
+        self.checked(field, x, |_| Ok(()))
+    }
+
+    /// Return the value of a field at a point of the scene, or zero where it has none or `check` refuses it.
+    pub fn checked(&self, field: &Field, x: [f64; 3], check: impl Fn(f64) -> Result<()>) -> f64 {
+        let value = field.eval_finite(self.what, x).and_then(|value| check(value).map(|()| value));
+        value.unwrap_or_else(|error| {
             self.refused.borrow_mut().get_or_insert_with(|| error.because(of_body(self.body)));
             0.0
         })
@@ -298,27 +304,41 @@ pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
             }
         }
     }
-    owners.sort_unstable();
-    owners.dedup();
-    let of = |point: u32| {
-        let first = owners.partition_point(|entry| entry.0 < point);
-        owners[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
-    };
+    let owners = Owners::new(owners);
     let mut lying = vec![Vec::new(); names.len()];
     for (place, group) in (0..).zip(mesh.groups.iter()) {
         if let Some(&body) = number.get(group.name.as_str()).filter(|_| group.dimension == D) {
             lying[body].push(place);
             continue;
         }
-        let on_all = |corners: &[u32], body: usize| corners.iter().all(|&point| of(point).any(|other| other == body));
+        let on_all =
+            |corners: &[u32], body: usize| corners.iter().all(|&point| owners.of(point).any(|other| other == body));
         let on = |simplex: &[u32]| {
             let corners = simplex[1..=group.dimension].to_vec();
-            of(simplex[0]).filter(move |&body| on_all(&corners, body)).collect::<Vec<_>>()
+            owners.of(simplex[0]).filter(move |&body| on_all(&corners, body)).collect::<Vec<_>>()
         };
         let bodies: BTreeSet<usize> = group.simplices().flat_map(on).collect();
         bodies.into_iter().for_each(|body| lying[body].push(place));
     }
     Ok(lying)
+}
+
+/// The bodies of every point of the mesh: (point, body), sorted.
+pub struct Owners(Vec<(u32, usize)>);
+
+impl Owners {
+    /// Sort the bodies of points.
+    pub fn new(mut all: Vec<(u32, usize)>) -> Self {
+        all.sort_unstable();
+        all.dedup();
+        Self(all)
+    }
+
+    /// Return the bodies of a point.
+    pub fn of(&self, point: u32) -> impl Iterator<Item = usize> {
+        let first = self.0.partition_point(|entry| entry.0 < point);
+        self.0[first..].iter().take_while(move |entry| entry.0 == point).map(|entry| entry.1)
+    }
 }
 
 /// Return the names of the groups that a name or pattern of the scene means. If none has such a name, those with the same plain

@@ -1,7 +1,7 @@
 //! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on surfaces are here, too,
 //! since rigid surfaces turn about the same centre.
 
-use super::roster::{earlier, find_group, not_on_body, of_body, point, without_area};
+use super::roster::{Values, earlier, find_group, not_on_body, of_body, point, without_area};
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
@@ -11,7 +11,6 @@ use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 
 /// One condition n.u = value at a node, with the direction n.
@@ -341,13 +340,15 @@ pub fn spring_blocks<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Vec<NodalBlock<D>>> {
     let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
-    let fault = RefCell::new(None);
-    let value = |field: &Field, x: [f64; D]| match stiffness(field, spring, space.in_scene(x)) {
-        Ok(value) => value,
-        Err(error) => {
-            fault.borrow_mut().get_or_insert(error.because(of_body(&spec.name.value)));
-            0.0
-        }
+    let values = Values::of("the stiffness of this spring", &spec.name.value);
+    let value = |field: &Field, x: [f64; D]| {
+        let x = space.in_scene(x);
+        values.checked(field, x, |k| {
+            let message =
+                || format!("the stiffness of the spring on `{}` is {} at {}", spring.on.value, shown(k), point(x));
+            let place = field.place().unwrap_or(&spring.on.place);
+            if k >= 0.0 { Ok(()) } else { Err(Error::scene(place, message()).label("must not be negative")) }
+        })
     };
     let at = |x: [f64; D], n: [f64; D]| -> [[f64; D]; D] {
         match &spring.kind {
@@ -374,30 +375,8 @@ pub fn spring_blocks<const D: usize>(
         }
         surface::foundation(space, &facets, &at)
     };
-    match fault.into_inner() {
-        Some(error) => Err(error),
-        None if blocks.is_empty() => Err(not_on_body(&spring.on, &spec.name.value)),
-        None => Ok(blocks),
-    }
-}
-
-/// Return the stiffness at a point.
-///
-/// # Errors
-/// The stiffness is negative or not finite.
-fn stiffness(field: &Field, spring: &SpringSpec, x: [f64; 3]) -> Result<f64> {
-    match field.eval_finite("the stiffness of this spring", x)? {
-        k if k >= 0.0 => Ok(k),
-        k => {
-            let message = format!(
-                "the stiffness of the spring on `{}` is {} at {}",
-                spring.on.value,
-                shown(k),
-                super::roster::point(x)
-            );
-            Err(Error::scene(field.place().unwrap_or(&spring.on.place), message).label("must not be negative"))
-        }
-    }
+    values.refused()?;
+    if blocks.is_empty() { Err(not_on_body(&spring.on, &spec.name.value)) } else { Ok(blocks) }
 }
 
 /// Return the centre of a surface: the mean place over its area.

@@ -3,21 +3,11 @@
 
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::expression::Field;
-use crate::fem::{Facets, element};
+use crate::fem::element;
 use crate::output::vtu::{CellKind, Grid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
-
-/// One surface of a pair, which is a set of facets of a body.
-pub struct Surface<'a, const D: usize> {
-    /// Index of the body.
-    pub body: usize,
-    /// Name of the physical group, or of the body if the pair was found.
-    pub name: &'a str,
-    /// The facets, oriented outwards.
-    pub facets: Facets<D>,
-}
 
 /// The facets of the side that carries the contact points.
 #[derive(Serialize, Deserialize)]
