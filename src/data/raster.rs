@@ -234,7 +234,6 @@ impl<'a> Words<'a> {
     }
 }
 
-/// Return the refusal of a word that is no number.
 fn refuse_word(spec: &DataSpec, line: u64, word: &str) -> Error {
     let start: String = word.chars().take(40).collect();
     let help = format!("if it stands for a point without a height, write missing = {start:?}");

@@ -80,7 +80,6 @@ fn of_text(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     Ok(rows)
 }
 
-/// Return the fields of a line.
 fn fields_of(text: &[u8], separator: u8) -> impl Iterator<Item = &[u8]> {
     let fields = text.split(move |&byte| byte == separator).map(<[u8]>::trim_ascii);
     // several blanks are one separator
@@ -113,7 +112,6 @@ fn refuse_empty_row<'a>(
     Err(spec.refuse(format!("line {line} has no number, but {count} times `{word}`"), &help))
 }
 
-/// Return the refusal of a field that is no number.
 fn refuse_field(spec: &DataSpec, line: u64, field: &[u8]) -> Error {
     let what = match field.is_empty() {
         true => format!("line {line} lacks a number between two separators"),
@@ -231,7 +229,6 @@ fn refuse_short_header(spec: &DataSpec, bytes: &[u8]) -> Result<()> {
     }
 }
 
-/// Read the numbers of an array.
 fn numbers<T: Deserialize + Into<f64>>(file: NpyFile<&[u8]>) -> std::io::Result<Vec<f64>> {
     file.data::<T>().map_err(std::io::Error::other)?.map(|number| number.map(Into::into)).collect()
 }

@@ -116,7 +116,6 @@ fn border(mut edge: Edge, place: [f64; 2]) -> Sample {
     Sample { value: a.value + t * (b.value - a.value), gradient: [slope * x, slope * y] }
 }
 
-/// Return the vector from a to b.
 fn from(a: Height, b: Height) -> [f64; 2] {
     [b.place.x - a.place.x, b.place.y - a.place.y]
 }

@@ -1,6 +1,7 @@
 //! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
 
 use super::roster::{find_group, load_dimensions};
+use super::supports::unit;
 use crate::contact::{add, pad};
 use crate::error::Result;
 use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};
@@ -72,7 +73,6 @@ pub struct Outer {
     held: Vec<Place>,
     /// Integrals of the shape functions over the body, if it has no loads, supports or springs.
     whole: Weights,
-    /// Number of nodes of the body.
     nodes: usize,
 }
 
@@ -95,19 +95,18 @@ impl Outer {
                 LoadKind::Force { total, .. } | LoadKind::Turning { force: total, .. } => total,
                 _ => resultant(load)?,
             };
-            outer.loaded.push(Place::new(space, group, unit(force).into_iter().collect()));
+            outer.loaded.push(Place::new(space, group, normalized(force).into_iter().collect()));
         }
-        let axes = |c: usize| std::array::from_fn(|k| if k == c { 1.0 } else { 0.0 });
         for fix in &spec.fix {
             let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
-            let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axes);
+            let components = (0..D).filter(|&c| fix.value[c].is_some()).map(unit);
             let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
             outer.held.push(Place::new(space, group, components.chain(normal).collect()));
         }
         for spring in &spec.spring {
             let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
             let directions = match &spring.kind {
-                SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axes).collect(),
+                SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(unit).collect(),
                 SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
             };
             outer.held.push(Place::new(space, group, directions));
@@ -160,16 +159,12 @@ fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &
 
 /// Return the integrals of the shape functions over a surface.
 fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
-    first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| along_first()))
+    first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| unit(0)))
 }
 
 /// Return the integrals of the shape functions over the body.
 fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
-    first_components(&assemble::body_force(space, Parts::Whole, &|_| along_first()))
-}
-
-fn along_first<const D: usize>() -> [f64; D] {
-    std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 })
+    first_components(&assemble::body_force(space, Parts::Whole, &|_| unit(0)))
 }
 
 fn first_components<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {
@@ -183,10 +178,10 @@ fn normal<const D: usize>(space: &Space<D>, group: &crate::mesh::Group) -> Optio
     }
     let mut sum = [0.0; 3];
     space.facets(group).normals(space).into_iter().for_each(|n| add(&mut sum, pad(n)));
-    unit(sum)
+    normalized(sum)
 }
 
-fn unit(v: [f64; 3]) -> Option<[f64; 3]> {
+fn normalized(v: [f64; 3]) -> Option<[f64; 3]> {
     let size = dot(&v, &v).sqrt();
     (size > 0.0).then(|| v.map(|v| v / size))
 }

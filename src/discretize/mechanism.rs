@@ -95,7 +95,6 @@ fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
 /// The contact rows of some bodies. Pairs are numbered among those that touch these bodies.
 struct Rows {
     segments: Vec<Vec<Segment>>,
-    /// Number of points of each pair.
     points: Vec<usize>,
     /// Share of each point in the area of its pair, so that motions have equal weight wherever they are resisted.
     weight: Vec<f64>,
@@ -142,7 +141,6 @@ impl<const D: usize> Search<'_, '_, D> {
         &self.bodies[body].unconstrained.left
     }
 
-    /// Return the extent of a body.
     fn extent(&self, body: usize) -> &Extent {
         &self.bodies[body].part.facts.extent
     }
@@ -431,9 +429,7 @@ fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
 struct Moving<const D: usize> {
     /// Indices of the bodies that it moves.
     bodies: Vec<usize>,
-    /// Rigid motion of each of these bodies.
     motions: Vec<RigidMotion<D>>,
-    /// Name of the motion.
     name: String,
     /// Gap change per unit of the motion: the root of the sum over pairs of its mean square.
     error: f64,

@@ -357,7 +357,6 @@ pub struct Resultant {
 }
 
 impl Resultant {
-    /// Add a force at a node.
     fn add<const D: usize>(&mut self, space: &Space<D>, node: u32, force: [f64; D]) {
         add(&mut self.force, space.net_force(force));
         add(&mut self.moment, space.net_moment(node, force));

@@ -284,7 +284,8 @@ impl<const D: usize> Constraints<D> {
     }
 }
 
-fn unit<const D: usize>(component: usize) -> [f64; D] {
+/// Return the unit vector along an axis.
+pub fn unit<const D: usize>(component: usize) -> [f64; D] {
     std::array::from_fn(|c| if c == component { 1.0 } else { 0.0 })
 }
 
@@ -383,7 +384,7 @@ pub fn spring_blocks<const D: usize>(
 pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts) -> [f64; 3] {
     let sum =
         |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
-    let area = sum(&|_| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }))[0];
+    let area = sum(&|_| unit(0))[0];
     sum(&|x| x).map(|sum| sum / area)
 }
 
@@ -418,8 +419,7 @@ pub fn moment_load<const D: usize>(
     // In the plane bodies turn about z alone. The other axes keep a one on the diagonal.
     let mut inertia = Matrix3::identity();
     for axis in if D == 2 { 2..3 } else { 0..3 } {
-        let unit = std::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 });
-        inertia.set_column(axis, &moment_of(&turn(unit)));
+        inertia.set_column(axis, &moment_of(&turn(unit(axis))));
     }
     let theta = inertia.lu().solve(&Vector3::from(moment)).unwrap_or(Vector3::repeat(f64::NAN));
     turn(theta.into())

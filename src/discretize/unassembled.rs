@@ -98,7 +98,6 @@ pub struct OnDofs {
 
 /// A dof that can be fixed against a motion.
 pub struct Candidate {
-    /// Index of the dof.
     dof: usize,
     /// Magnitude of the motion there.
     pub size: f64,

@@ -155,7 +155,6 @@ fn asked(body: &BodySpec) -> Asked<'_> {
 /// What a line of a scene needs of the group that it names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Need {
-    /// Facets.
     Facets,
     /// Facets or points: a total force.
     Either,

@@ -31,15 +31,12 @@ pub(super) fn parse(text: Text, scope: Scope) -> Result<Vec<Step>> {
     }
 }
 
-/// The state of the parser.
 struct Parser<'a> {
     text: Text<'a>,
     scope: Scope<'a>,
-    /// The next token.
     token: Token<'a>,
     /// The bytes of the next token in the text.
     span: Range<usize>,
-    /// Depth of nesting.
     depth: usize,
     /// The steps so far.
     code: Vec<Step>,
@@ -246,7 +243,6 @@ impl<'a> Parser<'a> {
             .help("write `*` to multiply")
     }
 
-    /// Return the names of all functions.
     fn functions(&self) -> impl Iterator<Item = &'a str> + use<'a> {
         let data = self.scope.data.keys().map(String::as_str);
         program::functions().map(|name| -> &'a str { name }).chain(data)
@@ -275,7 +271,6 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// A token of an expression.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Token<'a> {
     Number(f64),

@@ -11,7 +11,6 @@ use std::sync::Arc;
 /// Largest number of variables of an expression.
 pub(super) const MOST_VARIABLES: usize = 4;
 
-/// Values of the variables.
 pub(super) type Values<T> = [T; MOST_VARIABLES];
 
 /// A step of an expression in postfix order.
@@ -28,7 +27,6 @@ pub(super) enum Step {
 
 /// The numbers for which expressions are evaluated: plain numbers, or pairs of a value and a derivative.
 pub(super) trait Number: Copy + Default {
-    /// Return a constant.
     fn constant(value: f64) -> Self;
     /// Return a function of this number.
     fn one(self, function: &Unary) -> Self;
@@ -86,7 +84,6 @@ impl Program {
         Self { steps, depth }
     }
 
-    /// Return the value for given values of the variables.
     pub(super) fn eval<T: Number>(&self, variables: &Values<T>) -> T {
         self.eval_with(variables, |_, _| {})
     }
@@ -310,7 +307,6 @@ pub(super) const SIGN: u8 = 6;
 /// Binding power of `^`, which groups to the right.
 pub(super) const POWER: u8 = 7;
 
-/// Return the names of the functions.
 pub(super) fn functions() -> impl Iterator<Item = &'static str> {
     UNARY.iter().map(|function| function.name).chain(BINARY.iter().map(|function| function.name))
 }

@@ -107,7 +107,6 @@ struct Head {
     tag: i32,
     /// Type of the elements.
     kind: Kind,
-    /// Number of elements.
     count: usize,
 }
 

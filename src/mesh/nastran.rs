@@ -40,7 +40,6 @@ fn is_read(name: &str) -> bool {
     matches!(name, "GRID" | "GRDSET") || name.starts_with("CORD") || SOLIDS.iter().any(|solid| solid.0 == name)
 }
 
-/// An entry.
 struct Card<'a> {
     /// The file, for messages.
     path: &'a Path,
@@ -222,7 +221,6 @@ fn sixteen(x: f64) -> String {
     std::iter::once(format!("{x:?}")).chain(shorter).find(|text| text.len() <= 16).unwrap_or_default()
 }
 
-/// A system of coordinates.
 #[derive(Clone, Copy)]
 struct System<'a> {
     kind: Coordinates,

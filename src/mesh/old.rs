@@ -218,7 +218,6 @@ pub struct Element {
     pub nodes: Vec<u64>,
 }
 
-/// An entity of format 4.1.
 #[derive(PartialEq, Eq, PartialOrd, Ord)]
 struct Entity {
     dimension: usize,

@@ -115,7 +115,6 @@ fn notes(path: &Path, reader: &Reader, left_out: &LeftOut) -> Vec<String> {
     notes
 }
 
-/// A group.
 struct Group {
     dimension: usize,
     name: String,
@@ -138,7 +137,6 @@ struct LeftOut {
     renamed: Vec<String>,
 }
 
-/// The groups of a file.
 struct Groups<'a> {
     model: &'a Model,
     lines: &'a Lines,

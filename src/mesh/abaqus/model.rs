@@ -174,7 +174,6 @@ pub struct Numbering {
     edges: &'static [[usize; 2]],
 }
 
-/// The numberings of all shapes.
 static NUMBERINGS: [Numbering; 7] = [
     Numbering { shape: &LINE, faces: &[], edges: &[[0, 1]] },
     Numbering { shape: &TRIANGLE, faces: &[&[0, 1], &[1, 2], &[2, 0]], edges: &[[0, 1], [1, 2], [2, 0]] },

@@ -172,7 +172,6 @@ impl Reader {
         })
     }
 
-    /// Start a set.
     fn set(&mut self, keyword: &Keyword, spelling: String) -> TextResult<Data> {
         let shift = match keyword.get("INSTANCE").map(spelled) {
             Some(name) => *self.instances.get(&name).ok_or_else(|| format!("there is no instance `{name}`"))?,
@@ -196,7 +195,6 @@ impl Reader {
         Ok(Data::Set { name: normal(&spelling), nodes, generate, shift })
     }
 
-    /// Start a surface.
     fn surface(&mut self, keyword: &Keyword, spelling: String) -> TextResult<Data> {
         let name = normal(&spelling);
         let kind = keyword.get("TYPE").unwrap_or("ELEMENT").to_ascii_uppercase();
@@ -285,7 +283,6 @@ impl Reader {
         }
     }
 
-    /// Read a data line.
     fn data(&mut self, data: Data, line: &str, at: At) -> TextResult<Data> {
         let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
         match data {
@@ -308,7 +305,6 @@ impl Reader {
         }
     }
 
-    /// Read a node.
     fn node(&mut self, words: &[&str], set: Option<&str>, coordinates: Coordinates, at: At) -> TextResult<()> {
         let tag = count(words[0])?.saturating_add(self.scope.shift);
         let given = reals(&words[1..words.len().min(4)])?;
@@ -355,7 +351,6 @@ impl Reader {
         Ok(Data::Elements { name, role, set, open: Vec::new() })
     }
 
-    /// Read members of a set.
     fn members(&mut self, name: &str, nodes: bool, generate: bool, shift: u64, words: &[&str]) -> TextResult<()> {
         let sets = if nodes { &mut self.model.node_sets } else { &mut self.model.element_sets };
         let mut others = Vec::new();
@@ -377,7 +372,6 @@ impl Reader {
         Ok(())
     }
 
-    /// Read faces of a surface.
     fn face(&mut self, name: &str, words: &[&str], line: &str) -> TextResult<()> {
         let label = words.get(1).map(|word| word.to_ascii_uppercase()).unwrap_or_default();
         let number = label.strip_prefix('S').and_then(|digits| digits.parse::<usize>().ok());

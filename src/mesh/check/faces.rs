@@ -12,7 +12,6 @@ pub const NONE: u32 = u32::MAX;
 #[derive(Clone)]
 pub struct Cells<'a, const D: usize> {
     mesh: &'a Mesh<D>,
-    /// The group of the body.
     group: &'a Group,
     /// Nodes per cell: corners, then mid-edge nodes if its elements are quadratic.
     pub stride: usize,
@@ -71,17 +70,20 @@ impl<'a, const D: usize> Cells<'a, D> {
 
     /// Return the refusal of the body because of `what` is wrong with some of its cells, at the point `at`.
     pub fn refuse(&self, what: &str, cells: &[usize], at: [f64; 3]) -> Error {
-        let mesh = self.mesh;
-        let at = mesh.in_scene(std::array::from_fn(|c| at[c]));
-        let place = at[..D].iter().map(|x| x.to_string()).collect::<Vec<_>>().join(", ");
-        let error = Error::mesh(&mesh.path, None, format!("body `{}`: {what} at ({place})", self.group.name));
-        let tags: Vec<String> =
-            cells.iter().filter_map(|&cell| self.group.tags.get(cell)).map(u64::to_string).collect();
-        match &tags[..] {
-            [] => error,
-            [one] => error.because(format!("it is element {one} of the mesh file")),
-            _ => error.because(format!("they are elements {} of the mesh file", tags.join(" and "))),
-        }
+        refuse(self.mesh, self.group, format!("body `{}`: {what}", self.group.name), cells, at)
+    }
+}
+
+/// Return the refusal of some elements of a group at a point.
+pub fn refuse<const D: usize>(mesh: &Mesh<D>, group: &Group, what: String, elements: &[usize], at: [f64; 3]) -> Error {
+    let at = mesh.in_scene(std::array::from_fn(|c| at[c]));
+    let place = at[..D].iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let error = Error::mesh(&mesh.path, None, format!("{what} at ({place})"));
+    let tags: Vec<String> = elements.iter().filter_map(|&at| group.tags.get(at)).map(u64::to_string).collect();
+    match &tags[..] {
+        [] => error,
+        [one] => error.because(format!("it is element {one} of the mesh file")),
+        _ => error.because(format!("they are elements {} of the mesh file", tags.join(" and "))),
     }
 }
 

@@ -35,7 +35,7 @@ use super::{Group, Mesh};
 use crate::error::{Error, Result};
 use crate::linalg::{Joined, bounds};
 use crate::problem::order::Order;
-use faces::{Cells, Faces, NONE};
+use faces::{Cells, Faces, NONE, refuse};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
 use surface::Surface;
@@ -153,7 +153,6 @@ struct Found {
 }
 
 impl<'a> InUse<'a> {
-    /// Start with a group and its duty.
     fn new(group: &'a Group, duty: Duty) -> Self {
         Self { group, duty, found: vec![Found::default(); group.len()] }
     }
@@ -244,20 +243,15 @@ impl<'a> InUse<'a> {
     /// Return the refusal of a simplex of the group.
     fn refuse<const D: usize>(&self, mesh: &Mesh<D>, index: usize, what: &str, help: &str) -> Error {
         let points = &self.group.connectivity[index * self.group.stride..][..=self.group.dimension];
-        let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
-        let place = mesh.in_scene(std::array::from_fn(mean));
-        let place = place[..D].iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
         let thing = match (self.group.dimension, D) {
             (0, _) => "point",
             (1, 3) => "edge",
             _ => "facet",
         };
-        let message = format!("a {thing} of group `{}` {what}, at ({place})", self.group.name);
-        let error = Error::mesh(&mesh.path, None, message).help(help);
-        match self.group.tags.get(index) {
-            Some(tag) => error.because(format!("it is element {tag} of the mesh file")),
-            None => error,
-        }
+        let mean = |c: usize| points.iter().map(|&p| mesh.points[p as usize][c]).sum::<f64>() / points.len() as f64;
+        let at = std::array::from_fn(|c| if c < D { mean(c) } else { 0.0 });
+        let what = format!("a {thing} of group `{}` {what},", self.group.name);
+        refuse(mesh, self.group, what, &[index], at).help(help)
     }
 }
 

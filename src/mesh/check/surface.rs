@@ -46,7 +46,6 @@ impl<'a, const D: usize> Surface<'a, D> {
         Self { cells, faces, nodes, stride, tree }
     }
 
-    /// Return the nodes of a facet.
     fn facet(&self, i: usize) -> &[u32] {
         &self.nodes[i * self.stride..][..self.stride]
     }
@@ -316,7 +315,6 @@ fn dot(a: Point, b: Point) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Return the cross product.
 fn cross(a: Point, b: Point) -> Point {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
@@ -326,7 +324,6 @@ fn apart(a: Point, b: Point) -> f64 {
     dot(minus(a, b), minus(a, b)).sqrt()
 }
 
-/// Return the point `a + t (b - a)`.
 fn between(a: Point, b: Point, t: f64) -> Point {
     std::array::from_fn(|c| a[c] + t * (b[c] - a[c]))
 }

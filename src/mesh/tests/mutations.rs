@@ -60,7 +60,6 @@ impl Random {
         start..(start + 1 + self.below(most)).min(length)
     }
 
-    /// Change some bytes.
     fn change(&mut self, bytes: &mut Vec<u8>) {
         let range = self.range(bytes.len());
         if range.is_empty() {
