@@ -133,7 +133,7 @@ fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
     let name = file_name(("input file", digest_of_bytes(&bytes)), path);
     let make = |_: &Path, made: &Path| write(made, &bytes);
     let place = |cache: &Path| cache.join(&name);
-    let loaded = made_anew(&name, &folders(), |file| read_converted(path, file), make, place)?;
+    let loaded = made_anew((path, &name), None, &folders(), make, place)?;
     Ok(Loaded { origin: Origin::File, notes, ..loaded })
 }
 
@@ -142,7 +142,6 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
     let path = &file.value;
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let name = file_name(("converted", ending, digest_of_bytes(bytes)), path);
-    let parse = |file: &mut Digested<File>| read_converted(path, file);
     let guard = &Guard::default();
     let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
         let script = &foreign::mesh(file, bytes, work)?;
@@ -150,16 +149,26 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
             Task { script, shown: path, set: &[], is_mesh: true, dimension: D, order: Order::P1, guard, interrupt };
         gmsh.run(&task, made, work)
     };
-    kept((path, &name), None, &folders(), parse, make).map_err(|error| error.at(&file.place))
+    kept((path, &name), None, None, &folders(), make).map_err(|error| error.at(&file.place))
 }
 
-/// Read a mesh that was made from the file of another program.
-fn read_converted<const D: usize>(path: &Path, file: &mut Digested<File>) -> Result<Mesh<D>> {
-    msh::read(path, Box::new(file), Maker::Other).map_err(|error| match error.advice() {
-        // Advice for scripts does not help with such a file.
-        Some(advice) if !advice.contains("Physical") => error,
-        _ => error.help(format!("see what Gmsh makes of it: gmsh {}", path.display())),
-    })
+/// Read a mesh that was made from the file at `path`, and return it with the digest of its file. The mesh of a script must have the
+/// requested `order`; that of another program has none.
+fn read_made<const D: usize>(path: &Path, order: Option<Order>, file: File) -> Result<(Mesh<D>, String)> {
+    let mut source = Digested::new(file);
+    let maker = if order.is_some() { Maker::Script } else { Maker::Other };
+    let mesh: Mesh<D> = msh::read(path, Box::new(&mut source), maker).map_err(|error| match error.advice() {
+        // Advice for scripts does not help with a file of another program.
+        advice if order.is_none() && advice.is_none_or(|advice| advice.contains("Physical")) => {
+            error.help(format!("see what Gmsh makes of it: gmsh {}", path.display()))
+        }
+        _ => error,
+    })?;
+    if order.is_some_and(|order| mesh.order != order) {
+        let error = Error::mesh(path, None, "Gmsh made a mesh of another order than the scene asks for");
+        return Err(error.help("remove `Mesh.ElementOrder` and `SetOrder` from the script"));
+    }
+    Ok((mesh, source.digest()))
 }
 
 /// Return the mesh `name` from the cache, which is in one of `folders`, or make it from `path`. Only the latter takes Gmsh.
@@ -168,9 +177,9 @@ fn read_converted<const D: usize>(path: &Path, file: &mut Digested<File>) -> Res
 /// not identify all that the mesh is made from; then the mesh is always made anew.
 fn kept<const D: usize>(
     (path, name): (&Path, &str),
+    order: Option<Order>,
     unkept: Option<String>,
     folders: &[PathBuf],
-    mut parse: impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
     make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
 ) -> Result<Loaded<D>> {
     let gmsh = Gmsh::find();
@@ -180,38 +189,29 @@ fn kept<const D: usize>(
     };
     // A file of the cache that cannot be read or is damaged counts as absent.
     for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
-        if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| digested(file, &mut parse).ok()) {
+        if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| read_made(path, order, file).ok()) {
             return Ok(Loaded::new(mesh, Origin::Cache, cached, digest));
         }
     }
     let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
     let place = |cache: &Path| cache::made_by(cache, name, &gmsh.identity());
-    let loaded = made_anew(name, folders, parse, |work, made| make(&gmsh, work, made), place)?;
+    let loaded = made_anew((path, name), order, folders, |work, made| make(&gmsh, work, made), place)?;
     Ok(Loaded { unkept, ..loaded })
-}
-
-/// Return a mesh and the digest of its file.
-fn digested<const D: usize>(
-    file: File,
-    parse: &mut impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
-) -> Result<(Mesh<D>, String)> {
-    let mut source = Digested::new(file);
-    parse(&mut source).map(|mesh| (mesh, source.digest()))
 }
 
 /// Make the mesh `name` and put it into the cache, at the `place` in its folder. `make` gets a folder to work in and the path of the
 /// file that it must write there.
 fn made_anew<const D: usize>(
-    name: &str,
+    (path, name): (&Path, &str),
+    order: Option<Order>,
     folders: &[PathBuf],
-    mut parse: impl FnMut(&mut Digested<File>) -> Result<Mesh<D>>,
     make: impl FnOnce(&Path, &Path) -> Result<()>,
     place: impl FnOnce(&Path) -> PathBuf,
 ) -> Result<Loaded<D>> {
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(name);
     let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
-    let mesh = make(workshop.path(), &made).and_then(|()| digested(open()?, &mut parse));
+    let mesh = make(workshop.path(), &made).and_then(|()| read_made(path, order, open()?));
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
     let file = workshop.publish(&made, place)?;
@@ -301,7 +301,7 @@ pub(super) fn meshed<const D: usize>(
         let script = sized.as_deref().unwrap_or(&own);
         gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
     };
-    kept((path, &name), unkept, folders, |file| checked(path, file, order), make)
+    kept((path, &name), Some(order), unkept, folders, make)
 }
 
 /// Return the path of a script in the folder `work` that includes the one at `path`, or `None` if the last line of that script
@@ -335,16 +335,6 @@ pub fn recall_final(purpose: &str) -> Option<String> {
 
 fn final_name(purpose: &str) -> String {
     file_name(purpose, Path::new("sizes")) + ".pos"
-}
-
-/// Return the mesh in a file that Gmsh made from a script, provided that it has the requested order.
-fn checked<const D: usize>(path: &Path, file: &mut Digested<File>, order: Order) -> Result<Mesh<D>> {
-    let mesh: Mesh<D> = msh::read(path, Box::new(file), Maker::Script)?;
-    if mesh.order == order {
-        return Ok(mesh);
-    }
-    let error = Error::mesh(path, None, "Gmsh made a mesh of another order than the scene asks for");
-    Err(error.help("remove `Mesh.ElementOrder` and `SetOrder` from the script"))
 }
 
 /// Name in messages, where meshes from files have their path.
