@@ -4,6 +4,7 @@ mod grammar;
 mod program;
 #[cfg(test)]
 mod tests;
+
 pub use grammar::Scope;
 
 use crate::data::{Data, Library};

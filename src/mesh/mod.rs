@@ -26,10 +26,10 @@ mod split;
 #[cfg(test)]
 mod tests;
 mod trust;
+
 pub use check::{Asked, Checked, Duty, Parts};
 pub use foreign::is_shape;
-pub use groups::Numbering;
-pub use groups::{Group, Groups};
+pub use groups::{Group, Groups, Numbering};
 pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
 pub use msh::{Maker, parse};

@@ -1,10 +1,4 @@
-//! Tests on meshes that the real Gmsh makes.
-//!
-//! Tests on the geometries in `meshes/`.
-//!
-//! Tests on files that are not valid meshes.
-//!
-//! Tests of the way from scripts and files to meshes, with the cache.
+//! Tests on meshes that the real Gmsh makes: of scripts here and in `meshes/`, of damaged files, and of the way through the cache.
 
 mod mutations;
 

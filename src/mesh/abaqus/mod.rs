@@ -3,12 +3,6 @@
 //! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of cells
 //! that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are placed. Names are
 //! written in lower case. Characters that no name can have become `_`. Other keywords are skipped.
-//!
-//! From the sets and surfaces of an input file to groups of cells, facets, edges and points.
-//!
-//! Faces and edges of cells by their corners, to find those that shells, membranes and trusses lie on.
-//!
-//! Groups as a mesh in Gmsh's format 4.1.
 
 mod lines;
 mod model;
