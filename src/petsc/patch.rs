@@ -6,7 +6,7 @@
 //! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
 //! ```
 //!
-//! r is the residual and z the result. Both products need the columns P of A only; each process has its rows of these columns.
+//! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of these columns.
 
 use super::around::Subspace;
 use super::factor::Factor;
@@ -106,26 +106,15 @@ fn of_whole_nodes(mut dofs: Vec<usize>, block_size: usize) -> Vec<usize> {
 }
 
 impl Subspace for Patch {
-    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-        let residual: Vec<f64> = self.inside.iter().map(|&i| r[i]).collect();
-        let (mut y, mut ay) = (vec![0.0; residual.len()], vec![0.0; self.touched.len()]);
-        self.factor.solve(&residual, &mut y)?;
-        // SAFETY: the product reads one and writes to the other.
-        let product = |y, ay| unsafe { petsc!(MatMult(self.columns, y, ay)) };
-        self.over_inside.map(("y", &y), &self.over_touched, ("A y", &mut ay), product)?;
-        self.touched.iter().zip(&ay).for_each(|(&i, ay)| r[i] -= ay);
-        self.inside.iter().zip(&y).for_each(|(&i, y)| x[i] += y);
-        Ok(())
-    }
-
-    fn project(&self, z: &mut [f64]) -> Result<()> {
+    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let part: Vec<f64> = self.touched.iter().map(|&i| z[i]).collect();
-        let (mut az, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
-        // SAFETY: as above.
+        let (mut rest, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
+        // SAFETY: the product reads one and writes to the other.
         let product = |part, az| unsafe { petsc!(MatMultTranspose(self.columns, part, az)) };
-        self.over_touched.map(("z", &part), &self.over_inside, ("A z", &mut az), product)?;
-        self.factor.solve(&az, &mut y)?;
-        self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] -= y);
+        self.over_touched.map(("z", &part), &self.over_inside, ("A z", &mut rest), product)?;
+        rest.iter_mut().zip(&self.inside).for_each(|(rest, &i)| *rest = r[i] - *rest);
+        self.factor.solve(&rest, &mut y)?;
+        self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] += y);
         Ok(())
     }
 }

@@ -14,17 +14,12 @@ impl Ksp {
     /// ```
     /// use std::{cell::Cell, rc::Rc};
     /// use winkler::{error::Result, petsc::{Ksp, Matrix, Session, Subspace}};
-    /// /// The first unknown of diag(1e6, 2, 3), and how often each of its two functions was called.
-    /// struct First(Rc<[Cell<usize>; 2]>);
+    /// /// The first unknown of diag(1e6, 2, 3), and how often it was solved.
+    /// struct First(Rc<Cell<usize>>);
     /// impl Subspace for First {
-    ///     fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-    ///         self.0[0].set(self.0[0].get() + 1);
-    ///         (x[0], r[0]) = (x[0] + r[0] / 1e6, 0.0);
-    ///         Ok(())
-    ///     }
-    ///     fn project(&self, z: &mut [f64]) -> Result<()> {
-    ///         self.0[1].set(self.0[1].get() + 1);
-    ///         z[0] = 0.0;
+    ///     fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+    ///         self.0.set(self.0.get() + 1);
+    ///         z[0] = r[0] / 1e6;
     ///         Ok(())
     ///     }
     /// }
@@ -34,16 +29,16 @@ impl Ksp {
     /// let mut ksp = Ksp::new(&session, "")?;
     /// ksp.set_operator(&a)?;
     /// ksp.set_from_options()?;
-    /// let calls = Rc::new([Cell::new(0), Cell::new(0)]);
+    /// let calls = Rc::new(Cell::new(0));
     /// ksp.wrap(&a, c"first", Box::new(First(calls.clone())))?;
     /// let mut x = [0.0; 3];
-    /// // two eigenvalues are left; the space is solved in once, and each application corrects afterwards alone
+    /// // two eigenvalues are left; the space is solved in before, and each application corrects afterwards alone
     /// assert_eq!(ksp.solve_until(&[1e6, 2.0, 3.0], &mut x, &mut |_| false)?.iterations, 2);
     /// assert!(x.iter().all(|x| (x - 1.0).abs() < 1e-12));
-    /// assert_eq!((calls[0].get(), calls[1].get()), (1, 3));
+    /// assert_eq!(calls.get(), 4);
     /// // one application by itself corrects before and after
     /// ksp.precondition(&[1e6, 2.0, 3.0], &mut x)?;
-    /// assert_eq!((x, calls[0].get(), calls[1].get()), ([1.0, 2.0, 3.0], 2, 4));
+    /// assert_eq!((x, calls.get()), ([1.0, 2.0, 3.0], 6));
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
     ///
@@ -71,15 +66,14 @@ impl Ksp {
         Ok(())
     }
 
-    /// Solve exactly in the outermost subspace before the iteration: add Q b to `x` and replace `rest` = b by b - A Q b.
+    /// Solve exactly in the outermost subspace before the iteration: set `x` to Q b and replace `rest` = b by b - A x.
     ///
-    /// All residuals of conjugate gradients from there have Q r = 0, and for these z = (I - Q A) M r. That saves half of the work in the
-    /// space (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2"). The shortened form is in use until the returned guard is
-    /// dropped. Return `None` without a subspace, or for another method than `cg`.
+    /// All residuals of conjugate gradients from there have Q r = 0. So an application needs no solve before M, which saves half of the work in
+    /// the space, until the returned guard is dropped. Return `None` without a subspace, or for another method than `cg`.
     ///
     /// # Errors
     /// Failures of the solver library.
-    pub(super) fn start(&self, rest: &mut [f64], x: &mut [f64]) -> Result<Option<Started<'_>>> {
+    pub(super) fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Option<Started<'_>>> {
         let Some(outermost) = self.wrappers.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };
         outermost.start(rest, x).map(Some)
     }

@@ -178,7 +178,7 @@ impl<'a> Gradients<'a> {
     /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r - r_previous): with this
     /// flexible rule, the preconditioner may be an inexact solve.
     fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
-        let y = self.coarse.part(&correction.closing(), false);
+        let y = self.coarse.part(&correction.closing());
         add_motions(&self.coarse, model, -1.0, &y, &mut correction);
         match self.previous.take() {
             None => correction,

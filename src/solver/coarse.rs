@@ -44,17 +44,10 @@ struct WithSprings {
 }
 
 impl Subspace for WithSprings {
-    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-        let (y, _) = self.coarse.solve(&[&*r]);
-        self.coarse.add(1.0, &y, &mut [x]);
-        self.rigid.rows.add_transpose(-1.0, &self.coarse.forces(&y), r);
-        Ok(())
-    }
-
-    fn project(&self, z: &mut [f64]) -> Result<()> {
+    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let mut closing = vec![0.0; self.rigid.rows.rows()];
         self.rigid.rows.multiply(z, &mut closing);
-        self.coarse.add(-1.0, &self.coarse.part(&closing, true), &mut [z]);
+        self.coarse.add(1.0, &self.coarse.correction(r, &closing), &mut [z]);
         Ok(())
     }
 }
