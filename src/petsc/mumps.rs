@@ -2,10 +2,10 @@
 //!
 //! Through PETSc, MUMPS would take a poor ordering and return the complement in part only.
 
+use super::Session;
 use super::ffi::{MumpsInt, mumps as c};
-use super::integers::fit;
+use super::library::{self, fit};
 use super::metis::{self, Graph};
-use super::{Session, beside};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{RSMPI_COMM_SELF, RSMPI_Comm_c2f};
 use std::ptr::null_mut;
@@ -58,7 +58,7 @@ const RESERVED: [(usize, &str); 8] = [
 pub struct Schur {
     /// The struct of MUMPS, which keeps pointers into the arrays below.
     mumps: Box<Padded>,
-    library: beside::Mumps,
+    library: library::Mumps,
     rows: Vec<MumpsInt>,
     columns: Vec<MumpsInt>,
     values: Vec<f64>,
@@ -109,7 +109,7 @@ impl Schur {
         let mut schur = Schur {
             // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and sizes of nothing.
             mumps: Box::new(unsafe { std::mem::zeroed() }),
-            library: beside::mumps()?,
+            library: library::mumps()?,
             rows: lower.iter().map(|entry| one(entry.0)).collect(),
             columns: lower.iter().map(|entry| one(entry.1)).collect(),
             values: lower.iter().map(|&(i, j, value)| value * scale[i] * scale[j]).collect(),

@@ -1,9 +1,8 @@
 //! A linear solve with a stopping test of the caller.
 
-use super::around::ERROR;
-use super::integers::{flag, is_set};
 use super::ksp::Solved;
-use super::library::petsc;
+use super::library::{flag, is_set, petsc};
+use super::subspace::ERROR;
 use super::vector::slice;
 use super::{Ksp, ffi};
 use crate::error::Result;
