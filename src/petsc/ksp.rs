@@ -65,7 +65,7 @@ pub struct Ksp {
     /// The number of updates of the matrix.
     pub(super) updates: Rc<Cell<u64>>,
     /// The number of updates of the matrix with which the preconditioner failed, if it did.
-    pub(super) failed_at: Cell<Option<u64>>,
+    failed_at: Cell<Option<u64>>,
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
     /// The subspaces around the preconditioner, the innermost first.
@@ -474,13 +474,13 @@ impl Ksp {
     /// Return whether MUMPS' factorisation needed more space or message buffers than its analysis foresaw.
     ///
     /// The need of several ranks depends on the order of their messages.
-    pub(super) fn lacks_space(&self) -> bool {
+    fn lacks_space(&self) -> bool {
         let info = || self.mumps_info(self.pc().ok()?);
         self.failure().is_some() && info().is_some_and(|(first, _)| matches!(first, -8 | -9 | -17 | -20))
     }
 
     /// Allow the next factorisation `percent` more space than MUMPS' analysis foresees. To be called before its set-up.
-    pub(super) fn set_extra_space(&self, percent: Int) -> Result<()> {
+    fn set_extra_space(&self, percent: Int) -> Result<()> {
         let (pc, mut factor) = (self.pc()?, null_mut());
         // SAFETY: the matrix of the factors belongs to the preconditioner; PETSc refuses one that is not of MUMPS.
         unsafe {

@@ -169,7 +169,7 @@ thread_local! {
 }
 
 /// Run `call`, and turn a nonzero code into an error with PETSc's message.
-pub(super) fn check_in(
+fn check_in(
     library: &ffi::Library,
     function: &str,
     call: impl FnOnce(&ffi::Library) -> ffi::PetscErrorCode,
@@ -302,7 +302,7 @@ pub(super) fn mumps() -> Result<Mumps> {
 ///
 /// # Errors
 /// When two MUMPS are loaded: their common blocks and names would get mixed up.
-pub(super) fn check_one_mumps(petsc: &ffi::Library) -> Result<()> {
+fn check_one_mumps(petsc: &ffi::Library) -> Result<()> {
     let Ok(own) = mumps() else { return Ok(()) };
     // SAFETY: the type of MUMPS' header.
     match unsafe { petsc.address::<Mumps>("dmumps_c") } {

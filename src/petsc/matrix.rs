@@ -365,8 +365,8 @@ pub struct Rows {
     pub(super) row_ptr: Vec<Int>,
     pub(super) columns: Vec<Int>,
     /// The compressed rows of the other columns, in global numbers.
-    pub(super) other_row_ptr: Vec<Int>,
-    pub(super) other_columns: Vec<Int>,
+    other_row_ptr: Vec<Int>,
+    other_columns: Vec<Int>,
     pub(super) values: Vec<f64>,
 }
 
@@ -469,7 +469,7 @@ pub(super) unsafe extern "C" fn free(rows: *mut c_void) -> ffi::PetscErrorCode {
 ///
 /// # Safety
 /// The matrix is one of PETSc's; the rows are from a box that nobody else frees.
-pub(super) unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
+unsafe fn attach(mat: ffi::Mat, rows: *mut Rows) -> Result<()> {
     let mut container = null_mut();
     // SAFETY: the communicator is the constant of MPI itself; the matrix takes a reference to the container; the destructor fits the
     // pointer by the caller's promise.

@@ -323,7 +323,7 @@ pub fn launcher() -> Command {
 
 /// Return the error of a rank that MPI takes for a lone process, though a launcher started it as one of several: the launcher belongs to
 /// another MPI than the program. Only the first rank prints it.
-pub(super) fn refuse_stranger(size: usize, library: &str) -> Result<()> {
+fn refuse_stranger(size: usize, library: &str) -> Result<()> {
     let Some((started, rank)) = started(|name| env::var(name).ok()).filter(|_| size == 1) else { return Ok(()) };
     let message = format!(
         "{started} ranks were started, but each of them is alone: their launcher is not of the MPI of this program, {library}"
@@ -365,7 +365,7 @@ fn is_several(variable: impl Fn(&str) -> Option<String>) -> bool {
 }
 
 /// Run `start` with the settings for a lone process or for ranks on one machine, unless the user set one of them.
-pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
+fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
     let settings = match seen() {
         false => &ALONE[..],
         true if are_together() => &TOGETHER,

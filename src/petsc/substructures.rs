@@ -252,7 +252,7 @@ impl<'a> Layout<'a> {
 }
 
 /// The label of a node of the separator. The nodes of the halves have the labels 0 and 1.
-pub(super) const SEPARATOR: i32 = -1;
+const SEPARATOR: i32 = -1;
 
 /// Return the label of each node of the `dofs`: 0 or 1 for its half, or [`SEPARATOR`]. Collective, with the same result on all processes.
 ///
@@ -353,7 +353,7 @@ fn separate(ptr: &[i32], col: &[i32], half: &mut [i32]) {
 }
 
 /// A map from a distributed vector to the entries that this process needs, and back.
-pub(super) struct Scatter {
+struct Scatter {
     scatter: ffi::VecScatter,
     /// PETSc's header of the distributed vector.
     distributed: Vector,

@@ -6,32 +6,23 @@
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
 
-mod coarse;
 mod condensed;
 pub mod cost;
-pub mod dense;
-pub mod krylov;
-pub mod memory;
-pub mod monolithic;
+mod dense;
+mod krylov;
+mod monolithic;
+pub mod names;
 pub mod options;
 pub mod preset;
-mod retained;
 mod robin;
 mod sparse;
-pub mod speed;
-mod split;
-mod union;
 
-pub use coarse::RigidSpace;
-pub use condensed::CondensedBody;
+pub use condensed::{CondensedBody, Retained};
 pub use dense::Dense;
 pub use krylov::Krylov;
-pub use monolithic::Monolithic;
-pub use retained::Retained;
+pub use monolithic::{Monolithic, RigidSpace, Union};
 pub use robin::RobinMatrix;
 pub use sparse::SparseBody;
-pub use split::Split;
-pub use union::Union;
 
 use crate::error::Result;
 use crate::linalg::Csr;
