@@ -18,9 +18,8 @@ use crate::model::linear::LinearStep;
 use crate::model::origin::Origin;
 use crate::model::surface::{meeting_slopes, surface_slopes};
 use crate::problem::stop::StopRule;
-use crate::robin::coefficient::{Coefficient, underconstrained};
-use crate::robin::extend::extend;
-use crate::robin::interval::{Interval, interval};
+use crate::robin::spectrum::{Interval, interval};
+use crate::robin::sweep::{Coefficient, extend, underconstrained};
 use std::time::Instant;
 
 /// The method of a run.

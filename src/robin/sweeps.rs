@@ -4,8 +4,7 @@
 //! ([`Coarse`]). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
 //! moved until they are in balance again. Every rank has all contact points, so this needs no message and no solve.
 
-use super::coefficient::Coefficient;
-use super::sweep::{Sweep, Sweeper};
+use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
