@@ -9,17 +9,8 @@
 //!
 //! Each term of the gap is zero on the graph of the law and positive elsewhere. The bound needs no spectrum, no history and no constants.
 //!
-//! Least scales of a run: energies, pressures and forces by which a contact that vanishes is measured.
-//!
-//! Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then everything that a relative
-//! tolerance could refer to vanishes with the error, and rest or the automatic start is the reference. Its layers may answer an overlap with any
-//! pressure, so the surfaces deflect first ([`start::at`]). A contact may also vanish while bodies carry other loads. Then the reference is the energy
-//! of their strains, as a pressure on all surfaces.
-//!
-//! A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of what the bodies carry, which
-//! is lost in the rounding of their forces. A start that the scene gives is no reference, because it may be any displacement.
-//!
-//! Roundoff of compressions and pressures where displacements are far larger than compressions.
+//! Beside the bound stand what errors are measured by ([`Scale`]), and what roundoff makes of compressions and pressures where displacements are far
+//! larger than compressions.
 
 use super::progress::Equilibrium;
 use super::start;
@@ -200,6 +191,16 @@ impl Reached {
 }
 
 /// The least scales of a run.
+///
+/// They are energies, pressures and forces by which a contact that vanishes is measured.
+///
+/// Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then everything that a relative
+/// tolerance could refer to vanishes with the error, and rest or the automatic start is the reference. Its layers may answer an overlap with any
+/// pressure, so the surfaces deflect first ([`start::at`]). A contact may also vanish while bodies carry other loads. Then the reference is the energy
+/// of their strains, as a pressure on all surfaces.
+///
+/// A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of what the bodies carry, which
+/// is lost in the rounding of their forces. A start that the scene gives is no reference, because it may be any displacement.
 #[derive(Debug, Clone, Default)]
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.

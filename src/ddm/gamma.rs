@@ -1,14 +1,4 @@
-//! Relaxation rules: gamma of (42), from the sweeps so far.
-//!
-//! The paper's iteration: u <- u + gamma z.
-//!
-//! Exact line search.
-//!
-//! Aitken's rule.
-//!
-//! The rule of Barzilai and Borwein.
-//!
-//! The best stationary gamma, from estimates of the bounds of the spectrum of G^-1 F1'' during the run.
+//! The paper's iteration u <- u + gamma z, and its relaxation rules: gamma of (42), from the sweeps so far.
 
 use super::robin::{Acceleration, Iterate, Step, best_factor, best_gamma, relaxed_factor};
 use crate::error::Result;

@@ -9,18 +9,7 @@
 //! ```
 //!
 //! A fixed point has c = c_q and p = p_q: the equations (26). The gap between (c, p) and the law bounds the error of u. Where steps have to be
-//! shortened, the laws are smoothed for a while ([`path`](super::path)).
-//!
-//! The forcing rule: an inexact linear step of Newton's method ends when the error of the linear solver is small compared with the distance from
-//! the laws (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known after each iteration of the linear solver.
-//!
-//! The rigid correction: bodies without supports are moved to where a state in equilibrium is closest to the laws.
-//!
-//! Free rigid motions E strain nothing. With (u, p) also (u + E a, p) is in equilibrium, for any amounts a. If no pressure is negative, the laws
-//! can have these pressures. Then the Moreau envelope of the layers, resolved on lines of slope rho, is least where the layer states balance the
-//! loads. So pressures that follow from statics alone need no steps in which the compressions follow them.
-//!
-//! Linear steps: their springs, and the response of bodies and layers to small loads.
+//! shortened, the laws are smoothed for a while ([`Path`](super::progress::Path)).
 
 use super::bound::{Reached, Scale, compression_roundoff, contact_energy, surface_energy};
 use super::progress::Equilibrium;
@@ -282,6 +271,9 @@ impl Newton<'_, '_> {
 const DELAY: usize = 3;
 
 /// The stopping test of a linear step.
+///
+/// The forcing rule: an inexact linear step of Newton's method ends when the error of the linear solver is small compared with the distance from
+/// the laws (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known after each iteration of the linear solver.
 struct Forcing<'a> {
     /// Layer states from which the step is taken.
     places: &'a Layer,
@@ -347,6 +339,10 @@ const PART: f64 = 0.25;
 
 /// Move u by a free rigid motion, and the step x that led to u with it, if this brings u much nearer to the laws. `p` are the pressures of
 /// the step and `rho` the slopes of the lines on which the laws are resolved, n each. The loads are balanced to the `tolerance` of the run.
+///
+/// Free rigid motions E strain nothing. With (u, p) also (u + E a, p) is in equilibrium, for any amounts a. If no pressure is negative, the laws
+/// can have these pressures. Then the Moreau envelope of the layers, resolved on lines of slope rho, is least where the layer states balance the
+/// loads. So pressures that follow from statics alone need no steps in which the compressions follow them.
 fn rigid_correction(model: &Model, [u, x]: [&mut Field; 2], p: &[f64], rho: &[f64], tolerance: f64) {
     let motions = Motions::of(model);
     if motions.count() == 0 || p.iter().any(|&p| p < 0.0) {

@@ -14,23 +14,6 @@
 //! step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like single nodes. The laws themselves are best resolved with the slopes of the last step. Where
 //! they are smoothed, many points move at once, some of which are hardly pressed and some nearly fixed. There the slope is the geometric mean of
 //! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself (docs/methods.md).
-//!
-//! The remedy for slow convergence: a path of smoothed laws.
-//!
-//! Where slender bodies peel off each other, the contact moves by about one point a step, however Newton's method begins. Laws smoothed by an
-//! energy per area mu ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once. In equilibrium with smoothed
-//! laws, the duality gap is at most mu times the area. As mu falls, the states follow the central path of interior-point methods to the laws
-//! themselves.
-//!
-//! mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too. D, its mean over all
-//! points, shows how far Newton's method has come.
-//!
-//! ```text
-//! enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
-//! step     mu <- min(mu, D),  D from the smoothed laws: mu stays while the states are far, and falls as fast as Newton's method converges
-//! lost     mu <- D where D is more than 100 mu
-//! leave    when mu times the area is below what the tolerance of the run can detect
-//! ```
 
 use crate::model::Model;
 use crate::model::layer::Layer;
@@ -144,6 +127,21 @@ const SHORTENED: usize = 2;
 const AHEAD: f64 = 100.0;
 
 /// The state of a run's paths.
+///
+/// They are the remedy for slow convergence. Where slender bodies peel off each other, the contact moves by about one point a step, however Newton's method begins. Laws smoothed by an
+/// energy per area mu ([`resolve`](crate::contact::law::resolve)) have no corner, so that many points move at once. In equilibrium with smoothed
+/// laws, the duality gap is at most mu times the area. As mu falls, the states follow the central path of interior-point methods to the laws
+/// themselves.
+///
+/// mu is measured by the squared distance e^2/rho of states in equilibrium from the laws, which is an energy per area, too. D, its mean over all
+/// points, shows how far Newton's method has come.
+///
+/// ```text
+/// enter    at the second step with the laws themselves that is not taken whole:  mu = 100 D
+/// step     mu <- min(mu, D),  D from the smoothed laws: mu stays while the states are far, and falls as fast as Newton's method converges
+/// lost     mu <- D where D is more than 100 mu
+/// leave    when mu times the area is below what the tolerance of the run can detect
+/// ```
 #[derive(Debug, Clone, Default)]
 pub(super) struct Path {
     /// Steps with the laws themselves that were not taken whole, since the last path.

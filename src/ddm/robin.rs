@@ -7,15 +7,7 @@
 //! update      u <- u + gamma z                                                (42)
 //! ```
 //!
-//! Accelerations: rules that make the next iterate from the sweep at the present one. All minimise the same F1 with the same sweep.
-//!
-//! A new acceleration is a new file that implements the trait [`Acceleration`].
-//!
-//! Anderson acceleration of the sweep, safeguarded by F1.
-//!
-//! Nonlinear conjugate gradients, preconditioned by the Robin sweep.
-//!
-//! Estimates of the iterations that a run would still need, from the spectrum of G^-1 F1'' and the method's own rate.
+//! An [`Acceleration`] makes the next iterate from the sweep at the present one. All minimise the same F1 with the same sweep.
 
 use super::run::{End, Last, Row, Run};
 use super::stop::Status;

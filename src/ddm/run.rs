@@ -1,9 +1,4 @@
 //! What both loops share: the history of a run, its scales, the checks that end it, and its observer.
-//!
-//! The history of a run: one row per iterate, shown to an observer during the run.
-//!
-//! What a run remembers of its iterates besides the last one. This memory decides when the run ends and how its next steps are taken, not what the
-//! solution is. So a run that goes on from a file begins without it.
 
 use super::bound::{ROUNDING, Reached, Scale, compression_roundoff};
 use super::progress::Progress;
@@ -407,6 +402,9 @@ pub(super) struct Last {
 }
 
 /// The memory of a run.
+///
+/// It is of iterates besides the last one, and decides when the run ends and how its next steps are taken, not what the
+/// solution is. So a run that goes on from a file begins without it.
 #[derive(Debug, Clone)]
 pub struct Memory {
     pub(super) cycle: Cycle,

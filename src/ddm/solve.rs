@@ -1,6 +1,4 @@
-//! A run from its start to its result, by either loop.
-//!
-//! The start of a run: given by the scene, found by itself, or left by another run.
+//! A run from its start to its result, by either loop. The start is given by the scene, found by itself, or left by another run.
 
 use super::bound::{OffLaws, ROUNDING, Reached, Scale, compression_roundoff, pressure_roundoff, roundoff_safety};
 use super::newton::resisting;

@@ -1,13 +1,4 @@
-//! The status with which a run ends, and the watches for roundoff and cycles.
-//!
-//! Estimates of the error of the pressures, from their change while the residual fell.
-//!
-//! A last step that moves nothing proves little. It may have been short, or along modes that do not change the contact, while other modes are far
-//! from their end. In the long run, errors fall as the residual does. While the residual falls to a share s of its earlier value, a pressure
-//! changes by 1 - s of its earlier error. So s/(1 - s) of that change is left as its error.
-//!
-//! The stop rule that ends a run when the error of the iteration is small relative to the error of the discretisation: further iterations would
-//! change nothing.
+//! The status with which a run ends, and what ends it: the watches for roundoff, cycles and pressures that still move, and the error of the mesh.
 
 use crate::error::Result;
 use crate::model::field::Field;
@@ -226,6 +217,12 @@ impl Cycle {
 const FALLEN: f64 = 0.1;
 
 /// Earlier iterates, whose residuals fall from each to the next at least to the share [`FALLEN`].
+///
+/// They estimate the error of the pressures from their change while the residual fell.
+///
+/// A last step that moves nothing proves little. It may have been short, or along modes that do not change the contact, while other modes are far
+/// from their end. In the long run, errors fall as the residual does. While the residual falls to a share s of its earlier value, a pressure
+/// changes by 1 - s of its earlier error. So s/(1 - s) of that change is left as its error.
 #[derive(Debug, Default, Clone)]
 pub struct Steady {
     past: Vec<Earlier>,

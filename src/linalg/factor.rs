@@ -1,8 +1,5 @@
-//! The factor of a semidefinite matrix of blocks: it gives a solution of A x = b and a basis of the kernel.
-//!
-//! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks per body.
-//!
-//! Minimum degree ordering: an order in which the elimination of the vertices of a graph adds few edges.
+//! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks per body, and their factor, which gives a solution of A x = b and a
+//! basis of the kernel.
 
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;

@@ -2,10 +2,6 @@
 //!
 //! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's 32-bit integer, so that a pattern can be
 //! passed to PETSc without a copy.
-//!
-//! Sums that do not depend on the distribution of their terms over ranks.
-//!
-//! Disjoint sets that grow together.
 
 use crate::error::{Error, Kind, Result};
 pub use factor::{Blocks, Factor, PART, TOLERANCE};

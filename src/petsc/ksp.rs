@@ -1,8 +1,4 @@
-//! Linear solvers (KSP with a preconditioner PC).
-//!
-//! Preconditioners and factorisations that fail, and how a solver recovers.
-//!
-//! Why a linear solver stopped.
+//! Linear solvers (KSP with a preconditioner PC): their options, solves, why a solve stopped, and how a solver recovers from a factorisation that failed.
 
 use super::library::{flag, is_set, petsc, text, text_from};
 use super::mumps::EXTRA_SPACE;

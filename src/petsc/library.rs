@@ -1,26 +1,15 @@
-//! PETSc's library, which the first call that needs it opens and starts.
+//! The libraries of PETSc and MUMPS: how they are opened, started and called, and what their errors become.
 //!
-//! It brings a hundred other libraries, whose loading takes longer than the solution of a small scene. A lone process whose bodies are all
-//! condensed creates no object of PETSc and never opens it.
-//!
-//! PETSc's error codes as [`Error`], with PETSc's own message.
+//! PETSc brings a hundred other libraries, whose loading takes longer than the solution of a small scene. So it is opened and started by the first
+//! call that needs it. A lone process whose bodies are all condensed needs MUMPS only, whose file is opened alone, with the BLAS and LAPACK that it
+//! brings. The build asks the loader which file has the function that PETSc calls.
 //!
 //! PETSc reports an error frame by frame, innermost first, to a handler. The handler of this module records the frames and prints nothing.
 //! [`check_in`] reads them when the code has come back to Rust.
 //!
-//! MUMPS with the BLAS and LAPACK that it brings: the very libraries that PETSc uses.
-//!
-//! A lone process whose bodies are all condensed needs MUMPS and not PETSc, whose hundred libraries take longer to load than a small scene takes.
-//! So the file of MUMPS is opened alone. The build asks the loader which file has the function that PETSc calls.
-//!
-//! Access to single options in PETSc's own table.
-//!
-//! The table of options until PETSc is started.
-//!
-//! Integers and flags of the libraries, each of which has its own width.
-//!
-//! PETSc has [`Int`](super::Int), 32 or 64 bits as it was configured. MUMPS has [`MumpsInt`](super::ffi::MumpsInt), which is mostly 32 bits beside
-//! either PETSc. METIS has one of two widths, which it shows when it is loaded. Patterns of this program have 32 bits.
+//! Each library has integers of its own width. PETSc has [`Int`](super::Int), 32 or 64 bits as it was configured. MUMPS has
+//! [`MumpsInt`](super::ffi::MumpsInt), which is mostly 32 bits beside either PETSc. METIS has one of two widths, which it shows when it is loaded.
+//! Patterns of this program have 32 bits.
 
 use super::ffi::mumps::DMUMPS_STRUC_C;
 use super::ffi::{FILE, PetscBool};
@@ -28,7 +17,6 @@ use super::{ffi, keep_apart};
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
 use std::cell::{Cell, RefCell};
-use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr::{null, null_mut};
@@ -74,17 +62,10 @@ pub(super) fn may_wait(words: &[String], home: Option<&Path>) -> bool {
     words.is_empty() && home.is_none() && !["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"].into_iter().any(set)
 }
 
-/// Return the functions of the running PETSc. If it does not run yet, it is started with the options that were set meanwhile.
+/// Return the functions of the running PETSc, which is started if it does not run yet.
 pub(super) fn running() -> Result<&'static ffi::Library> {
     if !runs() {
         start(&[], None)?;
-        let library = open()?;
-        for (name, value, is_read) in take_waiting() {
-            set_option(library, &name, value.as_deref())?;
-            if is_read {
-                read_option(library, &name)?;
-            }
-        }
     }
     open()
 }
@@ -139,9 +120,7 @@ pub(super) fn start(words: &[String], home: Option<&Path>) -> Result<()> {
     for name in [NO_SIGNALS, NO_FILES] {
         let name = CString::new(name).map_err(nul)?;
         // SAFETY: the name lives until the end of the call.
-        check_in(library, "PetscOptionsClearValue", |petsc| unsafe {
-            petsc.PetscOptionsClearValue(null_mut(), name.as_ptr())
-        })?;
+        unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }?;
     }
     Ok(())
 }
@@ -199,10 +178,10 @@ fn failure(library: &ffi::Library, function: &str, code: ffi::PetscErrorCode) ->
 
 /// Return PETSc's general text for an error code.
 fn meaning(library: &ffi::Library, code: ffi::PetscErrorCode) -> Option<String> {
-    let mut text: *const c_char = std::ptr::null();
+    let mut text: *const c_char = null();
     // SAFETY: PETSc sets the pointer to a static text or to null; the message of the error itself is not requested.
     unsafe {
-        library.PetscErrorMessage(code as _, &mut text, std::ptr::null_mut());
+        library.PetscErrorMessage(code as _, &mut text, null_mut());
         (!text.is_null()).then(|| string(text))
     }
     .filter(|text| !text.is_empty())
@@ -225,7 +204,7 @@ pub(super) unsafe fn string(text: *const c_char) -> String {
 /// # Safety
 /// The call sets the pointer to null or to a text that ends with a zero byte.
 pub(super) unsafe fn text_from(call: impl FnOnce(&mut *const c_char) -> Result<()>) -> Option<String> {
-    let mut text = std::ptr::null();
+    let mut text = null();
     call(&mut text).ok()?;
     // SAFETY: the caller's promise.
     (!text.is_null()).then(|| unsafe { string(text) })
@@ -264,9 +243,6 @@ pub(super) unsafe extern "C" fn record(
 /// The file with MUMPS: a library of its own, or PETSc's with MUMPS inside.
 const MUMPS: &str = env!("WINKLER_MUMPS_LIBRARY");
 
-/// The name of MUMPS' one function.
-const FUNCTION: &CStr = c"dmumps_c";
-
 /// MUMPS' one function.
 pub(super) type Mumps = unsafe extern "C" fn(*mut DMUMPS_STRUC_C);
 
@@ -292,7 +268,7 @@ fn opened() -> Result<&'static Library> {
 /// Return the function of MUMPS.
 pub(super) fn mumps() -> Result<Mumps> {
     // SAFETY: the type of MUMPS' header.
-    let found = unsafe { opened()?.get::<Mumps>(FUNCTION.to_bytes_with_nul()) };
+    let found = unsafe { opened()?.get::<Mumps>(b"dmumps_c\0") };
     found
         .map(|function| *function)
         .map_err(|cause| Error::new(Kind::Solver, format!("there is no MUMPS in {MUMPS}")).because(cause.to_string()))
@@ -326,110 +302,12 @@ pub(super) fn address(name: &CStr) -> *mut c_void {
     }
     // SAFETY: an address without a type, which is not used as one.
     let found = opened().ok().and_then(|library| unsafe { library.get::<*mut c_void>(name.to_bytes_with_nul()) }.ok());
-    found.map_or(std::ptr::null_mut(), |address| *address)
-}
-
-/// Set an option of the running PETSc.
-pub(super) fn set_option(library: &ffi::Library, name: &str, value: Option<&str>) -> Result<()> {
-    let name = key(name)?;
-    let value = value.map(text).transpose()?;
-    let value = value.as_ref().map_or(null(), |value| value.as_ptr());
-    // SAFETY: both texts live until the end of the call and end with a zero byte; PETSc copies them.
-    check_in(library, "PetscOptionsSetValue", |petsc| unsafe {
-        petsc.PetscOptionsSetValue(null_mut(), name.as_ptr(), value)
-    })
-}
-
-/// Return the value of an option of the running PETSc, and mark it as read.
-pub(super) fn read_option(library: &ffi::Library, name: &str) -> Result<Option<String>> {
-    let name = key(name)?;
-    let mut value: *const c_char = null();
-    let mut set = flag(false);
-    // SAFETY: the name lives until the end of the call; PETSc writes to the two variables only.
-    check_in(library, "PetscOptionsFindPair", |petsc| unsafe {
-        petsc.PetscOptionsFindPair(null_mut(), null(), name.as_ptr(), &mut value, &mut set)
-    })?;
-    // SAFETY: null, or a text that PETSc keeps until the option changes; it is copied.
-    Ok((!value.is_null()).then(|| unsafe { string(value) }))
-}
-
-/// Return a name with its dash.
-pub(super) fn dashed(name: &str) -> String {
-    if name.starts_with('-') { name.to_owned() } else { format!("-{name}") }
-}
-
-/// Return a name as PETSc expects it, or refuse it: PETSc would store any text and never find some of them again.
-pub(super) fn key(name: &str) -> Result<CString> {
-    let name = dashed(name);
-    let valid =
-        name.strip_prefix('-').is_some_and(|bare| bare.trim_start_matches('-').starts_with(char::is_alphabetic))
-            && !name.contains(char::is_whitespace);
-    if !valid {
-        return Err(Error::new(Kind::Solver, format!("`{name}` is not the name of a PETSc option")));
-    }
-    text(&name)
+    found.map_or(null_mut(), |address| *address)
 }
 
 /// Return a text that ends with a zero byte, as C expects it.
 pub(super) fn text(text: &str) -> Result<CString> {
     CString::new(text).map_err(|_| Error::new(Kind::Solver, format!("a zero byte in a PETSc option: {text:?}")))
-}
-
-/// An option: its name with the dash, and its value if it has one.
-pub type Entry = (String, Option<String>);
-
-#[derive(Default)]
-struct Slot {
-    value: Option<String>,
-    is_read: bool,
-}
-
-thread_local! {
-    static TABLE: RefCell<BTreeMap<String, Slot>> = const { RefCell::new(BTreeMap::new()) };
-}
-
-/// Return the key of an option in the table. PETSc ignores the case of letters.
-fn known_name(table: &BTreeMap<String, Slot>, name: &str) -> String {
-    table.keys().find(|known| known.eq_ignore_ascii_case(name)).cloned().unwrap_or_else(|| name.to_owned())
-}
-
-/// Set an option. Names of this module have their dash.
-pub(super) fn set_waiting(name: &str, value: Option<&str>) {
-    TABLE.with_borrow_mut(|table| {
-        let name = known_name(table, name);
-        table.insert(name, Slot { value: value.map(str::to_owned), is_read: false });
-    });
-}
-
-/// Remove an option.
-pub(super) fn clear_waiting(name: &str) {
-    TABLE.with_borrow_mut(|table| table.remove(&known_name(table, name)));
-}
-
-/// Mark an option as read and return its value.
-pub(super) fn read_waiting(name: &str) -> Option<String> {
-    TABLE.with_borrow_mut(|table| {
-        let slot = table.get_mut(&known_name(table, name))?;
-        slot.is_read = true;
-        slot.value.clone()
-    })
-}
-
-/// Return whether an option was read.
-pub(super) fn waiting_was_read(name: &str) -> bool {
-    TABLE.with_borrow(|table| table.get(&known_name(table, name)).is_some_and(|slot| slot.is_read))
-}
-
-/// Return all options sorted by name, or only those that nobody has read.
-pub(super) fn waiting_entries(only_unread: bool) -> Vec<Entry> {
-    let entry =
-        |(name, slot): (&String, &Slot)| (!only_unread || !slot.is_read).then(|| (name.clone(), slot.value.clone()));
-    TABLE.with_borrow(|table| table.iter().filter_map(entry).collect())
-}
-
-/// Take all options out of the table: name, value, and whether it was read.
-pub(super) fn take_waiting() -> impl Iterator<Item = (String, Option<String>, bool)> {
-    TABLE.take().into_iter().map(|(name, slot)| (name, slot.value, slot.is_read))
 }
 
 /// Return a count as an integer of a `library`; the message names what is counted.

@@ -1,8 +1,4 @@
-//! Sparse matrices (MATAIJ).
-//!
-//! The rows of a sparse matrix, which are checked and then belong to PETSc's matrix.
-//!
-//! Index sets (IS), and access to rows and submatrices.
+//! Sparse matrices (MATAIJ), the rows that they are made of, and their index sets (IS) and submatrices.
 
 use super::library::{fit, flag, petsc};
 use super::vector::{Vector, check_length, slice};

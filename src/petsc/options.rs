@@ -1,21 +1,19 @@
-//! PETSc's table of options. A process has one such table.
-//!
-//! Lists of words: those that begin options of PETSc, and the options of PETSc as a whole, which belong to no solver.
+//! PETSc's table of options, of which a process has one, and the words that begin options of PETSc.
 
-use super::library::{
-    self, Entry, clear_waiting, dashed, flag, is_set, key, petsc, read_option, read_waiting, set_option, set_waiting,
-    string, text, waiting_entries, waiting_was_read,
-};
+use super::library::{self, flag, is_set, petsc, string, text};
 use super::{Session, ffi};
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use std::collections::BTreeMap;
-use std::ffi::c_char;
-use std::ptr::null_mut;
+use std::ffi::{CString, c_char};
+use std::ptr::{null, null_mut};
+
+/// An option: its name with the dash, and its value if it has one.
+pub type Entry = (String, Option<String>);
 
 /// PETSc's table of options, filled from the command line, `PETSC_OPTIONS`, `.petscrc` of the home folder and `-options_file`.
 ///
 /// Names may be given with or without their dash and are returned with it. PETSc ignores the case of their letters. Queries of this type do
-/// not mark an option as read.
+/// not mark an option as read. Before PETSc is started there are no options, and setting one starts it.
 ///
 /// ```
 /// use winkler::petsc::Session;
@@ -55,13 +53,10 @@ impl Options {
     /// # Errors
     /// When the name does not begin with a letter after its dash or has a blank, or a text has a zero byte.
     pub fn set(&self, name: &str, value: Option<&str>) -> Result<()> {
-        if library::runs() {
-            return set_option(library::running()?, name, value);
-        }
-        key(name)?;
-        value.map(text).transpose()?;
-        set_waiting(&dashed(name), value);
-        Ok(())
+        let (name, value) = (key(name)?, value.map(text).transpose()?);
+        let value = value.as_ref().map_or(null(), |value| value.as_ptr());
+        // SAFETY: both texts live until the end of the call and end with a zero byte; PETSc copies them.
+        unsafe { petsc!(PetscOptionsSetValue(null_mut(), name.as_ptr(), value)) }
     }
 
     /// Return the value of an option. It is empty for an option without a value, and `None` for an option that is not set.
@@ -81,13 +76,12 @@ impl Options {
     /// # Errors
     /// When the name is not a valid name of an option.
     pub fn clear(&self, name: &str) -> Result<()> {
-        let known = key(name)?;
+        let name = key(name)?;
         if !library::runs() {
-            clear_waiting(&dashed(name));
             return Ok(());
         }
         // SAFETY: the text lives until the end of the call; null means PETSc's one table.
-        unsafe { petsc!(PetscOptionsClearValue(null_mut(), known.as_ptr())) }
+        unsafe { petsc!(PetscOptionsClearValue(null_mut(), name.as_ptr())) }
     }
 
     /// Return all options that are set, sorted by name.
@@ -99,7 +93,7 @@ impl Options {
     /// When PETSc is out of memory.
     pub fn all(&self) -> Result<Vec<Entry>> {
         if !library::runs() {
-            return Ok(waiting_entries(false));
+            return Ok(Vec::new());
         }
         let mut entries: BTreeMap<String, Option<String>> = self.left()?.into_iter().collect();
         let mut whole: *mut c_char = null_mut();
@@ -114,7 +108,7 @@ impl Options {
         };
         for word in words.split_whitespace().filter(|word| word.starts_with('-')) {
             if !entries.contains_key(word) && self.used(word) {
-                entries.insert(word.to_owned(), read_option(library::running()?, word)?);
+                entries.insert(word.to_owned(), read(word)?);
             }
         }
         Ok(entries.into_iter().collect())
@@ -122,10 +116,7 @@ impl Options {
 
     /// Return whether an option is set and was read by PETSc or [`mark_used`](Self::mark_used).
     pub fn used(&self, name: &str) -> bool {
-        if !library::runs() {
-            return waiting_was_read(&dashed(name));
-        }
-        let Ok(name) = key(name) else { return false };
+        let Some(name) = key(name).ok().filter(|_| library::runs()) else { return false };
         let mut used = flag(false);
         // this function of PETSc expects the name without its dash
         let bare = &name.as_c_str().to_bytes_with_nul()[1..];
@@ -139,12 +130,7 @@ impl Options {
     /// # Errors
     /// When the name is not a valid name of an option.
     pub fn mark_used(&self, name: &str) -> Result<()> {
-        if library::runs() {
-            return read_option(library::running()?, name).map(drop);
-        }
-        key(name)?;
-        read_waiting(&dashed(name));
-        Ok(())
+        if library::runs() { read(name).map(drop) } else { key(name).map(drop) }
     }
 
     /// Return the options that nobody has read so far, sorted by name.
@@ -153,7 +139,7 @@ impl Options {
     /// When PETSc is out of memory.
     pub fn left(&self) -> Result<Vec<Entry>> {
         if !library::runs() {
-            return Ok(waiting_entries(true));
+            return Ok(Vec::new());
         }
         let mut count = 0;
         let (mut names, mut values) = (null_mut(), null_mut());
@@ -172,6 +158,29 @@ impl Options {
         entries.sort();
         Ok(entries)
     }
+}
+
+/// Return the value of an option of the running PETSc, and mark it as read.
+fn read(name: &str) -> Result<Option<String>> {
+    let (name, mut value, mut set) = (key(name)?, null(), flag(false));
+    // SAFETY: the name lives until the end of the call; PETSc writes to the two variables only.
+    unsafe { petsc!(PetscOptionsFindPair(null_mut(), null(), name.as_ptr(), &mut value, &mut set)) }?;
+    // SAFETY: null, or a text that PETSc keeps until the option changes; it is copied.
+    Ok((!value.is_null()).then(|| unsafe { string(value) }))
+}
+
+fn dashed(name: &str) -> String {
+    if name.starts_with('-') { name.to_owned() } else { format!("-{name}") }
+}
+
+/// Return a name as PETSc expects it, or refuse it: PETSc would store any text and never find some of them again.
+fn key(name: &str) -> Result<CString> {
+    let name = dashed(name);
+    let is_valid = name.trim_start_matches('-').starts_with(char::is_alphabetic) && !name.contains(char::is_whitespace);
+    if !is_valid {
+        return Err(Error::new(Kind::Solver, format!("`{name}` is not the name of a PETSc option")));
+    }
+    text(&name)
 }
 
 /// The words after the prefix with which the options of a solver begin: its objects, and objects nested in them.

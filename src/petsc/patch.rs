@@ -7,8 +7,6 @@
 //! ```
 //!
 //! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of these columns.
-//!
-//! A factorisation of a principal submatrix P'AP, distributed over the processes of A.
 
 use super::library::{flag, petsc};
 use super::matrix::Indices;

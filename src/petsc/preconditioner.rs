@@ -1,6 +1,4 @@
-//! Multigrid of two levels (PCMG) with a given interpolation.
-//!
-//! Exact solves in subspaces around the preconditioner of a solver.
+//! Preconditioners that the program makes: multigrid of two levels (PCMG), and exact solves in subspaces around any preconditioner.
 
 use super::library::{flag, petsc};
 use super::matrix::check;

@@ -1,24 +1,8 @@
-//! Start and end of MPI and PETSc in this process.
-//!
-//! Launchers of MPI, and a quick start of Open MPI where no network is needed.
-//!
-//! By itself Open MPI searches for networks, and version 4 starts a daemon for a lone process. Start and end of MPI take, in medians of 11 and
-//! of 5 runs on a busy machine with two cores:
-//!
-//! | | Open MPI 4.1 | Open MPI 5.0 |
-//! | --- | --- | --- |
-//! | lone process without settings | 0.63 s, CPU 0.079 s | 1.39 s, CPU 0.128 s |
-//! | with them | 0.047 s, CPU 0.019 s | 0.11 s, CPU 0.023 s |
-//! | two ranks under `mpiexec` without settings | 0.89 s | 2.17 s |
-//! | with them | 0.78 s | 0.45 s |
-//!
-//! The settings are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them and break.
-//!
-//! Stages of PETSc's log, which `-log_view` lists separately.
+//! Start and end of MPI and PETSc in this process, the launchers of MPI, and stages of PETSc's log, which `-log_view` lists separately.
 
 use super::blas;
 use super::files::Files;
-use super::library::{self, petsc, take_waiting, text};
+use super::library::{self, petsc, text};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
@@ -214,7 +198,6 @@ impl Drop for Running {
     fn drop(&mut self) {
         // callers that want the error call `finish`
         let _ = library::end();
-        drop(take_waiting());
     }
 }
 
@@ -365,6 +348,18 @@ fn is_several(variable: impl Fn(&str) -> Option<String>) -> bool {
 }
 
 /// Run `start` with the settings for a lone process or for ranks on one machine, unless the user set one of them.
+///
+/// By itself Open MPI searches for networks, and version 4 starts a daemon for a lone process. Start and end of MPI take, in medians of 11 and
+/// of 5 runs on a busy machine with two cores:
+///
+/// | | Open MPI 4.1 | Open MPI 5.0 |
+/// | --- | --- | --- |
+/// | lone process without settings | 0.63 s, CPU 0.079 s | 1.39 s, CPU 0.128 s |
+/// | with them | 0.047 s, CPU 0.019 s | 0.11 s, CPU 0.023 s |
+/// | two ranks under `mpiexec` without settings | 0.89 s | 2.17 s |
+/// | with them | 0.78 s | 0.45 s |
+///
+/// The settings are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them and break.
 fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
     let settings = match seen() {
         false => &ALONE[..],

@@ -12,10 +12,6 @@
 //! More than two parts do not pay. Elimination of n dofs in space takes c n^2 operations. The interface of p parts has about p^(1/3) n^(2/3)
 //! dofs and takes c' p n^2, so that the best p does not depend on n. The size of S grows as p^(2/3). For two spheres with 99 900 dofs and
 //! n = 8166, two, three and four parts on four processes take the same time, and 152, 158, and 176 MB.
-//!
-//! Bisection of some nodes of a matrix into two halves without coupling, and a separator between them.
-//!
-//! Exchange of entries of a distributed vector that a process needs or contributes to (VecScatter).
 
 use super::library::{fit, petsc};
 use super::matrix::{Indices, row};

@@ -1,6 +1,4 @@
-//! Vectors: headers of PETSc, made once, over slices of Rust.
-//!
-//! The communicator of an object: one process or all.
+//! Vectors: headers of PETSc, made once, over slices of Rust. The scope of an object is one process or all.
 
 use super::library::petsc;
 use super::{Int, Session, ffi};

@@ -1,9 +1,5 @@
-//! The interval (33) of gamma in which Theorem 3 promises convergence, for the Robin form that a run ended with.
-//!
-//! The theorem asks for constants of F1' over all displacements. A layer has such constants on bounded ranges only. So they are taken over
-//! the level set {F1 <= F1(u0)} of the start u0, which an iteration that descends never leaves.
-//!
-//! Bounds of the spectrum of G^-1 F1'' from the directions that a method has taken.
+//! Bounds of the spectrum of G^-1 F1'': the interval (33) of gamma in which Theorem 3 promises convergence, and estimates from the directions that a
+//! method has taken.
 
 use super::sweep::Sweeper;
 use super::sweeps::gradients;
@@ -18,6 +14,9 @@ use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// Bounds of F1'' in the norm of the Robin form G over a level set: `lower` G <= F1'' <= `upper` G.
+///
+/// The theorem asks for constants of F1' over all displacements. A layer has such constants on bounded ranges only. So they are taken over
+/// the level set {F1 <= F1(u0)} of the start u0, which an iteration that descends never leaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interval {
     /// B_Phi of Theorem 3; zero if nothing but contact, which may open, holds a body.

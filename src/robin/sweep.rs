@@ -1,15 +1,5 @@
-//! One sweep (41): every body solves its own linear problem, independently of the others.
-//!
-//! The Robin coefficient: what stands in diag(omega psi kappa) of G.
-//!
-//! Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each contact row, in the layout
-//! of a trace vector, because the two bodies of a pair may need different weights.
-//!
-//! The start of sweeps: a trace, extended into every body with the interior in equilibrium.
-//!
-//! The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the energy of the body among
-//! all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every step
-//! the error shrinks by the ratio of the two stiffnesses.
+//! One sweep (41): every body solves its own linear problem, independently of the others. A sweep needs the Robin coefficient, and a start, which is
+//! a trace extended into every body.
 
 use crate::error::{Error, Result};
 use crate::exchange::{self, ASKS, Exchange, asks};
@@ -232,6 +222,9 @@ fn known_correction(model: &Model, index: usize, r: &[f64], last: &Sweep, factor
 }
 
 /// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.
+///
+/// Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each contact row, in the layout
+/// of a trace vector, because the two bodies of a pair may need different weights.
 pub struct Coefficient {
     zone: Zone,
     rule: RobinRule,
@@ -368,6 +361,10 @@ fn extension_springs(slot: &BodySlot) -> Vec<f64> {
 ///
 /// # Errors
 /// Failures of the solver library.
+///
+/// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the energy of the body among
+/// all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every step
+/// the error shrinks by the ratio of the two stiffnesses.
 pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Field, Failure>> {
     let mut iterate = Field { states: Vec::new(), trace: vec![0.0; trace.len()] };
     let mut failed = vec![0.0; model.bodies.len()];

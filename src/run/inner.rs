@@ -10,6 +10,7 @@ use super::words::in_words;
 use crate::discretize::Outline;
 use crate::error::Result;
 use crate::fem::Interpolation;
+use crate::file::available_memory;
 use crate::model::BodySlot;
 use crate::petsc::Session;
 use crate::problem::{Linear, MethodName, Order, Preset};
@@ -54,7 +55,7 @@ pub struct Inner<'a> {
 impl<'a> Inner<'a> {
     /// Start from the free memory and the options that the user wrote. This scene can reuse the bodies `kept` of an earlier one. Collective.
     pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
-        let mine = cost::available_memory() as u64;
+        let mine = available_memory() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());

@@ -4,17 +4,16 @@
 //! stiffness and g = f_R - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R is dense and small.
 //! A state stands for that of the whole body with its interior in equilibrium. So residual, energies and all output have the values of the whole body.
 //!
-//! The dofs of a body that a condensed solver retains, and the axes in which it sees them.
-//!
 //! The method sees a body only through its contact rows, so the dofs in these rows are retained. Where all rows that touch a node have the same normal n,
 //! the node is turned to axes (n, t, ...), and only its dof along n is retained. Some more dofs are
 //! retained where supports and contact do not constrain the interior well.
 
 use super::options::Chosen;
-use super::{Dense, SparseBody, cost};
+use super::{Dense, SparseBody};
 use crate::error::{Error, Kind, Result};
 use crate::fem::ElasticBody;
 use crate::fem::rigid::{AtDofs, FreeMotion};
+use crate::file::available_memory;
 use crate::linalg::{Blocks, Csr, dot};
 use crate::model::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
 use crate::petsc::{Rows, Schur, Session};
@@ -106,7 +105,7 @@ impl CondensedBody {
         let mut schur =
             self.chosen.lend(session, || Schur::analyse(session, name, self.dimension, len, &lower, dofs))?;
         drop(lower);
-        let (needed, free) = (schur.expected_megabytes(), cost::available_memory() / 1_000_000);
+        let (needed, free) = (schur.expected_megabytes(), available_memory() / 1_000_000);
         if needed > free {
             let message = format!("body `{name}`: its factorisation needs {needed} MB of memory, {free} MB are free");
             return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));

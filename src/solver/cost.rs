@@ -1,17 +1,8 @@
 //! What inner solvers cost: the choice between a factorisation and multigrid for bodies in space.
 //!
 //! The dense operations of a factorisation are counted before it is made ([`factorisation`]). All other work is
-//! proportional to the entries of K. It is expressed in products of K with a vector, whose speed is that of the machine's memory ([`speed`](super::speed)).
+//! proportional to the entries of K. It is expressed in products of K with a vector, whose speed is that of the machine's memory ([`products`]).
 //! docs/solvers.md compares both ways and the choice on thirty scenes, which are called the table below.
-//!
-//! The memory and operations that factorisations take, and the memory that the machine has.
-//!
-//! How fast this machine multiplies with sparse matrices in memory.
-//!
-//! A factorisation is mostly dense algebra on numbers in the cache. Multigrid reads sparse matrices from memory. Processors differ by a factor of five
-//! in the speed of memory and much less in dense algebra, so a choice between the two that was measured on one machine is wrong on another.
-//!
-//! The cost of a sparse Cholesky factorisation, counted in advance.
 
 use super::Retained;
 use crate::error::Result;
@@ -219,11 +210,6 @@ fn analysed(body: &Candidate, ptr: &[u32], col: &[u32], speed: f64) -> Result<Co
     Ok(body.factored(work.operations, work.entries, speed))
 }
 
-/// Return the bytes that programs can still take without swapping, as Linux reports them. On other systems there is no limit.
-pub fn available_memory() -> usize {
-    crate::file::bytes_in_proc("/proc/meminfo", "MemAvailable").map_or(usize::MAX, |bytes| bytes as usize)
-}
-
 /// Return the estimated bytes of the sparse Cholesky factor of a plane body by nested dissection. They grow as n log n; the constant was
 /// measured on blocks of 32 000 to 500 000 dofs.
 pub fn plane_factor_bytes(dofs: usize) -> usize {
@@ -254,6 +240,9 @@ const PER_ROW: usize = 27;
 const TIMES: usize = 3;
 
 /// Return how many entries of a sparse matrix one core multiplies in a second. The first call measures it, which takes 40 to 70 ms.
+///
+/// A factorisation is mostly dense algebra on numbers in the cache. Multigrid reads sparse matrices from memory. Processors differ by a factor of five
+/// in the speed of memory and much less in dense algebra, so a choice between the two that was measured on one machine is wrong on another.
 pub fn products() -> f64 {
     static SPEED: OnceLock<f64> = OnceLock::new();
     *SPEED.get_or_init(measured)

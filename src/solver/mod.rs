@@ -20,8 +20,8 @@ mod sparse;
 pub use condensed::{CondensedBody, Retained};
 pub use dense::Dense;
 pub use krylov::Krylov;
-pub use monolithic::{Monolithic, RigidSpace, Union};
-pub use robin::RobinMatrix;
+pub use monolithic::{Monolithic, Union};
+pub use robin::{RigidSpace, RobinMatrix};
 pub use sparse::SparseBody;
 
 use crate::error::Result;

@@ -4,19 +4,14 @@
 //! With whole bodies it is the reference for methods that decompose: the same functional with one big sparse factorisation. With
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Where bodies are distributed over ranks, each
 //! rank owns some rows. Where whole bodies live on several ranks, as condensed ones do, every rank has the whole matrix and solves for itself.
-//!
-//! The matrices of all bodies joined in one: how bodies and contact rows are placed in it.
-//!
-//! The [coarse space](crate::model::coarse) of rigid motions, put around a preconditioner of the matrix of all bodies.
 
-use super::{InnerSolver, Krylov, RobinMatrix};
+use super::{InnerSolver, Krylov, RigidSpace, RobinMatrix};
 use crate::error::Result;
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable, dot};
-use crate::model::coarse::{Coarse, Space};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::{BodyCounts, BodySlot, Distribution, Field, Joint, Matrices, Model};
-use crate::petsc::{Iterate, Rows, Subspace};
+use crate::petsc::{Iterate, Rows};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -447,49 +442,4 @@ fn pins(motions: &[Rc<[f64]>]) -> Vec<usize> {
         pins.push(pin);
     }
     pins
-}
-
-/// The rigid motions of all bodies, in the rows of the matrix that this rank owns.
-pub struct RigidSpace {
-    space: Rc<Space>,
-    /// The columns of B that this rank owns; one row a contact point.
-    rows: Csr,
-}
-
-impl RigidSpace {
-    /// Return the space for the bodies of a model, or `None` if no two bodies in contact can both move freely. Then no bodies move together, and the space
-    /// would save nothing. `offset` is the first entry of each body in a vector of this rank, and its length. `rows` are B of all
-    /// bodies together, and `first` is the number of the first row that this rank owns.
-    pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<Self> {
-        let mut free_sides = vec![0; model.pairs.len()];
-        for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty()) {
-            slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
-        }
-        if !free_sides.contains(&2) {
-            return None;
-        }
-        let columns = offset[offset.len() - 1];
-        let owned = rows.of_columns(columns, |i| i.checked_sub(first).filter(|i| *i < columns));
-        Some(Self { space: Rc::new(Space::of(model, Some(offset))), rows: owned })
-    }
-
-    /// Return the space for these spring stiffnesses, one a contact point.
-    pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
-        Box::new(WithSprings { coarse: Coarse::new(self.space.clone(), springs), rigid: self.clone() })
-    }
-}
-
-/// The space of rigid motions for one set of springs.
-struct WithSprings {
-    coarse: Coarse,
-    rigid: Rc<RigidSpace>,
-}
-
-impl Subspace for WithSprings {
-    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
-        let mut closing = vec![0.0; self.rigid.rows.rows()];
-        self.rigid.rows.multiply(z, &mut closing);
-        self.coarse.add(1.0, &self.coarse.correction(r, &closing), &mut [z]);
-        Ok(())
-    }
 }

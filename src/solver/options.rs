@@ -9,18 +9,6 @@
 //!    a prefixed name to the plain one, and its table holds only 512 options.
 //! 3. An option that stands in a scene may choose a solver or set a parameter of one, and nothing else ([`check_of_scene`]).
 //! 4. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before it starts.
-//!
-//! What the user wrote, and the options of one solver, which PETSc sees only while that solver works.
-//!
-//! The options that stand in a scene. They choose solvers and set parameters of solvers, and do nothing else.
-//!
-//! PETSc's options also write files, remove folders, call a shell, load libraries and read more options. A scene may come from anybody, so it
-//! may only have options of the lists in [`names`](super::names). An option that PETSc adds later is not among them.
-//!
-//! PETSc's options on the command line: telling them from the program's own words, and refusing those that would end the program without a
-//! proper message.
-//!
-//! Options that nobody read: mistyped ones, and valid ones that have no effect.
 
 use super::names::{self, Takes, WHOLE, bare, corrected, ends, looks, nest_of, of_scenes, takes};
 use crate::error::{Error, Kind, Result};
@@ -258,6 +246,9 @@ pub fn pairs(words: &[String]) -> Result<Vec<(&str, Option<&str>)>> {
 }
 
 /// Check that an option chooses a solver or sets a parameter of one, and can do nothing else: then a scene may have it.
+///
+/// PETSc's options also write files, remove folders, call a shell, load libraries and read more options. A scene may come from anybody, so it
+/// may only have options of the lists in [`names`](super::names). An option that PETSc adds later is not among them.
 ///
 /// # Errors
 /// Any other option, and a value that such an option does not take.

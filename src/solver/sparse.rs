@@ -1,11 +1,4 @@
 //! A body whose state has all its dofs and its rigid motion.
-//!
-//! The rigid-body split: displacements as deformation and rigid motion, stored apart.
-//!
-//! K R = 0 holds for the rigid motions R that supports leave free, but only in exact numbers. Entries of K and u are rounded, and
-//! f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft layer loses its strains in that error. So
-//! its displacement is v + R a with v orthogonal to R, a state is (v, a), and K multiplies v alone. A force is (r, R'r), so that the product of a force and a
-//! state is the work on the displacement. The rigid part R'r comes from loads and contact forces, without K.
 
 use super::{InnerSolver, RobinMatrix};
 use crate::error::{Error, Kind, Result};
@@ -318,6 +311,13 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 }
 
 /// Orthogonal rigid motions that a body's supports leave free, with their traces on its contact rows.
+///
+/// Displacements are stored as deformation and rigid motion apart.
+///
+/// K R = 0 holds for the rigid motions R that supports leave free, but only in exact numbers. Entries of K and u are rounded, and
+/// f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft layer loses its strains in that error. So
+/// its displacement is v + R a with v orthogonal to R, a state is (v, a), and K multiplies v alone. A force is (r, R'r), so that the product of a force and a
+/// state is the work on the displacement. The rigid part R'r comes from loads and contact forces, without K.
 #[derive(Default)]
 pub struct Split {
     /// R, one vector over the dofs for each motion. Their lengths lie between 1 and 2. They are scaled by powers of two, so that a
