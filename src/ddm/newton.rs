@@ -32,9 +32,6 @@ const HALF: f64 = 0.5;
 const UNSEEN: f64 = 0.01;
 
 /// Iterate from displacements and layer states until a rule ends the run.
-///
-/// # Errors
-/// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, states: Layer) -> Result<End> {
     let (unit, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
     let mut newton = Newton { run, linear, unit, tolerance, u, states, correction: None, best: None };
@@ -369,9 +366,6 @@ fn distance(model: &Model, u: &Field, compression: &[f64], pressure: &[f64], rho
 
 /// Return the response w of the bodies and their layers to small loads r, (K + B' diag(omega kappa) B) w = r, and its squared energy norm. The
 /// layers are in the states `places`. `loads` is r, one entry per dof of each body that lives on this rank. The relative error of w may be `share`.
-///
-/// # Errors
-/// Failures of the solver library.
 pub fn respond(
     model: &mut Model,
     step: &mut dyn LinearStep,

@@ -25,9 +25,6 @@ use std::collections::VecDeque;
 
 /// Iterate from a displacement until a rule ends the run. `linear` serves estimates of the mesh's error. A run that goes on already has the row
 /// of the displacement in its history.
-///
-/// # Errors
-/// Failures of the solver library. Not converging is a status.
 pub(super) fn iterate(
     run: &mut Run,
     acceleration: &mut dyn Acceleration,
@@ -124,9 +121,6 @@ pub trait Acceleration {
     fn name(&self) -> &'static str;
 
     /// Return the next step.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn step(&mut self, here: &mut Iterate) -> Result<Step>;
 
     /// Return the Ritz values on the span of its directions, which estimate the spectrum of G^-1 F1''.

@@ -122,9 +122,6 @@ impl Run<'_> {
     }
 
     /// Show the row of an iterate and keep it. Return the status if the run ends there.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn check_termination(&mut self, at: &Iterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
         let row = self.row(at);
         let increment = row.increment;

@@ -109,9 +109,6 @@ pub struct Outcome {
 }
 
 /// Run a method on a model from its start until a rule ends it.
-///
-/// # Errors
-/// Failures of the solver library. Not converging is a [`Status`].
 pub fn solve(
     model: &mut Model,
     method: &mut Method,

@@ -266,9 +266,6 @@ fn largest_difference(before: &[f64], now: &[f64]) -> f64 {
 pub trait Discretisation {
     /// Estimate the relative error of the discrete solution near an iterate, in the norm of [`Row::error`](super::Row). It is the part of the error
     /// that lies in the space of the iterates, so that it bounds the accuracy of nodal values.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn error(&mut self, model: &mut Model, linear: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64>;
 }
 
@@ -288,9 +285,6 @@ impl Balance {
     }
 
     /// Whether an iterate with this estimated error is good enough. If it is by the last estimate, a new estimate at this iterate has to confirm it.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn is_met(
         &mut self,
         model: &mut Model,

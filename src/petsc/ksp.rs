@@ -111,9 +111,6 @@ impl Ksp {
     /// Factor a symmetric positive definite matrix with `rows` rows on this process by MUMPS, whatever options say.
     ///
     /// [`failure`](Self::failure) reports whether the factorisation succeeded.
-    ///
-    /// # Errors
-    /// PETSc's.
     pub(super) fn factored(session: &Session, scope: Scope, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
         let mut solver = Self::of(session, scope, "")?;
         let new = || Vector::new(session, scope, rows, 1);

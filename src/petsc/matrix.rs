@@ -136,9 +136,6 @@ impl Matrix {
     }
 
     /// Change values in place and return what `change` returns. The pattern stays, and solvers factor again at their next use.
-    ///
-    /// # Errors
-    /// When PETSc refuses, which it does not for a matrix of this type.
     pub fn update<T>(&mut self, change: impl FnOnce(&mut [f64]) -> T) -> Result<T> {
         // SAFETY: PETSc uses the array in its own calls only, and `&mut self` excludes the slice of `values`.
         let result = change(unsafe { std::slice::from_raw_parts_mut(self.values, self.nonzeros) });
@@ -169,9 +166,6 @@ impl Matrix {
     }
 
     /// Declare the matrix symmetric and positive definite, now and after every update.
-    ///
-    /// # Errors
-    /// When PETSc refuses, which it does not for a matrix of this type.
     pub fn set_spd(&mut self) -> Result<()> {
         for option in [
             ffi::MatOption_MAT_SYMMETRIC,

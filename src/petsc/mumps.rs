@@ -205,9 +205,6 @@ impl Schur {
     }
 
     /// Return the condensed right-hand side b_R - K_RI K_II^-1 b_I.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn condense(&mut self, b: &[f64]) -> Result<Vec<f64>> {
         let mut reduced = vec![0.0; self.retained.len()];
         if reduced.is_empty() {
@@ -219,18 +216,12 @@ impl Schur {
     }
 
     /// Return x with the given x_R = `x_retained` and K_II x_I = b_I - K_IR x_R.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn expand(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
         self.condense(b)?;
         self.expand_condensed(b, x_retained)
     }
 
     /// Return the same x for the right-hand side of the last [`condense`](Self::condense), whose intermediate result MUMPS has kept.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn expand_condensed(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
         let mut x = self.scaled(b);
         let mut reduced: Vec<f64> =

@@ -88,9 +88,6 @@ impl Options {
     ///
     /// PETSc's own list is one text, in which a value may look like a name. A word of it counts as a name if it is among those
     /// [`left`](Self::left), or if PETSc says that such an option was read.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     pub fn all(&self) -> Result<Vec<Entry>> {
         if !library::runs() {
             return Ok(Vec::new());
@@ -134,9 +131,6 @@ impl Options {
     }
 
     /// Return the options that nobody has read so far, sorted by name.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     pub fn left(&self) -> Result<Vec<Entry>> {
         if !library::runs() {
             return Ok(Vec::new());

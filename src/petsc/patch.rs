@@ -69,9 +69,6 @@ impl Ksp {
     /// assert_eq!(ksp.pc_type(), "jacobi");
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
-    ///
-    /// # Errors
-    /// PETSc's.
     pub fn patch(&mut self, matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<bool> {
         self.recover()?;
         let Some(patch) = Patch::new(matrix, dofs, layers)? else { return Ok(false) };
@@ -139,9 +136,6 @@ impl Factor {
     /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
     ///
     /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order. `owned` are the `count` dofs that this process owns.
-    ///
-    /// # Errors
-    /// Lack of memory, and other failures of MUMPS.
     pub fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
         let (session, scope) = (matrix.session(), matrix.scope());
         // a half is to be no larger than what a process has of the matrix anyway
@@ -162,9 +156,6 @@ impl Factor {
     }
 
     /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
         match self {
             Self::Halves(halves) => halves.solve(b, x),

@@ -158,9 +158,6 @@ impl Ksp {
     /// assert_eq!((x, calls.get()), ([1.0, 2.0, 3.0], 6));
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
-    ///
-    /// # Errors
-    /// PETSc's.
     pub fn wrap(&mut self, matrix: &Matrix, name: &'static CStr, subspace: Box<dyn Subspace>) -> Result<()> {
         let wrapper = Wrapper::new(matrix, self.outermost_pc()?, name, subspace)?;
         // SAFETY: a preconditioner of the same matrix.
@@ -170,9 +167,6 @@ impl Ksp {
     }
 
     /// Go back to the preconditioner that options chose.
-    ///
-    /// # Errors
-    /// PETSc's.
     pub fn unwrap(&mut self) -> Result<()> {
         if let Some(innermost) = self.wrappers.first() {
             // SAFETY: the preconditioner that this solver had.
@@ -187,9 +181,6 @@ impl Ksp {
     ///
     /// All residuals of conjugate gradients from there have Q r = 0. So an application needs no solve before M, which saves half of the work in
     /// the space, until the returned guard is dropped. Return `None` without a subspace, or for another method than `cg`.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub(super) fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Option<Started<'_>>> {
         let Some(outermost) = self.wrappers.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };
         outermost.start(rest, x).map(Some)

@@ -19,9 +19,6 @@ use std::ptr::{null, null_mut};
 /// which is a multiplicative Schwarz step before and after M. Slices have one entry for each row of this process. Calls are collective.
 pub trait Subspace {
     /// Add Q (r - A z) to z.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()>;
 }
 

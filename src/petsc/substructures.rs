@@ -56,9 +56,6 @@ impl Substructures {
     /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
     ///
     /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order.
-    ///
-    /// # Errors
-    /// Lack of memory, and other failures of MUMPS.
     pub fn new(matrix: &Matrix, dofs: &[usize]) -> Result<Option<Self>> {
         let (session, scope) = (matrix.session().clone(), matrix.scope());
         let layout = Layout::new(matrix, dofs)?;
@@ -85,9 +82,6 @@ impl Substructures {
     }
 
     /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
         let interior = self.interior.len();
         let mut inside = vec![0.0; interior + self.near.len()];

@@ -42,9 +42,6 @@ struct Test<'a, 'b> {
 
 impl Ksp {
     /// Let conjugate gradients estimate the spectrum of the preconditioned matrix (Lanczos). To be called before the set-up.
-    ///
-    /// # Errors
-    /// PETSc's.
     pub fn estimate_spectrum(&self) -> Result<()> {
         // SAFETY: a solver of ours and a flag.
         unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, flag(true))) }

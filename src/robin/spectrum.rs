@@ -45,9 +45,6 @@ const PARTS: usize = 32;
 
 /// Return the interval at a solution with this `layer`, for the Robin term that the model carries; none if the eigenvalues cannot be found.
 /// `excess` is F1(u0) - F1 of the solution. Collective: solves with G.
-///
-/// # Errors
-/// Failures of the solver library.
 pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<Interval>> {
     let (mut least, mut most) = (vec![0.0; model.points()], vec![0.0; model.points()]);
     for (i, pair) in model.pairs.iter().enumerate() {

@@ -80,9 +80,6 @@ impl Sweeper {
     ///
     /// A body without pressure and Robin term, now and in the last sweep, has r = (1 - gamma) r_last and the same G. Its z is known without a
     /// solve, as long as rounding is far below r.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn sweep(
         &mut self,
         model: &mut Model,
@@ -105,9 +102,6 @@ impl Sweeper {
     }
 
     /// Apply G^-1 to any residual as a preconditioner; the result keeps the residual. `product` of the result is `other`'z.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
         let bodies = model.bodies.len();
         let (known, energies) = (vec![None; bodies], vec![Energy::default(); bodies]);
@@ -163,9 +157,6 @@ impl Sweeper {
 
 impl Task<'_> {
     /// Return z of a body. Its numbers for the message go to `scalars`; if its inner solver fails, the cause goes to `reason`.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn solve_body(
         &mut self,
         index: usize,
@@ -339,9 +330,6 @@ const STEPS: usize = 4;
 
 /// Give every body that lives on this rank the Robin term of its extension, and set its solver up. A refusal of the solver or of an option
 /// then comes before the first sweep, and the extension needs no other factorisation.
-///
-/// # Errors
-/// Failures of the solver library.
 pub fn prepare(model: &mut Model) -> Result<()> {
     for index in 0..model.bodies.len() {
         let springs = extension_springs(&model.bodies[index]);
@@ -406,9 +394,6 @@ struct Extension {
 }
 
 /// Extend the trace `target` of a body, with springs of this stiffness at its contact rows. Collective for a distributed body.
-///
-/// # Errors
-/// Failures of the solver library.
 fn extend_body(body: &mut dyn Body, exchange: &dyn Exchange, springs: &[f64], target: &[f64]) -> Result<Extension> {
     body.robin(springs)?;
     let mut u = body.rest();

@@ -103,9 +103,6 @@ pub(super) struct Found {
 /// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. `springs`
 /// are omega kappa at the points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
 /// not see the slow modes.
-///
-/// # Errors
-/// Failures of the solver library.
 pub(super) fn gradients(
     model: &mut Model,
     sweeper: &mut Sweeper,
