@@ -39,7 +39,6 @@ mod preconditioner;
 mod requirements;
 mod session;
 mod subspace;
-mod substructures;
 mod until;
 mod vector;
 
