@@ -1,6 +1,6 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{Change, InnerSolver, Seen};
+use super::{Change, InnerSolver};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::coarse::{Coarse, Space};
@@ -18,8 +18,6 @@ pub struct RobinMatrix<S> {
     solver: S,
     /// Spring stiffnesses d of G, one a row of B.
     weight: Vec<f64>,
-    /// Spring stiffnesses in the matrix that the preconditioner was set up with. Where stiff rows are solved exactly, they are at most those of `soft`.
-    prepared: Vec<f64>,
     /// Spring stiffnesses that double the stiffness under a row.
     soft: Vec<f64>,
     coupling: Coupling,
@@ -44,7 +42,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
         let square = |q| rows.row(q).map(|(_, b)| b * b).sum::<f64>();
         let soft = row_stiffness.iter().enumerate().map(|(q, stiffness)| stiffness / square(q).powi(2)).collect();
         Ok(Self {
-            prepared: weight.clone(),
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
@@ -63,20 +60,15 @@ impl<S: InnerSolver> RobinMatrix<S> {
         }
         self.weight.copy_from_slice(weight);
         self.counts.robin_updates += 1;
-        let softened: Vec<f64> = weight.iter().zip(&self.soft).map(|(weight, soft)| weight.min(*soft)).collect();
-        let (coupling, soft, prepared) = (&self.coupling, &self.soft, &self.prepared);
         let change = Change {
-            write: &|g| coupling.write(rows, weight, g),
-            changed: &|| poor_dofs(rows, soft, prepared, weight),
-            stiff: &|| poor_dofs(rows, soft, &softened, weight),
+            write: &|g| self.coupling.write(rows, weight, g),
+            rows,
+            springs: weight,
+            soft: &self.soft,
             coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
         };
         let began = Instant::now();
-        match self.solver.update(change)? {
-            Seen::Older => {}
-            Seen::Patched => self.prepared = softened,
-            Seen::Whole => self.prepared.copy_from_slice(weight),
-        }
+        self.solver.update(change)?;
         self.count_seconds(began.elapsed().as_secs_f64());
         Ok(())
     }
@@ -261,24 +253,4 @@ impl Subspace for WithSprings {
         self.coarse.add(1.0, &self.coarse.correction(r, &closing), &mut [z]);
         Ok(())
     }
-}
-
-/// Ratio of the stiffnesses under a contact row beyond which a preconditioner is poor there, in either direction. With 1.2, 1.5, 2 and 3
-/// `groove3d` (n = 16, layer 1e7) takes 50, 50, 56 and 56 iterations, `hertz-sphere` (P1, n = 12, layer 1e6) 56, 54, 56 and 117.
-const POOR: f64 = 1.5;
-
-/// Return the dofs, sorted, of contact rows at which a preconditioner with springs `old` is poor for springs `new`: the stiffnesses under the row
-/// differ by more than the factor [`POOR`]. `soft` are the springs that double the stiffness under a row; all three have one entry a row.
-///
-/// The eigenvalues of G_old^-1 G_new lie between the smallest and the largest ratio of the springs. Where the body is stiff
-/// compared with its springs, they do not come near these bounds. So the stiffness of the body counts with that of the spring.
-fn poor_dofs(rows: &Csr, soft: &[f64], old: &[f64], new: &[f64]) -> Vec<usize> {
-    let is_poor = |q: &usize| {
-        let (before, after) = (soft[*q] + old[*q], soft[*q] + new[*q]);
-        after > POOR * before || before > POOR * after
-    };
-    let mut dofs: Vec<usize> = (0..rows.rows()).filter(is_poor).flat_map(|q| rows.row(q).map(|(i, _)| i)).collect();
-    dofs.sort_unstable();
-    dofs.dedup();
-    dofs
 }
