@@ -48,8 +48,10 @@ const FUNCTIONS: &[&str] = &[
     "MatCreate",
     "MatCreateMPIAIJWithSplitArrays",
     "MatCreateSeqAIJWithArrays",
+    "MatCreateSubMatrices",
     "MatCreateSubMatrix",
     "MatDestroy",
+    "MatDestroySubMatrices",
     "MatGetRow",
     "MatIncreaseOverlap",
     "MatMPIAIJGetSeqAIJ",
@@ -134,6 +136,10 @@ const FUNCTIONS: &[&str] = &[
     "VecResetArray",
     "VecRestoreArray",
     "VecRestoreArrayRead",
+    "VecScatterBegin",
+    "VecScatterCreate",
+    "VecScatterDestroy",
+    "VecScatterEnd",
     "VecSetBlockSize",
 ];
 
@@ -344,7 +350,7 @@ fn declare(folders: &[PathBuf], mpi: &build_probe_mpi::Library) {
         // the type of communicators in the whole crate is that of the `mpi` crate
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type("(KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool)")
+        .allowlist_type("(InsertMode|KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool|ScatterMode)")
         .allowlist_var(VERSIONS.join("|"))
         .dynamic_library_name("Library")
         .dynamic_link_require_all(true);

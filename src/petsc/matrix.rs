@@ -542,6 +542,25 @@ impl Indices {
         unsafe { petsc!(MatCreateSubMatrix(matrix.raw(), self.0, columns.0, reuse, &mut part)) }?;
         Ok(part)
     }
+
+    /// Fetch the submatrix of these rows and the given `columns`, which other processes may own, and hand it to `read`.
+    ///
+    /// Each process has its own index sets. Rows and columns of the submatrix are numbered by their positions in the sets. Collective.
+    pub(super) fn fetch(
+        &self,
+        matrix: &Matrix,
+        columns: &Indices,
+        read: impl FnOnce(ffi::Mat) -> Result<()>,
+    ) -> Result<()> {
+        let (reuse, mut parts) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
+        // SAFETY: one matrix, of this process, which lives until `read` is done.
+        unsafe {
+            petsc!(MatCreateSubMatrices(matrix.raw(), 1, &self.0, &columns.0, reuse, &mut parts))?;
+            let done = read(*parts);
+            petsc!(MatDestroySubMatrices(1, &mut parts))?;
+            done
+        }
+    }
 }
 
 impl Drop for Indices {

@@ -39,6 +39,7 @@ mod preconditioner;
 mod requirements;
 mod session;
 mod subspace;
+mod substructures;
 mod until;
 mod vector;
 

@@ -9,12 +9,12 @@
 //! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of these columns.
 
 use super::library::{flag, petsc};
-use super::matrix::{Indices, row};
+use super::matrix::Indices;
 use super::subspace::Subspace;
+use super::substructures::Substructures;
 use super::vector::Vector;
-use super::{Ksp, Matrix, Schur, Scope, ffi};
+use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
-use std::cell::RefCell;
 
 /// The space of the dofs P, with the columns P of A and the factor of P'AP.
 struct Patch {
@@ -123,26 +123,28 @@ impl Drop for Patch {
     }
 }
 
-/// The factor of P'AP, where P are some dofs of a matrix A.
-enum Factor {
-    /// That of one process, in the order of METIS.
-    Alone(RefCell<Schur>),
-    /// That of several processes, by MUMPS in parallel.
-    Together(Ksp),
+/// The factor of P'AP, where P are some dofs of a matrix A. A run has one or two of them.
+///
+/// MUMPS on all processes is for a P'AP of which a half would be more than a process has of the matrix anyway. On a quiet machine with two processes both
+/// take the same time: 45 s for `flange` with n = 2 under a layer of 1e8, compiled without optimisation. But each solve by MUMPS takes many messages, so
+/// that it takes 1.7 times as long on a machine with ten processes a core.
+#[allow(clippy::large_enum_variant)]
+pub(super) enum Factor {
+    /// Two halves, each eliminated by one process.
+    Halves(Substructures),
+    /// One factorisation by MUMPS on all processes.
+    Parallel(Ksp),
 }
 
 impl Factor {
     /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
     ///
     /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order. `owned` are the `count` dofs that this process owns.
-    fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
-        let (session, size) = (matrix.session(), matrix.block_size());
-        if matrix.scope() == Scope::Process {
-            let mut schur = Schur::analyse(session, "", size, dofs.len(), &lower_triangle(matrix, dofs)?, &[])?;
-            return match schur.factor() {
-                Err(_) if schur.is_singular() => Ok(None),
-                done => done.map(|()| Some(Self::Alone(RefCell::new(schur)))),
-            };
+    pub fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
+        let (session, scope) = (matrix.session(), matrix.scope());
+        // a half is to be no larger than what a process has of the matrix anyway
+        if dofs.len() * scope.processes(session) <= 2 * matrix.total() {
+            return Ok(Substructures::new(matrix, dofs)?.map(Self::Halves));
         }
         let mut block = owned.submatrix(matrix, owned)?;
         // SAFETY: a matrix of rows and columns of one that is positive definite.
@@ -150,35 +152,18 @@ impl Factor {
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, flag(true)))?;
             petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, flag(true)))?;
         }
-        let solver = Ksp::factored(session, matrix.scope(), block, count);
+        let solver = Ksp::factored(session, scope, block, count);
         // SAFETY: our reference; the solver has its own.
         unsafe { petsc!(MatDestroy(&mut block)) }?;
         let solver = solver?;
-        Ok(solver.failure().is_none().then_some(Self::Together(solver)))
+        Ok(solver.failure().is_none().then_some(Self::Parallel(solver)))
     }
 
     /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
-    fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
+    pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
         match self {
-            Self::Alone(schur) => x.copy_from_slice(&schur.borrow_mut().expand_condensed(b, &[])?),
-            Self::Together(solver) => solver.solve(b, x).map(drop)?,
+            Self::Halves(halves) => halves.solve(b, x),
+            Self::Parallel(solver) => solver.solve(b, x).map(|_| ()),
         }
-        Ok(())
     }
-}
-
-/// Return the entries (row, column, value) of the lower triangle of P'AP, row by row, numbered by the positions of the dofs P. This process has the
-/// whole matrix.
-fn lower_triangle(matrix: &Matrix, dofs: &[usize]) -> Result<Vec<(usize, usize, f64)>> {
-    let mut lower = Vec::new();
-    for (i, &dof) in dofs.iter().enumerate() {
-        row(matrix.raw(), dof, |columns, values| {
-            // open contact leaves zeros in the pattern of the matrix
-            for (&column, &value) in columns.iter().zip(values).filter(|(_, value)| **value != 0.0) {
-                let position = dofs[..=i].binary_search(&(column as usize)).ok();
-                lower.extend(position.map(|j| (i, j, value)));
-            }
-        })?;
-    }
-    Ok(lower)
 }
