@@ -35,8 +35,8 @@
 //! ```
 
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
-pub use crate::ddm::acceleration::Iterate;
 pub use crate::ddm::gamma::GammaRule;
+pub use crate::ddm::robin::Iterate;
 pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;

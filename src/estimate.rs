@@ -13,7 +13,7 @@ mod sides;
 pub mod sizes;
 mod square;
 
-use crate::ddm::{Discretisation, linear};
+use crate::ddm::{Discretisation, respond};
 use crate::discretize::meshes::{Meshes, Recovered};
 use crate::error::{Error, Kind, Result};
 use crate::fem::InterpolationError;
@@ -156,7 +156,7 @@ fn nodal_errors(
     loads: &[Vec<f64>],
     mean_error: &[f64],
 ) -> Result<NodalErrors> {
-    let response = linear::respond(model, step, layer, loads, tolerance(model, layer, mean_error))?;
+    let response = respond(model, step, layer, loads, tolerance(model, layer, mean_error))?;
     let (field, mut energy) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
     let closing: Vec<f64> = field.closing().iter().zip(mean_error).map(|(w, mean)| w + mean).collect();
     for (q, mean) in mean_error.iter().enumerate() {

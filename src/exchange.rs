@@ -45,7 +45,7 @@ pub fn scatter<T: Plain>(exchange: &dyn Exchange, mut part: impl FnMut(usize) ->
 }
 
 /// Return the value of every rank, in the order of the ranks (all_gather). Collective.
-pub fn all_gather<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
+pub fn all_gather<T: Plain>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {
         return vec![mine];
     }
@@ -53,7 +53,7 @@ pub fn all_gather<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine
 }
 
 /// Send `mine[k]` to rank k, and return the values from every rank, in the order of the ranks (all_to_all). Collective.
-pub fn all_to_all<T: Serialize + DeserializeOwned>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
+pub fn all_to_all<T: Plain>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
     if exchange.ranks() == 1 {
         return mine;
     }
@@ -85,10 +85,7 @@ pub fn asked(sums: &[f64]) -> u8 {
 ///
 /// # Errors
 /// The error of the first rank, there; on the other ranks an error of the same kind without a message.
-pub fn broadcast<T: Serialize + DeserializeOwned>(
-    exchange: &dyn Exchange,
-    mine: impl FnOnce() -> Result<T>,
-) -> Result<T> {
+pub fn broadcast<T: Plain>(exchange: &dyn Exchange, mine: impl FnOnce() -> Result<T>) -> Result<T> {
     if exchange.rank() == 0 {
         let found = mine();
         if exchange.ranks() > 1 {

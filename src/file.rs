@@ -53,6 +53,11 @@ pub fn other_encoding(bytes: &[u8]) -> Option<&'static str> {
     }
 }
 
+/// Return the bytes that programs can still take without swapping, as Linux reports them. On other systems there is no limit.
+pub fn available_memory() -> usize {
+    bytes_in_proc("/proc/meminfo", "MemAvailable").map_or(usize::MAX, |bytes| bytes as usize)
+}
+
 /// Return the number of bytes on a line of a file of /proc, such as `MemAvailable` of /proc/meminfo; none where there is no such file or line.
 pub fn bytes_in_proc(file: &str, line: &str) -> Option<u64> {
     bytes_on_line(&std::fs::read_to_string(file).ok()?, line)

@@ -1,13 +1,8 @@
 //! What both loops share: the history of a run, its scales, the checks that end it, and its observer.
 
-use super::balance::Balance;
-use super::bound::Reached;
-use super::history::{Observer, Row};
-use super::memory::Memory;
-use super::origin::Origin;
-use super::roundoff;
-use super::scale::Scale;
-use super::stop::{Status, relative_increment};
+use super::bound::{ROUNDING, Reached, Scale, compression_roundoff};
+use super::progress::Progress;
+use super::stop::{Balance, Cycle, Stagnation, Status, Steady, relative_increment};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -15,8 +10,10 @@ use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
+use crate::model::origin::Origin;
 use crate::problem::stop::StopRule;
-use crate::robin::Sweep;
+use crate::robin::{Sweep, Sweeper};
+use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
 /// A run under way.
@@ -125,9 +122,6 @@ impl Run<'_> {
     }
 
     /// Show the row of an iterate and keep it. Return the status if the run ends there.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn check_termination(&mut self, at: &Iterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
         let row = self.row(at);
         let increment = row.increment;
@@ -329,8 +323,121 @@ pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
     }
     model.exchange.sum(&mut sum);
     // an error e of a compression makes the force omega kappa e, which springs omega kappa at least resist
-    for (q, error) in roundoff::of_compressions(model, &u.trace).into_iter().enumerate() {
+    for (q, error) in compression_roundoff(model, &u.trace).into_iter().enumerate() {
         sum[0] += model.weight[q] * layer.tangent[q] * error.powi(2);
     }
-    roundoff::ROUNDING * sum[0]
+    ROUNDING * sum[0]
+}
+
+/// One row of the iteration history: iterate u^k and the step that leads on from it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Load step, from 1 on; 0 where there are none.
+    pub step: usize,
+    /// k: updates made so far.
+    pub iteration: usize,
+    /// The number that ends the run (docs/theory.md): for sweeps the relative residual of the iterate, for Newton's method its relative error.
+    pub residual: f64,
+    /// Largest of `increments`; NaN in row 0, before the first update.
+    pub increment: f64,
+    /// Relative error of the iterate in the energy norm; NaN while it is not known.
+    pub error: f64,
+    /// Whether `error` is a bound; otherwise it is an estimate.
+    pub is_bound: bool,
+    /// The paper's rho of each body, in the order of the scene: relative increment of the normal displacements in the step that led to this
+    /// iterate.
+    pub increments: Vec<f64>,
+    /// Relaxation, or length of the step, that led to this iterate; NaN in row 0.
+    pub gamma: f64,
+    /// Functional F1 (25).
+    pub energy: f64,
+    /// Contact points with c > 0.
+    pub closed: usize,
+    /// All contact points.
+    pub points: usize,
+    /// Sweeps so far; each solves in every body once.
+    pub sweeps: usize,
+    /// Numeric factorisations (or preconditioner set-ups) so far, all bodies.
+    pub factorizations: usize,
+    /// Inner Krylov iterations so far, all bodies (0 with a direct solver).
+    pub inner_iterations: usize,
+    /// Steps of Newton's method so far that were taken with smoothed laws.
+    pub smoothed: usize,
+    /// Seconds since the iteration began.
+    pub seconds: f64,
+}
+
+/// An observer of an iteration, such as the table on the terminal or a progress line.
+pub trait Observer {
+    /// Take a complete row.
+    fn row(&mut self, row: &Row);
+    /// Return the requests from outside, as [`ASKS`](crate::exchange::ASKS) bits whose meaning is the caller's own; called once an iterate. The
+    /// requests of one rank reach all ranks, and the run ends with [`Status::Paused`](super::Status::Paused), from where it can go on.
+    fn asked(&self) -> u8 {
+        0
+    }
+}
+
+/// An observer that does nothing.
+pub struct Silent;
+
+impl Observer for Silent {
+    fn row(&mut self, _row: &Row) {}
+}
+
+/// The step that led to an iterate of sweeps.
+#[derive(Debug, Clone)]
+pub(super) struct Last {
+    /// The sweep before the step.
+    pub sweep: Sweep,
+    /// gamma, if the step was taken along the sweep's correction.
+    pub relaxed: Option<f64>,
+    /// Length of the step along its direction.
+    pub length: f64,
+    /// Change of the traces, 2n.
+    pub moved: Vec<f64>,
+}
+
+/// The memory of a run.
+///
+/// It is of iterates besides the last one, and decides when the run ends and how its next steps are taken, not what the
+/// solution is. So a run that goes on from a file begins without it.
+#[derive(Debug, Clone)]
+pub struct Memory {
+    pub(super) cycle: Cycle,
+    pub(super) stagnation: Stagnation,
+    /// Pressures of earlier sweeps.
+    pub(super) steady: Steady,
+    /// Steps of Newton's method.
+    pub(super) progress: Progress,
+    /// Layer states of the next step of Newton's method, if the run paused.
+    pub(super) states: Option<Layer>,
+    /// Counters of sweeps.
+    pub(super) sweeper: Sweeper,
+    /// The last step of sweeps.
+    pub(super) last: Option<Last>,
+    /// The sweep at the last iterate, if the run paused.
+    pub(super) sweep: Option<Sweep>,
+    /// Sweeps of this run that another process made.
+    pub(super) earlier: usize,
+    /// Sweeps that the solver of linear steps had made before this run began.
+    pub(super) foreign: usize,
+}
+
+impl Memory {
+    /// Return the memory of a run that begins with this watch for stagnation, by a solver that had made `foreign` sweeps before.
+    pub(super) fn new(stagnation: Stagnation, foreign: usize) -> Self {
+        Self {
+            cycle: Cycle::default(),
+            stagnation,
+            steady: Steady::default(),
+            progress: Progress::default(),
+            states: None,
+            sweeper: Sweeper::default(),
+            last: None,
+            sweep: None,
+            earlier: 0,
+            foreign,
+        }
+    }
 }

@@ -1,30 +1,23 @@
-//! A run from its start to its result, by either loop.
+//! A run from its start to its result, by either loop. The start is given by the scene, found by itself, or left by another run.
 
-use super::acceleration::Acceleration;
-use super::balance::{Balance, Discretisation};
-use super::bound::{OffLaws, Reached};
-use super::forecast::Forecast;
-use super::history::{Observer, Row};
-use super::initial::{Start, State, find_start, first_states, fits};
-use super::memory::Memory;
-use super::origin::Origin;
-use super::roundoff::{self, ROUNDING};
-use super::run::{End, Run, rounding};
-use super::scale::Scale;
-use super::start::RigidStart;
-use super::stop::{Stagnation, Status};
+use super::bound::{OffLaws, ROUNDING, Reached, Scale, compression_roundoff, pressure_roundoff, roundoff_safety};
+use super::newton::resisting;
+use super::robin::{Acceleration, Forecast};
+use super::run::{End, Memory, Observer, Row, Run, rounding};
+use super::start::{self, RigidStart};
+use super::stop::{Balance, Discretisation, Stagnation, Status};
 use super::{newton, robin};
 use crate::error::Result;
 use crate::model::Model;
-use crate::model::body::BodyCounts;
+use crate::model::body::{Body, BodyCounts};
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
+use crate::model::origin::Origin;
 use crate::model::surface::{meeting_slopes, surface_slopes};
 use crate::problem::stop::StopRule;
-use crate::robin::coefficient::Coefficient;
-use crate::robin::extend::extend;
-use crate::robin::interval::{Interval, interval};
+use crate::robin::spectrum::{Interval, interval};
+use crate::robin::sweep::{Coefficient, extend, underconstrained};
 use std::time::Instant;
 
 /// The method of a run.
@@ -116,9 +109,6 @@ pub struct Outcome {
 }
 
 /// Run a method on a model from its start until a rule ends it.
-///
-/// # Errors
-/// Failures of the solver library. Not converging is a [`Status`].
 pub fn solve(
     model: &mut Model,
     method: &mut Method,
@@ -284,7 +274,7 @@ impl Run<'_> {
         let compression = self.model.compression(&traced.trace);
         let roundoff_level = match end.status {
             Status::RoundoffLimited => {
-                let roundoff = roundoff::of_compressions(self.model, &traced.trace);
+                let roundoff = compression_roundoff(self.model, &traced.trace);
                 roundoff_level(self.model, &end.iterate, &end.layer, &roundoff)
             }
             _ => 0.0,
@@ -293,7 +283,7 @@ impl Run<'_> {
             origin.give(self.model, &mut end.iterate);
         }
         // the displacements of the result have the digits of whole ones, not of those relative to the origin
-        let roundoff = roundoff::of_compressions(self.model, &end.iterate.trace);
+        let roundoff = compression_roundoff(self.model, &end.iterate.trace);
         let off = OffLaws::new(self.model, &end.layer, &compression, &roundoff);
         Ok(Outcome {
             iterations: findings.updates,
@@ -349,12 +339,115 @@ impl Run<'_> {
             }
         };
         let peak = self.scale.peak(&layer.pressure, self.strain);
-        let times = roundoff::safety(is_sweeps, &end.status);
-        let error = times * roundoff::of_pressures(model, &end.iterate.trace, layer, &answer, peak);
+        let times = roundoff_safety(is_sweeps, &end.status);
+        let error = times * pressure_roundoff(model, &end.iterate.trace, layer, &answer, peak);
         if is_sweeps && end.status == Status::RoundoffLimited {
             // pressures that are taken from compressions balance the loads only to the digits of the compressions
             return error.max(self.scale.imbalance(model, &layer.force, self.strain));
         }
         error
     }
+}
+
+/// The start of a run.
+#[derive(Debug, Clone, Default)]
+pub enum Start {
+    /// Rigid bodies on their own surfaces.
+    #[default]
+    Automatic,
+    /// The automatic start, already found for these loads.
+    Found(Box<RigidStart>),
+    /// Outer normal displacement of all contact rows (2n, layout of a trace vector).
+    Trace(Vec<f64>),
+    /// Contact pressures (n) for Newton's method, for example from another mesh; sweeps begin automatically.
+    Pressure(Vec<f64>),
+    /// A displacement, used as it is.
+    Resume(Field),
+    /// The state in which another run paused.
+    Continue(Box<State>),
+}
+
+/// The state from which a run goes on.
+#[derive(Debug, Clone)]
+pub struct State {
+    /// Displacements. If the states are not those that the solvers of the bodies work with, only the traces are used.
+    pub field: Field,
+    /// Compressions of the layers' states, n.
+    pub compression: Vec<f64>,
+    /// Energy per area by which the laws are smoothed, n; empty for the laws themselves.
+    pub smoothing: Vec<f64>,
+    /// History so far.
+    pub rows: Vec<Row>,
+    /// Memory of the run; none if the state comes from a file.
+    pub memory: Option<Memory>,
+}
+
+impl From<Option<Vec<f64>>> for Start {
+    /// Start from a trace, or automatically.
+    fn from(trace: Option<Vec<f64>>) -> Self {
+        trace.map_or(Start::Automatic, Start::Trace)
+    }
+}
+
+/// Return the springs omega kappa (n) of the first linear step of Newton's method; none if there is no solution. An automatic start is replaced by
+/// the one that is found.
+pub fn first_springs(model: &Model, begin: &mut Start) -> Option<Vec<f64>> {
+    let rigid = find_start(model).ok()?;
+    let springs = resisting(model, first_states(model, begin, &rigid).springs(model));
+    if let Start::Automatic = begin {
+        *begin = Start::Found(Box::new(rigid));
+    }
+    Some(springs)
+}
+
+/// Return the automatic start. If no method can find a solution, return the reason: a motion that nothing resists, or loads that push a body off
+/// for ever.
+fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
+    if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
+        return Err(Status::Underconstrained(moved));
+    }
+    if let Some(mechanism) = &model.mechanism {
+        return Err(Status::Mechanism(mechanism.clone()));
+    }
+    start::find(model, None).map_err(|moving| Status::Unbounded { moving })
+}
+
+/// Return the layer states from which Newton's method begins.
+fn first_states(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
+    match begin {
+        Start::Automatic | Start::Found(_) => rigid.places.clone(),
+        Start::Trace(trace) => match start::find(model, Some(trace)) {
+            Ok(rigid) => rigid.places,
+            Err(_) => start::at(model, trace),
+        },
+        Start::Resume(field) => Layer::at(model, &field.trace),
+        Start::Continue(state) => {
+            let paused = state.memory.as_ref().and_then(|memory| memory.states.clone());
+            paused.unwrap_or_else(|| Layer::smoothed(model, state.compression.clone(), &state.smoothing))
+        }
+        Start::Pressure(pressure) => {
+            let mut compression = Vec::with_capacity(pressure.len());
+            for (i, pair) in model.pairs.iter().enumerate() {
+                compression.extend(model.range(i).map(|q| pair.law.compression(q - model.offset[i], pressure[q])));
+            }
+            Layer::new(model, compression)
+        }
+    }
+}
+
+/// Whether a field has the states that the bodies work with: vectors of the same length, whose traces agree with those of the field to half the
+/// digits. Collective.
+pub(super) fn fits(model: &Model, field: &Field) -> bool {
+    let bodies = model.bodies.iter().map(|slot| slot.local.as_ref());
+    let is_odd =
+        |(body, state): (Option<&Box<dyn Body>>, &Vec<f64>)| body.is_some_and(|body| body.len() != state.len());
+    let mut odd = [bodies.zip(&field.states).filter(|pair| is_odd(*pair)).count() as f64];
+    model.exchange.sum(&mut odd);
+    if odd[0] > 0.0 {
+        return false;
+    }
+    let mut traced = field.clone();
+    traced.retrace(model);
+    let difference = traced.trace.iter().zip(&field.trace).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+    difference <= f64::EPSILON * crate::linalg::dot(&field.trace, &field.trace)
 }

@@ -1,10 +1,11 @@
-//! The factor of a semidefinite matrix of blocks: it gives a solution of A x = b and a basis of the kernel.
+//! Symmetric positive semidefinite matrices of small dense blocks, one row of blocks per body, and their factor, which gives a solution of A x = b and a
+//! basis of the kernel.
 
-use super::blocks::Blocks;
-use super::degree;
 use nalgebra::{DMatrix, DVector};
-use std::collections::BTreeSet;
+use std::cell::RefCell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::rc::Rc;
 
 /// Relative stiffness below which a motion counts as free: the one tolerance that decides which motions are unconstrained.
 ///
@@ -361,7 +362,7 @@ fn structure(matrix: &Blocks) -> Vec<Column> {
         graph[vertex[j]].push(vertex[i]);
     }
     graph.iter_mut().for_each(|near| near.sort_unstable());
-    let order = degree::order_again(graph);
+    let order = order_again(graph);
     let mut step = vec![0; order.len()];
     order.iter().enumerate().for_each(|(k, (v, _))| step[*v] = k);
     let column = |(v, near): &(usize, Vec<usize>)| {
@@ -380,4 +381,343 @@ fn steps(matrix: &Blocks, columns: &[Column]) -> Vec<usize> {
     let mut of_first = vec![0; matrix.unknowns()];
     columns.iter().enumerate().for_each(|(k, column)| of_first[column.own.start] = k);
     (0..matrix.rows()).map(|i| of_first.get(matrix.range(i).start).copied().unwrap_or(0)).collect()
+}
+
+/// A symmetric matrix of dense blocks; only non-zero blocks are stored.
+#[derive(Debug, Clone)]
+pub struct Blocks {
+    /// First unknown of each row of blocks, and the number of all unknowns.
+    first: Vec<usize>,
+    /// The blocks (i, j) of row i with j >= i, by j.
+    rows: Vec<BTreeMap<usize, DMatrix<f64>>>,
+}
+
+impl Blocks {
+    /// Return a zero matrix with this number of unknowns in each row of blocks; a row may have none.
+    pub fn new(sizes: &[usize]) -> Self {
+        let mut first = vec![0];
+        sizes.iter().for_each(|size| first.push(first[first.len() - 1] + size));
+        Self { first, rows: vec![BTreeMap::new(); sizes.len()] }
+    }
+
+    /// Return a matrix of a single block.
+    pub fn single(block: &DMatrix<f64>) -> Self {
+        let mut blocks = Self::new(&[block.nrows()]);
+        blocks.add(0, 0, block);
+        blocks
+    }
+
+    /// Return the number of rows of blocks.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Return the number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.first[self.rows.len()]
+    }
+
+    /// Return the unknowns of a row of blocks.
+    pub fn range(&self, i: usize) -> Range<usize> {
+        self.first[i]..self.first[i + 1]
+    }
+
+    /// Add a block at (i, j), and its transpose at (j, i) if i and j differ.
+    pub fn add(&mut self, i: usize, j: usize, block: &DMatrix<f64>) {
+        debug_assert_eq!(block.shape(), (self.range(i).len(), self.range(j).len()));
+        if i > j {
+            return self.add(j, i, &block.transpose());
+        }
+        if !block.is_empty() {
+            self.rows[i].entry(j).and_modify(|sum| *sum += block).or_insert_with(|| block.clone());
+        }
+    }
+
+    /// Return the block (i, i).
+    pub fn diagonal(&self, i: usize) -> DMatrix<f64> {
+        let size = self.range(i).len();
+        self.rows[i].get(&i).cloned().unwrap_or_else(|| DMatrix::zeros(size, size))
+    }
+
+    /// Iterate over the stored blocks (i, j, block) with i <= j, row by row.
+    pub fn stored(&self) -> impl Iterator<Item = (usize, usize, &DMatrix<f64>)> {
+        self.rows.iter().enumerate().flat_map(|(i, row)| row.iter().map(move |(&j, block)| (i, j, block)))
+    }
+
+    /// Return A x.
+    pub fn multiply(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut y = DVector::zeros(self.unknowns());
+        for (i, j, block) in self.stored() {
+            let (own, other) = (self.range(i), self.range(j));
+            y.rows_mut(own.start, own.len()).gemv(1.0, block, &x.rows(other.start, other.len()), 1.0);
+            if i != j {
+                y.rows_mut(other.start, other.len()).gemv_tr(1.0, block, &x.rows(own.start, own.len()), 1.0);
+            }
+        }
+        y
+    }
+}
+
+/// The vertices in the order of their elimination, each with its neighbours at that time.
+pub type Order = Rc<Vec<(usize, Vec<usize>)>>;
+
+thread_local! {
+    /// The last graph with its order.
+    static LAST: RefCell<(Vec<Vec<usize>>, Order)> = RefCell::default();
+}
+
+/// Return [`order`] of a graph; it is kept for the next call with the same graph. A run factors the springs between its bodies some ten times,
+/// and the order takes a third as long as the factor.
+pub fn order_again(graph: Vec<Vec<usize>>) -> Order {
+    // a single vertex does not replace the graph that is kept
+    if graph.len() < 2 {
+        return order(graph).into();
+    }
+    LAST.with_borrow_mut(|(last, known)| {
+        if *last != graph {
+            *known = order(graph.clone()).into();
+            *last = graph;
+        }
+        Rc::clone(known)
+    })
+}
+
+/// Return the vertices in the order of their elimination, each with its neighbours at that time.
+///
+/// `graph` has the neighbours of each vertex, sorted, without the vertex itself. Every step eliminates the first vertex of least degree, and connects
+/// its neighbours to each other (George, Liu: The evolution of the minimum degree ordering algorithm, 1989). The graph is explicit, because it is
+/// small: one vertex per body.
+pub fn order(mut graph: Vec<Vec<usize>>) -> Vec<(usize, Vec<usize>)> {
+    let mut queue: BTreeSet<(usize, usize)> = graph.iter().enumerate().map(|(v, near)| (near.len(), v)).collect();
+    let mut order = Vec::with_capacity(graph.len());
+    while let Some((_, vertex)) = queue.pop_first() {
+        let near = std::mem::take(&mut graph[vertex]);
+        for &other in &near {
+            let before = graph[other].len();
+            let joined = union(&graph[other], &near, [vertex, other]);
+            if joined.len() != before {
+                queue.remove(&(before, other));
+                queue.insert((joined.len(), other));
+            }
+            graph[other] = joined;
+        }
+        order.push((vertex, near));
+    }
+    order
+}
+
+/// Return the sorted union of two sorted lists without the members `without`.
+fn union(a: &[usize], b: &[usize], without: [usize; 2]) -> Vec<usize> {
+    let mut all = Vec::with_capacity(a.len() + b.len());
+    let (mut i, mut k) = (0, 0);
+    while i < a.len() || k < b.len() {
+        let next = a.get(i).copied().unwrap_or(usize::MAX).min(b.get(k).copied().unwrap_or(usize::MAX));
+        i += usize::from(a.get(i) == Some(&next));
+        k += usize::from(b.get(k) == Some(&next));
+        if !without.contains(&next) {
+            all.push(next);
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+    /// Numbers in [-1, 1) that look random.
+    fn random(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        }
+    }
+
+    fn dense(matrix: &Blocks) -> DMatrix<f64> {
+        let n = matrix.unknowns();
+        let column = |j: usize| matrix.multiply(&DVector::from_fn(n, |i, _| f64::from(u8::from(i == j))));
+        DMatrix::from_columns(&(0..n).map(column).collect::<Vec<_>>())
+    }
+
+    /// Adds a spring of stiffness k that each unknown u of these bodies stretches by g(u).
+    fn spring(matrix: &mut Blocks, k: f64, ends: &[(usize, Vec<f64>)]) {
+        for (s, (i, g)) in ends.iter().enumerate() {
+            for (j, h) in &ends[s..] {
+                matrix.add(*i, *j, &(k * DVector::from_column_slice(g) * DVector::from_column_slice(h).transpose()));
+            }
+        }
+    }
+
+    /// Checks the rank, every kernel vector, that they are a reduced basis, and solutions.
+    fn check(matrix: &Blocks, nullity: usize, tolerance: f64) -> Factor {
+        let factor = matrix.factor();
+        let kernel = factor.kernel();
+        assert_eq!((kernel.len(), factor.rank()), (nullity, matrix.unknowns() - nullity));
+        let sizes = (0..matrix.rows()).flat_map(|i| matrix.diagonal(i).diagonal().data.as_vec().clone());
+        let size = DVector::from_vec(sizes.collect());
+        for (k, vector) in kernel.iter().enumerate() {
+            assert_eq!(vector.amax(), 1.0);
+            let stored = vector.dot(&matrix.multiply(vector));
+            let most = size.dot(&vector.component_mul(vector)) + TOLERANCE * size.amax();
+            assert!(stored <= TOLERANCE * most, "{stored} of {most}");
+            for (l, &u) in factor.left_out().iter().enumerate() {
+                assert_eq!(vector[u] != 0.0, k == l);
+            }
+        }
+        let mut next = random(7);
+        let b = matrix.multiply(&DVector::from_fn(matrix.unknowns(), |_, _| next()));
+        let error = (matrix.multiply(&factor.solve(&b)) - &b).amax();
+        assert!(error <= tolerance * b.amax().max(1e-300), "{error} of {}", b.amax());
+        factor
+    }
+
+    #[test]
+    fn random_matrices_have_the_rank_of_their_eigenvalues() {
+        for seed in 0..200 {
+            let mut next = random(seed);
+            let mut whole = |most: f64| (0.5 * (next() + 1.0) * most) as usize;
+            let sizes: Vec<usize> = (0..3 + whole(8.0)).map(|_| whole(7.0)).collect();
+            let springs = whole(1.2 * sizes.iter().sum::<usize>() as f64);
+            let mut matrix = Blocks::new(&sizes);
+            for _ in 0..springs {
+                let [i, j] = [whole(sizes.len() as f64), whole(sizes.len() as f64)];
+                // whole numbers make many combinations vanish
+                let mut ends = vec![(i, (0..sizes[i]).map(|_| whole(5.0) as f64 - 2.0).collect())];
+                if j != i {
+                    ends.push((j, (0..sizes[j]).map(|_| whole(5.0) as f64 - 2.0).collect()));
+                }
+                spring(&mut matrix, 10f64.powi(whole(5.0) as i32), &ends);
+            }
+            let eigen = SymmetricEigen::new(dense(&matrix));
+            let zero = 1e-12 * eigen.eigenvalues.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+            check(&matrix, eigen.eigenvalues.iter().filter(|value| **value <= zero).count(), 1e-8);
+        }
+    }
+
+    /// Chains of springs that differ by 1e8: one that floats, and one that the softest spring of all holds.
+    #[test]
+    fn chains_float_or_are_held() {
+        for (count, held) in [(3, false), (3, true), (400, false), (400, true)] {
+            let mut matrix = Blocks::new(&vec![1; count]);
+            for i in 1..count {
+                let k = if i % 7 < 3 { 1e8 } else { 1.0 };
+                spring(&mut matrix, k, &[(i - 1, vec![1.0]), (i, vec![-1.0])]);
+            }
+            if held {
+                spring(&mut matrix, 1.0, &[(count / 2, vec![1.0])]);
+            }
+            let factor = check(&matrix, usize::from(!held), 1e-10);
+            // rounding of the stiff springs, as the soft ones feel it
+            assert!(factor.kernel().iter().all(|vector| vector.iter().all(|u| (u - 1.0).abs() < 1e-5)));
+        }
+    }
+
+    /// Two groups that float, a body that nothing touches, one without unknowns, one that is held by hardly anything.
+    #[test]
+    fn groups_float_each_alone() {
+        let mut matrix = Blocks::new(&[2, 2, 0, 3, 1, 1, 2]);
+        spring(&mut matrix, 5.0, &[(0, vec![1.0, 0.0]), (1, vec![-1.0, 0.0])]);
+        spring(&mut matrix, 5.0, &[(0, vec![0.0, 1.0]), (1, vec![0.0, -1.0])]);
+        spring(&mut matrix, 1e9, &[(4, vec![1.0]), (5, vec![-1.0])]);
+        // slides along its plane but for a rounding error; and that much is held in earnest
+        spring(&mut matrix, 1.0, &[(6, vec![1.0, 1e-16])]);
+        let factor = check(&matrix, 2 + 3 + 1 + 1, 1e-12);
+        let pure = factor.kernel_entries().iter().map(Vec::len).collect::<Vec<_>>();
+        assert_eq!(pure.iter().filter(|count| **count == 1).count(), 4, "{pure:?}");
+        assert_eq!(pure.iter().filter(|count| **count == 2).count(), 3, "{pure:?}");
+        spring(&mut matrix, 1.0, &[(6, vec![0.0, 1e-12])]);
+        check(&matrix, 2 + 3 + 1, 1e-12);
+    }
+
+    /// Springs between neighbours of a lattice at corners of the blocks, in the order (translations, rotations).
+    fn lattice(counts: [usize; 3], held: f64) -> Blocks {
+        let space = counts[2] > 1;
+        let number = |at: [usize; 3]| (at[2] * counts[1] + at[1]) * counts[0] + at[0];
+        let size = if space { 6 } else { 3 };
+        let mut matrix = Blocks::new(&vec![size; counts.iter().product()]);
+        let along = |direction: [f64; 3], arm: [f64; 3]| {
+            let turn = |i: usize, j: usize| arm[i] * direction[j] - arm[j] * direction[i];
+            let turns = [turn(1, 2), turn(2, 0), turn(0, 1)];
+            if space {
+                direction.into_iter().chain(turns).collect()
+            } else {
+                vec![direction[0], direction[1], turns[2]]
+            }
+        };
+        for i in 0..counts.iter().product() {
+            let at = [i % counts[0], i / counts[0] % counts[1], i / counts[0] / counts[1]];
+            let steps = (0..27).map(|s| [s % 3, s / 3 % 3, s / 9].map(|step| step as i64 - 1));
+            for step in steps.filter(|step| *step > [0, 0, 0]) {
+                let other: [i64; 3] = std::array::from_fn(|c| at[c] as i64 + step[c]);
+                let wall = !space && step[0] * step[1] < 0;
+                if wall || (0..3).any(|c| other[c] < 0 || other[c] >= counts[c] as i64) {
+                    continue;
+                }
+                let arm = step.map(|step| 0.5 * step as f64);
+                for c in 0..if space { 3 } else { 2 } {
+                    let direction: [f64; 3] = std::array::from_fn(|d| f64::from(u8::from(c == d)));
+                    for corner in [-0.3, 0.4] {
+                        let arm: [f64; 3] = std::array::from_fn(|d| arm[d] + if d == c { 0.0 } else { corner });
+                        let mine = along(direction, arm);
+                        let back: [f64; 3] = std::array::from_fn(|d| arm[d] - step[d] as f64);
+                        let its = along(direction, back).into_iter().map(|g| -g).collect();
+                        spring(&mut matrix, 1.0, &[(i, mine), (number(other.map(|x| x as usize)), its)]);
+                    }
+                }
+            }
+        }
+        if held > 0.0 {
+            (0..size).for_each(|c| {
+                spring(&mut matrix, held, &[(0, (0..size).map(|d| f64::from(u8::from(c == d))).collect())])
+            });
+        }
+        matrix
+    }
+
+    #[test]
+    fn a_large_wall_floats_as_one_body() {
+        let wall = lattice([64, 64, 1], 0.0);
+        let factor = check(&wall, 3, 1e-9);
+        // rows from the first entry on would have 7e6
+        assert!(factor.entries() < 1_000_000, "{}", factor.entries());
+        // held at one block by hardly anything
+        check(&lattice([64, 64, 1], 1e-4), 0, 1e-6);
+    }
+
+    #[test]
+    fn blocks_in_space_float_as_one_body() {
+        let factor = lattice([8, 8, 8], 0.0).factor();
+        assert_eq!(factor.kernel().len(), 6);
+        assert!(factor.entries() < 1_200_000, "{}", factor.entries());
+        check(&lattice([5, 4, 6], 0.0), 6, 1e-10);
+    }
+
+    #[test]
+    fn an_order_is_that_of_its_graph() {
+        let chain = |n: usize| -> Vec<Vec<usize>> {
+            (0..n).map(|v| [v.checked_sub(1), (v + 1 < n).then_some(v + 1)].into_iter().flatten().collect()).collect()
+        };
+        for n in [4, 4, 1, 4, 7, 4] {
+            assert_eq!(*order_again(chain(n)), order(chain(n)), "{n}");
+        }
+    }
+
+    #[test]
+    fn leaves_go_before_their_tree_and_a_ring_is_closed() {
+        // a star with centre 0: no edge is added, and the centre is among the last two
+        let star = vec![vec![1, 2, 3, 4], vec![0], vec![0], vec![0], vec![0]];
+        let eliminated = order(star);
+        assert!(eliminated.iter().all(|(_, near)| near.len() <= 1));
+        assert!(eliminated[3..].iter().any(|(vertex, _)| *vertex == 0));
+        // a ring of five: each has two neighbours until three are left
+        let ring = (0..5).map(|v: usize| {
+            let mut near = vec![(v + 1) % 5, (v + 4) % 5];
+            near.sort_unstable();
+            near
+        });
+        let degrees: Vec<usize> = order(ring.collect()).into_iter().map(|(_, near)| near.len()).collect();
+        assert_eq!(degrees, [2, 2, 2, 1, 0]);
+    }
 }

@@ -3,25 +3,22 @@
 //! Dense algebra comes from `nalgebra`. The sparse type is our own because its index type must be PETSc's 32-bit integer, so that a pattern can be
 //! passed to PETSc without a copy.
 
-mod blocks;
-#[cfg(test)]
-mod blocks_tests;
-mod degree;
-mod factor;
-mod joined;
-pub mod portable;
-mod symbolic;
-mod total;
-
-pub use blocks::Blocks;
-pub use factor::{Factor, PART, TOLERANCE};
-pub use joined::Joined;
-pub use symbolic::{Work, factorisation};
-pub use total::Total;
-
 use crate::error::{Error, Kind, Result};
+pub use factor::{Blocks, Factor, PART, TOLERANCE};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+
+mod factor;
+
+/// Powers, exponentials and the like with the same last digit on all processors.
+///
+/// The C library has several versions of each function and chooses one for the processor. Every rank evaluates the laws of all contact points. On
+/// processors of two kinds, ranks would decide differently near a tolerance, and wait for each other for ever.
+pub mod portable {
+    pub use libm::{
+        acos, asin, atan, atan2, cbrt, cos, cosh, exp, expm1, hypot, log, log1p, log2, log10, pow, sin, sinh, tan, tanh,
+    };
+}
 
 /// Return the least and the largest coordinates of points: the corners of their bounding box. Without points the least ones are infinite.
 pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f64; K]; 2] {
@@ -194,6 +191,84 @@ pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
     }
 }
 
+/// A sum with the rounding errors of its additions. The rounded total of both is the same in any order of the terms, but for rare last digits.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+pub struct Total {
+    sum: f64,
+    lost: f64,
+}
+
+impl Total {
+    /// Add a term.
+    pub fn add(&mut self, term: f64) {
+        let next = self.sum + term;
+        let added = next - self.sum;
+        self.lost += (self.sum - (next - added)) + (term - added);
+        self.sum = next;
+    }
+
+    /// Add all terms of another sum.
+    pub fn join(&mut self, other: &Self) {
+        self.add(other.sum);
+        self.add(other.lost);
+    }
+
+    /// Return the sum.
+    pub fn value(&self) -> f64 {
+        self.sum + self.lost
+    }
+}
+
+impl FromIterator<f64> for Total {
+    fn from_iter<I: IntoIterator<Item = f64>>(terms: I) -> Self {
+        let mut total = Self::default();
+        terms.into_iter().for_each(|term| total.add(term));
+        total
+    }
+}
+
+/// Disjoint sets of things that are joined directly or through others.
+pub struct Joined(Vec<u32>);
+
+impl Joined {
+    /// Start with `count` things, each in a set of its own.
+    pub fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    fn root(&mut self, mut thing: u32) -> u32 {
+        while self.0[thing as usize] != thing {
+            // The thing now points to the one two steps above, which halves the way up for the next search.
+            let above = self.0[self.0[thing as usize] as usize];
+            self.0[thing as usize] = above;
+            thing = above;
+        }
+        thing
+    }
+
+    /// Join two things.
+    pub fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[a.max(b) as usize] = a.min(b);
+    }
+
+    /// Return the number of sets, and the index of the set of each thing. Sets are numbered in the order of their first things.
+    pub fn classes(mut self) -> (usize, Vec<u32>) {
+        let mut of_thing: Vec<u32> = vec![0; self.0.len()];
+        let mut count = 0;
+        for thing in 0..self.0.len() {
+            // The root is the least of all things in the set.
+            let root = self.root(thing as u32) as usize;
+            if root == thing {
+                of_thing[thing] = count;
+                count += 1;
+            }
+            of_thing[thing] = of_thing[root];
+        }
+        (count as usize, of_thing)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -222,5 +297,18 @@ mod tests {
         assert_eq!(dot(&y, &ax), dot(&x, &aty));
         assert_eq!(a.position(0, 2), Some(1));
         assert_eq!(a.position(0, 1), None);
+    }
+
+    /// Terms of very different sizes, shared in two ways: a plain sum would lose the small ones, and differ.
+    #[test]
+    fn parts_of_a_sum_are_its_parts_in_any_order() {
+        let terms: Vec<f64> = (0..1000).map(|k| (f64::from(k) * 0.7).sin() * 10f64.powi(k % 17)).collect();
+        let whole: Total = terms.iter().copied().collect();
+        let mut joined = Total::default();
+        terms.rchunks(37).for_each(|part| joined.join(&part.iter().copied().collect()));
+        assert_eq!(whole.value(), joined.value());
+        let plain: f64 = terms.iter().sum();
+        let back: f64 = terms.iter().rev().sum();
+        assert!(plain != back && (plain - whole.value()).abs() > 0.0);
     }
 }

@@ -83,25 +83,39 @@ impl Coarse {
 
     /// Return the amounts y of the solution in the space, with Z'HZ y = Z'r, and its squared energy norm. One message.
     pub fn solve(&self, r: &[impl AsRef<[f64]>]) -> (DVector<f64>, f64) {
-        let motions = self.space.bodies.iter().map(|(_, motions)| motions.len()).sum();
-        let mut work = DVector::zeros(motions);
-        for Column { motion, vector, first, values } in &self.space.columns {
-            work[*motion] += dot(values, &r[*vector].as_ref()[*first..]);
-        }
+        let mut work = self.local_work(r);
         self.space.exchange.sum(work.as_mut_slice());
         let y = self.factor.solve(&work);
         let energy = y.dot(&work);
         (y, energy)
     }
 
-    /// Return the amounts y of the part that a vector z has in the space, with Z'HZ y = Z'H z, from its closings B z at the points, n. If the closings are
-    /// `shared`, each rank has one term of their sum over ranks; this takes a message.
-    pub fn part(&self, closing: &[f64], shared: bool) -> DVector<f64> {
-        let force: Vec<f64> = self.springs.iter().zip(closing).map(|(spring, s)| spring * s).collect();
-        let mut work = self.space.motions().work(&force);
-        if shared {
-            self.space.exchange.sum(work.as_mut_slice());
+    /// Return Z'r, of the vectors of this rank alone.
+    fn local_work(&self, r: &[impl AsRef<[f64]>]) -> DVector<f64> {
+        let motions = self.space.bodies.iter().map(|(_, motions)| motions.len()).sum();
+        let mut work = DVector::zeros(motions);
+        for Column { motion, vector, first, values } in &self.space.columns {
+            work[*motion] += dot(values, &r[*vector].as_ref()[*first..]);
         }
+        work
+    }
+
+    /// Return the work Z'H z of a vector z on the motions, from its closings B z at the points, n.
+    fn work(&self, closing: &[f64]) -> DVector<f64> {
+        let force: Vec<f64> = self.springs.iter().zip(closing).map(|(spring, s)| spring * s).collect();
+        self.space.motions().work(&force)
+    }
+
+    /// Return the amounts y of the part that a vector z has in the space, with Z'HZ y = Z'H z, from its closings B z at the points, n.
+    pub fn part(&self, closing: &[f64]) -> DVector<f64> {
+        self.factor.solve(&self.work(closing))
+    }
+
+    /// Return the amounts y that correct z as a solution of H z = r, with Z'HZ y = Z'(r - H z). Each rank has one term of the sum B z over ranks,
+    /// n, as `closing`. One message.
+    pub fn correction(&self, r: &[f64], closing: &[f64]) -> DVector<f64> {
+        let mut work = self.local_work(&[r]) - self.work(closing);
+        self.space.exchange.sum(work.as_mut_slice());
         self.factor.solve(&work)
     }
 

@@ -8,7 +8,7 @@
 //! AVX-512. On an EPYC `groove3d` with n = 12 takes 1.19 CPU s by MUMPS with these and 0.92 with those for AVX2. So a run warns, with the
 //! variable to set.
 
-use super::beside::address;
+use super::library::address;
 use crate::error::{Error, Kind, Result};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::path::PathBuf;

@@ -1,15 +1,13 @@
-//! Linear solvers (KSP with a preconditioner PC).
+//! Linear solvers (KSP with a preconditioner PC): their options, solves, why a solve stopped, and how a solver recovers from a factorisation that failed.
 
-use super::around::Wrapper;
-use super::error::text_from;
-use super::integers::{flag, is_set};
-use super::library::petsc;
+use super::library::{flag, is_set, petsc, text, text_from};
 use super::mumps::EXTRA_SPACE;
-use super::table::text;
+use super::subspace::Wrapper;
 use super::vector::Vector;
-use super::{ConvergedReason, Int, Matrix, Scope, Session, ffi, is_of_family};
+use super::{Int, Matrix, Scope, Session, ffi, is_of_family};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
+use std::fmt;
 use std::ptr::null_mut;
 use std::rc::Rc;
 
@@ -63,7 +61,7 @@ pub struct Ksp {
     /// The number of updates of the matrix.
     pub(super) updates: Rc<Cell<u64>>,
     /// The number of updates of the matrix with which the preconditioner failed, if it did.
-    pub(super) failed_at: Cell<Option<u64>>,
+    failed_at: Cell<Option<u64>>,
     /// Whether a solve writes to its right-hand side.
     writes_to_b: bool,
     /// The subspaces around the preconditioner, the innermost first.
@@ -113,9 +111,6 @@ impl Ksp {
     /// Factor a symmetric positive definite matrix with `rows` rows on this process by MUMPS, whatever options say.
     ///
     /// [`failure`](Self::failure) reports whether the factorisation succeeded.
-    ///
-    /// # Errors
-    /// PETSc's.
     pub(super) fn factored(session: &Session, scope: Scope, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
         let mut solver = Self::of(session, scope, "")?;
         let new = || Vector::new(session, scope, rows, 1);
@@ -419,5 +414,154 @@ impl Drop for Ksp {
     fn drop(&mut self) {
         // SAFETY: the one reference of this wrapper.
         let _ = unsafe { petsc!(KSPDestroy(&mut self.ksp)) };
+    }
+}
+
+impl Ksp {
+    /// Return why the set-up of the preconditioner failed, such as a zero pivot, or `None` if it did not.
+    pub fn failure(&self) -> Option<String> {
+        let pc = self.pc().ok()?;
+        let text = match self.failed_reason().ok()? {
+            ffi::PCFailedReason_PC_NOERROR => return None,
+            ffi::PCFailedReason_PC_FACTOR_STRUCT_ZEROPIVOT => "a zero pivot in the pattern of the factorisation",
+            ffi::PCFailedReason_PC_FACTOR_NUMERIC_ZEROPIVOT => "a zero pivot in the factorisation",
+            ffi::PCFailedReason_PC_FACTOR_OUTMEMORY => "not enough memory for the factorisation",
+            ffi::PCFailedReason_PC_FACTOR_OTHER => "the factorisation failed",
+            ffi::PCFailedReason_PC_SUBPC_ERROR => "a preconditioner inside it failed",
+            _ => "its set-up failed",
+        };
+        Some(match self.mumps_info(pc) {
+            Some((first, second)) => {
+                format!("{text}; MUMPS says INFOG(1)={first}, INFOG(2)={second}")
+            }
+            None => text.to_owned(),
+        })
+    }
+
+    /// Reset a preconditioner that failed if the matrix has changed since. PETSc's interface to MUMPS never factors again after a failure.
+    pub(super) fn recover(&self) -> Result<()> {
+        let Some(before) = self.failed_at.get() else {
+            return Ok(());
+        };
+        if self.updates.get() == before {
+            return Ok(());
+        }
+        self.failed_at.set(None);
+        self.reset()
+    }
+
+    /// Reset the preconditioner, and keep the matrix and everything else.
+    pub(super) fn reset(&self) -> Result<()> {
+        let pc = self.pc()?;
+        let (mut matrix, mut same) = (null_mut(), null_mut());
+        // SAFETY: the reset drops the matrix; our reference keeps it until it is set again.
+        unsafe {
+            petsc!(PCGetOperators(pc, &mut matrix, &mut same))?;
+            petsc!(PetscObjectReference(matrix.cast()))?;
+            let set = petsc!(PCReset(pc)).and_then(|()| petsc!(KSPSetOperators(self.ksp, matrix, matrix)));
+            petsc!(PetscObjectDereference(matrix.cast()))?;
+            set
+        }
+    }
+
+    /// Return whether MUMPS' factorisation needed more space or message buffers than its analysis foresaw.
+    ///
+    /// The need of several ranks depends on the order of their messages.
+    fn lacks_space(&self) -> bool {
+        let info = || self.mumps_info(self.pc().ok()?);
+        self.failure().is_some() && info().is_some_and(|(first, _)| matches!(first, -8 | -9 | -17 | -20))
+    }
+
+    /// Allow the next factorisation `percent` more space than MUMPS' analysis foresees. To be called before its set-up.
+    fn set_extra_space(&self, percent: Int) -> Result<()> {
+        let (pc, mut factor) = (self.pc()?, null_mut());
+        // SAFETY: the matrix of the factors belongs to the preconditioner; PETSc refuses one that is not of MUMPS.
+        unsafe {
+            petsc!(PCFactorSetUpMatSolverType(pc))?;
+            petsc!(PCFactorGetMatrix(pc, &mut factor))?;
+            petsc!(MatMumpsSetIcntl(factor, 14, percent))
+        }
+    }
+
+    /// Note with which values of the matrix the preconditioner failed, if it did.
+    pub(super) fn note_failure(&self) -> Result<()> {
+        let failed = self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR;
+        self.failed_at.set(failed.then(|| self.updates.get()));
+        Ok(())
+    }
+
+    /// Return PETSc's reason for a failure of the preconditioner.
+    fn failed_reason(&self) -> Result<ffi::PCFailedReason> {
+        let mut reason = ffi::PCFailedReason_PC_NOERROR;
+        let pc = self.pc()?;
+        // SAFETY: the preconditioner of this solver.
+        unsafe { petsc!(PCGetFailedReason(pc, &mut reason)) }?;
+        Ok(reason)
+    }
+
+    /// Return MUMPS' INFOG(1) and INFOG(2), if MUMPS factors.
+    fn mumps_info(&self, pc: ffi::PC) -> Option<(Int, Int)> {
+        if self.factor_package()? != "mumps" {
+            return None;
+        }
+        let mut factor = null_mut();
+        let (mut first, mut second) = (0, 0);
+        // SAFETY: MUMPS has factored, and the factors belong to the preconditioner.
+        unsafe {
+            petsc!(PCFactorGetMatrix(pc, &mut factor)).ok()?;
+            petsc!(MatMumpsGetInfog(factor, 1, &mut first)).ok()?;
+            petsc!(MatMumpsGetInfog(factor, 2, &mut second)).ok()?;
+        }
+        Some((first, second))
+    }
+}
+
+/// The reason why a linear solver stopped; it is displayed as a sentence.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConvergedReason {
+    /// PETSc's number of the reason, positive for convergence.
+    pub number: ffi::KSPConvergedReason,
+    text: String,
+}
+
+impl ConvergedReason {
+    /// Translate PETSc's number. `failure` returns the reason of a failed preconditioner.
+    pub(super) fn from_raw(raw: ffi::KSPConvergedReason, failure: impl FnOnce() -> String) -> Self {
+        let text = match raw {
+            ffi::KSPConvergedReason_KSP_CONVERGED_RTOL => "the relative tolerance was reached",
+            ffi::KSPConvergedReason_KSP_CONVERGED_ATOL => "the absolute tolerance was reached",
+            // a direct solve ends with this reason, too
+            ffi::KSPConvergedReason_KSP_CONVERGED_ITS => "the asked number of iterations was done",
+            ffi::KSPConvergedReason_KSP_DIVERGED_ITS => "the iteration limit was reached (-ksp_max_it)",
+            ffi::KSPConvergedReason_KSP_DIVERGED_DTOL => {
+                "the residual grew beyond the divergence tolerance (-ksp_divtol)"
+            }
+            ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN | ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN_BICG => {
+                "the Krylov method broke down"
+            }
+            ffi::KSPConvergedReason_KSP_DIVERGED_NONSYMMETRIC => {
+                "the Krylov method needs a symmetric matrix and preconditioner"
+            }
+            ffi::KSPConvergedReason_KSP_DIVERGED_INDEFINITE_PC => "the preconditioner is not positive definite",
+            ffi::KSPConvergedReason_KSP_DIVERGED_INDEFINITE_MAT => "the matrix is not positive definite",
+            ffi::KSPConvergedReason_KSP_DIVERGED_NANORINF => "infinity or not a number came up",
+            ffi::KSPConvergedReason_KSP_DIVERGED_PC_FAILED => {
+                &format!("the preconditioner could not be made: {}", failure())
+            }
+            raw if raw > 0 => &format!("PETSc converged for its reason {raw}"),
+            raw => &format!("PETSc diverged for its reason {raw}"),
+        };
+        Self { number: raw, text: text.to_owned() }
+    }
+
+    /// Return whether the solver converged. An iteration that has not ended did not.
+    pub fn converged(&self) -> bool {
+        self.number > 0
+    }
+}
+
+impl fmt::Display for ConvergedReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
     }
 }

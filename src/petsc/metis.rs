@@ -3,7 +3,7 @@
 //! The library is opened when it is first needed: the file that has METIS for PETSc, or else one of METIS' usual names. Its integers have 32 or 64
 //! bits, which it shows itself. Libraries of SCOTCH have some functions of the same names, with other arguments in older versions.
 
-use super::integers::fit;
+use super::library::fit;
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
 use std::ffi::{CStr, c_int, c_void};

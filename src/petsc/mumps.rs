@@ -2,10 +2,10 @@
 //!
 //! Through PETSc, MUMPS would take a poor ordering and return the complement in part only.
 
+use super::Session;
 use super::ffi::{MumpsInt, mumps as c};
-use super::integers::fit;
+use super::library::{self, fit};
 use super::metis::{self, Graph};
-use super::{Session, beside};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{RSMPI_COMM_SELF, RSMPI_Comm_c2f};
 use std::ptr::null_mut;
@@ -58,7 +58,7 @@ const RESERVED: [(usize, &str); 8] = [
 pub struct Schur {
     /// The struct of MUMPS, which keeps pointers into the arrays below.
     mumps: Box<Padded>,
-    library: beside::Mumps,
+    library: library::Mumps,
     rows: Vec<MumpsInt>,
     columns: Vec<MumpsInt>,
     values: Vec<f64>,
@@ -109,7 +109,7 @@ impl Schur {
         let mut schur = Schur {
             // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and sizes of nothing.
             mumps: Box::new(unsafe { std::mem::zeroed() }),
-            library: beside::mumps()?,
+            library: library::mumps()?,
             rows: lower.iter().map(|entry| one(entry.0)).collect(),
             columns: lower.iter().map(|entry| one(entry.1)).collect(),
             values: lower.iter().map(|&(i, j, value)| value * scale[i] * scale[j]).collect(),
@@ -205,9 +205,6 @@ impl Schur {
     }
 
     /// Return the condensed right-hand side b_R - K_RI K_II^-1 b_I.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn condense(&mut self, b: &[f64]) -> Result<Vec<f64>> {
         let mut reduced = vec![0.0; self.retained.len()];
         if reduced.is_empty() {
@@ -219,18 +216,12 @@ impl Schur {
     }
 
     /// Return x with the given x_R = `x_retained` and K_II x_I = b_I - K_IR x_R.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn expand(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
         self.condense(b)?;
         self.expand_condensed(b, x_retained)
     }
 
     /// Return the same x for the right-hand side of the last [`condense`](Self::condense), whose intermediate result MUMPS has kept.
-    ///
-    /// # Errors
-    /// Failures of MUMPS.
     pub fn expand_condensed(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
         let mut x = self.scaled(b);
         let mut reduced: Vec<f64> =

@@ -6,12 +6,12 @@
 //! y = S r_P,   z = P y + M (r - A P y),   z += P S (r - A z)_P       S = (P'AP)^-1
 //! ```
 //!
-//! r is the residual and z the result. Both products need the columns P of A only; each process has its rows of these columns.
+//! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of these columns.
 
-use super::around::Subspace;
-use super::factor::Factor;
-use super::indices::Indices;
-use super::library::petsc;
+use super::library::{flag, petsc};
+use super::matrix::Indices;
+use super::subspace::Subspace;
+use super::substructures::Substructures;
 use super::vector::Vector;
 use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
@@ -69,9 +69,6 @@ impl Ksp {
     /// assert_eq!(ksp.pc_type(), "jacobi");
     /// # Ok::<(), winkler::error::Error>(())
     /// ```
-    ///
-    /// # Errors
-    /// PETSc's.
     pub fn patch(&mut self, matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<bool> {
         self.recover()?;
         let Some(patch) = Patch::new(matrix, dofs, layers)? else { return Ok(false) };
@@ -106,26 +103,15 @@ fn of_whole_nodes(mut dofs: Vec<usize>, block_size: usize) -> Vec<usize> {
 }
 
 impl Subspace for Patch {
-    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()> {
-        let residual: Vec<f64> = self.inside.iter().map(|&i| r[i]).collect();
-        let (mut y, mut ay) = (vec![0.0; residual.len()], vec![0.0; self.touched.len()]);
-        self.factor.solve(&residual, &mut y)?;
-        // SAFETY: the product reads one and writes to the other.
-        let product = |y, ay| unsafe { petsc!(MatMult(self.columns, y, ay)) };
-        self.over_inside.map(("y", &y), &self.over_touched, ("A y", &mut ay), product)?;
-        self.touched.iter().zip(&ay).for_each(|(&i, ay)| r[i] -= ay);
-        self.inside.iter().zip(&y).for_each(|(&i, y)| x[i] += y);
-        Ok(())
-    }
-
-    fn project(&self, z: &mut [f64]) -> Result<()> {
+    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let part: Vec<f64> = self.touched.iter().map(|&i| z[i]).collect();
-        let (mut az, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
-        // SAFETY: as above.
+        let (mut rest, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
+        // SAFETY: the product reads one and writes to the other.
         let product = |part, az| unsafe { petsc!(MatMultTranspose(self.columns, part, az)) };
-        self.over_touched.map(("z", &part), &self.over_inside, ("A z", &mut az), product)?;
-        self.factor.solve(&az, &mut y)?;
-        self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] -= y);
+        self.over_touched.map(("z", &part), &self.over_inside, ("A z", &mut rest), product)?;
+        rest.iter_mut().zip(&self.inside).for_each(|(rest, &i)| *rest = r[i] - *rest);
+        self.factor.solve(&rest, &mut y)?;
+        self.inside.iter().zip(&y).for_each(|(&i, y)| z[i] += y);
         Ok(())
     }
 }
@@ -134,5 +120,50 @@ impl Drop for Patch {
     fn drop(&mut self) {
         // SAFETY: the one reference of this type.
         let _ = unsafe { petsc!(MatDestroy(&mut self.columns)) };
+    }
+}
+
+/// The factor of P'AP, where P are some dofs of a matrix A. A run has one or two of them.
+///
+/// MUMPS on all processes is for a P'AP of which a half would be more than a process has of the matrix anyway. On a quiet machine with two processes both
+/// take the same time: 45 s for `flange` with n = 2 under a layer of 1e8, compiled without optimisation. But each solve by MUMPS takes many messages, so
+/// that it takes 1.7 times as long on a machine with ten processes a core.
+#[allow(clippy::large_enum_variant)]
+pub(super) enum Factor {
+    /// Two halves, each eliminated by one process.
+    Halves(Substructures),
+    /// One factorisation by MUMPS on all processes.
+    Parallel(Ksp),
+}
+
+impl Factor {
+    /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
+    ///
+    /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order. `owned` are the `count` dofs that this process owns.
+    pub fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
+        let (session, scope) = (matrix.session(), matrix.scope());
+        // a half is to be no larger than what a process has of the matrix anyway
+        if dofs.len() * scope.processes(session) <= 2 * matrix.total() {
+            return Ok(Substructures::new(matrix, dofs)?.map(Self::Halves));
+        }
+        let mut block = owned.submatrix(matrix, owned)?;
+        // SAFETY: a matrix of rows and columns of one that is positive definite.
+        unsafe {
+            petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, flag(true)))?;
+            petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, flag(true)))?;
+        }
+        let solver = Ksp::factored(session, scope, block, count);
+        // SAFETY: our reference; the solver has its own.
+        unsafe { petsc!(MatDestroy(&mut block)) }?;
+        let solver = solver?;
+        Ok(solver.failure().is_none().then_some(Self::Parallel(solver)))
+    }
+
+    /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
+    pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
+        match self {
+            Self::Halves(halves) => halves.solve(b, x),
+            Self::Parallel(solver) => solver.solve(b, x).map(|_| ()),
+        }
     }
 }

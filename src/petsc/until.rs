@@ -1,9 +1,8 @@
 //! A linear solve with a stopping test of the caller.
 
-use super::around::ERROR;
-use super::integers::{flag, is_set};
 use super::ksp::Solved;
-use super::library::petsc;
+use super::library::{flag, is_set, petsc};
+use super::subspace::ERROR;
 use super::vector::slice;
 use super::{Ksp, ffi};
 use crate::error::Result;
@@ -43,9 +42,6 @@ struct Test<'a, 'b> {
 
 impl Ksp {
     /// Let conjugate gradients estimate the spectrum of the preconditioned matrix (Lanczos). To be called before the set-up.
-    ///
-    /// # Errors
-    /// PETSc's.
     pub fn estimate_spectrum(&self) -> Result<()> {
         // SAFETY: a solver of ours and a flag.
         unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, flag(true))) }

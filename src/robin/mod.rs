@@ -1,16 +1,11 @@
 //! The Robin form G_s = K_s + B_s' omega psi kappa B_s of every body s: its coefficient psi kappa, and the sweep, which solves with G_s in every
-//! body. Starts from a trace, linear steps, and bounds of the spectrum of G^-1 F1'' are made of sweeps alone.
+//! body. Starts from a trace, linear steps, and bounds of the spectrum of G^-1 F1'' are made of sweeps alone. Where a function says nothing else, its
+//! errors are failures of the solver library.
 
-pub mod coefficient;
-pub mod extend;
-pub mod interval;
-pub mod ritz;
+pub mod spectrum;
 pub mod sweep;
-pub mod sweeps;
+mod sweeps;
 
-pub use coefficient::Coefficient;
-pub use extend::prepare;
-pub use interval::Interval;
-pub use ritz::Ritz;
-pub use sweep::{Sweep, Sweeper};
+pub use spectrum::{Interval, Ritz};
+pub use sweep::{Coefficient, Sweep, Sweeper, prepare};
 pub use sweeps::Sweeps;

@@ -1,13 +1,17 @@
-//! One sweep (41): every body solves its own linear problem, independently of the others.
+//! One sweep (41): every body solves its own linear problem, independently of the others. A sweep needs the Robin coefficient, and a start, which is
+//! a trace extended into every body.
 
-use crate::error::Result;
-use crate::exchange::{self, ASKS, asks};
-use crate::linalg::{axpy, dot};
-use crate::model::Model;
+use crate::error::{Error, Result};
+use crate::exchange::{self, ASKS, Exchange, asks};
+use crate::linalg::{Blocks, axpy, dot};
 use crate::model::body::{Body, Energy};
 use crate::model::field::{Field, residuals};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
+use crate::model::rigid::{Moved, TOLERANCE, combined};
+use crate::model::{BodySlot, Model};
+use crate::problem::robin::{RobinRule, Zone};
+use nalgebra::DMatrix;
 
 // Positions of the numbers that a body adds to the message of a sweep.
 const DECREMENT: usize = 0;
@@ -76,9 +80,6 @@ impl Sweeper {
     ///
     /// A body without pressure and Robin term, now and in the last sweep, has r = (1 - gamma) r_last and the same G. Its z is known without a
     /// solve, as long as rounding is far below r.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn sweep(
         &mut self,
         model: &mut Model,
@@ -101,9 +102,6 @@ impl Sweeper {
     }
 
     /// Apply G^-1 to any residual as a preconditioner; the result keeps the residual. `product` of the result is `other`'z.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
         let bodies = model.bodies.len();
         let (known, energies) = (vec![None; bodies], vec![Energy::default(); bodies]);
@@ -159,9 +157,6 @@ impl Sweeper {
 
 impl Task<'_> {
     /// Return z of a body. Its numbers for the message go to `scalars`; if its inner solver fails, the cause goes to `reason`.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn solve_body(
         &mut self,
         index: usize,
@@ -215,4 +210,220 @@ fn known_correction(model: &Model, index: usize, r: &[f64], last: &Sweep, factor
         axpy(factor, &last.correction.states[index], &mut z);
         z
     })
+}
+
+/// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.
+///
+/// Any symmetric positive definite G leads to the same solution; G decides how fast. There is one weight for each contact row, in the layout
+/// of a trace vector, because the two bodies of a pair may need different weights.
+pub struct Coefficient {
+    zone: Zone,
+    rule: RobinRule,
+    /// Weights of the first call under the rule `frozen`.
+    frozen: Option<Vec<f64>>,
+}
+
+impl Coefficient {
+    /// Return a coefficient that has kept no weights yet.
+    pub fn new(zone: Zone, rule: RobinRule) -> Self {
+        Self { zone, rule, frozen: None }
+    }
+
+    /// Return omega psi kappa of every contact row (2n, layout of a trace vector) for layers in these states in iteration `k`.
+    ///
+    /// # Errors
+    /// A condition of the zone has no value at a contact point; all ranks find this.
+    pub fn weight(&mut self, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
+        if let Some(frozen) = &self.frozen {
+            return Ok(frozen.clone());
+        }
+        let points = tangents(&self.zone, model, layer, k).map_err(Error::common)?;
+        let tangent = [&points[..], &points[..]].concat();
+        Ok(match &self.rule {
+            RobinRule::Tangent => tangent,
+            RobinRule::Frozen => self.frozen.insert(constrained(model, tangent)).clone(),
+            RobinRule::Floor(floor) => {
+                let points = model.points();
+                tangent.into_iter().enumerate().map(|(i, w)| w.max(floor * model.weight[i % points])).collect()
+            }
+            RobinRule::Auto => constrained(model, tangent),
+        })
+    }
+}
+
+/// Return omega psi kappa at every point, n, in iteration `k`.
+fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
+    let mut weight = vec![0.0; model.points()];
+    for (pair, contact) in model.pairs.iter().enumerate() {
+        for q in model.range(pair) {
+            let point = q - model.offset[pair];
+            let inside = match zone {
+                Zone::None => false,
+                Zone::Full => true,
+                Zone::Active => layer.tangent[q] > 0.0,
+                Zone::Subset(holds) => holds.is_true_at("psi", contact.position[point], k)?,
+            };
+            if inside {
+                // a smoothed law has a tangent where the law itself has none
+                let tangent = match layer.tangent[q] {
+                    0.0 => contact.law.robin_tangent(point, layer.compression[q]),
+                    tangent => tangent,
+                };
+                weight[q] = model.weight[q] * tangent;
+            }
+        }
+    }
+    Ok(weight)
+}
+
+/// Return the first body that is unconstrained under the Robin term `weight` (omega psi kappa of the contact rows, 2n), and its motion. Springs
+/// below [`TOLERANCE`] of the largest stiffness in the body are lost in its rounding.
+pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
+    (0..model.bodies.len()).find_map(|body| {
+        let slot = &model.bodies[body];
+        let springs = springs(model, body, &model.of_body(body, weight));
+        let free = Blocks::free(&springs, slot.scale, TOLERANCE);
+        let names = slot.motions.iter().map(|motion| &motion.name[..]);
+        Some(Moved { body, name: combined(names, free.first()?.iter().copied()) })
+    })
+}
+
+/// Share of the stiffness of the body's own surface below which a motion is not held safely. At this share, a sweep would move the body by a
+/// thousand times what its surface gives way.
+const WEAK: f64 = 1e-3;
+
+/// Return the weights (2n). Every body that they do not hold safely gets at least the stiffness of its own surface as a whole.
+fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
+    for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
+        // the stiffness under each row, spread over all rows
+        let rows = slot.row_stiffness.len().max(1) as f64;
+        let surface: Vec<f64> = slot.row_stiffness.iter().map(|stiffness| stiffness / rows).collect();
+        let natural = springs(model, body, &surface);
+        let mut safe = springs(model, body, &model.of_body(body, &weight)) - WEAK * &natural;
+        // a motion that no contact row resists is not required to be held
+        let largest = natural.diagonal().max();
+        (0..safe.nrows()).for_each(|i| safe[(i, i)] += TOLERANCE * largest);
+        if safe.cholesky().is_some() {
+            continue;
+        }
+        let now = model.of_body(body, &weight);
+        let more: Vec<f64> = now.iter().zip(&surface).map(|(now, surface)| now.max(*surface)).collect();
+        model.put(body, &more, &mut weight);
+    }
+    weight
+}
+
+/// Return the stiffness of springs at a body's contact rows in terms of its free motions, a square matrix.
+fn springs(model: &Model, body: usize, weight: &[f64]) -> DMatrix<f64> {
+    let motions = &model.bodies[body].motions;
+    DMatrix::from_fn(motions.len(), motions.len(), |i, j| {
+        let (s, t) = (&motions[i].trace, &motions[j].trace);
+        (0..weight.len()).map(|q| weight[q] * s[q] * t[q]).sum()
+    })
+}
+
+/// Springs of the constraint B u = t over the stiffness of the nodes under them: half the digits of a number are left to the body.
+const STIFF: f64 = 1e4;
+
+/// Steps of the augmented Lagrangian method; each gains a factor of about `STIFF` over the surface's compliance.
+const STEPS: usize = 4;
+
+/// Give every body that lives on this rank the Robin term of its extension, and set its solver up. A refusal of the solver or of an option
+/// then comes before the first sweep, and the extension needs no other factorisation.
+pub fn prepare(model: &mut Model) -> Result<()> {
+    for index in 0..model.bodies.len() {
+        let springs = extension_springs(&model.bodies[index]);
+        if let Some(body) = &mut model.bodies[index].local {
+            body.robin(&springs)?;
+            body.set_up()?;
+        }
+    }
+    Ok(())
+}
+
+fn extension_springs(slot: &BodySlot) -> Vec<f64> {
+    slot.row_stiffness.iter().map(|k| STIFF * k).collect()
+}
+
+/// Return the iterate with the given trace (2n). Values at rows that a support prescribes are ignored. Collective.
+///
+/// # Errors
+/// Failures of the solver library.
+///
+/// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the energy of the body among
+/// all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every step
+/// the error shrinks by the ratio of the two stiffnesses.
+pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Field, Failure>> {
+    let mut iterate = Field { states: Vec::new(), trace: vec![0.0; trace.len()] };
+    let mut failed = vec![0.0; model.bodies.len()];
+    let mut reasons = vec![String::new(); model.bodies.len()];
+    for index in 0..model.bodies.len() {
+        let target = model.of_body(index, trace);
+        let slot = &mut model.bodies[index];
+        let springs = extension_springs(slot);
+        let Some(body) = &mut slot.local else {
+            iterate.states.push(Vec::new());
+            continue;
+        };
+        let Extension { state, rows, failure } = extend_body(&mut **body, &*model.exchange, &springs, &target)?;
+        model.put(index, &rows, &mut iterate.trace);
+        iterate.states.push(state);
+        if let Some(reason) = failure {
+            failed[index] = 1.0;
+            reasons[index] = reason;
+        }
+    }
+    // one message: traces, then which inner solvers failed
+    let mut message = [&iterate.trace[..], &failed[..]].concat();
+    model.exchange.sum(&mut message);
+    let failed = message.split_off(trace.len());
+    iterate.trace = message;
+    Ok(match failed.iter().position(|&failed| failed != 0.0) {
+        Some(body) => Err(Failure { body: Some(body), reason: std::mem::take(&mut reasons[body]) }),
+        None => Ok(iterate),
+    })
+}
+
+/// The extension of a trace into one body.
+struct Extension {
+    state: Vec<f64>,
+    /// B u of the state.
+    rows: Vec<f64>,
+    /// Why the inner solver failed last, if it did.
+    failure: Option<String>,
+}
+
+/// Extend the trace `target` of a body, with springs of this stiffness at its contact rows. Collective for a distributed body.
+fn extend_body(body: &mut dyn Body, exchange: &dyn Exchange, springs: &[f64], target: &[f64]) -> Result<Extension> {
+    body.robin(springs)?;
+    let mut u = body.rest();
+    let [mut r, mut z, mut product] = [(); 3].map(|()| vec![0.0; u.len()]);
+    let [mut rows, mut multiplier, mut force] = [(); 3].map(|()| vec![0.0; springs.len()]);
+    let (mut first, mut failure) = (None, None);
+    for step in 0..STEPS {
+        body.trace(&u, &mut rows);
+        if body.distribution().is_some() {
+            exchange.sum(&mut rows);
+        }
+        let mut violation = 0.0f64;
+        for q in 0..rows.len() {
+            let difference = if springs[q] > 0.0 { rows[q] - target[q] } else { 0.0 };
+            violation = violation.max(difference.abs());
+            if step > 0 {
+                multiplier[q] += springs[q] * difference;
+            }
+            force[q] = multiplier[q] + springs[q] * difference;
+        }
+        // the interior is in equilibrium from the first solve on
+        if first.is_some_and(|first: f64| violation <= 1e-9 * first) {
+            break;
+        }
+        first.get_or_insert(violation.max(f64::MIN_POSITIVE));
+        body.apply_stiffness(&u, &mut product);
+        body.residual(&u, &product, &force, &mut r);
+        failure = body.solve(&r, &mut z)?.failure.or(failure);
+        axpy(1.0, &z, &mut u);
+    }
+    body.trace(&u, &mut rows);
+    Ok(Extension { state: u, rows, failure })
 }

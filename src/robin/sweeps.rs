@@ -4,8 +4,7 @@
 //! ([`Coarse`]). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
 //! moved until they are in balance again. Every rank has all contact points, so this needs no message and no solve.
 
-use super::coefficient::Coefficient;
-use super::sweep::{Sweep, Sweeper};
+use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
@@ -104,9 +103,6 @@ pub(super) struct Found {
 /// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. `springs`
 /// are omega kappa at the points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
 /// not see the slow modes.
-///
-/// # Errors
-/// Failures of the solver library.
 pub(super) fn gradients(
     model: &mut Model,
     sweeper: &mut Sweeper,
@@ -178,7 +174,7 @@ impl<'a> Gradients<'a> {
     /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r - r_previous): with this
     /// flexible rule, the preconditioner may be an inexact solve.
     fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
-        let y = self.coarse.part(&correction.closing(), false);
+        let y = self.coarse.part(&correction.closing());
         add_motions(&self.coarse, model, -1.0, &y, &mut correction);
         match self.previous.take() {
             None => correction,

@@ -10,15 +10,15 @@ use super::words::in_words;
 use crate::discretize::Outline;
 use crate::error::Result;
 use crate::fem::Interpolation;
+use crate::file::available_memory;
 use crate::model::BodySlot;
 use crate::petsc::Session;
 use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
-use crate::solver::cost::{Candidate, Comparison, Step};
-use crate::solver::memory;
-use crate::solver::options::{Chosen, Typed, WHOLE};
+use crate::solver::cost::{self, Candidate, Comparison, Step};
+use crate::solver::names::WHOLE;
+use crate::solver::options::{Chosen, Typed};
 use crate::solver::preset::{self, Size};
-use crate::solver::speed;
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use std::collections::{BTreeMap, HashMap};
@@ -55,7 +55,7 @@ pub struct Inner<'a> {
 impl<'a> Inner<'a> {
     /// Start from the free memory and the options that the user wrote. This scene can reuse the bodies `kept` of an earlier one. Collective.
     pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
-        let mine = memory::available() as u64;
+        let mine = available_memory() as u64;
         let mut least = mine;
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
@@ -206,9 +206,9 @@ impl<'a> Inner<'a> {
             // The memory of reused bodies is allocated already.
             let are_kept = plans.iter().all(|plan| self.kept.contains_key(&plan.name));
             let memory = if are_kept { usize::MAX } else { self.memory };
-            let mut comparison = Comparison::of_cubes(&candidates, step, speed::REFERENCE);
+            let mut comparison = Comparison::of_cubes(&candidates, step, cost::REFERENCE);
             if comparison.is_worth_a_look() {
-                comparison = Comparison::of_cubes(&candidates, step, speed::products());
+                comparison = Comparison::of_cubes(&candidates, step, cost::products());
             }
             if !comparison.is_known(&candidates, memory) {
                 let graphs: Vec<_> = graphs.iter().map(|graph| (&graph.ptr[..], &graph.col[..])).collect();

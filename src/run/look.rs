@@ -12,8 +12,7 @@
 
 use super::ended::{All, Look, Recovered};
 use super::stages::Done;
-use crate::ddm::linear::resisting;
-use crate::ddm::{Inaccuracy, Row, Status, Whose};
+use crate::ddm::{Inaccuracy, Row, Status, Whose, resisting};
 use crate::discretize::Unbalanced;
 use crate::exchange::all_gather;
 use crate::linalg::{axpy, dot};

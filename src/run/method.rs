@@ -1,8 +1,8 @@
 //! The step from the method that a scene names to the method that runs.
 
 use super::stages::Built;
-use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
-use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
+use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Relaxed, Schedule, Spectral, Stationary};
+use crate::ddm::robin::{Acceleration, Anderson, Conjugate};
 use crate::ddm::{Method, Start, first_springs};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Interpolation;

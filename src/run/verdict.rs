@@ -2,7 +2,7 @@
 
 use super::requests;
 use super::words::in_words;
-use crate::ddm::forecast::{best_factor, best_gamma};
+use crate::ddm::robin::{best_factor, best_gamma};
 use crate::ddm::{Inaccuracy, Outcome, Status, Whose};
 use crate::model::{Mechanism, Model, Moved};
 use crate::output::{ForecastReport, StepReport, sci};

@@ -1,16 +1,18 @@
 //! What inner solvers cost: the choice between a factorisation and multigrid for bodies in space.
 //!
-//! The dense operations of a factorisation are counted before it is made ([`linalg::factorisation`](crate::linalg::factorisation)). All other work is
-//! proportional to the entries of K. It is expressed in products of K with a vector, whose speed is that of the machine's memory ([`speed`](super::speed)).
+//! The dense operations of a factorisation are counted before it is made ([`factorisation`]). All other work is
+//! proportional to the entries of K. It is expressed in products of K with a vector, whose speed is that of the machine's memory ([`products`]).
 //! docs/solvers.md compares both ways and the choice on thirty scenes, which are called the table below.
 
 use super::Retained;
 use crate::error::Result;
-use crate::linalg::factorisation;
-use crate::linalg::portable::pow;
+use crate::linalg::portable::{log2, pow};
 use crate::petsc::{Graph, nested_dissection};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
+use std::hint::black_box;
+use std::sync::OnceLock;
+use std::time::Instant;
 
 /// Dense operations a second, of two cores with AVX2 or one with AVX-512 (docs/solvers.md, "The choice").
 const RATE: f64 = 2.8e10;
@@ -208,12 +210,120 @@ fn analysed(body: &Candidate, ptr: &[u32], col: &[u32], speed: f64) -> Result<Co
     Ok(body.factored(work.operations, work.entries, speed))
 }
 
+/// Return the estimated bytes of the sparse Cholesky factor of a plane body by nested dissection. They grow as n log n; the constant was
+/// measured on blocks of 32 000 to 500 000 dofs.
+pub fn plane_factor_bytes(dofs: usize) -> usize {
+    let n = dofs as f64;
+    (60.0 * n * log2(n + 2.0)) as usize
+}
+
+/// Return the bytes of a condensed body besides its sparse factor: S with its pattern, G, and the factor of G.
+pub fn condensed_bytes(retained: usize) -> usize {
+    36 * retained * retained
+}
+
+/// Return the estimated operations of a sparse Cholesky factorisation of a plane body by nested dissection, measured on the same blocks as [`plane_factor_bytes`].
+pub fn plane_factor_work(dofs: usize) -> f64 {
+    56.0 * pow(dofs as f64, 1.5)
+}
+
+/// Entries a second on the machine of the table in docs/solvers.md.
+pub const REFERENCE: f64 = 5.3e8;
+
+/// Rows of the matrix that is multiplied. With [`PER_ROW`] entries in each it takes 39 MB, more than the caches of a core hold.
+const ROWS: usize = 120_000;
+
+/// Entries in a row of the matrix.
+const PER_ROW: usize = 27;
+
+/// Number of measurements. The fastest counts, because other work of the machine only makes a product slower.
+const TIMES: usize = 3;
+
+/// Return how many entries of a sparse matrix one core multiplies in a second. The first call measures it, which takes 40 to 70 ms.
+///
+/// A factorisation is mostly dense algebra on numbers in the cache. Multigrid reads sparse matrices from memory. Processors differ by a factor of five
+/// in the speed of memory and much less in dense algebra, so a choice between the two that was measured on one machine is wrong on another.
+pub fn products() -> f64 {
+    static SPEED: OnceLock<f64> = OnceLock::new();
+    *SPEED.get_or_init(measured)
+}
+
+fn measured() -> f64 {
+    // columns are neighbours on a lattice, as in the matrix of a mesh
+    let neighbour = |row: usize, k: usize| ((row + 3000 * (k / 9) + 55 * (k / 3 % 3) + k % 3) % ROWS) as u32;
+    let columns: Vec<u32> = (0..ROWS).flat_map(|row| (0..PER_ROW).map(move |k| neighbour(row, k))).collect();
+    let values = vec![1.0; ROWS * PER_ROW];
+    let (x, mut y) = (vec![1.0; ROWS], vec![0.0; ROWS]);
+    let mut least = f64::INFINITY;
+    for _ in 0..TIMES {
+        let began = Instant::now();
+        for (row, y) in y.iter_mut().enumerate() {
+            let row = PER_ROW * row..PER_ROW * (row + 1);
+            *y = columns[row.clone()].iter().zip(&values[row]).map(|(column, value)| value * x[*column as usize]).sum();
+        }
+        black_box(&mut y);
+        least = least.min(began.elapsed().as_secs_f64());
+    }
+    (ROWS * PER_ROW) as f64 / least
+}
+
+/// The size of a factorisation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Work {
+    /// Entries of the factor, without those among rows that stay.
+    entries: f64,
+    /// Multiplications and additions: the sum of the squared lengths of the columns.
+    operations: f64,
+}
+
+/// Return the work of the elimination of the nodes of a graph in a given order, where some unknowns stay (a Schur complement).
+///
+/// The neighbours of node i are `col[ptr[i]..ptr[i + 1]]`, with or without i itself. Node i is the `position[i]`-th to be eliminated, with
+/// `weight[i]` unknowns; `stays` are (node, number of its unknowns that stay). The entries of a row of the factor are on its paths through the
+/// elimination tree (Liu, SIAM J. Matrix Anal. Appl. 11, 1990, 134). So the count takes as many steps as the factor of the graph has entries.
+fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize], stays: &[(usize, usize)]) -> Work {
+    const NONE: u32 = u32::MAX;
+    let nodes = ptr.len() - 1;
+    let mut node_at = vec![0; nodes];
+    position.iter().enumerate().for_each(|(node, &at)| node_at[at as usize] = node);
+    // unknowns below the diagonal in the columns of each node, by its position
+    let mut below = vec![0.0; nodes];
+    let (mut parent, mut seen) = (vec![NONE; nodes], vec![NONE; nodes]);
+    let rows = node_at.iter().map(|&node| (node, weight[node])).chain(stays.iter().copied());
+    for (row, (node, unknowns)) in rows.enumerate() {
+        let row = row as u32;
+        if (row as usize) < nodes {
+            seen[row as usize] = row;
+        }
+        for &other in &col[ptr[node] as usize..ptr[node + 1] as usize] {
+            let mut at = position[other as usize] as u32;
+            // a node that stays is below all nodes that are eliminated
+            while at < row && seen[at as usize] != row {
+                seen[at as usize] = row;
+                below[at as usize] += unknowns as f64;
+                if parent[at as usize] == NONE && (row as usize) < nodes {
+                    parent[at as usize] = row;
+                }
+                at = parent[at as usize];
+            }
+        }
+    }
+    let mut work = Work::default();
+    for (&node, below) in node_at.iter().zip(below) {
+        for unknown in 0..weight[node] {
+            let length = below + (weight[node] - unknown) as f64;
+            work.entries += length;
+            work.operations += length * length;
+        }
+    }
+    work
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fem::rigid::AtDofs;
     use crate::linalg::Csr;
-    use crate::solver::speed::REFERENCE;
 
     /// Return the graph (ptr, col) of the nodes of a box, each coupled to the next along its edges, with contact along z on the nodes with z = 0.
     fn body([x, y, z]: [usize; 3]) -> (Vec<u32>, Vec<u32>, Retained) {
@@ -289,5 +399,58 @@ mod tests {
         assert!((more / (dense(3200.0) - dense(1600.0)) - 1.0).abs() < 1e-9, "{more}");
         assert!((apart.multigrid.seconds / (Step::Sweeps.times() * joined.multigrid.seconds) - 1.0).abs() < 1e-9);
         assert!(!joined.is_direct(usize::MAX) && apart.is_direct(usize::MAX));
+    }
+
+    /// Measured by MUMPS with METIS: 502 000 dofs took 538 MB and 2.0e10 operations.
+    #[test]
+    fn estimates_are_near_what_was_measured() {
+        let near = |estimate: f64, measured: f64| (0.7..1.5).contains(&(estimate / measured));
+        assert!(near(plane_factor_bytes(502_000) as f64, 538e6) && near(plane_factor_work(502_000), 2e10));
+    }
+
+    /// The speed lies between that of a machine of twenty years ago and one that does not exist yet.
+    #[test]
+    fn a_speed_is_measured() {
+        let speed = products();
+        assert!((1e6..1e12).contains(&speed), "{speed:e}");
+    }
+
+    /// Count the work by elimination in a dense pattern, unknown by unknown.
+    fn dense(pattern: &mut [Vec<bool>], order: &[usize]) -> Work {
+        let mut work = Work::default();
+        let mut gone = vec![false; pattern.len()];
+        for &pivot in order {
+            gone[pivot] = true;
+            let below: Vec<usize> = (0..pattern.len()).filter(|&i| !gone[i] && pattern[pivot][i]).collect();
+            let length = below.len() as f64 + 1.0;
+            work.entries += length;
+            work.operations += length * length;
+            below.iter().for_each(|&i| below.iter().for_each(|&j| pattern[i][j] = true));
+        }
+        work
+    }
+
+    /// A grid of 4 x 3 nodes with 2 unknowns each, in an order without sense; one unknown of two nodes stays.
+    #[test]
+    fn it_is_that_of_an_elimination() {
+        let (columns, nodes) = (4usize, 12usize);
+        let near =
+            |i: usize, j: usize| (i % columns).abs_diff(j % columns) <= 1 && (i / columns).abs_diff(j / columns) <= 1;
+        let (mut ptr, mut col) = (vec![0], Vec::new());
+        for i in 0..nodes {
+            col.extend((0..nodes).filter(|&j| near(i, j)).map(|j| j as u32));
+            ptr.push(col.len() as u32);
+        }
+        let position: Vec<i32> = (0..nodes as i32).map(|i| (5 * i + 3) % nodes as i32).collect();
+        for stays in [vec![], vec![(2, 1), (7, 1)]] {
+            let weight: Vec<usize> = (0..nodes).map(|i| if stays.contains(&(i, 1)) { 1 } else { 2 }).collect();
+            let mut pattern: Vec<Vec<bool>> =
+                (0..2 * nodes).map(|i| (0..2 * nodes).map(|j| near(i / 2, j / 2)).collect()).collect();
+            let mut order: Vec<usize> = (0..nodes).collect();
+            order.sort_by_key(|&i| position[i]);
+            let order: Vec<usize> = order.iter().flat_map(|&i| (0..weight[i]).map(move |k| 2 * i + k)).collect();
+            let work = factorisation(&ptr, &col, &position, &weight, &stays);
+            assert_eq!(work, dense(&mut pattern, &order), "{stays:?}");
+        }
     }
 }

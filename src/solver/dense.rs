@@ -1,6 +1,6 @@
 //! Dense Cholesky factorisation by the LAPACK that PETSc uses, for matrices without zeros.
 
-use super::{Change, InnerSolver, Seen};
+use super::{Change, InnerSolver};
 use crate::error::Result;
 use crate::model::Solved;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
@@ -25,10 +25,10 @@ impl Dense {
 }
 
 impl InnerSolver for Dense {
-    fn update(&mut self, change: Change) -> Result<Seen> {
+    fn update(&mut self, change: Change) -> Result<()> {
         (change.write)(&mut self.values);
         self.made = None;
-        Ok(Seen::Whole)
+        Ok(())
     }
 
     fn set_up(&mut self) -> Result<()> {

@@ -6,32 +6,23 @@
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
 
-mod coarse;
 mod condensed;
 pub mod cost;
-pub mod dense;
-pub mod krylov;
-pub mod memory;
-pub mod monolithic;
+mod dense;
+mod krylov;
+mod monolithic;
+pub mod names;
 pub mod options;
 pub mod preset;
-mod retained;
 mod robin;
 mod sparse;
-pub mod speed;
-mod split;
-mod union;
 
-pub use coarse::RigidSpace;
-pub use condensed::CondensedBody;
+pub use condensed::{CondensedBody, Retained};
 pub use dense::Dense;
 pub use krylov::Krylov;
-pub use monolithic::Monolithic;
-pub use retained::Retained;
-pub use robin::RobinMatrix;
+pub use monolithic::{Monolithic, Union};
+pub use robin::{RigidSpace, RobinMatrix};
 pub use sparse::SparseBody;
-pub use split::Split;
-pub use union::Union;
 
 use crate::error::Result;
 use crate::linalg::Csr;
@@ -57,23 +48,14 @@ fn integers(part: Vec<i32>) -> Vec<Int> {
 pub struct Change<'a> {
     /// Writes the values of G, in the order of the pattern that the solver was made with.
     pub write: &'a dyn Fn(&mut [f64]),
-    /// Returns the dofs of contact rows at which the preconditioner of an earlier G is poor: their springs have changed much.
-    pub changed: &'a dyn Fn() -> Vec<usize>,
-    /// Returns the dofs of contact rows at which even a new preconditioner is poor: their springs are stiff.
-    pub stiff: &'a dyn Fn() -> Vec<usize>,
+    /// The contact rows B.
+    pub rows: &'a Csr,
+    /// Spring stiffnesses d of G, one a row of B.
+    pub springs: &'a [f64],
+    /// Spring stiffnesses that double the stiffness under a row.
+    pub soft: &'a [f64],
     /// Returns the rigid motions of bodies as a subspace to be put around a preconditioner, if there are any.
     pub coarse: &'a dyn Fn() -> Option<Box<dyn Subspace>>,
-}
-
-/// What a solver works with after a change of G.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Seen {
-    /// The preconditioner of an earlier G, with exact solves at rows that have changed.
-    Older,
-    /// A preconditioner of G, with exact solves at stiff rows.
-    Patched,
-    /// G itself.
-    Whole,
 }
 
 /// An owner of the matrix G with a way to solve G z = r.
@@ -87,7 +69,7 @@ pub trait InnerSolver {
     }
 
     /// Change values of G. The next solve uses the new matrix.
-    fn update(&mut self, change: Change) -> Result<Seen>;
+    fn update(&mut self, change: Change) -> Result<()>;
 
     /// Factor G, or set up its preconditioner, if G has changed since.
     fn set_up(&mut self) -> Result<()>;

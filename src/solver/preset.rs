@@ -1,6 +1,6 @@
 //! The inner solver that a body gets when the user typed no PETSc option, and the default options of each.
 
-use super::memory;
+use super::cost;
 use super::options::Chosen;
 use crate::error::{Error, Kind, Result};
 use crate::petsc::HAS_HYPRE;
@@ -76,8 +76,8 @@ pub struct Size {
 impl Size {
     /// Return the estimated bytes of a solver that factors, for a plane body.
     pub fn bytes(&self, preset: Preset) -> usize {
-        let dense = if preset == Preset::Condensed { memory::of_condensed(self.retained) } else { 0 };
-        memory::in_plane(self.dofs) + dense
+        let dense = if preset == Preset::Condensed { cost::condensed_bytes(self.retained) } else { 0 };
+        cost::plane_factor_bytes(self.dofs) + dense
     }
 }
 
@@ -101,7 +101,7 @@ pub fn in_plane(size: &Size) -> (Preset, String) {
     // some dofs can be eliminated, and some remain
     let can_condense = (1..dofs).contains(&retained);
     let dense = (retained as f64).powi(3) / 3.0;
-    let pays = retained <= SMALL || dense <= memory::work_in_plane(dofs);
+    let pays = retained <= SMALL || dense <= cost::plane_factor_work(dofs);
     if can_condense && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {

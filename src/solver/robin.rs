@@ -1,10 +1,11 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{Change, InnerSolver, RigidSpace, Seen};
+use super::{Change, InnerSolver};
 use crate::error::Result;
 use crate::linalg::Csr;
-use crate::model::{BodyCounts, Solved};
-use crate::petsc::Rows;
+use crate::model::coarse::{Coarse, Space};
+use crate::model::{BodyCounts, Model, Solved};
+use crate::petsc::{Rows, Subspace};
 use std::ops::Range;
 use std::rc::Rc;
 use std::time::Instant;
@@ -17,8 +18,6 @@ pub struct RobinMatrix<S> {
     solver: S,
     /// Spring stiffnesses d of G, one a row of B.
     weight: Vec<f64>,
-    /// Spring stiffnesses in the matrix that the preconditioner was set up with. Where stiff rows are solved exactly, they are at most those of `soft`.
-    prepared: Vec<f64>,
     /// Spring stiffnesses that double the stiffness under a row.
     soft: Vec<f64>,
     coupling: Coupling,
@@ -43,7 +42,6 @@ impl<S: InnerSolver> RobinMatrix<S> {
         let square = |q| rows.row(q).map(|(_, b)| b * b).sum::<f64>();
         let soft = row_stiffness.iter().enumerate().map(|(q, stiffness)| stiffness / square(q).powi(2)).collect();
         Ok(Self {
-            prepared: weight.clone(),
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
@@ -62,20 +60,15 @@ impl<S: InnerSolver> RobinMatrix<S> {
         }
         self.weight.copy_from_slice(weight);
         self.counts.robin_updates += 1;
-        let softened: Vec<f64> = weight.iter().zip(&self.soft).map(|(weight, soft)| weight.min(*soft)).collect();
-        let (coupling, soft, prepared) = (&self.coupling, &self.soft, &self.prepared);
         let change = Change {
-            write: &|g| coupling.write(rows, weight, g),
-            changed: &|| poor_dofs(rows, soft, prepared, weight),
-            stiff: &|| poor_dofs(rows, soft, &softened, weight),
+            write: &|g| self.coupling.write(rows, weight, g),
+            rows,
+            springs: weight,
+            soft: &self.soft,
             coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
         };
         let began = Instant::now();
-        match self.solver.update(change)? {
-            Seen::Older => {}
-            Seen::Patched => self.prepared = softened,
-            Seen::Whole => self.prepared.copy_from_slice(weight),
-        }
+        self.solver.update(change)?;
         self.count_seconds(began.elapsed().as_secs_f64());
         Ok(())
     }
@@ -217,22 +210,47 @@ impl Coupling {
     }
 }
 
-/// Ratio of the stiffnesses under a contact row beyond which a preconditioner is poor there, in either direction. With 1.2, 1.5, 2 and 3
-/// `groove3d` (n = 16, layer 1e7) takes 50, 50, 56 and 56 iterations, `hertz-sphere` (P1, n = 12, layer 1e6) 56, 54, 56 and 117.
-const POOR: f64 = 1.5;
+/// The [coarse space](crate::model::coarse) of rigid motions of all bodies, in the rows of the matrix that this rank owns.
+pub struct RigidSpace {
+    space: Rc<Space>,
+    /// The columns of B that this rank owns; one row a contact point.
+    rows: Csr,
+}
 
-/// Return the dofs, sorted, of contact rows at which a preconditioner with springs `old` is poor for springs `new`: the stiffnesses under the row
-/// differ by more than the factor [`POOR`]. `soft` are the springs that double the stiffness under a row; all three have one entry a row.
-///
-/// The eigenvalues of G_old^-1 G_new lie between the smallest and the largest ratio of the springs. Where the body is stiff
-/// compared with its springs, they do not come near these bounds. So the stiffness of the body counts with that of the spring.
-fn poor_dofs(rows: &Csr, soft: &[f64], old: &[f64], new: &[f64]) -> Vec<usize> {
-    let is_poor = |q: &usize| {
-        let (before, after) = (soft[*q] + old[*q], soft[*q] + new[*q]);
-        after > POOR * before || before > POOR * after
-    };
-    let mut dofs: Vec<usize> = (0..rows.rows()).filter(is_poor).flat_map(|q| rows.row(q).map(|(i, _)| i)).collect();
-    dofs.sort_unstable();
-    dofs.dedup();
-    dofs
+impl RigidSpace {
+    /// Return the space for the bodies of a model, or `None` if no two bodies in contact can both move freely. Then no bodies move together, and the space
+    /// would save nothing. `offset` is the first entry of each body in a vector of this rank, and its length. `rows` are B of all
+    /// bodies together, and `first` is the number of the first row that this rank owns.
+    pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<Self> {
+        let mut free_sides = vec![0; model.pairs.len()];
+        for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty()) {
+            slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
+        }
+        if !free_sides.contains(&2) {
+            return None;
+        }
+        let columns = offset[offset.len() - 1];
+        let owned = rows.of_columns(columns, |i| i.checked_sub(first).filter(|i| *i < columns));
+        Some(Self { space: Rc::new(Space::of(model, Some(offset))), rows: owned })
+    }
+
+    /// Return the space for these spring stiffnesses, one a contact point.
+    pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
+        Box::new(WithSprings { coarse: Coarse::new(self.space.clone(), springs), rigid: self.clone() })
+    }
+}
+
+/// The space of rigid motions for one set of springs.
+struct WithSprings {
+    coarse: Coarse,
+    rigid: Rc<RigidSpace>,
+}
+
+impl Subspace for WithSprings {
+    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        let mut closing = vec![0.0; self.rigid.rows.rows()];
+        self.rigid.rows.multiply(z, &mut closing);
+        self.coarse.add(1.0, &self.coarse.correction(r, &closing), &mut [z]);
+        Ok(())
+    }
 }

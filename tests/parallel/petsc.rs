@@ -257,13 +257,19 @@ fn a_panic_on_one_rank_ends_the_others() {
     }
 }
 
-/// Options that were set while PETSc waited are those of its objects, and what was read stays read.
+/// PETSc waits for the first option or object. Its options are those of its objects, and what was read stays read.
 #[test]
-fn petsc_waits_till_it_is_needed_and_takes_over_the_options() {
+fn petsc_waits_till_it_is_needed() {
     let inside = || {
         let session = Session::start(&[])?;
         let options = session.options();
+        options.clear("-gone")?;
+        options.mark_used("-flag")?;
+        assert!(options.set("-1", None).is_err() && options.mark_used("-1").is_err());
+        assert!(options.all()?.is_empty() && options.left()?.is_empty() && !options.used("-flag"));
+        assert_eq!(session.petsc_version(), None);
         options.set("-a_ksp_rtol", Some("1e-3"))?;
+        assert!(session.petsc_version().is_some_and(|version| version.starts_with("3.")));
         options.set("-a_KSP_max_it", Some("7"))?;
         options.set("a_ksp_max_it", Some("9"))?;
         options.set("-flag", None)?;
@@ -271,30 +277,19 @@ fn petsc_waits_till_it_is_needed_and_takes_over_the_options() {
         options.set("-gone", None)?;
         options.clear("-GONE")?;
         options.mark_used("-flag")?;
-        assert!(options.set("-1", None).is_err() && options.mark_used("-1").is_err());
-        let state = || -> Result<_> {
-            let names =
-                |entries: Vec<(String, Option<String>)>| entries.into_iter().map(|(name, _)| name.to_lowercase());
-            let all: Vec<String> = names(options.all()?).collect();
-            let left: Vec<String> = names(options.left()?).collect();
-            let values = ["-a_ksp_rtol", "-A_ksp_max_it", "-flag", "-gone"].map(|name| options.get(name));
-            Ok((all, left, values, ["-flag", "-slip", "-none"].map(|name| options.used(name))))
-        };
-        let waiting = state()?;
-        assert_eq!(session.petsc_version(), None);
+        let left: Vec<String> = options.left()?.into_iter().map(|(name, _)| name.to_lowercase()).collect();
+        assert_eq!(left, ["-a_ksp_max_it", "-a_ksp_rtol", "-slip"]);
+        let values = ["-a_ksp_rtol", "-A_ksp_max_it", "-flag", "-gone"].map(|name| options.get(name));
+        assert_eq!(values, [Some("1e-3"), Some("9"), Some(""), None].map(|value| value.map(str::to_owned)));
+        assert_eq!(["-flag", "-slip", "-none"].map(|name| options.used(name)), [true, false, false]);
         let mut ksp = Ksp::new(&session, "a_")?;
-        assert!(session.petsc_version().is_some_and(|version| version.starts_with("3.")));
-        assert_eq!(state()?, waiting);
-        assert_eq!(waiting.1, ["-a_ksp_max_it", "-a_ksp_rtol", "-slip"]);
-        assert_eq!(waiting.2, [Some("1e-3"), Some("9"), Some(""), None].map(|value| value.map(str::to_owned)));
-        assert_eq!(waiting.3, [true, false, false]);
         ksp.set_operator(&chain(&session, 30)?)?;
         ksp.set_from_options()?;
         assert_eq!(ksp.tolerance(), 1e-3);
         assert_eq!(options.left()?.len(), 1);
         options.clear("-slip")
     };
-    expect_success(alone("petsc::petsc_waits_till_it_is_needed_and_takes_over_the_options", 0, &[], inside));
+    expect_success(alone("petsc::petsc_waits_till_it_is_needed", 0, &[], inside));
 }
 
 /// Options in the environment are PETSc's to read: then it does not wait.

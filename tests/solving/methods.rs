@@ -221,6 +221,23 @@ fn many_bodies_cost_multigrid_no_more_iterations() {
     assert_eq!(alone.converged().text("linear_step"), "cg + hypre");
 }
 
+/// Layers far stiffer than the blocks: what rounding leaves of residuals on rigid motions is taken out in each iteration, so that the preconditioner
+/// stays positive definite. The answer is that of a factorisation.
+#[test]
+fn many_bodies_under_stiff_layers_have_a_definite_preconditioner() {
+    for stiffness in ["1e4", "1e6"] {
+        let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
+        let run = |solver: &str| {
+            let sets = [solver, &layer, "output.plots=false", "output.pairs=all"];
+            solve(case("blocks"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        };
+        let [multigrid, direct] = ["solver=hypre", "solver=mumps"].map(run);
+        assert!(multigrid.count("inner_iterations") <= 50, "{}", multigrid.said());
+        let [ours, theirs] = [&multigrid, &direct].map(|run| run.contact_of(0)["pressure"].to_vec());
+        assert!(distance(&ours, &theirs) < 1e-6, "{stiffness}: {}", distance(&ours, &theirs));
+    }
+}
+
 /// Rigid bodies foretell a large curved contact, and Newton's steps need not grow it from within.
 #[test]
 fn rigid_bodies_foretell_the_contact() {

@@ -18,23 +18,14 @@ use std::ptr::{null, null_mut};
 ///
 /// which is a multiplicative Schwarz step before and after M. Slices have one entry for each row of this process. Calls are collective.
 pub trait Subspace {
-    /// Add Q r to x and subtract A Q r from r.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<()>;
-
-    /// Subtract Q A z from z.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn project(&self, z: &mut [f64]) -> Result<()>;
+    /// Add Q (r - A z) to z.
+    fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()>;
 }
 
-/// The preconditioner M inside a wrapper.
+/// The preconditioner M inside a wrapper, and the matrix A.
 struct Inner {
     pc: ffi::PC,
-    /// PETSc's headers of the argument and the result.
+    /// PETSc's headers of an argument and a result.
     vectors: [Vector; 2],
 }
 
@@ -43,6 +34,19 @@ impl Inner {
     fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         // SAFETY: the preconditioner reads one and writes to the other.
         self.vectors[0].map(("r", r), &self.vectors[1], ("z", z), |r, z| unsafe { petsc!(PCApply(self.pc, r, z)) })
+    }
+
+    /// Return r - A x.
+    fn residual(&self, r: &[f64], x: &[f64]) -> Result<Vec<f64>> {
+        let (mut matrix, mut rest) = (null_mut(), vec![0.0; r.len()]);
+        // SAFETY: the matrix of the preconditioner, which reads one vector and writes to the other.
+        let multiply = |x, y| unsafe {
+            petsc!(PCGetOperators(self.pc, &mut matrix, null_mut()))?;
+            petsc!(MatMult(matrix, x, y))
+        };
+        self.vectors[0].map(("x", x), &self.vectors[1], ("A x", &mut rest), multiply)?;
+        rest.iter_mut().zip(r).for_each(|(rest, r)| *rest = r - *rest);
+        Ok(rest)
     }
 }
 
@@ -65,17 +69,19 @@ struct Context {
 }
 
 impl Context {
+    /// Compute z from r. If Q r = 0 up to rounding, then z is Q r + (I - Q A) M r (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2").
+    /// The term Q r takes what rounding leaves of residuals in the space out again. Without it, conjugate gradients do not reduce that part, and
+    /// r'z becomes negative when little else is left of r.
     fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         if self.is_started.get() {
             self.inner.apply(r, z)?;
-            return self.subspace.project(z);
+            return self.subspace.correct(r, z);
         }
-        let (mut rest, mut x) = (r.to_vec(), vec![0.0; r.len()]);
-        self.subspace.start(&mut rest, &mut x)?;
-        self.inner.apply(&rest, z)?;
-        self.subspace.project(z)?;
+        let mut x = vec![0.0; r.len()];
+        self.subspace.correct(r, &mut x)?;
+        self.inner.apply(&self.inner.residual(r, &x)?, z)?;
         z.iter_mut().zip(&x).for_each(|(z, x)| *z += x);
-        Ok(())
+        self.subspace.correct(r, z)
     }
 }
 
@@ -111,10 +117,12 @@ impl Wrapper {
         self.context().inner.pc
     }
 
-    /// Add Q r to x, subtract A Q r from r, and take all residuals to have Q r = 0 until the guard is dropped.
-    pub fn start(&self, r: &mut [f64], x: &mut [f64]) -> Result<Started<'_>> {
+    /// Set x = Q b and `rest` = b - A x, and take all residuals to have Q r = 0 until the guard is dropped.
+    pub fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Started<'_>> {
         let context = self.context();
-        context.subspace.start(r, x)?;
+        x.fill(0.0);
+        context.subspace.correct(rest, x)?;
+        *rest = context.inner.residual(rest, x)?;
         context.is_started.set(true);
         Ok(Started(&context.is_started))
     }
