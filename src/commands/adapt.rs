@@ -1,10 +1,6 @@
-//! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own.
+//! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own. The sizes of
+//! the mesh that an adaptation ended with are saved: the next run begins with them, and `winkler mesh --adapted` makes the mesh of them.
 
-mod sized;
-#[cfg(test)]
-mod tests;
-
-use super::adapted;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use super::transfer::{self, EstimatedSolution};
 use crate::ddm::{Start, Status};
@@ -14,6 +10,7 @@ use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
 use crate::exchange::broadcast;
 use crate::interrupt::Interrupt;
+use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -22,7 +19,7 @@ use crate::problem::{MeshSource, MethodName, method};
 use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Scene};
 use crate::solver::options;
-use sized::{follow, sized, view};
+use serde_json::Value;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -60,7 +57,7 @@ pub struct Plan {
     resumed: Option<Checkpoint>,
     /// The scene as it was requested.
     requested: Rc<Scene>,
-    /// The key under which sizes are kept for later runs: see [`adapted::purpose`].
+    /// The key under which sizes are kept for later runs: see [`purpose`].
     purpose: String,
     /// The solution that the next round starts from; empty without one.
     start_from: Vec<ContactTable>,
@@ -131,7 +128,7 @@ impl Plan {
     /// Return the plan of a scene that has made no mesh yet, or none since the checkpoint.
     fn of(scene: Rc<Scene>, resumed: Option<Checkpoint>) -> Self {
         Self {
-            purpose: adapted::purpose(&scene),
+            purpose: purpose(&scene),
             goal: scene.adapt.clone(),
             requested: scene.clone(),
             scene,
@@ -165,7 +162,7 @@ impl Plan {
     /// Begin an adaptation with the mesh that an earlier adaptation ended with, or with a coarse one.
     fn begin_coarse(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
         // the cache of another rank may have other sizes
-        let mut view = broadcast(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
+        let mut view = broadcast(&Ranks::new(session), || Ok(recall(&self.purpose, true)))?;
         if view.is_none() {
             let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
             view = sized(session, &self.scene, coarse, interrupt, clock)?;
@@ -402,7 +399,7 @@ impl Plan {
     /// The cache of meshes cannot be written.
     pub fn save_mesh(&self, done: &Done) -> Result<()> {
         let sizes = self.sizes().filter(|_| self.adapts() && done.outcome.status.is_solved());
-        sizes.map_or(Ok(()), |sizes| adapted::save(&self.purpose, self.limit.is_none(), &sizes))
+        sizes.map_or(Ok(()), |sizes| save(&self.purpose, self.limit.is_none(), &sizes))
     }
 
     /// Return the view of the sizes that the mesh of this round follows.
@@ -427,4 +424,86 @@ impl Plan {
 /// Return the solution on the contact surfaces, one table for each pair.
 fn contact_tables(done: &Done) -> Vec<ContactTable> {
     (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
+}
+
+/// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
+pub(super) fn sized(
+    session: &Session,
+    scene: &Scene,
+    sizing: fn(&dyn Meshes, usize) -> Sizes,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Option<String>> {
+    let built = run::build(session, scene.clone(), interrupt, clock)?;
+    let bodies = built.discrete.bodies.len();
+    let sizes = built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies)));
+    options::withdraw(session).map(|()| sizes)
+}
+
+/// Return sizes as a view of Gmsh.
+pub(super) fn view(sizes: &Sizes) -> String {
+    mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
+}
+
+/// Let the mesh of a scene follow a view of sizes.
+pub(super) fn follow(scene: &mut Scene, view: Option<String>) {
+    if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
+        *sizes = view.map(Into::into);
+    }
+}
+
+/// Return the settings that an adapted mesh depends on, as a text: the key under which its sizes are saved.
+///
+/// Load steps are among them, since they choose the load under which meshes are adapted.
+pub fn purpose(scene: &Scene) -> String {
+    let mut settings = scene.settings();
+    let steps = settings["method"]["steps"].take();
+    ["output", "solver", "estimate"].iter().for_each(|key| settings[*key] = Value::Null);
+    settings["method"] = steps;
+    settings.to_string()
+}
+
+/// Save the sizes of the mesh that an adaptation ended with. The next run begins with them only if `is_reached`: the mesh has the error that
+/// was asked for.
+///
+/// # Errors
+/// The cache cannot be written.
+pub fn save(purpose: &str, is_reached: bool, sizes: &str) -> Result<()> {
+    mesh::keep_final(&key(purpose, is_reached), sizes)
+}
+
+/// Return the saved sizes of a mesh with the error that was asked for, or (not `is_reached`) of the best mesh of a run that did not reach it.
+pub fn recall(purpose: &str, is_reached: bool) -> Option<String> {
+    mesh::recall_final(&key(purpose, is_reached))
+}
+
+fn key(purpose: &str, is_reached: bool) -> String {
+    if is_reached { purpose.to_owned() } else { format!("best of {purpose}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+    use std::path::Path;
+
+    /// Return the plan of a scene that is adapted, without load steps.
+    fn plan() -> Plan {
+        let scene =
+            load(Path::new("meshes/groove-held/scene.toml"), &["adapt.error=1e-3".to_owned()]).expect("a scene");
+        Plan::of(Rc::new(scene), None)
+    }
+
+    /// A run that was interrupted on its best mesh once more ends there after a restart, with its reason. On any other mesh it goes on with the adaptation.
+    #[test]
+    fn a_restart_on_the_best_mesh_ends_there() {
+        for repeats_best in [true, false] {
+            let mut interrupted = plan();
+            (interrupted.repeats_best, interrupted.limit) = (repeats_best, repeats_best.then(|| "no mesh".to_owned()));
+            let head = interrupted.head().expect("a head");
+            let mut restarted = plan();
+            restarted.resume(&head);
+            assert_eq!((restarted.repeats_best, restarted.limit), (repeats_best, interrupted.limit));
+        }
+    }
 }

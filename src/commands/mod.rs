@@ -2,25 +2,19 @@
 //! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
 pub mod adapt;
-mod adapted;
 pub mod bench;
-mod cases;
 pub mod check;
 pub mod checkpoint;
 pub mod mesh;
 pub mod new;
-mod plots;
-mod series;
 pub mod solve;
-pub mod surfaces;
 pub mod sweep;
 pub mod transfer;
-mod watcher;
 pub mod write;
 
 use crate::error::Result;
 use crate::output::LISTED;
-use crate::output::progress::Line;
+use crate::output::terminal::Line;
 use crate::petsc::Session;
 use crate::problem::MethodName;
 use crate::run::report::{Shared, solvers_in_words};

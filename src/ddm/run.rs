@@ -15,7 +15,7 @@ use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
-use crate::problem::stop::StopRule;
+use crate::problem::method::StopRule;
 use crate::robin::Sweep;
 use std::time::Instant;
 

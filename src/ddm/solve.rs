@@ -21,7 +21,7 @@ use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 use crate::model::surface::{meeting_slopes, surface_slopes};
-use crate::problem::stop::StopRule;
+use crate::problem::method::StopRule;
 use crate::robin::coefficient::Coefficient;
 use crate::robin::extend::extend;
 use crate::robin::interval::{Interval, interval};

@@ -4,7 +4,7 @@ use super::surface::ContactSurface;
 use crate::contact::Carriers;
 use crate::expression::Field;
 use crate::fem::element;
-use crate::output::vtu::CellKind;
+use crate::output::fields::CellKind;
 use crate::problem::order::Order;
 
 /// How well a mesh follows a gap g. It is compared with its interpolation I g, which has the values of g at the contact points of

@@ -3,7 +3,7 @@
 
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::fem::{Facets, element};
-use crate::output::vtu::{CellKind, Grid};
+use crate::output::fields::{CellKind, Grid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};

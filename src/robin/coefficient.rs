@@ -8,7 +8,7 @@ use crate::linalg::Blocks;
 use crate::model::Model;
 use crate::model::layer::Layer;
 use crate::model::rigid::{Moved, TOLERANCE, combined};
-use crate::problem::robin::{RobinRule, Zone};
+use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
 /// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.

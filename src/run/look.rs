@@ -10,8 +10,8 @@
 //! where kappa are the tangent stiffnesses of the layers. The trial displacements v come from no solver: one is what the force on
 //! each node alone would cause, others are what forces on hats of coarser and coarser grids would cause (docs/theory.md).
 
-use super::ended::{All, Look, Recovered};
 use super::stages::Done;
+use super::stages::{All, Look, Recovered};
 use crate::ddm::linear::resisting;
 use crate::ddm::{Inaccuracy, Row, Status, Whose};
 use crate::discretize::Unbalanced;

@@ -1,10 +1,10 @@
 //! The report and the contact tables of a run, from its outcome.
 
-use super::clock::Clock;
-use super::ended::{All, Look};
+use super::stages::Clock;
+use super::stages::{All, Look};
 use super::stages::{Built, Done};
 use super::verdict::{self, forecast, message, status_name};
-use super::{balance, measure, pairs, preflight, requests, results};
+use super::{recorder, results, warnings};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Reached, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
         Status::Converged | Status::RoundoffLimited if verdict::step_warnings(&done.steps).is_empty() => 0,
-        Status::Paused { asked } => requests::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
+        Status::Paused { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
@@ -44,10 +44,10 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
-    report.warnings.extend(too_large.into_iter().chain(pairs::beyond_laws(done)));
-    let approaches = measure::approaches(done, recovered);
+    report.warnings.extend(too_large.into_iter().chain(warnings::beyond_laws(done)));
+    let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
-    let balances = balance::gather(done, recovered);
+    let balances = results::balances(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     if let Some(message) = lost_digits(done) {
         add_lost_digits(&mut report, message, &outcome.status);
@@ -285,7 +285,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let sides = discrete.sides(i);
-    let coupling = preflight::coupling(&done.built, i);
+    let coupling = results::coupling(&done.built, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
         surfaces: discrete.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
@@ -300,12 +300,12 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
-        force: sides.map(|side| measure::resultant(force, &pair.resultant[side])),
-        moment: sides.map(|side| measure::resultant(force, &pair.moment[side])),
+        force: sides.map(|side| results::resultant(force, &pair.resultant[side])),
+        moment: sides.map(|side| results::resultant(force, &pair.moment[side])),
         approach,
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
-        peak_compression: measure::peak(c),
+        peak_compression: results::peak(c),
         extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }

@@ -1,22 +1,20 @@
 //! Settings of the scene file. A key is declared once, as a field of a struct with its default and its description: see [`table`].
 //!
 //! A type that can be the value of a key implements [`Setting`]: what it looks like in TOML (for refusals and the JSON schema), how it is
-//! read, and how it is echoed in `report.json`. Structs of keys and lists of words get this from the macros [`table`] and [`words`].
-//! Values that have several forms implement the trait by hand, in `problem/keys`.
+//! read, and how it is echoed in `report.json`. Structs of keys and lists of words get this from the macros [`table`] and [`words`], and plain
+//! values here. Types with several forms implement the trait by hand, where they are declared in `problem`.
 
-mod context;
 mod macros;
-mod read;
-mod shape;
-mod values;
+mod tree;
 
-pub use context::{Context, choose, file};
 pub(crate) use macros::{keys, table, words};
-pub use read::{Entry, Keys, Node, Value, document, value};
-pub use shape::{TableShape, ValueKind, word};
+pub use tree::{Entry, Keys, Node, TableShape, Value, ValueKind, document, value, word};
 
-use crate::error::Result;
-use serde_json::{Map, Value as Json};
+use crate::data::Library;
+use crate::error::{Error, Located, Result};
+use crate::expression::{Expression, Field, Scope};
+use serde_json::{Map, Value as Json, json};
+use std::path::{Path, PathBuf};
 
 /// A type that can be the value of a key.
 pub trait Setting: Sized {
@@ -41,4 +39,243 @@ pub type Entries = Map<String, Json>;
 /// Return a table of the echo without the keys that are left out.
 pub fn entries<const N: usize>(pairs: [(&str, Json); N]) -> Entries {
     pairs.into_iter().filter(|(_, value)| !value.is_null()).map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+/// The context in which values are decoded.
+pub struct Context<'a> {
+    /// Space dimension: 2 or 3.
+    pub dimension: usize,
+    /// Folder of the scene file.
+    pub folder: &'a Path,
+    /// Functions from files, by name.
+    pub data: Library,
+}
+
+/// The smallest absolute value of a number that is not zero; its reciprocal is the largest. Energies contain squares of loads and
+/// displacements, and their rounding errors are 1e-32 times as large.
+const LEAST: f64 = 1e-110;
+
+impl Context<'_> {
+    /// Return a number, or an expression in the coordinates.
+    ///
+    /// # Errors
+    /// Values of another kind, texts that are no expression, and numbers that are too large or too small.
+    pub fn field(&self, node: &Node) -> Result<Field> {
+        let field = match &node.value {
+            Value::Integer(_) | Value::Float(_) => Field::Constant(node.number()?),
+            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data)?,
+            _ => return Err(node.expected("a number or an expression", "")),
+        };
+        match field {
+            Field::Constant(value) if value != 0.0 && !(LEAST..=LEAST.recip()).contains(&value.abs()) => Err(node
+                .refuse(format!("no run computes with a number like {value:e}"))
+                .label("must be 0, or of a size from 1e-110 to 1e110")
+                .help("choose other units of length and force")),
+            field => Ok(field),
+        }
+    }
+
+    /// Return a vector with as many components as the scene has dimensions; in the plane the third one is zero.
+    pub fn vector(&self, node: &Node) -> Result<[Field; 3]> {
+        let mut vector = [const { Field::Constant(0.0) }; 3];
+        for (component, item) in vector.iter_mut().zip(self.components(node)?) {
+            *component = self.field(item)?;
+        }
+        Ok(vector)
+    }
+
+    /// Return a vector of expressions, with as many components as the scene has dimensions. Numbers become constant expressions.
+    pub fn expressions(&self, node: &Node) -> Result<Vec<Expression>> {
+        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
+        let component = |item: &Node| match &item.value {
+            Value::Integer(_) | Value::Float(_) => Expression::parse(&item.number()?.to_string(), &item.place, scope),
+            Value::String(text) => Expression::parse(text, &item.place, scope),
+            _ => Err(item.expected("a number or an expression", "")),
+        };
+        self.components(node)?.iter().map(component).collect()
+    }
+
+    /// Return the components of a vector; there must be as many as the scene has dimensions.
+    pub fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
+        let items = node.list()?;
+        if items.len() != self.dimension {
+            let place = items.get(self.dimension).map_or(&node.place, |extra| &extra.place);
+            let count = format!("a vector has {} components here, not {}", self.dimension, items.len());
+            return Err(Error::scene(place, count).help(format!("the dimension of the scene is {}", self.dimension)));
+        }
+        Ok(items)
+    }
+}
+
+/// Return the path of a file, joined with the folder of the scene.
+///
+/// # Errors
+/// A file that does not exist.
+pub fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
+    let name = node.name()?.value;
+    let path = folder.join(&name);
+    match std::fs::metadata(&path) {
+        Ok(found) if found.is_file() => Ok(Located::new(path, node.place.clone())),
+        Ok(_) => Err(node.refuse(format!("{} is not a file", path.display()))),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+            let names: Vec<_> = files.map(|file| file.file_name().to_string_lossy().into_owned()).collect();
+            let wanted = path.file_name().unwrap_or_default().to_string_lossy();
+            let error = node.refuse(format!("there is no file {}", path.display())).label("not there");
+            Err(error.suggest(&wanted, names.iter().map(String::as_str), || {
+                "paths are relative to the folder of the scene file".to_owned()
+            }))
+        }
+        Err(error) => Err(node.refuse(format!("cannot look at {}", path.display())).because(error.to_string())),
+    }
+}
+
+/// Return the choice of this name; `what` names the key in the message.
+///
+/// # Errors
+/// A word that is no choice, with the nearest one as advice.
+pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Result<T> {
+    let word = node.string()?;
+    if let Some((_, choice)) = choices.iter().find(|(name, _)| *name == word) {
+        return Ok(choice.clone());
+    }
+    let names: Vec<_> = choices.iter().map(|(name, _)| *name).collect();
+    let otherwise = || format!("it is one of {}", names.join(", "));
+    Err(node.refuse(format!("unknown {what} `{word}`")).suggest(word, names.iter().copied(), otherwise))
+}
+
+/// Implement [`Setting`] for types that JSON has, with the kind of value and the function that reads it.
+macro_rules! plain {
+    ($($Type:ty: $kind:ident, $read:expr;)*) => {$(
+        impl Setting for $Type {
+            fn kind() -> ValueKind {
+                ValueKind::$kind
+            }
+
+            fn read(node: &Node, _: &Context) -> Result<Self> {
+                $read(node)
+            }
+
+            fn echo(&self, _: usize) -> Json {
+                json!(self)
+            }
+        }
+    )*};
+}
+
+plain! {
+    bool: Flag, Node::boolean;
+    f64: Number, Node::number;
+    // a whole number >= 1
+    usize: PositiveInteger, Node::count;
+    // a text that is not empty
+    String: Text, |node: &Node| node.name().map(|name| name.value);
+}
+
+/// A path that is not joined with the folder of the scene, and need not exist.
+impl Setting for PathBuf {
+    fn kind() -> ValueKind {
+        ValueKind::Text
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        String::read(node, context).map(Self::from)
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        json!(self.display().to_string())
+    }
+}
+
+/// A number or an expression.
+impl Setting for Field {
+    fn kind() -> ValueKind {
+        ValueKind::Field
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        context.field(node)
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        match self {
+            Field::Constant(value) => json!(value),
+            other => json!(other.text()),
+        }
+    }
+}
+
+/// A vector with one component for each dimension; in the plane the third one is zero.
+impl Setting for [Field; 3] {
+    fn kind() -> ValueKind {
+        ValueKind::Field.list()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        context.vector(node)
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        self.iter().take(dimension).map(|component| component.echo(dimension)).collect()
+    }
+}
+
+/// One expression for each dimension.
+impl Setting for Vec<Expression> {
+    fn kind() -> ValueKind {
+        ValueKind::Field.list()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        context.expressions(node)
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        self.iter().map(Expression::text).collect()
+    }
+}
+
+impl<T: Setting> Setting for Vec<T> {
+    fn kind() -> ValueKind {
+        T::kind().list()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        node.list()?.iter().map(|item| T::read(item, context)).collect()
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        self.iter().map(|item| item.echo(dimension)).collect()
+    }
+}
+
+/// A key that need not be given.
+impl<T: Setting> Setting for Option<T> {
+    fn kind() -> ValueKind {
+        T::kind()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        T::read(node, context).map(Some)
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        self.as_ref().map_or(Json::Null, |value| value.echo(dimension))
+    }
+}
+
+/// A value with its place in the scene.
+impl<T: Setting> Setting for Located<T> {
+    fn kind() -> ValueKind {
+        T::kind()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        T::read(node, context).map(|value| Self::new(value, node.place.clone()))
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        self.value.echo(dimension)
+    }
 }

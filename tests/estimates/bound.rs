@@ -9,8 +9,8 @@ use winkler::model::field::{apply_stiffness, local_dot, residual};
 use winkler::model::{Field, Model};
 use winkler::petsc::Session;
 use winkler::run;
-use winkler::run::clock::Clock;
 use winkler::run::stages::Begin;
+use winkler::run::stages::Clock;
 use winkler::scene;
 use winkler::solver::options;
 

@@ -1,7 +1,7 @@
 //! The error of a contact pressure, against a table or against the closed form of the scene.
 
 use super::plan::Plan;
-use super::request::usage;
+use super::plan::usage;
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::scene::Scene;

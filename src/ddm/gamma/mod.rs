@@ -13,7 +13,7 @@ pub use spectral::Spectral;
 use super::acceleration::Iterate;
 use super::forecast::{best_factor, relaxed_factor};
 use crate::model::line::Unbounded;
-use crate::problem::own::Own;
+use crate::problem::Own;
 use crate::robin::Ritz;
 
 /// A rule that chooses gamma^k after the sweep of iteration k.
