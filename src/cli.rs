@@ -209,9 +209,6 @@ pub fn run(words: Vec<OsString>) -> i32 {
 }
 
 /// Parse the words of a command line into a command and the options of PETSc.
-///
-/// # Errors
-/// Refusals of the command line, among them the text of help and the version.
 fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusal> {
     let refuse = |message: String, help: String| Err(Refusal::Ours(Error::new(Kind::Usage, message).help(help)));
     let mut words = words.into_iter();
@@ -354,9 +351,6 @@ const VARIABLES: [&str; 2] = ["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"];
 
 /// Refuse ranks that differ in the version of the program, in the words of the command line after the program's name, or in the options of PETSc
 /// in the environment. Collective.
-///
-/// # Errors
-/// A collective error with what the ranks were started with.
 fn refuse_other_words(session: &Session, words: &[OsString]) -> Result<()> {
     let words = words.iter().skip(1).map(shown).collect::<Vec<_>>().join(" ");
     let mut facts =

@@ -18,7 +18,6 @@ use crate::problem::history::History;
 use crate::problem::{MeshSource, MethodName, method};
 use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Scene};
-use crate::solver::options;
 use serde_json::Value;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -204,13 +203,12 @@ impl Plan {
     }
 
     /// End the adaptation on the mesh of this round. Return whether another round makes all load steps on it.
-    fn end_meshes(&mut self, session: &Session) -> Result<bool> {
-        let Some(steps) = self.later_steps.take() else { return Ok(false) };
+    fn end_meshes(&mut self) -> bool {
+        let Some(steps) = self.later_steps.take() else { return false };
         // the first step has another load than the largest one, so that it finds its own start
         self.start_from.clear();
         Rc::make_mut(&mut self.scene).method.steps = steps;
-        options::withdraw(session)?;
-        Ok(true)
+        true
     }
 
     /// Refuse a mesh that is a file, since it cannot follow sizes.
@@ -231,27 +229,25 @@ impl Plan {
     pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
         loop {
             match run::build(session, self.scene.clone(), interrupt, clock) {
-                Err(error) if error.kind() == Kind::Mesh && self.best.is_some() => self.coarsen(session, &error)?,
+                Err(error) if error.kind() == Kind::Mesh && self.best.is_some() => self.coarsen(&error),
                 built => return built,
             }
         }
     }
 
     /// Follow coarser sizes, or the best mesh once more, after sizes that gave no mesh.
-    fn coarsen(&mut self, session: &Session, error: &Error) -> Result<()> {
-        let Some(best) = &mut self.best else { return Ok(()) };
+    fn coarsen(&mut self, error: &Error) {
+        let Some(best) = &mut self.best else { return };
         best.next.refine(1.0 / GROWTH);
         if best.next.cells > self.rounds[best.round - 1].cells as f64 {
-            return self.go_from_best(session).map(drop);
+            self.go_from_best();
+            return;
         }
         self.limit = Some(format!("no mesh comes of the sizes after mesh {}: {}", best.round, error.message()));
-        self.end_with_best(session, f64::INFINITY).map(drop)
+        self.end_with_best(f64::INFINITY);
     }
 
     /// Return where this round begins: where a checkpoint or an earlier round ended.
-    ///
-    /// # Errors
-    /// The checkpoint is of another mesh.
     pub fn begin(&mut self, built: &Built) -> Result<Begin> {
         match self.resumed.take() {
             Some(checkpoint) => checkpoint.resume(built),
@@ -281,19 +277,10 @@ impl Plan {
         })
     }
 
-    /// Make the plan of the next round. Return whether there is one. Collective.
-    ///
-    /// # Errors
-    /// Failures of PETSc.
-    pub fn advance(
-        &mut self,
-        session: &Session,
-        done: &Done,
-        estimate: Option<&Estimate>,
-        clock: &mut Clock,
-    ) -> Result<bool> {
+    /// Make the plan of the next round. Return whether there is one.
+    pub fn advance(&mut self, done: &Done, estimate: Option<&Estimate>, clock: &mut Clock) -> bool {
         if matches!(done.outcome.status, Status::Paused { .. }) || self.is_stepping() {
-            return Ok(false);
+            return false;
         }
         let is_solved = done.outcome.status.is_solved();
         let (discrete, model) = (&done.built.discrete, done.model());
@@ -302,28 +289,27 @@ impl Plan {
                 self.start_from = contact_tables(done);
             }
             self.scene = finer;
-            options::withdraw(session)?;
-            return Ok(true);
+            return true;
         }
         let (Some(goal), Some(estimate), Some(meshes)) = (self.goal.clone(), estimate, &discrete.meshes) else {
-            return Ok(false);
+            return false;
         };
         self.record(done, estimate, clock);
         if !is_solved || self.repeats_best {
-            return Ok(false);
+            return false;
         }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
         if error <= goal.error.value {
-            return self.end_meshes(session);
+            return self.end_meshes();
         }
         if self.rounds.len() >= goal.rounds {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
-            return self.end_with_best(session, error);
+            return self.end_with_best(error);
         }
         // coarse meshes may miss a singularity of the pressure: on the first mesh that resolves it the estimated error of pressures grows,
         // while that in energy falls
         if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
-            return self.follow_best(session);
+            return self.follow_best();
         }
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
@@ -334,35 +320,34 @@ impl Plan {
         let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: GROWTH, most });
         if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {
             self.limit = Some(format!("a mesh has {cells} cells: allow more (adapt.cells)"));
-            return self.end_with_best(session, error);
+            return self.end_with_best(error);
         }
         let (round, view, tables) = (self.rounds.len(), self.sizes(), contact_tables(done));
         self.best = Some(Best { error, energy: estimate.energy, round, view, next, tables, worse: 0 });
-        self.go_from_best(session)
+        self.go_from_best()
     }
 
     /// After a mesh that is worse than the best one, let another mesh with more cells follow the best one, or end the run.
-    fn follow_best(&mut self, session: &Session) -> Result<bool> {
-        let Some(best) = &mut self.best else { return Ok(false) };
+    fn follow_best(&mut self) -> bool {
+        let Some(best) = &mut self.best else { return false };
         best.worse += 1;
         if best.worse == MOST_WORSE {
             let Best { round, error, .. } = best;
             self.limit =
                 Some(format!("mesh {round} has an error of {error:.1e}, and {MOST_WORSE} more meshes are no better"));
-            return self.end_with_best(session, f64::INFINITY);
+            return self.end_with_best(f64::INFINITY);
         }
         best.next.refine(GROWTH);
-        self.go_from_best(session)
+        self.go_from_best()
     }
 
     /// Let the next mesh follow the sizes that the errors of the best one lead to, and start from the solution on the best one.
-    fn go_from_best(&mut self, session: &Session) -> Result<bool> {
-        let Some(best) = &self.best else { return Ok(false) };
+    fn go_from_best(&mut self) -> bool {
+        let Some(best) = &self.best else { return false };
         self.start_from = best.tables.clone();
         self.predicted_cells = Some(best.next.cells);
         follow(Rc::make_mut(&mut self.scene), Some(view(&best.next)));
-        options::withdraw(session)?;
-        Ok(true)
+        true
     }
 
     /// Add the report of this round.
@@ -381,25 +366,22 @@ impl Plan {
     }
 
     /// End the run with the best mesh. Return whether there is one more round on it: not if this round, with this `error`, is no worse.
-    fn end_with_best(&mut self, session: &Session, error: f64) -> Result<bool> {
-        let Some(best) = self.best.take().filter(|best| best.error < error) else { return self.end_meshes(session) };
+    fn end_with_best(&mut self, error: f64) -> bool {
+        let Some(best) = self.best.take().filter(|best| best.error < error) else { return self.end_meshes() };
         self.repeats_best = true;
         self.start_from = best.tables;
         follow(Rc::make_mut(&mut self.scene), best.view.as_deref().map(str::to_owned));
         if self.later_steps.is_some() {
-            return self.end_meshes(session);
+            return self.end_meshes();
         }
-        options::withdraw(session)?;
-        Ok(true)
+        true
     }
 
-    /// Save the sizes of the mesh with which the run has ended, on the rank that writes.
-    ///
-    /// # Errors
-    /// The cache of meshes cannot be written.
+    /// Save the sizes of the mesh with which the run has ended, on the rank that writes. The next run begins with them only if the mesh has the
+    /// error that was asked for.
     pub fn save_mesh(&self, done: &Done) -> Result<()> {
         let sizes = self.sizes().filter(|_| self.adapts() && done.outcome.status.is_solved());
-        sizes.map_or(Ok(()), |sizes| save(&self.purpose, self.limit.is_none(), &sizes))
+        sizes.map_or(Ok(()), |sizes| mesh::keep_final(&key(&self.purpose, self.limit.is_none()), &sizes))
     }
 
     /// Return the view of the sizes that the mesh of this round follows.
@@ -427,7 +409,7 @@ fn contact_tables(done: &Done) -> Vec<ContactTable> {
 }
 
 /// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
-pub(super) fn sized(
+fn sized(
     session: &Session,
     scene: &Scene,
     sizing: fn(&dyn Meshes, usize) -> Sizes,
@@ -436,17 +418,16 @@ pub(super) fn sized(
 ) -> Result<Option<String>> {
     let built = run::build(session, scene.clone(), interrupt, clock)?;
     let bodies = built.discrete.bodies.len();
-    let sizes = built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies)));
-    options::withdraw(session).map(|()| sizes)
+    Ok(built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies))))
 }
 
 /// Return sizes as a view of Gmsh.
-pub(super) fn view(sizes: &Sizes) -> String {
+fn view(sizes: &Sizes) -> String {
     mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
 }
 
 /// Let the mesh of a scene follow a view of sizes.
-pub(super) fn follow(scene: &mut Scene, view: Option<String>) {
+fn follow(scene: &mut Scene, view: Option<String>) {
     if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
         *sizes = view.map(Into::into);
     }
@@ -463,16 +444,7 @@ pub fn purpose(scene: &Scene) -> String {
     settings.to_string()
 }
 
-/// Save the sizes of the mesh that an adaptation ended with. The next run begins with them only if `is_reached`: the mesh has the error that
-/// was asked for.
-///
-/// # Errors
-/// The cache cannot be written.
-pub fn save(purpose: &str, is_reached: bool, sizes: &str) -> Result<()> {
-    mesh::keep_final(&key(purpose, is_reached), sizes)
-}
-
-/// Return the saved sizes of a mesh with the error that was asked for, or (not `is_reached`) of the best mesh of a run that did not reach it.
+/// Return the saved sizes of the mesh of an earlier run: one with the error that was asked for, or (not `is_reached`) of the best mesh of a run that did not reach it.
 pub fn recall(purpose: &str, is_reached: bool) -> Option<String> {
     mesh::recall_final(&key(purpose, is_reached))
 }

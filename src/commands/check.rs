@@ -443,9 +443,6 @@ fn surface_to_json(built: &Built, pair: usize) -> Value {
 }
 
 /// Draw the data of contacts and their laws into a folder.
-///
-/// # Errors
-/// Files that cannot be written.
 pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
     for (name, data) in in_contacts(built) {
         if let Some(plot) = profiles(&data, built) {

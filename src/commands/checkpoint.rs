@@ -64,9 +64,6 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Write the state of a paused run into a folder. Collective; the rank with `writes` writes the file.
-    ///
-    /// # Errors
-    /// The file cannot be written, on the rank that writes it.
     pub fn write(folder: &Path, head: Head, done: &Done, writes: bool) -> Result<()> {
         let (model, Done { built, outcome, steps, earlier, .. }) = (done.model(), done);
         let states = gather(model, &outcome.iterate);
@@ -112,9 +109,6 @@ impl Checkpoint {
     }
 
     /// Return the state from which a problem goes on, restricted to the bodies of this rank.
-    ///
-    /// # Errors
-    /// The problem has another mesh.
     pub fn resume(self, built: &Built) -> Result<Begin> {
         // only the first rank has read the mesh
         if built.mesh.is_some() && self.head.mesh != mesh_digest(built) {

@@ -65,9 +65,6 @@ pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
 }
 
 /// Let the mesh of a scene follow the sizes with which the last run that adapted it ended. Return whether that run reached its error.
-///
-/// # Errors
-/// A scene that is not adapted, or has not been.
 fn follow_adapted(scene: &mut Scene) -> Result<bool> {
     let purpose = adapt::purpose(scene);
     let (MeshSource::Geo { file, sizes, .. }, Some(adapt)) = (&mut scene.mesh, &scene.adapt) else {
@@ -144,9 +141,6 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
 }
 
 /// Return what is printed about each body.
-///
-/// # Errors
-/// A body without cells.
 fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<Value>> {
     let mesh = &verified.mesh;
     let mut checked = verified.checked.iter();

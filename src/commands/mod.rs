@@ -62,9 +62,6 @@ impl Terminal {
     }
 
     /// Return the lines of `--verbose` to be printed on this rank: what was decided and why, and the PETSc options of each body. Collective.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     fn decisions(&self, session: &Session, ready: &Prepared) -> Result<Vec<String>> {
         let lines = if self.is_verbose { decisions(session, ready)? } else { Vec::new() };
         Ok(if self.is_first { lines } else { Vec::new() })

@@ -4,14 +4,14 @@
 use super::solve::claim;
 use super::write::{Plots, to_json};
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
-use crate::ddm::{Observer, Row, Status};
+use crate::ddm::Status;
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::tables::{contact_column, vector_columns, vector_fields};
 use crate::output::{Folder, LISTED, Report, RowFile, busiest, say, sci, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::run::{self, Begin, Built, Clock, Done, Prepared, Recorder, Requests, report, results};
+use crate::run::{self, Begin, Built, Clock, Done, Prepared, Requests, report, results};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
@@ -59,13 +59,13 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         plots: Plots::default(),
         reports: Vec::new(),
     };
-    let mut watcher = Watcher(Requests::new(interrupt, None));
+    let mut requests = Requests::new(interrupt, None);
     let (mut exit, mut before) = (0, None);
     for case in &cases {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
         let ready = sweep.prepare(&axes, case, before.take(), &mut clock)?;
-        let done = run::iterate(ready, interrupt, &mut watcher, &mut clock)?;
+        let done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
         exit = exit.max(report::exit_code(&done));
@@ -107,19 +107,6 @@ impl Case {
     }
 }
 
-/// An observer that passes signals on, and writes no rows.
-struct Watcher(Requests);
-
-impl Observer for Watcher {
-    fn row(&mut self, _row: &Row) {}
-
-    fn asked(&self) -> u8 {
-        self.0.bits()
-    }
-}
-
-impl Recorder for Watcher {}
-
 /// The sweep under way: what it prints and the table that it writes.
 struct Sweep<'a> {
     session: &'a Session,
@@ -139,9 +126,6 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     /// Build the problem of a run, with what the run before has left, and set up its method. Collective.
-    ///
-    /// # Errors
-    /// Refusals of the problem; a run whose row would have other columns than those before; failures of the file system.
     fn prepare(&mut self, axes: &[Axis], case: &Case, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
         let session = self.session;
         let built = run::build_after(session, case.scene.clone(), before, self.interrupt, clock)?;
@@ -282,9 +266,6 @@ impl Axis {
     }
 
     /// Read the axes of `--over KEY=V1,V2,...`.
-    ///
-    /// # Errors
-    /// A text that is not of this form.
     pub fn all_over(typed: &[String]) -> Result<Vec<Self>> {
         typed.iter().map(|text| Self::over(text)).collect()
     }

@@ -157,9 +157,6 @@ impl ResultFiles<'_> {
 }
 
 /// Return a report, or several, as JSON text that ends with a newline.
-///
-/// # Errors
-/// None in practice: a report holds nothing that JSON cannot hold.
 pub fn to_json(report: &impl Serialize) -> Result<String> {
     serde_json::to_string_pretty(report)
         .map(|text| text + "\n")
@@ -241,9 +238,6 @@ pub fn write(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
 }
 
 /// Write the fields at the end of a run in the same way.
-///
-/// # Errors
-/// Those of [`write`].
 fn write_last(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
     if done.built.scene.output.msh {
         views(done, recovered, folder)?;
@@ -369,9 +363,6 @@ impl Plots {
     }
 
     /// Write all plots.
-    ///
-    /// # Errors
-    /// Files that cannot be written.
     pub fn write(self, folder: &Folder) -> Result<()> {
         let convergence = Plot::convergence(&self.title, &self.histories);
         folder.write("convergence.svg", |out| convergence.write(out))?;
@@ -386,9 +377,6 @@ impl Plots {
 }
 
 /// Write the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps.
-///
-/// # Errors
-/// A file that cannot be written.
 fn write_approach(done: &Done, shown: &[usize], folder: &Folder) -> Result<()> {
     if done.steps.len() < 2 {
         return Ok(());

@@ -38,25 +38,18 @@ impl CellKind {
 
     /// Return the number of points per cell.
     pub fn stride(self) -> usize {
-        match self {
-            CellKind::Line => 2,
-            CellKind::QuadraticLine => 3,
-            CellKind::Triangle => 3,
-            CellKind::QuadraticTriangle => 6,
-            CellKind::Tetra => 4,
-            CellKind::QuadraticTetra => 10,
-        }
+        self.facts().0
     }
 
-    /// Return the type of a cell in VTK.
-    fn vtk(self) -> CellType {
+    /// Return the number of points, the type in VTK, the dimension, and the type in Gmsh of a cell.
+    fn facts(self) -> (usize, CellType, i32, i32) {
         match self {
-            CellKind::Line => CellType::Line,
-            CellKind::QuadraticLine => CellType::QuadraticEdge,
-            CellKind::Triangle => CellType::Triangle,
-            CellKind::QuadraticTriangle => CellType::QuadraticTriangle,
-            CellKind::Tetra => CellType::Tetra,
-            CellKind::QuadraticTetra => CellType::QuadraticTetra,
+            CellKind::Line => (2, CellType::Line, 1, 1),
+            CellKind::QuadraticLine => (3, CellType::QuadraticEdge, 1, 8),
+            CellKind::Triangle => (3, CellType::Triangle, 2, 2),
+            CellKind::QuadraticTriangle => (6, CellType::QuadraticTriangle, 2, 9),
+            CellKind::Tetra => (4, CellType::Tetra, 3, 4),
+            CellKind::QuadraticTetra => (10, CellType::QuadraticTetra, 3, 11),
         }
     }
 }
@@ -107,9 +100,6 @@ impl BodyField {
 
     /// Write VTK's XML format with binary (base64) data and the point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         self.into_grid().write(encoding, out)
     }
@@ -130,9 +120,6 @@ impl BodyField {
     }
 
     /// Write the `.pvtu` file that joins the parts of a body in `files` of the same folder.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn join(files: &[String], encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let kind = if encoding.single { "Float32" } else { "Float64" };
         let mut out = TagWriter::new(out);
@@ -170,9 +157,6 @@ pub struct Grid {
 
 impl Grid {
     /// Write VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let numbers = |data: Vec<f64>| -> IOBuffer {
             if encoding.single { data.into_iter().map(|x| x as f32).collect::<Vec<_>>().into() } else { data.into() }
@@ -192,7 +176,7 @@ impl Grid {
                     connectivity: self.connectivity.into_iter().map(u64::from).collect(),
                     offsets: (1..=cells).map(|cell| (cell * stride) as u64).collect(),
                 },
-                types: vec![self.cell.vtk(); cells],
+                types: vec![self.cell.facts().1; cells],
             },
             data: Attributes { point: arrays(self.at_points), cell: arrays(self.at_cells) },
         };
@@ -227,9 +211,6 @@ pub struct Entry<'a> {
 }
 
 /// Write the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
-///
-/// # Errors
-/// Those of `out`.
 pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="Collection" version="1.0">"#)?;
@@ -340,28 +321,11 @@ pub struct Tags {
     pub cells: usize,
 }
 
-impl CellKind {
-    /// Return the dimension of a cell and its type in Gmsh.
-    fn gmsh(self) -> (i32, i32) {
-        match self {
-            CellKind::Line => (1, 1),
-            CellKind::QuadraticLine => (1, 8),
-            CellKind::Triangle => (2, 2),
-            CellKind::QuadraticTriangle => (2, 9),
-            CellKind::Tetra => (3, 4),
-            CellKind::QuadraticTetra => (3, 11),
-        }
-    }
-}
-
 impl Grid {
     /// Write the grid as `.msh`. Its cells are a physical group with the title as name, and each array at its points becomes a
     /// view `title: name`. Symmetric tensors become full ones. Nodes with a NaN are left out of a view.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write_msh(&self, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
-        let (dimension, _) = self.cell.gmsh();
+        let (_, _, dimension, _) = self.cell.facts();
         let tag = tags.entity as i32 + 1;
         let name = self.title.replace('"', "'");
         write!(out, "$MeshFormat\n4.1 1 8\n")?;
@@ -379,7 +343,7 @@ impl Grid {
 
     /// Write the one entity that has all cells, with its bounding box and its physical group.
     fn write_entity(&self, tag: i32, out: &mut dyn Write) -> io::Result<()> {
-        let (dimension, _) = self.cell.gmsh();
+        let (_, _, dimension, _) = self.cell.facts();
         let corner = |pick: fn(f64, f64) -> f64| -> [f64; 3] {
             std::array::from_fn(|k| self.points.iter().map(|x| x[k]).reduce(pick).unwrap_or(0.0))
         };
@@ -395,7 +359,7 @@ impl Grid {
 
     /// Write the points.
     fn write_nodes(&self, tag: i32, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
-        let (dimension, _) = self.cell.gmsh();
+        let (_, _, dimension, _) = self.cell.facts();
         let (count, first) = (self.points.len(), tags.points + 1);
         writeln!(out, "$Nodes")?;
         write_u64(out, &[1, count, first, tags.points + count])?;
@@ -408,7 +372,7 @@ impl Grid {
 
     /// Write the cells.
     fn write_elements(&self, tag: i32, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
-        let (dimension, kind) = self.cell.gmsh();
+        let (_, _, dimension, kind) = self.cell.facts();
         let cells = self.connectivity.chunks_exact(self.cell.stride());
         writeln!(out, "$Elements")?;
         write_u64(out, &[1, cells.len(), tags.cells + 1, tags.cells + cells.len()])?;

@@ -23,9 +23,6 @@ pub struct Folder {
 
 impl Folder {
     /// Open the folder, which is created with its parents if needed, and check that it can be written.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when it cannot be created, is no folder, belongs to another user, or cannot be written.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref().to_owned();
         make_folder(&path)?;
@@ -54,9 +51,6 @@ impl Folder {
     }
 
     /// Remove the files that an earlier run left, and nothing else.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when a file cannot be removed.
     pub fn clear(&self) -> Result<()> {
         for name in files_of_runs(&self.path) {
             let path = self.path.join(&name);
@@ -84,9 +78,6 @@ impl Folder {
     /// Write a whole file `name` and replace one of this name.
     ///
     /// The text goes to a temporary file in the same folder, which is renamed when it is complete.
-    ///
-    /// # Errors
-    /// [`Kind::File`] with the path and the cause; then nothing was changed.
     pub fn write(&self, name: &str, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
         let path = self.path.join(name);
         write_whole(&path, fill)?;
@@ -95,9 +86,6 @@ impl Folder {
     }
 
     /// Open a file `name` that begins with `start` and grows while the program works. It replaces one of this name.
-    ///
-    /// # Errors
-    /// [`Kind::File`] with the path and the cause; then nothing was changed.
     pub fn open(&self, name: &str, start: &[u8]) -> Result<(PathBuf, File)> {
         let path = self.path.join(name);
         let file = replace(&path, |out| out.write_all(start))?;
@@ -106,9 +94,6 @@ impl Folder {
     }
 
     /// Create a folder inside this one, unless it is there already.
-    ///
-    /// # Errors
-    /// [`Kind::File`] with the path and the cause.
     pub fn subfolder(&self, name: &str) -> Result<()> {
         let path = self.path.join(name);
         if path.is_symlink() {
@@ -120,9 +105,6 @@ impl Folder {
 }
 
 /// Create a folder with its parents, unless it is there already.
-///
-/// # Errors
-/// [`Kind::File`] when it cannot be created, or something else has its name.
 pub fn make_folder(path: &Path) -> Result<()> {
     // the nearest existing ancestor must be a folder
     let in_the_way = path.ancestors().find(|part| part.symlink_metadata().is_ok()).filter(|part| !part.is_dir());
@@ -175,9 +157,6 @@ fn create_new(path: &Path) -> io::Result<File> {
 
 /// Write a whole file or nothing: fill a temporary file beside `path` and rename it. A link of this name is replaced, not
 /// followed.
-///
-/// # Errors
-/// [`Kind::File`] with the path and the cause; then nothing was changed.
 pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     replace(path, fill).map(|_| ())
 }
@@ -493,9 +472,6 @@ pub struct Checksums(BTreeMap<String, String>);
 
 impl Checksums {
     /// Write the checksums of the named files of a folder. Names without a file are skipped.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when a file cannot be read, or the list cannot be written.
     pub fn save<'a>(folder: &Folder, names: impl Iterator<Item = &'a String>) -> Result<()> {
         let mut text = format!("{SUMS_TITLE}\n");
         for name in names {
@@ -517,9 +493,6 @@ impl Checksums {
     }
 
     /// Parse a list of checksums; `path` names the list in the error.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when the list itself is damaged.
     pub fn parse(path: &Path, bytes: &[u8]) -> Result<Self> {
         let text = std::str::from_utf8(bytes).ok().and_then(|text| text.strip_suffix('\n'));
         let intact = text.and_then(|text| text.rsplit_once('\n')).filter(|(above, last)| {
@@ -531,9 +504,6 @@ impl Checksums {
     }
 
     /// Check the bytes of a file against its checksum. A file without a checksum passes.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when the bytes are not those that the run wrote.
     pub fn check(&self, folder: &Path, name: &str, bytes: &[u8]) -> Result<()> {
         match self.0.get(name) {
             Some(expected) if *expected != sum(bytes) => Err(damaged(&folder.join(name))),

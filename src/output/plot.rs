@@ -188,17 +188,11 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Plot {
     /// Write the plot as SVG, 900 by 560 pixels, on white.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         out.write_all(self.svg()?.as_bytes())
     }
 
     /// Return the SVG text that [`Self::write`] writes.
-    ///
-    /// # Errors
-    /// Those of drawing to memory; none is known.
     pub fn svg(&self) -> io::Result<String> {
         let mut text = String::new();
         let [width, height] = [SIZE.0, SIZE.1].map(|size| size * FINE as u32);

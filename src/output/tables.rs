@@ -29,9 +29,6 @@ pub struct RowFile {
 
 impl RowFile {
     /// Open a file with its header and the rows that are `known` already. It replaces a file of this name.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
     pub fn create(folder: &Folder, name: &str, header: &[String], known: &[Vec<String>]) -> Result<Self> {
         let mut start = line(header);
         known.iter().for_each(|row| start.extend(line(row)));
@@ -70,9 +67,6 @@ impl RowFile {
     }
 
     /// Complete the file.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when rows could still not be written.
     pub fn finish(mut self) -> Result<()> {
         if self.failure.is_some() {
             self.write();
@@ -101,9 +95,6 @@ pub struct HistoryWriter {
 impl HistoryWriter {
     /// Open `history.csv` and write its header; `bodies` are the names in the order of [`Row::increments`]. With `steps`, each
     /// row begins with its load step.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
     pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S], steps: bool) -> Result<Self> {
         let mut header: Vec<String> = if steps { vec!["step".into()] } else { Vec::new() };
         header.extend(["iteration", "residual", "error", "increment"].map(String::from));
@@ -157,9 +148,6 @@ pub struct StepTable {
 impl StepTable {
     /// Open `steps.csv` and write its header from the names of `factors`, `pairs` and `reactions`, each of which occurs once. The
     /// `measure` is that of the pairs.
-    ///
-    /// # Errors
-    /// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
     pub fn create(
         folder: &Folder,
         factors: &[String],
@@ -230,9 +218,6 @@ impl PairRow {
 }
 
 /// Write the pairs to `contacts.csv`, in the order of the scene.
-///
-/// # Errors
-/// [`Kind::File`](crate::error::Kind::File) when the file cannot be written.
 pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<()> {
     folder.write("contacts.csv", |out| write(out, pairs, rows))
 }
@@ -299,9 +284,6 @@ pub struct ContactTable {
 
 impl ContactTable {
     /// Write the table as CSV, one row per contact point, with numbers to full precision.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let [name_a, name_b] = self.side_names.each_ref().map(|side| format!("u_n_{side}"));
         let mut columns: Vec<(&str, &[f64])> = vec![

@@ -150,7 +150,7 @@ fn shape() -> TableShape {
 
 impl Setting for History {
     fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::PositiveInteger, ValueKind::Number.list(), shape().into()])
+        ValueKind::Either(vec![ValueKind::Integer(1), ValueKind::Number.list(), shape().into()])
     }
 
     /// Read the load steps: so many equal ones, a list of factors, or the table of a file.

@@ -45,9 +45,6 @@ impl<T: ?Sized> Own<T> {
     }
 
     /// Return the law or rule of a name; `what` says in the message which of the two it is.
-    ///
-    /// # Errors
-    /// An unknown name.
     pub fn get(&self, what: &str, name: &str) -> Result<&T> {
         self.0.get(name).map(|own| &**own).ok_or_else(|| {
             let error = Error::new(Kind::Scene, format!("no {what} is called `{name}`"));

@@ -26,9 +26,6 @@ pub struct Files {
 
 impl Files {
     /// Open a folder.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when its list of checksums is damaged.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(folder::SUMS);
         // a killed run or one of an earlier version has no list
@@ -45,9 +42,6 @@ impl Files {
     }
 
     /// Read a file.
-    ///
-    /// # Errors
-    /// [`Kind::File`] when it cannot be read, or is damaged.
     pub fn read(&self, name: &str) -> Result<Vec<u8>> {
         let bytes = crate::file::read(&self.path(name))?;
         self.sums.as_ref().map_or(Ok(()), |sums| sums.check(&self.folder, name, &bytes))?;
@@ -55,9 +49,6 @@ impl Files {
     }
 
     /// Return the rows of a table, none if there is no such file.
-    ///
-    /// # Errors
-    /// Those of [`Self::read`]; [`Kind::File`] when it is no CSV file.
     pub fn rows(&self, name: &str) -> Result<Vec<Row>> {
         if !self.path(name).exists() {
             return Ok(Vec::new());
@@ -338,9 +329,6 @@ struct OpenPiece {
 }
 
 /// Read a `.vtu` or `.pvtu` file.
-///
-/// # Errors
-/// A description of what is wrong with the file.
 fn read_vtu(bytes: &[u8]) -> Parsed<Content> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is no text")?;
     let mut reader = quick_xml::Reader::from_str(text);

@@ -304,9 +304,6 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
 }
 
 /// Return the pictures called `what` as SVG, at least one.
-///
-/// # Errors
-/// [`Kind::File`] when the folder lacks the data.
 fn drawn(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>> {
     let lacks = |lacking: &str, advice: &str| {
         Error::new(Kind::File, format!("{} has {lacking}", folder.display())).help(advice)

@@ -273,9 +273,6 @@ pub fn targets(scene: &Scene) -> String {
 }
 
 /// Build a scene with what the run of another scene before it has left. Collective.
-///
-/// # Errors
-/// Those of [`build`].
 pub fn build_after(
     session: &Session,
     scene: Rc<Scene>,
@@ -294,7 +291,6 @@ pub fn build_after(
     }
     let is_same = settings(&last.scene, without_values) == settings(&scene, without_values);
     let condensed = if is_same { last.into_condensed() } else { Vec::new() };
-    options::withdraw(session)?;
     build_with(session, scene, condensed, interrupt, clock)
 }
 

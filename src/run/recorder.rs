@@ -3,7 +3,7 @@
 use super::look;
 use super::results;
 use super::stages::{All, Done, Prepared};
-use crate::ddm::{self, Observer, Settings, Silent, Start, Status};
+use crate::ddm::{self, Observer, Row, Settings, Silent, Start, Status};
 use crate::error::Result;
 use crate::exchange::ASKS;
 use crate::interrupt::{self, ENDING, Interrupt};
@@ -23,6 +23,7 @@ pub trait Recorder: Observer {
 }
 
 impl Recorder for Silent {}
+impl Recorder for Requests {}
 
 /// Solve through all pauses until a rule or a signal ends the run. `full` is whether this is the full load. There the run may end
 /// at the error of the discretisation, and the interval of gamma is computed if the scene requests it.
@@ -73,9 +74,13 @@ impl Requests {
         let every = minutes.and_then(|minutes| Duration::try_from_secs_f64(60.0 * minutes).ok());
         Self { interrupt: interrupt.clone(), every, last: Cell::new(Instant::now()) }
     }
+}
 
-    /// Return the bits of the current requests.
-    pub fn bits(&self) -> u8 {
+/// As the observer of a run it passes requests on, and writes no rows.
+impl Observer for Requests {
+    fn row(&mut self, _row: &Row) {}
+
+    fn asked(&self) -> u8 {
         let ending = ENDING.iter().position(|&signal| self.interrupt.asked() == Some(signal));
         let snapshot = if self.interrupt.wants_snapshot() { SNAPSHOT } else { 0 };
         let due = self.every.is_some_and(|every| self.last.get().elapsed() >= every);
@@ -107,7 +112,7 @@ mod tests {
 
     #[test]
     fn time_asks_for_checkpoints_and_nothing_else() {
-        let asking = |minutes| Requests::new(&Interrupt::default(), minutes).bits();
+        let asking = |minutes| Requests::new(&Interrupt::default(), minutes).asked();
         assert_eq!([asking(None), asking(Some(1e9)), asking(Some(0.0))], [0, 0, CHECKPOINT]);
         assert_eq!((signal(CHECKPOINT | SNAPSHOT), is_snapshot(CHECKPOINT)), (None, false));
         let reported = [0b111, 0b110, 0b100].map(signal_name);

@@ -45,9 +45,6 @@ pub struct Built {
 /// A scene with its mesh, from which the problem of each leg of its load history is prepared.
 pub trait Legs {
     /// Prepare the problem of the leg that begins with a step. Condensed bodies of the leg before are reused. Collective.
-    ///
-    /// # Errors
-    /// Loads that a body cannot have, and failures of the solver library.
     fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared>;
 }
 

@@ -95,9 +95,6 @@ const FLAGS: [(&str, &str); 5] = [
 
 /// Apply one override to the tree of a scene. It is `KEY=VALUE`, or an option with its value as typed (`--over KEY=VALUE`,
 /// `--tolerance 1e-3`, `--vtu`).
-///
-/// # Errors
-/// A text without `=`, a path that leads nowhere, and values that are not TOML.
 fn apply(tree: &mut Node, text: &str) -> Result<()> {
     let text = text.trim_end();
     let text = if text.starts_with("--") { text.to_owned() } else { format!("--set {text}") };

@@ -145,7 +145,7 @@ const ALL: [(&str, Most); 1] = [("all", Most(usize::MAX))];
 
 impl Setting for Most {
     fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::NonNegativeInteger, word(&ALL)])
+        ValueKind::Either(vec![ValueKind::Integer(0), word(&ALL)])
     }
 
     fn read(node: &Node, _: &Context) -> Result<Self> {

@@ -22,9 +22,6 @@ pub trait Setting: Sized {
     fn kind() -> ValueKind;
 
     /// Read a value that was checked to be of this kind.
-    ///
-    /// # Errors
-    /// Values that have no meaning.
     fn read(node: &Node, context: &Context) -> Result<Self>;
 
     /// Return the value as the scene file may have it. `dimension` is that of the scene. Null stands for a key that is left out.
@@ -108,9 +105,6 @@ impl Context<'_> {
 }
 
 /// Return the path of a file, joined with the folder of the scene.
-///
-/// # Errors
-/// A file that does not exist.
 pub fn file(folder: &Path, node: &Node) -> Result<Located<PathBuf>> {
     let name = node.name()?.value;
     let path = folder.join(&name);
@@ -147,10 +141,10 @@ pub fn choose<T: Clone>(node: &Node, what: &str, choices: &[(&str, T)]) -> Resul
 
 /// Implement [`Setting`] for types that JSON has, with the kind of value and the function that reads it.
 macro_rules! plain {
-    ($($Type:ty: $kind:ident, $read:expr;)*) => {$(
+    ($($Type:ty: $kind:expr, $read:expr;)*) => {$(
         impl Setting for $Type {
             fn kind() -> ValueKind {
-                ValueKind::$kind
+                $kind
             }
 
             fn read(node: &Node, _: &Context) -> Result<Self> {
@@ -165,12 +159,12 @@ macro_rules! plain {
 }
 
 plain! {
-    bool: Flag, Node::boolean;
-    f64: Number, Node::number;
+    bool: ValueKind::Flag, Node::boolean;
+    f64: ValueKind::Number, Node::number;
     // a whole number >= 1
-    usize: PositiveInteger, Node::count;
+    usize: ValueKind::Integer(1), Node::count;
     // a text that is not empty
-    String: Text, |node: &Node| node.name().map(|name| name.value);
+    String: ValueKind::Text, |node: &Node| node.name().map(|name| name.value);
 }
 
 /// A path that is not joined with the folder of the scene, and need not exist.

@@ -49,9 +49,6 @@ pub fn document(source: &Arc<Source>) -> Result<Node> {
 }
 
 /// Parse the value that reaches from byte `offset` of the source to its end.
-///
-/// # Errors
-/// Those of [`document`].
 pub fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
     let value = DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
     Convert { source, offset }.node(&value)
@@ -251,7 +248,7 @@ impl ValueKind {
             Self::Text | Self::Word(_) => matches!(value, Value::String(_)),
             Self::Flag => matches!(value, Value::Boolean(_)),
             Self::Number => matches!(value, Value::Integer(_) | Value::Float(_)),
-            Self::NonNegativeInteger | Self::PositiveInteger | Self::OneOf(_) => matches!(value, Value::Integer(_)),
+            Self::Integer(_) | Self::OneOf(_) => matches!(value, Value::Integer(_)),
             Self::Field => matches!(value, Value::Integer(_) | Value::Float(_) | Value::String(_)),
             Self::List(_) => matches!(value, Value::List(_)),
             Self::Table(_) | Self::Map(_) => matches!(value, Value::Table(_)),
@@ -262,8 +259,7 @@ impl ValueKind {
     /// Return what a whole number must be instead; `None` if it is in range.
     fn breach(&self, number: i64) -> Option<String> {
         match self {
-            Self::NonNegativeInteger if number < 0 => Some("must be 0 or more".to_owned()),
-            Self::PositiveInteger if number < 1 => Some("must be 1 or more".to_owned()),
+            Self::Integer(least) if number < *least => Some(format!("must be {least} or more")),
             Self::OneOf(known) if !known.contains(&number) => {
                 let known: Vec<String> = known.iter().map(i64::to_string).collect();
                 Some(format!("must be {}", known.join(" or ")))
@@ -411,10 +407,8 @@ pub enum ValueKind {
     Flag,
     /// A number.
     Number,
-    /// A whole number >= 0.
-    NonNegativeInteger,
-    /// A whole number >= 1.
-    PositiveInteger,
+    /// A whole number that is at least this.
+    Integer(i64),
     /// One of these whole numbers.
     OneOf(&'static [i64]),
     /// A number, or an expression in the coordinates.
@@ -517,7 +511,7 @@ impl ValueKind {
             Self::Text | Self::Word(_) => "a string".to_owned(),
             Self::Flag => "true or false".to_owned(),
             Self::Number => "a number".to_owned(),
-            Self::NonNegativeInteger | Self::PositiveInteger | Self::OneOf(_) => "a whole number".to_owned(),
+            Self::Integer(_) | Self::OneOf(_) => "a whole number".to_owned(),
             Self::Field => "a number or an expression".to_owned(),
             Self::List(_) => "a list".to_owned(),
             Self::Table(_) | Self::Map(_) => "a table".to_owned(),

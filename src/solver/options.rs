@@ -19,5 +19,5 @@ mod unread;
 pub use chosen::{Chosen, Typed};
 pub use command_line::{refuse_log, refuse_traps, split};
 pub use names::{WHOLE, looks};
-pub use scene::{check_of_scene, pairs, set_of_scene, withdraw};
+pub use scene::{check_of_scene, pairs, set_of_scene};
 pub use unread::{show_help, unread};

@@ -73,9 +73,6 @@ impl References {
 }
 
 /// Read the contact tables in a folder of results, in the order of their names.
-///
-/// # Errors
-/// A folder or table that cannot be read.
 pub(super) fn tables(folder: &Path) -> Result<Vec<Points>> {
     let entries = std::fs::read_dir(folder).map_err(|cause| Error::file(folder, "read", &cause))?;
     let is_table = |path: &PathBuf| {

@@ -21,7 +21,7 @@ use process::Runner;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
-use table::{Row, Table};
+use table::{Row, SKIPPED, Table};
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -51,11 +51,13 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         let is_new = old.is_none();
         let mut row = match old {
             Some(row) => row,
-            None if table.is_beyond(case) => Row::skipped(case, "an earlier mesh took too long"),
-            None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
+            None if table.is_beyond(case) => Row::unsolved(case, SKIPPED, "an earlier mesh took too long"),
+            None if began.elapsed().as_secs_f64() >= request.budget => {
+                Row::unsolved(case, SKIPPED, "the budget is spent")
+            }
             None => measure(case, scene, &runner, &reference, &mut meshed)?,
         };
-        row.inputs = inputs.unwrap_or_default();
+        row.set("inputs", inputs.unwrap_or_default());
         if !(request.quiet && row.is_good()) {
             bar.suspend(|| say(row.line(&case.label, is_new)))?;
         }

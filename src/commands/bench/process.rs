@@ -89,9 +89,6 @@ impl Runner {
     }
 
     /// Make the mesh of a run. A failure is not reported here, since the run itself fails in the same way.
-    ///
-    /// # Errors
-    /// A file system that refuses.
     pub fn mesh(&self, case: &Case) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg("mesh").arg(&case.scene);
@@ -100,9 +97,6 @@ impl Runner {
     }
 
     /// Run a case as often as asked for, or until it fails.
-    ///
-    /// # Errors
-    /// A file system that refuses.
     pub fn repeat(&self, case: &Case) -> Result<Vec<Run>> {
         let mut runs = Vec::new();
         for _ in 0..self.repeat {

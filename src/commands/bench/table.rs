@@ -30,16 +30,13 @@ const SETTINGS: &str = "bench.txt";
 
 impl<'a> Table<'a> {
     /// Open the file of a plan. With `--resume` its rows are read first, if they were made with the same settings.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn open(folder: &'a Folder, plan: &'a Plan, request: &Request, reference: &References) -> Result<Self> {
         let columns: Vec<String> = plan.columns().into_iter().chain(Row::columns().map(str::to_owned)).collect();
         let settings = settings(request, reference);
         let path = folder.path().join(SETTINGS);
         let is_known = request.resume && crate::file::read(&path).is_ok_and(|old| old == settings.as_bytes());
         let mut old = if is_known { read(folder, &columns) } else { Vec::new() };
-        old.retain(|row| !matches!(row.status.as_str(), "killed" | "failed" | SKIPPED));
+        old.retain(|row| !matches!(row.text("status"), "killed" | "failed" | SKIPPED));
         folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
         // the file has the old rows from the start, so that a benchmark that is killed loses none
         let file = RowFile::create(folder, FILE, &columns, &old.iter().map(Row::fields).collect::<Vec<_>>())?;
@@ -48,7 +45,7 @@ impl<'a> Table<'a> {
 
     /// Return the row of a case that an earlier benchmark made from the same inputs. Scenes, data and meshes may have been edited meanwhile.
     pub fn old_row(&self, case: &Case, inputs: Option<&str>) -> Option<Row> {
-        let is_same = |row: &&Row| row.key == case.key && Some(row.inputs.as_str()) == inputs;
+        let is_same = |row: &&Row| row.key == case.key && Some(row.text("inputs")) == inputs;
         self.old.iter().find(is_same).cloned()
     }
 
@@ -56,7 +53,7 @@ impl<'a> Table<'a> {
     pub fn is_beyond(&self, case: &Case) -> bool {
         let columns = self.plan.columns();
         let is_like = |row: &Row| (0..row.key.len()).all(|k| is_of_mesh(&columns[k]) || row.key[k] == case.key[k]);
-        self.rows.iter().any(|row| row.is_late() && is_like(row))
+        self.rows.iter().any(|row| row.text("status") == "timeout" && is_like(row))
     }
 
     /// Add a row. A new row is written at once, so that it is kept whatever comes next. Return the message that the file lacks rows, once.
@@ -69,9 +66,6 @@ impl<'a> Table<'a> {
     }
 
     /// Add the numbers that need the whole table, and write all rows again.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn complete(&mut self) -> Result<()> {
         self.compare_with_finest();
         self.compare_with_linear();
@@ -128,7 +122,8 @@ impl<'a> Table<'a> {
             let alike = linear.iter().filter(|other| same(row, other));
             let cost = alike.filter_map(|other| other.number("linear_seconds")).fold(f64::INFINITY, f64::min);
             if cost.is_finite() && cost > 0.0 {
-                row.set_linear_solves(cost);
+                let own = ["set_up_seconds", "iterate_seconds"].iter().filter_map(|name| row.number(name)).sum::<f64>();
+                row.set("linear_solves", own / cost);
             }
         }
     }
@@ -207,27 +202,15 @@ pub(super) const SKIPPED: &str = "skipped";
 pub(super) struct Row {
     /// Values of the columns of the plan.
     pub key: Vec<String>,
-    /// Number of runs.
-    runs: usize,
-    /// Status of the run.
-    pub status: String,
-    /// The status in words.
-    message: String,
-    /// The method that ran; the one that was asked for where nothing ran.
-    pub method: String,
-    /// Numbers by the names of their columns.
-    numbers: BTreeMap<&'static str, f64>,
-    /// The text that says what the error is measured in and against; empty without an error.
-    pub error_of: String,
-    /// Digest of the inputs of the run; empty if they are not known.
-    pub inputs: String,
+    /// The texts of the other columns, as they are in the file; those that are empty may be missing.
+    values: BTreeMap<&'static str, String>,
     /// Relative error of the displacements from the report, where the scene has their closed form.
     pub displacement_error: Option<f64>,
 }
 
 impl Row {
     /// Return the names of its columns after the key.
-    pub fn columns() -> impl Iterator<Item = &'static str> {
+    fn columns() -> impl Iterator<Item = &'static str> {
         TEXTS.into_iter().chain(NUMBERS.map(|(name, _)| name)).chain(LAST)
     }
 
@@ -235,7 +218,7 @@ impl Row {
     pub fn new(case: &Case, runs: &[Run]) -> Self {
         let worst = runs.iter().find(|run| !is_good(&run.status));
         let Some(shown) = worst.or(runs.first()) else {
-            return Self::empty(case, "failed", "nothing was run");
+            return Self::unsolved(case, "failed", "nothing was run");
         };
         // such a run makes one update, and ends as it should
         let linear = case.is_linear() && shown.status == "iteration-limit";
@@ -244,14 +227,15 @@ impl Row {
         } else {
             (shown.status.as_str(), shown.message.as_str())
         };
-        let mut row = Self::empty(case, status, message);
-        row.runs = runs.len();
+        let mut row = Self::unsolved(case, status, message);
+        row.set("runs", runs.len());
         if let (false, Some(method)) = (case.is_linear(), shown.report["method"].as_str()) {
-            row.method = method.to_owned();
+            row.set("method", method);
         }
         let runs = Runs { all: runs, shown, is_linear: case.is_linear() };
-        let numbers = NUMBERS.iter().map(|(name, number)| (*name, number(&runs).unwrap_or(f64::NAN)));
-        row.numbers = numbers.filter(|(_, value)| value.is_finite()).collect();
+        for (name, number) in NUMBERS {
+            number(&runs).filter(|value| value.is_finite()).iter().for_each(|value| row.set(name, value));
+        }
         row.displacement_error = runs.largest("error_l2");
         row
     }
@@ -259,65 +243,52 @@ impl Row {
     /// Return the row of a case whose scene is refused.
     pub fn refused(case: &Case, error: &Error) -> Self {
         let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
-        Self::empty(case, "refused", &format!("error: {}{help}", error.message()))
+        Self::unsolved(case, "refused", &format!("error: {}{help}", error.message()))
     }
 
-    /// Return the row of a case that is not run.
-    pub fn skipped(case: &Case, why: &str) -> Self {
-        Self::empty(case, SKIPPED, why)
-    }
-
-    fn empty(case: &Case, status: &str, message: &str) -> Self {
-        Self {
-            key: case.key.clone(),
-            runs: 0,
-            status: status.to_owned(),
-            message: message.to_owned(),
-            method: case.requested_method().to_owned(),
-            numbers: BTreeMap::new(),
-            error_of: String::new(),
-            inputs: String::new(),
-            displacement_error: None,
-        }
+    /// Return the row of a case without results.
+    pub fn unsolved(case: &Case, status: &str, message: &str) -> Self {
+        let texts = [("runs", "0"), ("status", status), ("message", message), ("method", case.requested_method())];
+        let values = texts.map(|(name, text)| (name, text.to_owned())).into();
+        Self { key: case.key.clone(), values, displacement_error: None }
     }
 
     /// Return whether the run ended as it should.
     pub fn is_good(&self) -> bool {
-        is_good(&self.status)
-    }
-
-    /// Return whether the run did not end in time.
-    pub fn is_late(&self) -> bool {
-        self.status == "timeout"
+        is_good(self.text("status"))
     }
 
     /// Return whether it is one linear factor-and-solve.
-    pub fn is_linear(&self) -> bool {
-        self.status == LINEAR
+    fn is_linear(&self) -> bool {
+        self.text("status") == LINEAR
+    }
+
+    /// Return the text of a column.
+    pub fn text(&self, name: &str) -> &str {
+        self.values.get(name).map_or("", String::as_str)
     }
 
     /// Return the number of a column.
-    pub fn number(&self, name: &str) -> Option<f64> {
-        self.numbers.get(name).copied()
+    fn number(&self, name: &str) -> Option<f64> {
+        self.text(name).parse().ok()
+    }
+
+    /// Set the text or number of a column.
+    pub fn set(&mut self, name: &'static str, value: impl ToString) {
+        self.values.insert(name, value.to_string());
     }
 
     /// Set the error, and the text that says what it is measured in and against.
     pub fn set_error(&mut self, error: f64, what: &str) {
-        self.numbers.insert("error", error);
-        self.error_of = what.to_owned();
-    }
-
-    /// Set the number of linear factor-and-solves that take as long as set-up and iteration, from the seconds of one of them.
-    fn set_linear_solves(&mut self, linear_seconds: f64) {
-        let own: f64 = ["set_up_seconds", "iterate_seconds"].iter().filter_map(|name| self.number(name)).sum();
-        self.numbers.insert("linear_solves", own / linear_seconds);
+        self.set("error", error);
+        self.set("error_of", what);
     }
 
     /// Return the row as a line for the terminal.
     pub fn line(&self, label: &str, is_new: bool) -> String {
-        let mut line = format!("{label}: {}", self.status);
-        if !self.is_good() && !self.message.is_empty() {
-            line += &format!(" ({})", self.message);
+        let mut line = format!("{label}: {}", self.text("status"));
+        if !self.is_good() && !self.text("message").is_empty() {
+            line += &format!(" ({})", self.text("message"));
         }
         if let Some(time) = self.number("seconds") {
             line += &format!(", {} s", seconds(time));
@@ -332,29 +303,15 @@ impl Row {
     }
 
     /// Return the row as fields of the file.
-    pub fn fields(&self) -> Vec<String> {
-        let texts = [self.runs.to_string(), self.status.clone(), self.message.clone(), self.method.clone()];
-        let numbers =
-            NUMBERS.iter().map(|(name, _)| self.number(name).map_or(String::new(), |value| value.to_string()));
-        let last = [self.error_of.clone(), self.inputs.clone()];
-        self.key.iter().cloned().chain(texts).chain(numbers).chain(last).collect()
+    fn fields(&self) -> Vec<String> {
+        self.key.iter().cloned().chain(Self::columns().map(|name| self.text(name).to_owned())).collect()
     }
 
     /// Return the row of a record of the file.
-    pub fn parse(record: &csv::StringRecord) -> Self {
-        let keys = record.len() - Self::columns().count();
-        let numbers = NUMBERS.iter().zip(keys + TEXTS.len()..);
-        Self {
-            key: record.iter().take(keys).map(str::to_owned).collect(),
-            runs: record[keys].parse().unwrap_or(0),
-            status: record[keys + 1].to_owned(),
-            message: record[keys + 2].to_owned(),
-            method: record[keys + 3].to_owned(),
-            numbers: numbers.filter_map(|(&(name, _), k)| Some((name, record[k].parse().ok()?))).collect(),
-            error_of: record[record.len() - 2].to_owned(),
-            inputs: record[record.len() - 1].to_owned(),
-            displacement_error: None,
-        }
+    fn parse(record: &csv::StringRecord) -> Self {
+        let mut key: Vec<String> = record.iter().map(str::to_owned).collect();
+        let values = key.split_off(record.len() - Self::columns().count());
+        Self { key, values: Self::columns().zip(values).collect(), displacement_error: None }
     }
 }
 
@@ -439,32 +396,17 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     }
 }
 
-/// A function that returns a number as a text.
-type Format = fn(f64) -> String;
-
 /// Columns with a number: heading, name in the rows, format.
-const SHOWN: [(&str, &str, Format); 8] = [
-    ("dofs", "dofs", whole),
-    ("iterations", "iterations", whole),
-    ("sweeps", "sweeps", whole),
+const SHOWN: [(&str, &str, fn(f64) -> String); 8] = [
+    ("dofs", "dofs", |value| format!("{value:.0}")),
+    ("iterations", "iterations", |value| format!("{value:.0}")),
+    ("sweeps", "sweeps", |value| format!("{value:.0}")),
     ("s", "seconds", seconds),
     ("CPU s", "cpu_seconds", seconds),
-    ("MB", "memory_mb", whole),
-    ("linear solves", "linear_solves", tenths),
-    ("error", "error", two),
+    ("MB", "memory_mb", |value| format!("{value:.0}")),
+    ("linear solves", "linear_solves", |value| format!("{value:.1}")),
+    ("error", "error", |value| sci(value, 2)),
 ];
-
-fn whole(value: f64) -> String {
-    format!("{value:.0}")
-}
-
-fn tenths(value: f64) -> String {
-    format!("{value:.1}")
-}
-
-fn two(value: f64) -> String {
-    sci(value, 2)
-}
 
 /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
 pub(super) fn summary(rows: &[Row], plan: &Plan) -> comfy_table::Table {
@@ -480,7 +422,7 @@ pub(super) fn summary(rows: &[Row], plan: &Plan) -> comfy_table::Table {
     table.set_header(heads.chain(["method", "status"]).chain(numbers.iter().map(|number| number.0)));
     let line = |row: &Row| -> Vec<String> {
         let words = named.iter().map(|&column| row.key[column].clone());
-        let words = words.chain([row.method.clone(), row.status.clone()]);
+        let words = words.chain(["method", "status"].map(|name| row.text(name).to_owned()));
         words.chain(numbers.iter().map(|(_, name, format)| row.number(name).map_or(String::new(), format))).collect()
     };
     table.add_rows(rows.iter().map(line));
@@ -531,7 +473,7 @@ impl Chart<'_> {
         let all: Vec<(f64, f64)> = series.iter().flat_map(|series| series.points.iter().copied()).collect();
         let front = Series::new("Pareto front", pareto(all), Style::Dashed).color(Color::Grey);
         series.push(front);
-        let of = self.rows.iter().map(|row| row.error_of.as_str()).find(|of| !of.is_empty())?;
+        let of = self.rows.iter().map(|row| row.text("error_of")).find(|of| !of.is_empty())?;
         self.plot(&format!("relative error ({of})"), "wall time, s", series)
     }
 
@@ -566,7 +508,7 @@ impl Chart<'_> {
         let columns = self.plan.columns();
         // the method of a curve is the one that ran
         let value = |row: &Row, column: usize| -> String {
-            if columns[column] == ASKED { row.method.clone() } else { row.key[column].clone() }
+            if columns[column] == ASKED { row.text("method").to_owned() } else { row.key[column].clone() }
         };
         let differs = |&column: &usize| self.rows.iter().any(|row| value(row, column) != value(self.rows[0], column));
         let named: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).filter(differs).collect();

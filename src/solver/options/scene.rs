@@ -115,7 +115,7 @@ pub fn set_of_scene(session: &Session, bodies: &[&str], words: &[String]) -> Res
 }
 
 /// Take the options of a scene out of PETSc's table.
-pub fn withdraw(session: &Session) -> Result<()> {
+fn withdraw(session: &Session) -> Result<()> {
     OF_SCENE.take().iter().try_for_each(|name| session.options().clear(name))
 }
 
