@@ -42,7 +42,6 @@ const MOST_WORSE: usize = 2;
 
 /// The state of a run on several meshes. A round is one mesh, with the solution on it.
 pub struct Plan {
-    /// The scene of this round.
     pub scene: Rc<Scene>,
     /// Reports of the rounds so far.
     pub rounds: Vec<RoundReport>,
@@ -86,7 +85,6 @@ struct Best {
     view: Option<Arc<str>>,
     /// The sizes that its errors lead to.
     next: Sizes,
-    /// The solution on it.
     tables: Vec<ContactTable>,
     /// Number of meshes since then, all worse.
     worse: usize,

@@ -115,7 +115,9 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
         _ => all_bodies(built),
     };
     let splits = built.splits.iter().map(|line| format!("  {line}"));
-    let lines = splits.chain(lines).chain(data_lines(built)).chain(match built.discrete.model.pairs.len() {
+    let data = in_contacts(built);
+    let data = data.values().flat_map(|data| lines_of_data(data));
+    let lines = splits.chain(lines).chain(data).chain(match built.discrete.model.pairs.len() {
         ..=LISTED => each_pair(built),
         _ => all_pairs(built),
     });
@@ -277,10 +279,6 @@ fn in_contacts(built: &Built) -> BTreeMap<String, Arc<Data>> {
 }
 
 /// Return the lines that describe the data of contacts.
-fn data_lines(built: &Built) -> Vec<String> {
-    in_contacts(built).values().flat_map(|data| lines_of_data(data)).collect()
-}
-
 fn lines_of_data(data: &Data) -> Vec<String> {
     let (name, file) = (&data.spec.name, data.spec.file.display());
     let Some(grid) = data.grid() else {

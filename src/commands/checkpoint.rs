@@ -52,13 +52,11 @@ pub struct Head {
 
 /// A checkpoint that was read.
 pub struct Checkpoint {
-    /// The file.
     path: PathBuf,
     /// The part that is JSON.
     pub head: Head,
     /// Rows of the history of earlier load steps.
     earlier: Vec<Row>,
-    /// The state of the iteration.
     state: State,
 }
 

@@ -1,16 +1,16 @@
 //! The commands, one file each: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`], [`new`](mod@new). This file has what
 //! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
-pub mod adapt;
-pub mod bench;
-pub mod check;
+mod adapt;
+pub(crate) mod bench;
+pub(crate) mod check;
 pub mod checkpoint;
-pub mod mesh;
-pub mod new;
-pub mod solve;
-pub mod sweep;
-pub mod transfer;
-pub mod write;
+pub(crate) mod mesh;
+pub(crate) mod new;
+pub(crate) mod solve;
+pub(crate) mod sweep;
+mod transfer;
+mod write;
 
 use crate::error::Result;
 use crate::output::LISTED;

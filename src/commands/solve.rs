@@ -108,7 +108,6 @@ struct Solver<'s> {
     plan: Plan,
     /// The table of iterations on the terminal.
     table: IterationTable,
-    /// The tables in files.
     tables: Tables,
     /// Whether the folder has a checkpoint of this run.
     has_checkpoint: bool,

@@ -235,7 +235,6 @@ fn refuse_other_columns(columns: &[String], header: &[String], label: &str) -> R
 
 /// What varies between runs.
 pub struct Axis {
-    /// Name of its column.
     pub name: String,
     /// Values in the order of the runs.
     pub choices: Vec<Choice>,
@@ -246,9 +245,7 @@ pub struct Axis {
 pub struct Choice {
     /// Its text in the table.
     pub text: String,
-    /// Overrides of the scene.
     pub overrides: Vec<String>,
-    /// PETSc options.
     pub petsc: Vec<String>,
 }
 

@@ -26,15 +26,11 @@ use std::path::Path;
 
 /// The results of a run, and where they are to be written.
 pub struct ResultFiles<'a> {
-    /// Session of this rank.
     pub session: &'a Session,
-    /// Folder of results.
     pub path: &'a Path,
     /// Plan with the meshes before.
     pub plan: &'a Plan,
-    /// Solution.
     pub done: &'a Done,
-    /// Estimate of its error.
     pub estimate: Option<&'a Estimate>,
     /// Whether fields may be written, if the scene asks for them.
     pub fields: bool,
@@ -111,7 +107,10 @@ impl ResultFiles<'_> {
 
     /// Write the table of all pairs, and a table for each of the pairs that are shown.
     fn tables(&self, folder: &Folder, report: &Report, shown: &[usize], plots: &Plots) -> Result<()> {
-        let mut rows: Vec<PairRow> = (0..report.pairs.len()).map(|i| report::pair_row(self.done, i)).collect();
+        let (model, layer) = (self.done.model(), &self.done.outcome.layer);
+        let compression = |i: usize| &layer.compression[model.range(i)];
+        let row = |(i, pair): (usize, &ContactPair)| PairRow::new(&pair.weight, &pair.gap, compression(i));
+        let mut rows: Vec<PairRow> = model.pairs.iter().enumerate().map(row).collect();
         let stems = stems(self.done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
         plots.files().for_each(|(i, file)| rows[i].plot = file);

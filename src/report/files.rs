@@ -68,7 +68,6 @@ pub fn value(row: &Row, column: &str) -> f64 {
 
 /// A body or a contact surface as triangles.
 pub struct Part {
-    /// Name.
     pub name: String,
     /// Points before deformation.
     pub points: Vec<[f64; 3]>,
@@ -273,7 +272,7 @@ pub fn magnification(parts: &[Part]) -> f64 {
 }
 
 /// A value, or a description of what is wrong with the file.
-type Parsed<T> = Result<T, String>;
+type Parsed<T> = std::result::Result<T, String>;
 
 /// The attributes of an element by name.
 type Attributes = HashMap<String, String>;
@@ -287,45 +286,31 @@ enum Content {
 }
 
 /// Points and cells with values at the points.
-#[derive(Debug, Default, PartialEq)]
-pub struct Piece {
-    /// Points.
-    pub points: Vec<[f64; 3]>,
+#[derive(Default)]
+struct Piece {
+    points: Vec<[f64; 3]>,
     /// Type number in VTK and point numbers of each cell.
-    pub cells: Vec<(u8, Vec<usize>)>,
+    cells: Vec<(u8, Vec<usize>)>,
     /// Arrays at the points by name; all components of a point stand together.
-    pub at_points: HashMap<String, Vec<f64>>,
-}
-
-/// The numbers of an array.
-enum Numbers {
-    Real(Vec<f64>),
-    Whole(Vec<u64>),
+    at_points: HashMap<String, Vec<f64>>,
 }
 
 /// The encoding of the arrays of a file.
 #[derive(Clone, Copy)]
 struct Encoding {
-    /// Whether numbers are big-endian.
     is_big: bool,
-    /// Bytes of a size in the header of an array.
-    size: usize,
     is_compressed: bool,
 }
 
-/// An array of a piece.
-struct Array {
-    /// Name of the element around it, such as `PointData`.
-    section: String,
-    name: String,
-    numbers: Numbers,
-}
-
-/// A piece that is being read: its numbers of points and cells, and the arrays so far.
+/// A piece that is being read.
+#[derive(Default)]
 struct OpenPiece {
-    points: usize,
-    cells: usize,
-    arrays: Vec<Array>,
+    /// Numbers of points and cells.
+    counts: [usize; 2],
+    coordinates: Vec<f64>,
+    at_points: HashMap<String, Vec<f64>>,
+    /// Connectivity, offsets and types of the cells.
+    lists: HashMap<String, Vec<u64>>,
 }
 
 /// Read a `.vtu` or `.pvtu` file.
@@ -363,15 +348,17 @@ struct Document {
 }
 
 impl Document {
-    /// Process the start tag of an element.
     fn start(&mut self, tag: &BytesStart) -> Parsed<()> {
         let (name, attributes) = (name_of(tag), attributes(tag)?);
         match name.as_str() {
             "VTKFile" => self.encoding = Some(encoding_of(&attributes)?),
             "Piece" => {
-                let count = |key: &str| number(&attributes, key);
-                let (points, cells) = (count("NumberOfPoints")?, count("NumberOfCells")?);
-                self.piece = Some(OpenPiece { points, cells, arrays: Vec::new() });
+                let count = |key: &str| {
+                    let number = attributes.get(key).and_then(|text| text.parse().ok());
+                    number.ok_or_else(|| format!("a piece has no `{key}`"))
+                };
+                let counts = [count("NumberOfPoints")?, count("NumberOfCells")?];
+                self.piece = Some(OpenPiece { counts, ..OpenPiece::default() });
             }
             "DataArray" => self.array = Some(attributes),
             _ => {}
@@ -380,20 +367,25 @@ impl Document {
         Ok(())
     }
 
-    /// Process text, which may be the data of an array.
+    /// Process text, which may be the data of an array. The section is the element around that.
     fn text(&mut self, data: &[u8]) -> Parsed<()> {
         let (Some(piece), Some(attributes), Some(encoding)) = (&mut self.piece, self.array.take(), self.encoding)
         else {
             return Ok(());
         };
-        let section = self.elements.iter().rev().nth(1).cloned().unwrap_or_default();
         let name = attributes.get("Name").cloned().unwrap_or_default();
-        let numbers = numbers(&attributes, data, encoding).map_err(|what| format!("array `{name}`: {what}"))?;
-        piece.arrays.push(Array { section, name, numbers });
+        let wrong = |what: String| format!("array `{name}`: {what}");
+        match self.elements.iter().rev().nth(1).map_or("", String::as_str) {
+            "Points" => piece.coordinates = reals(&attributes, data, encoding).map_err(wrong)?,
+            "Cells" => drop(piece.lists.insert(name.clone(), wholes(&attributes, data, encoding).map_err(wrong)?)),
+            "PointData" => {
+                drop(piece.at_points.insert(name.clone(), reals(&attributes, data, encoding).map_err(wrong)?));
+            }
+            _ => {}
+        }
         Ok(())
     }
 
-    /// Process the end tag of an element.
     fn end(&mut self, name: &[u8]) -> Parsed<()> {
         self.elements.pop();
         match name {
@@ -405,7 +397,6 @@ impl Document {
         Ok(())
     }
 
-    /// Return the content of the whole file.
     fn content(self) -> Parsed<Content> {
         match (self.pieces.is_empty(), self.sources.is_empty()) {
             (false, true) => Ok(Content::Pieces(self.pieces)),
@@ -422,7 +413,7 @@ fn name_of(tag: &BytesStart) -> String {
 
 /// Return the attributes of an element.
 fn attributes(tag: &BytesStart) -> Parsed<Attributes> {
-    let attribute = |one: Result<quick_xml::events::attributes::Attribute, _>| {
+    let attribute = |one: std::result::Result<quick_xml::events::attributes::Attribute, _>| {
         let one = one.map_err(|cause: quick_xml::events::attributes::AttrError| cause.to_string())?;
         let value = one.unescape_value().map_err(|cause| cause.to_string())?.into_owned();
         Ok((String::from_utf8_lossy(one.key.as_ref()).into_owned(), value))
@@ -430,74 +421,79 @@ fn attributes(tag: &BytesStart) -> Parsed<Attributes> {
     tag.attributes().map(attribute).collect()
 }
 
-/// Return the number in an attribute of a piece.
-fn number(attributes: &Attributes, key: &str) -> Parsed<usize> {
-    attributes.get(key).and_then(|text| text.parse().ok()).ok_or_else(|| format!("a piece has no `{key}`"))
+/// Return the value of an attribute, empty without one.
+fn text<'a>(attributes: &'a Attributes, key: &str) -> &'a str {
+    attributes.get(key).map_or("", String::as_str)
 }
 
-/// Return the encoding from the attributes of the root element.
+/// Return the encoding from the attributes of the root element. Sizes have eight bytes, but in a `.pvtu`, which has no arrays.
 fn encoding_of(attributes: &Attributes) -> Parsed<Encoding> {
-    let text = |key: &str| attributes.get(key).map_or("", String::as_str);
-    let size = match text("header_type") {
-        "UInt64" => 8,
-        "UInt32" | "" => 4,
-        other => return Err(format!("sizes are of the type `{other}`")),
-    };
-    let is_compressed = match text("compressor") {
+    if !matches!(text(attributes, "header_type"), "UInt64" | "") {
+        return Err(format!("sizes are of the type `{}`", text(attributes, "header_type")));
+    }
+    let is_compressed = match text(attributes, "compressor") {
         "" => false,
         "vtkZLibDataCompressor" => true,
         other => return Err(format!("it is compressed by `{other}`, which is not read")),
     };
-    let is_big = match text("byte_order") {
+    let is_big = match text(attributes, "byte_order") {
         "LittleEndian" => false,
         "BigEndian" => true,
         other => return Err(format!("its order of bytes is `{other}`")),
     };
-    Ok(Encoding { is_big, size, is_compressed })
+    Ok(Encoding { is_big, is_compressed })
 }
 
-/// Decode the numbers of an array.
-fn numbers(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Numbers> {
-    let text = |key: &str| attributes.get(key).map_or("", String::as_str);
-    if text("format") != "binary" {
-        return Err(format!("its format is `{}`, not `binary`", text("format")));
-    }
-    let bytes = bytes(data.trim_ascii(), encoding)?;
-    let whole = |size: usize| split(&bytes, size, encoding.is_big).map(Numbers::Whole);
-    match text("type") {
-        "UInt8" => whole(1),
-        "UInt32" | "Int32" => whole(4),
-        "UInt64" | "Int64" => whole(8),
-        "Float64" => Ok(Numbers::Real(split(&bytes, 8, encoding.is_big)?.into_iter().map(f64::from_bits).collect())),
+/// Decode an array of floating-point numbers.
+fn reals(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<f64>> {
+    let bytes = bytes(attributes, data, encoding)?;
+    match text(attributes, "type") {
+        "Float64" => Ok(split(&bytes, 8, encoding)?.into_iter().map(f64::from_bits).collect()),
         "Float32" => {
-            let bits = split(&bytes, 4, encoding.is_big)?;
-            Ok(Numbers::Real(bits.into_iter().map(|bits| f64::from(f32::from_bits(bits as u32))).collect()))
+            let single = |bits| f64::from(f32::from_bits(bits as u32));
+            Ok(split(&bytes, 4, encoding)?.into_iter().map(single).collect())
         }
         other => Err(format!("its numbers are of the type `{other}`")),
     }
 }
 
+/// Decode an array of whole numbers.
+fn wholes(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<u64>> {
+    let bytes = bytes(attributes, data, encoding)?;
+    match text(attributes, "type") {
+        "UInt8" => split(&bytes, 1, encoding),
+        "UInt64" => split(&bytes, SIZE, encoding),
+        other => Err(format!("its numbers are of the type `{other}`")),
+    }
+}
+
 /// Split bytes into numbers of `size` bytes each.
-fn split(bytes: &[u8], size: usize, is_big: bool) -> Parsed<Vec<u64>> {
+fn split(bytes: &[u8], size: usize, encoding: Encoding) -> Parsed<Vec<u64>> {
     if !bytes.len().is_multiple_of(size) {
         return Err("it ends within a number".to_owned());
     }
     let value = |chunk: &[u8]| {
         let join = |all: u64, byte: &u8| all << 8 | u64::from(*byte);
-        if is_big { chunk.iter().fold(0, join) } else { chunk.iter().rev().fold(0, join) }
+        if encoding.is_big { chunk.iter().fold(0, join) } else { chunk.iter().rev().fold(0, join) }
     };
     Ok(bytes.chunks_exact(size).map(value).collect())
 }
 
+/// Bytes of a size in front of the data of an array.
+const SIZE: usize = 8;
+
 /// Decode the bytes of an array, which follow their sizes.
-fn bytes(data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
+fn bytes(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
+    if text(attributes, "format") != "binary" {
+        return Err(format!("its format is `{}`, not `binary`", text(attributes, "format")));
+    }
+    let data = data.trim_ascii();
     let decode = |text: &[u8]| STANDARD.decode(text).map_err(|cause| format!("no base64: {cause}"));
-    let Encoding { is_big, size, is_compressed } = encoding;
     let short = || "it is shorter than it says".to_owned();
-    if !is_compressed {
+    if !encoding.is_compressed {
         let all = decode(data)?;
-        let (head, rest) = all.split_at_checked(size).ok_or_else(short)?;
-        return match split(head, size, is_big)?[0] == rest.len() as u64 {
+        let (head, rest) = all.split_at_checked(SIZE).ok_or_else(short)?;
+        return match split(head, SIZE, encoding)?[0] == rest.len() as u64 {
             true => Ok(rest.to_vec()),
             false => Err("it has not as many bytes as it says".to_owned()),
         };
@@ -505,11 +501,11 @@ fn bytes(data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
     // The data begins with at least three sizes, which are encoded separately. The first size is the number of blocks, and
     // it tells how long the encoded sizes are.
     let encoded = |bytes: usize| bytes.div_ceil(3).checked_mul(4);
-    let first = encoded(size).and_then(|length| data.get(..length)).ok_or_else(short)?;
-    let count = split(decode(first)?.get(..size).ok_or_else(short)?, size, is_big)?[0];
-    let head = usize::try_from(count).ok().and_then(|count| count.checked_add(3)?.checked_mul(size));
+    let first = encoded(SIZE).and_then(|length| data.get(..length)).ok_or_else(short)?;
+    let count = split(decode(first)?.get(..SIZE).ok_or_else(short)?, SIZE, encoding)?[0];
+    let head = usize::try_from(count).ok().and_then(|count| count.checked_add(3)?.checked_mul(SIZE));
     let head_length = head.and_then(encoded).filter(|&length| length <= data.len()).ok_or_else(short)?;
-    let sizes = split(&decode(&data[..head_length])?, size, is_big)?;
+    let sizes = split(&decode(&data[..head_length])?, SIZE, encoding)?;
     let [_, block, last, compressed @ ..] = &sizes[..] else { return Err(short()) };
     inflate(&decode(&data[head_length..])?, compressed, *block, *last)
 }
@@ -539,44 +535,35 @@ fn inflate(packed: &[u8], lengths: &[u64], block: u64, last: u64) -> Parsed<Vec<
 
 impl OpenPiece {
     /// Return the piece, if all its counts agree.
-    fn close(self) -> Parsed<Piece> {
-        let Self { points: count, cells, arrays } = self;
-        let (mut piece, mut lists, mut coordinates) = (Piece::default(), HashMap::new(), None);
-        for Array { section, name, numbers } in arrays {
-            match (section.as_str(), numbers) {
-                ("Points", Numbers::Real(values)) => coordinates = Some(values),
-                ("Cells", Numbers::Whole(values)) => drop(lists.insert(name, values)),
-                ("PointData", Numbers::Real(values)) => {
-                    if count == 0 || !values.len().is_multiple_of(count) || values.is_empty() {
-                        return Err(format!("array `{name}` has {} values for {count} points", values.len()));
-                    }
-                    if values.iter().any(|value| value.is_infinite()) {
-                        return Err(format!("array `{name}` has a value that is not finite"));
-                    }
-                    piece.at_points.insert(name, values);
-                }
-                _ => {}
+    fn close(mut self) -> Parsed<Piece> {
+        let [count, cells] = self.counts;
+        for (name, values) in &self.at_points {
+            if count == 0 || !values.len().is_multiple_of(count) || values.is_empty() {
+                return Err(format!("array `{name}` has {} values for {count} points", values.len()));
+            }
+            if values.iter().any(|value| value.is_infinite()) {
+                return Err(format!("array `{name}` has a value that is not finite"));
             }
         }
-        let coordinates = coordinates.filter(|x| Some(x.len()) == count.checked_mul(3));
-        let coordinates = coordinates.ok_or_else(|| format!("it has not the {count} points that it says"))?;
-        if !coordinates.iter().all(|x| x.is_finite()) {
+        if Some(self.coordinates.len()) != count.checked_mul(3) {
+            return Err(format!("it has not the {count} points that it says"));
+        }
+        if !self.coordinates.iter().all(|x| x.is_finite()) {
             return Err("a coordinate is not finite".to_owned());
         }
-        piece.points = coordinates.as_chunks().0.to_vec();
-        let mut list = |name: &str| lists.remove(name).ok_or_else(|| format!("it has no {name} of cells"));
+        let mut list = |name: &str| self.lists.remove(name).ok_or_else(|| format!("it has no {name} of cells"));
         let (nodes, ends, kinds) = (list("connectivity")?, list("offsets")?, list("types")?);
         if ends.len() != cells || kinds.len() != cells || ends.last().copied().unwrap_or(0) != nodes.len() as u64 {
             return Err(format!("it has not the {cells} cells that it says"));
         }
-        let mut start = 0;
+        let (mut start, mut all) = (0, Vec::new());
         for (&kind, &end) in kinds.iter().zip(&ends) {
             let nodes = nodes.get(start..end as usize).ok_or("a cell ends before it begins")?;
             let cell: Option<Vec<usize>> =
                 nodes.iter().map(|&node| usize::try_from(node).ok().filter(|&node| node < count)).collect();
-            piece.cells.push((kind as u8, cell.ok_or("a cell has a point that is not there")?));
+            all.push((kind as u8, cell.ok_or("a cell has a point that is not there")?));
             start = end as usize;
         }
-        Ok(piece)
+        Ok(Piece { points: self.coordinates.as_chunks().0.to_vec(), cells: all, at_points: self.at_points })
     }
 }

@@ -341,7 +341,6 @@ fn drawn(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>> {
 struct PressurePicture {
     /// `plot` or `map`.
     pub kind: &'static str,
-    /// The picture as SVG.
     pub svg: String,
     /// A note on points that the picture leaves out.
     pub note: Option<String>,

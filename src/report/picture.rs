@@ -53,9 +53,7 @@ impl View {
 pub struct Picture<'a> {
     /// Name of the field with its unit.
     pub title: &'a str,
-    /// Levels between the colours.
     pub levels: Levels,
-    /// Directions.
     pub view: View,
     /// Factor of the displacements; none for surfaces without displacements.
     pub magnification: Option<f64>,
@@ -78,7 +76,6 @@ struct Region {
 struct Shape {
     /// Name, shown under the pointer; empty for none.
     name: String,
-    /// Regions from back to front.
     regions: Vec<Region>,
     /// Outline as an SVG path; empty for none.
     outline: String,
@@ -147,7 +144,6 @@ struct Surface<'a> {
     seen: &'a [[f64; 3]],
     /// Points in steps of the picture.
     places: Vec<[f64; 2]>,
-    /// Values at the points.
     values: Vec<f64>,
 }
 

@@ -152,7 +152,9 @@ where
             warnings,
             legs: None,
         };
-        built.warnings.extend(warnings::swapped_tables(&built));
+        let pairs = 0..built.discrete.model.pairs.len();
+        let swapped: Vec<String> = pairs.filter_map(|i| warnings::swapped_table(&built, i)).collect();
+        built.warnings.extend(swapped);
         Ok(built)
     }
 

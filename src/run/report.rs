@@ -1,8 +1,6 @@
 //! The report and the contact tables of a run, from its outcome.
 
-use super::stages::Clock;
-use super::stages::{All, Look};
-use super::stages::{Built, Done};
+use super::stages::{All, Built, Clock, Done, Look};
 use super::verdict::{self, forecast, message, status_name};
 use super::{recorder, results, warnings};
 use crate::contact::{ContactPair, Left};
@@ -14,7 +12,7 @@ use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, LookReport, PairReport,
-    PairRow, Report, sci,
+    Report, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -44,7 +42,9 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
-    report.warnings.extend(too_large.into_iter().chain(warnings::beyond_laws(done)));
+    report
+        .warnings
+        .extend(too_large.into_iter().chain((0..model.pairs.len()).filter_map(|i| warnings::beyond_law(done, i))));
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);
@@ -309,12 +309,6 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }
-}
-
-/// Return the further columns of `contacts.csv` for pair `i`.
-pub fn pair_row(done: &Done, i: usize) -> PairRow {
-    let pair = &done.model().pairs[i];
-    PairRow::new(&pair.weight, &pair.gap, &done.outcome.layer.compression[done.model().range(i)])
 }
 
 /// Return the zeros of the compression c between neighbouring points of a curve, interpolated linearly.

@@ -4,7 +4,6 @@
 use super::numbered;
 use super::stages::{All, Built, Done, Recovered};
 use crate::contact::{ContactPair, moment_in_scene};
-use crate::ddm::Status;
 use crate::discretize::{Balance, BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
@@ -52,13 +51,10 @@ struct Extremes {
     von_mises: f64,
     /// Point of the largest von Mises stress.
     at: [f64; 3],
-    /// Least and largest principal stress.
     principal: [f64; 2],
-    /// Largest displacement.
     displacement: f64,
     /// Bounding box of the points: least and largest coordinates.
     extent: [[f64; 3]; 2],
-    /// Largest strain.
     strain: Strained,
     /// Norms of the error and of the known displacements: L2, H1 seminorm, energy.
     norms: Option<[[f64; 3]; 2]>,
@@ -318,11 +314,6 @@ fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
     let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(weight, n)| weight * n[k]).sum());
     let (size, total) = (sum.iter().map(|n| n * n).sum::<f64>().sqrt(), pair.weight.iter().sum::<f64>());
     (size > CANCELS * total).then(|| sum.map(|n| n / size))
-}
-
-/// Whether a run with this status is a start for the next load step.
-pub fn is_usable(status: &Status) -> bool {
-    status.is_solved() || *status == Status::IterationLimit
 }
 
 /// Numbers of a resultant: force and moment.

@@ -54,7 +54,7 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
         if last || interrupted {
             return Ok(done);
         }
-        let usable = results::is_usable(&of_step.status);
+        let usable = of_step.status.is_solved() || of_step.status == Status::IterationLimit;
         if history.leg(all.step).contains(&(all.step - 1)) {
             all.end_step(&mut done, &of_step);
             done.recovered = None;

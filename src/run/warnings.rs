@@ -233,18 +233,13 @@ fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     })
 }
 
-/// Return a warning for each pair whose table is probably written as (p, c).
-pub fn swapped_tables(built: &Built) -> Vec<String> {
-    (0..built.discrete.model.pairs.len()).filter_map(|i| swapped_table(built, i)).collect()
-}
-
-/// Return the warning for pair `i`, if its layer is a table that makes sense the other way round alone.
+/// Return the warning for pair `i`, if its layer is a table that makes sense as (p, c) alone.
 ///
 /// Numbers have no units here, so that two facts of the bodies decide. The stiffness of the layer, p/c at the end of the table, is compared
 /// with that of the stiffer body against a uniform pressure, its modulus over its depth: c/p is nearer to it than p/c. And the table does not
 /// fit: its largest pressure is below the mean pressure of the loads, or without loads its largest compression exceeds the contact surface.
 /// A layer that is really as soft as that has a table which reaches to its loads.
-fn swapped_table(built: &Built, i: usize) -> Option<String> {
+pub fn swapped_table(built: &Built, i: usize) -> Option<String> {
     let (pair, contact) = (&built.discrete.model.pairs[i], &built.discrete.contacts[i]);
     let LayerSpec::Table(points) = &contact.spec.layer else { return None };
     let &[c, p] = points.last()?;
@@ -274,14 +269,9 @@ fn extent(points: &[[f64; 3]]) -> f64 {
     (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Return a warning for each pair whose layer is compressed beyond the end of its law, at the solution or in a load step. There the
+/// Return the warning for pair `i`, if its layer is compressed beyond the end of its law, at the solution or in a load step. There the
 /// law is extrapolated by a straight line from the end of a table, or of an expression with `up_to`, without measured data.
-pub fn beyond_laws(done: &Done) -> Vec<String> {
-    (0..done.model().pairs.len()).filter_map(|i| beyond_law(done, i)).collect()
-}
-
-/// Return the warning for pair `i`, if its layer is beyond the end of its law.
-fn beyond_law(done: &Done, i: usize) -> Option<String> {
+pub fn beyond_law(done: &Done, i: usize) -> Option<String> {
     let pair = &done.model().pairs[i];
     let end = (0..pair.len()).map(|q| pair.law.end(q)).fold(f64::INFINITY, f64::min);
     let Compressed { most, pressure, step } = most_compressed(done, i)?;

@@ -180,7 +180,6 @@ fn is_trusted(tree: &Node, keys: &Keys) -> Result<bool> {
 
 /// A number for a script of Gmsh.
 struct NamedNumber {
-    /// Place of the name.
     place: Place,
     name: String,
     value: f64,

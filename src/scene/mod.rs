@@ -157,7 +157,6 @@ struct Step<'a> {
     name: &'a str,
     /// Place of the key in the option.
     place: Place,
-    /// The path before the key.
     parent: &'a str,
     /// Whether the next key of the path is the number of an item.
     before_number: bool,

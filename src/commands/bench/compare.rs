@@ -19,7 +19,6 @@ pub(super) struct Points {
     at: Vec<[f64; 3]>,
     /// Areas (lengths in the plane), n.
     weight: Vec<f64>,
-    /// Pressures, n.
     pressure: Vec<f64>,
 }
 

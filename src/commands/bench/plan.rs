@@ -13,7 +13,6 @@ pub(super) struct Plan {
     pub scenes: Vec<Scene>,
     /// Their names in the table.
     pub names: Vec<String>,
-    /// Keys of `--over`.
     pub keys: Vec<String>,
     /// The combinations, ordered by scene, values of the keys, order, method, solver and ranks; the last changes first.
     pub cases: Vec<Case>,
@@ -22,19 +21,15 @@ pub(super) struct Plan {
 /// One combination.
 #[derive(Debug, Clone)]
 pub(super) struct Case {
-    /// Scene file.
     pub scene: PathBuf,
     /// Values of the columns that distinguish it from other cases: see [`Plan::columns`].
     pub key: Vec<String>,
     /// A text that distinguishes it from the other cases of the plan.
     pub label: String,
-    /// Overrides of the scene.
     pub overrides: Vec<String>,
     /// Those overrides that the mesh depends on.
     pub mesh_overrides: Vec<String>,
-    /// PETSc options.
     pub petsc: Vec<String>,
-    /// Number of MPI ranks.
     pub ranks: usize,
 }
 

@@ -22,7 +22,6 @@ use wait4::{ResUse, Wait4};
 pub(super) struct Run {
     /// Status of the report, or `refused`, `timeout`, `killed` or `failed`.
     pub status: String,
-    /// The status in words.
     pub message: String,
     /// Wall seconds from start to end of the process.
     pub seconds: f64,
@@ -228,7 +227,6 @@ pub(super) fn folder_of(runs: &Path, key: &[String]) -> PathBuf {
 struct Ended {
     /// Resources that it used; `None` if it could not be started or waited for.
     used: Option<ResUse>,
-    /// Whether its time was over.
     is_late: bool,
     seconds: f64,
     /// Its standard output and standard error.

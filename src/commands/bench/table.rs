@@ -16,7 +16,6 @@ pub(super) struct Table<'a> {
     folder: &'a Folder,
     plan: &'a Plan,
     columns: Vec<String>,
-    /// Rows so far.
     pub rows: Vec<Row>,
     /// Rows of an earlier benchmark that can be reused.
     old: Vec<Row>,
