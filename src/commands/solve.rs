@@ -2,7 +2,7 @@
 
 use super::adapt::Plan;
 use super::checkpoint::{self, Checkpoint};
-use super::write::{self, ResultFiles, to_json};
+use super::write::{ResultFiles, to_json, write_fields};
 use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
@@ -352,8 +352,8 @@ impl Recorder for Solver<'_> {
             table.rows.complaint().iter().for_each(|text| self.table.warn(text));
         }
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
-        if scene.output.vtu && !ends {
-            let written = write::write(done, recovered, &self.folder);
+        if !ends {
+            let written = write_fields(done, recovered, &self.folder, false);
             self.note_failure("a field of a load step", written);
         }
     }

@@ -79,7 +79,7 @@ impl ResultFiles<'_> {
             }
         }
         if fields {
-            written = written.and(write_last(done, &recovered, &folder));
+            written = written.and(write_fields(done, &recovered, &folder, true));
         }
         clock.phase("output");
         clock.total();
@@ -224,28 +224,22 @@ fn names(done: &Done) -> Vec<String> {
     bodies.chain(stems(done)).collect()
 }
 
-/// Write the fields of the step that has ended. Each rank writes its parts of bodies; the first rank also writes the contact surfaces and the
-/// files that join parts.
-///
-/// # Errors
-/// Files that cannot be written; the failure of a solver that should have found the interior of a body.
-pub fn write(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
-    folder.subfolder(STEPS)?;
-    let (step, steps) = (done.steps.len(), done.built.scene.method.steps.steps.len());
-    fields(done, recovered, folder, &|name| stem_of(name, step, steps))?;
-    collection(done, folder, false)
-}
-
-/// Write the fields at the end of a run in the same way.
-fn write_last(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
-    if done.built.scene.output.msh {
+/// Write the fields at the end of a run or, before that, of the load step that has ended. Each rank writes its parts of bodies; the first rank also
+/// writes the contact surfaces and the files that join parts.
+pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) -> Result<()> {
+    let (output, step, steps) = (&done.built.scene.output, done.steps.len(), done.built.scene.method.steps.steps.len());
+    if ended && output.msh {
         views(done, recovered, folder)?;
     }
-    if !done.built.scene.output.vtu {
+    if !output.vtu {
         return Ok(());
     }
-    fields(done, recovered, folder, &safe_name)?;
-    collection(done, folder, true)
+    if !ended {
+        folder.subfolder(STEPS)?;
+    }
+    let stem = |name: &str| if ended { safe_name(name) } else { stem_of(name, step, steps) };
+    fields(done, recovered, folder, &stem)?;
+    collection(done, folder, ended)
 }
 
 /// Write bodies and contact surfaces for Gmsh, each file with tags of its own.
