@@ -292,12 +292,12 @@ impl Setting for Support {
         let on = pattern(keys.require("on")?, context)?;
         let mut value = [const { None }; 3];
         for (value, axis) in value.iter_mut().zip(AXES) {
-            *value = keys.read(axis, |node| context.field(node))?;
+            *value = keys.read(axis, |node| Field::read(node, context))?;
         }
         let normal = match keys.get("symmetry") {
             Some(node) if node.boolean()? => Some(Field::Constant(0.0)),
             Some(node) => return Err(node.refuse("`symmetry = false` holds nothing").help("remove this support")),
-            None => keys.read("normal", |node| context.field(node))?,
+            None => keys.read("normal", |node| Field::read(node, context))?,
         };
         Ok(Support { on, value, normal, path: keys.read("path", Node::name)?, factor: 1.0 })
     }
@@ -333,12 +333,14 @@ impl Setting for SpringSpec {
         let keys = Keys::open(node, &spring_shape())?;
         let on = pattern(keys.require("on")?, context)?;
         let kind = match (keys.get("stiffness"), keys.get("normal")) {
-            (Some(node), _) if matches!(node.value, Value::List(_)) => SpringKind::Vector(context.vector(node)?),
+            (Some(node), _) if matches!(node.value, Value::List(_)) => {
+                SpringKind::Vector(<[Field; 3]>::read(node, context)?)
+            }
             (Some(node), _) => {
-                let field = context.field(node)?;
+                let field = Field::read(node, context)?;
                 SpringKind::Vector([field.clone(), field.clone(), field])
             }
-            (None, Some(node)) => SpringKind::Normal(context.field(node)?),
+            (None, Some(node)) => SpringKind::Normal(Field::read(node, context)?),
             (None, None) => {
                 return Err(node
                     .refuse(format!("the spring on `{}` has no stiffness", on.value))
@@ -380,8 +382,8 @@ impl Setting for Load {
                 .help("a rigid surface moves as one under a total force: force = [0, -10], rigid = true"));
         }
         let kind = match [keys.get("pressure"), keys.get("traction"), force, moment] {
-            [Some(pressure), ..] => LoadKind::Pressure(context.field(pressure)?),
-            [_, Some(traction), ..] => LoadKind::Traction(context.vector(traction)?),
+            [Some(pressure), ..] => LoadKind::Pressure(Field::read(pressure, context)?),
+            [_, Some(traction), ..] => LoadKind::Traction(<[Field; 3]>::read(traction, context)?),
             [.., force, Some(moment)] if rigid => {
                 let force = force.map_or(Ok([0.0; 3]), |force| numbers(force, context))?;
                 LoadKind::Turning { force, moment: moment_of(moment, context)? }
@@ -459,7 +461,7 @@ fn echo_of_moment(moment: &[f64; 3], dimension: usize) -> Json {
 /// Return a vector of numbers; expressions in the coordinates are refused.
 fn numbers(node: &Node, context: &Context) -> Result<[f64; 3]> {
     let mut numbers = [0.0; 3];
-    for (number, field) in numbers.iter_mut().zip(context.vector(node)?) {
+    for (number, field) in numbers.iter_mut().zip(<[Field; 3]>::read(node, context)?) {
         match field {
             Field::Constant(value) => *number = value,
             field => {

@@ -161,7 +161,8 @@ impl ElasticitySpec {
                 "a material is young and poisson, orthotropic = { E1 = ... } or anisotropic = [C11, ...]";
             let young = keys.require("young").map_err(|error| error.help(OTHERS))?;
             let poisson = keys.require("poisson")?;
-            let constants = Constants::Isotropic { young: context.field(young)?, poisson: context.field(poisson)? };
+            let constants =
+                Constants::Isotropic { young: Field::read(young, context)?, poisson: Field::read(poisson, context)? };
             (constants, &young.place)
         };
         let axes = keys.read("axes", |node| axes(node, context))?;
@@ -219,7 +220,7 @@ fn orthotropic(node: &Node, context: &Context) -> Result<Constants> {
     let keys = Keys::open(node, &orthotropic_shape())?;
     let mut fields = [const { Field::Constant(0.0) }; 9];
     for (field, name) in fields.iter_mut().zip(Constants::ORTHOTROPIC) {
-        *field = context.field(keys.require(name)?)?;
+        *field = Field::read(keys.require(name)?, context)?;
     }
     Ok(Constants::Orthotropic(Box::new(fields)))
 }
@@ -231,7 +232,7 @@ fn anisotropic(node: &Node, context: &Context) -> Result<Constants> {
         return Err(node.refuse(format!("an anisotropic material has 21 constants, not {}", items.len())).help(UPPER));
     }
     for (field, item) in fields.iter_mut().zip(items) {
-        *field = context.field(item)?;
+        *field = Field::read(item, context)?;
     }
     Ok(Constants::Anisotropic(fields))
 }
@@ -244,7 +245,7 @@ fn axes(node: &Node, context: &Context) -> Result<AxesSpec> {
             (None, _) => direction(keys.require("axis")?, context)?,
             (Some(axis), _) => direction(axis, context)?,
         };
-        return Ok(AxesSpec::Angle { angle: context.field(angle)?, axis });
+        return Ok(AxesSpec::Angle { angle: Field::read(angle, context)?, axis });
     }
     let first = direction(keys.require("first").map_err(|error| error.help(AXES))?, context)?;
     let second = match (keys.get("second"), context.dimension) {
@@ -259,9 +260,9 @@ fn axes(node: &Node, context: &Context) -> Result<AxesSpec> {
 fn direction(node: &Node, context: &Context) -> Result<[Field; 3]> {
     match &node.value {
         Value::List(items) if context.dimension == 2 && items.len() == 3 => {
-            let [x, y, z] = [0, 1, 2].map(|i| context.field(&items[i]));
+            let [x, y, z] = [0, 1, 2].map(|i| Field::read(&items[i], context));
             Ok([x?, y?, z?])
         }
-        _ => context.vector(node),
+        _ => <[Field; 3]>::read(node, context),
     }
 }

@@ -281,7 +281,7 @@ impl AsperitySpec {
 /// Return a law with the values of its parameters.
 fn read_form(form: &'static LawForm, node: &Node, context: &Context) -> Result<LayerSpec> {
     let keys = Keys::open(node, &form_shape(form))?;
-    let value = |parameter: &Parameter| context.field(keys.require(parameter.key)?);
+    let value = |parameter: &Parameter| Field::read(keys.require(parameter.key)?, context);
     let values = form.parameters.iter().map(value).collect::<Result<_>>()?;
     Ok(LayerSpec::Form { form, values })
 }

@@ -44,17 +44,34 @@ pub fn build(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    build_with(session, scene.into(), Vec::new(), interrupt, clock)
+    build_after(session, scene.into(), None, interrupt, clock)
 }
 
-/// Build the discrete problem as [`build`] does, with the bodies `kept` from an earlier scene.
-fn build_with(
+/// Build a scene with what the run of another scene before it has left. Collective.
+///
+/// The stiffness matrix of a body does not depend on method, layers, gaps and the values of loads and supports: then a condensed body is
+/// reused. Where only the method changes, the whole problem is reused.
+pub fn build_after(
     session: &Session,
     scene: Rc<Scene>,
-    kept: Vec<BodySlot>,
+    before: Option<Done>,
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
+    let mut kept = Vec::new();
+    if let Some(Done { built: mut last, .. }) = before {
+        if serves(&last, &scene) {
+            let discrete = &mut last.discrete;
+            discrete.model.exchange = Rc::new(Ranks::new(session));
+            let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+            discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
+            discrete.assemblies = 0;
+            return Ok(Built { scene, ..last });
+        }
+        if settings(&last.scene, without_values) == settings(&scene, without_values) {
+            kept = last.into_condensed();
+        }
+    }
     collectively(session, options::refuse_log(session))?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
@@ -272,28 +289,6 @@ pub fn targets(scene: &Scene) -> String {
     let rules = rules.iter().filter_map(|(name, value)| value.map(|value| format!("{name} <= {value:e}")));
     let balanced = stop.balanced.then(|| format!("error <= {} of the discretisation's", ddm::SHARE));
     rules.chain(balanced).collect::<Vec<_>>().join(" or ")
-}
-
-/// Build a scene with what the run of another scene before it has left. Collective.
-pub fn build_after(
-    session: &Session,
-    scene: Rc<Scene>,
-    before: Option<Done>,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Built> {
-    let Some(Done { built: mut last, .. }) = before else { return build(session, scene, interrupt, clock) };
-    if serves(&last, &scene) {
-        let discrete = &mut last.discrete;
-        discrete.model.exchange = Rc::new(Ranks::new(session));
-        let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-        discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
-        discrete.assemblies = 0;
-        return Ok(Built { scene, ..last });
-    }
-    let is_same = settings(&last.scene, without_values) == settings(&scene, without_values);
-    let condensed = if is_same { last.into_condensed() } else { Vec::new() };
-    build_with(session, scene, condensed, interrupt, clock)
 }
 
 /// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.

@@ -53,45 +53,6 @@ pub struct Context<'a> {
 const LEAST: f64 = 1e-110;
 
 impl Context<'_> {
-    /// Return a number, or an expression in the coordinates.
-    ///
-    /// # Errors
-    /// Values of another kind, texts that are no expression, and numbers that are too large or too small.
-    pub fn field(&self, node: &Node) -> Result<Field> {
-        let field = match &node.value {
-            Value::Integer(_) | Value::Float(_) => Field::Constant(node.number()?),
-            Value::String(text) => Field::parse(text, &node.place, self.dimension, false, &self.data)?,
-            _ => return Err(node.expected("a number or an expression", "")),
-        };
-        match field {
-            Field::Constant(value) if value != 0.0 && !(LEAST..=LEAST.recip()).contains(&value.abs()) => Err(node
-                .refuse(format!("no run computes with a number like {value:e}"))
-                .label("must be 0, or of a size from 1e-110 to 1e110")
-                .help("choose other units of length and force")),
-            field => Ok(field),
-        }
-    }
-
-    /// Return a vector with as many components as the scene has dimensions; in the plane the third one is zero.
-    pub fn vector(&self, node: &Node) -> Result<[Field; 3]> {
-        let mut vector = [const { Field::Constant(0.0) }; 3];
-        for (component, item) in vector.iter_mut().zip(self.components(node)?) {
-            *component = self.field(item)?;
-        }
-        Ok(vector)
-    }
-
-    /// Return a vector of expressions, with as many components as the scene has dimensions. Numbers become constant expressions.
-    pub fn expressions(&self, node: &Node) -> Result<Vec<Expression>> {
-        let scope = Scope { variables: &["x", "y", "z"][..self.dimension], data: &self.data };
-        let component = |item: &Node| match &item.value {
-            Value::Integer(_) | Value::Float(_) => Expression::parse(&item.number()?.to_string(), &item.place, scope),
-            Value::String(text) => Expression::parse(text, &item.place, scope),
-            _ => Err(item.expected("a number or an expression", "")),
-        };
-        self.components(node)?.iter().map(component).collect()
-    }
-
     /// Return the components of a vector; there must be as many as the scene has dimensions.
     pub fn components<'n>(&self, node: &'n Node) -> Result<&'n [Node]> {
         let items = node.list()?;
@@ -189,7 +150,18 @@ impl Setting for Field {
     }
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
-        context.field(node)
+        let field = match &node.value {
+            Value::Integer(_) | Value::Float(_) => Field::Constant(node.number()?),
+            Value::String(text) => Field::parse(text, &node.place, context.dimension, false, &context.data)?,
+            _ => return Err(node.expected("a number or an expression", "")),
+        };
+        match field {
+            Field::Constant(value) if value != 0.0 && !(LEAST..=LEAST.recip()).contains(&value.abs()) => Err(node
+                .refuse(format!("no run computes with a number like {value:e}"))
+                .label("must be 0, or of a size from 1e-110 to 1e110")
+                .help("choose other units of length and force")),
+            field => Ok(field),
+        }
     }
 
     fn echo(&self, _: usize) -> Json {
@@ -207,7 +179,11 @@ impl Setting for [Field; 3] {
     }
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
-        context.vector(node)
+        let mut vector = [const { Field::Constant(0.0) }; 3];
+        for (component, item) in vector.iter_mut().zip(context.components(node)?) {
+            *component = Field::read(item, context)?;
+        }
+        Ok(vector)
     }
 
     fn echo(&self, dimension: usize) -> Json {
@@ -215,14 +191,20 @@ impl Setting for [Field; 3] {
     }
 }
 
-/// One expression for each dimension.
+/// One expression for each dimension. Numbers become constant expressions.
 impl Setting for Vec<Expression> {
     fn kind() -> ValueKind {
         ValueKind::Field.list()
     }
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
-        context.expressions(node)
+        let scope = Scope { variables: &["x", "y", "z"][..context.dimension], data: &context.data };
+        let component = |item: &Node| match &item.value {
+            Value::Integer(_) | Value::Float(_) => Expression::parse(&item.number()?.to_string(), &item.place, scope),
+            Value::String(text) => Expression::parse(text, &item.place, scope),
+            _ => Err(item.expected("a number or an expression", "")),
+        };
+        context.components(node)?.iter().map(component).collect()
     }
 
     fn echo(&self, _: usize) -> Json {
