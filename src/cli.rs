@@ -1,6 +1,6 @@
 //! The command line: arguments -> request -> command -> exit code.
 //!
-//! The refusal of ranks that were started with different command lines. They would wait for each other without end.
+//! Ranks that were started with different command lines are refused, since they would wait for each other without end.
 
 use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result, few};

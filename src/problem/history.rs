@@ -3,7 +3,7 @@
 //! A line of the scene (a load or a support) with a `path` takes the factor of that name. A leg is a series of consecutive steps whose
 //! factors are positive multiples of each other. On a leg all loads have one common factor, the share, so that nothing is assembled anew.
 //!
-//! `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
+//! In a scene they are `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
 use super::body::{BodySpec, LoadKind};
 use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
