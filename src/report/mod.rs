@@ -50,11 +50,11 @@ pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
 }
 
 /// The results in a folder.
-pub struct Results {
+struct Results {
     files: Files,
     report: Value,
     /// Units of the scene, if it names them.
-    pub units: Option<Units>,
+    units: Option<Units>,
 }
 
 impl Results {
@@ -62,7 +62,7 @@ impl Results {
     ///
     /// # Errors
     /// [`Kind::File`] when it is missing or no report.
-    pub fn read(folder: &Path) -> Result<Self> {
+    fn read(folder: &Path) -> Result<Self> {
         let path = folder.join("report.json");
         if !path.exists() {
             return Err(Error::new(Kind::File, format!("{} has no report.json", folder.display()))
@@ -94,7 +94,7 @@ impl Results {
     }
 
     /// Return the bodies, if the run wrote their fields.
-    pub fn bodies(&self) -> Result<Vec<Part>> {
+    fn bodies(&self) -> Result<Vec<Part>> {
         let names = self.names("bodies", |body| body["name"].as_str().map(str::to_owned));
         let parts = names.iter().filter_map(|name| Some((name, self.file(&[&safe_name(name), name])?)));
         parts.map(|(name, file)| Part::read(&self.files, &file, name, "von_mises")).collect()
@@ -127,12 +127,12 @@ impl Results {
     }
 
     /// Return a label with one of the units of the scene.
-    pub fn label(&self, what: &str, unit: fn(&Units) -> &str) -> String {
+    fn label(&self, what: &str, unit: fn(&Units) -> &str) -> String {
         label(what, self.units.as_ref().map(unit))
     }
 
     /// Return the plot of residual, error and increment over the iteration, none without iterations.
-    pub fn convergence(&self) -> Result<Option<Plot>> {
+    fn convergence(&self) -> Result<Option<Plot>> {
         let rows = self.files.rows("history.csv")?;
         // iterations count from zero in each load step, so rows are numbered through
         let steps = rows.first().is_some_and(|row| row.contains_key("step"));
@@ -161,7 +161,7 @@ impl Results {
 
     /// Return the plot of the area or length in contact over the contact force, with a curve over the load steps for each pair;
     /// none without steps.
-    pub fn area(&self) -> Option<Plot> {
+    fn area(&self) -> Option<Plot> {
         let curves =
             self.curves(|pair| (force(pair), number(pair.get("contact_area").unwrap_or(&pair["contact_length"]))))?;
         let series = curves.into_iter().map(|(name, points)| Series::new(name, points, Style::LineMarkers)).collect();
@@ -189,13 +189,57 @@ impl Results {
         self.units.as_ref().map(|units| format!("{}{}", units.length, if self.is_area() { "²" } else { "" }))
     }
 
-    /// Return a picture of the pressure of each pair that touches and has a table.
+    /// Return a picture of the pressure of each pair that touches and has a table, by the rows of `contacts.csv`.
     fn pressures(&self, alone: bool) -> Result<Vec<PressurePicture>> {
-        pressure_pictures(&self.files, self.is_space(), self.units.as_ref(), alone)
+        let pairs = self.files.rows("contacts.csv")?;
+        let mut pictures = Vec::new();
+        for pair in pairs.iter().filter(|pair| value(pair, "peak_pressure") > 0.0) {
+            let Some(table) = pair.get("table").filter(|table| !table.is_empty() && !table.contains('/')) else {
+                continue;
+            };
+            let name = |column: &str| pair.get(column).map_or("", String::as_str);
+            pictures.push(self.pressure(table, format!("{} – {}", name("a"), name("b")), alone)?);
+        }
+        Ok(pictures)
+    }
+
+    /// Return the picture of the pressure in the table of a pair: a curve in the plane, a map in space.
+    fn pressure(&self, table: &str, title: String, alone: bool) -> Result<PressurePicture> {
+        let rows = self.files.rows(table)?;
+        let points: Vec<[f64; 3]> = rows.iter().map(|row| ["x", "y", "z"].map(|axis| value(row, axis))).collect();
+        let pressures: Vec<f64> = rows.iter().map(|row| value(row, "pressure")).collect();
+        let [low, high] = bounds(points.iter().copied());
+        let mut axes = [0, 1, 2];
+        axes.sort_by(|&i, &j| (high[j] - low[j]).total_cmp(&(high[i] - low[i])).then(i.cmp(&j)));
+        let pressure = self.label("contact pressure", |units| units.stress);
+        if !self.is_space() {
+            let along = self.label(["x", "y", "z"][axes[0]], |units| units.length);
+            let curve = points.iter().zip(&pressures).map(|(x, &p)| (x[axes[0]], p)).collect();
+            let plot = Plot::pressure(&title, &along, &pressure, vec![Series::new("", curve, Style::Line)]);
+            return Ok(PressurePicture { kind: "plot", svg: svg(&plot)?, note: None });
+        }
+        // the two longest directions, in alphabetical order
+        let axes = [axes[0].min(axes[1]), axes[0].max(axes[1])];
+        let title = format!("{title}: {pressure}");
+        // the facets show more than the points, if the run wrote them
+        let file = format!("{}.vtu", table.strip_suffix(".csv").unwrap_or(table));
+        let has_facets = self.files.path(&file).is_file();
+        let every = if has_facets { 1 } else { points.len().div_ceil(POINTS).max(1) };
+        let surface = match has_facets {
+            true => Part::read(&self.files, &file, &title, "pressure")?,
+            false => discs(&title, points.iter().zip(&pressures).step_by(every), axes),
+        };
+        let values: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
+        let [_, most] = range(values.iter());
+        let (levels, view) = (Levels { range: [0.0, most], squares: false, opens: true }, View::flat(axes));
+        let drawing = Picture { title: &title, levels, view, magnification: None, outlines: has_facets, alone };
+        let svg = drawing.svg(&[surface], &[values]).map_err(failed)?;
+        let note = (every > 1).then(|| format!("One of {every} contact points; the table has all."));
+        Ok(PressurePicture { kind: "map", svg, note })
     }
 
     /// Return the picture of the stress, or else the displacement, on deformed bodies. Bodies in space show their surfaces.
-    pub fn field(&self, bodies: &[Part], stress: bool) -> Result<String> {
+    fn field(&self, bodies: &[Part], stress: bool) -> Result<String> {
         let values: Vec<Vec<f64>> =
             bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();
         let range = picture::range(values.iter().flatten());
@@ -229,7 +273,7 @@ impl Results {
             true => None,
             false => Some(data(&bodies, &self.surfaces()?, magnification(&bodies), self.is_space())),
         };
-        let convergence = self.convergence()?.map(|plot| plot.svg().map_err(failed)).transpose()?;
+        let convergence = self.convergence()?.map(|plot| svg(&plot)).transpose()?;
         let unit = |unit: fn(&Units) -> &str| self.label("", unit);
         let phases = ["mesh", "discretize", "set-up", "iterate", "estimate", "output"];
         let timed = |phase: &&str| report["times"].get(*phase).is_some();
@@ -247,7 +291,7 @@ impl Results {
             view,
             pressures => self.pressures(false)?,
             convergence,
-            approach => self.approach().map(|plot| plot.svg().map_err(failed)).transpose()?,
+            approach => self.approach().map(|plot| svg(&plot)).transpose()?,
             phases => phases.into_iter().filter(timed).chain(["total"]).collect::<Vec<_>>(),
             command => self.command(),
             settings => serde_json::to_string_pretty(&report["settings"]).unwrap_or_default(),
@@ -310,14 +354,12 @@ fn drawn(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>> {
     };
     let pictures: Vec<String> = match what {
         "pressure" => results.pressures(true)?.into_iter().map(|picture| picture.svg).collect(),
-        "convergence" => {
-            results.convergence()?.map(|plot| plot.svg().map_err(failed)).transpose()?.into_iter().collect()
-        }
+        "convergence" => results.convergence()?.map(|plot| svg(&plot)).transpose()?.into_iter().collect(),
         "area" => {
             let Some(plot) = results.area() else {
                 return Err(lacks("no load steps", "give the scene `method.steps`, or a history of its loads"));
             };
-            vec![plot.svg().map_err(failed)?]
+            vec![svg(&plot)?]
         }
         _ => {
             let bodies = results.bodies()?;
@@ -340,74 +382,14 @@ fn drawn(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>> {
 #[derive(Serialize)]
 struct PressurePicture {
     /// `plot` or `map`.
-    pub kind: &'static str,
-    pub svg: String,
+    kind: &'static str,
+    svg: String,
     /// A note on points that the picture leaves out.
-    pub note: Option<String>,
+    note: Option<String>,
 }
 
 /// Most points in a map.
 const POINTS: usize = 8000;
-
-/// Return a picture of the pressure of each pair that has a table and touches, by the rows of `contacts.csv`.
-fn pressure_pictures(
-    files: &Files,
-    is_space: bool,
-    units: Option<&Units>,
-    alone: bool,
-) -> Result<Vec<PressurePicture>> {
-    let pairs = files.rows("contacts.csv")?;
-    let mut pictures = Vec::new();
-    for pair in pairs.iter().filter(|pair| value(pair, "peak_pressure") > 0.0) {
-        let Some(table) = pair.get("table").filter(|table| !table.is_empty() && !table.contains('/')) else { continue };
-        let name = |column: &str| pair.get(column).map_or("", String::as_str);
-        let title = format!("{} – {}", name("a"), name("b"));
-        pictures.push(picture(files, table, title, is_space, units, alone)?);
-    }
-    Ok(pictures)
-}
-
-/// Return the picture of the pressure in the table of a pair.
-fn picture(
-    files: &Files,
-    table: &str,
-    title: String,
-    is_space: bool,
-    units: Option<&Units>,
-    alone: bool,
-) -> Result<PressurePicture> {
-    let rows = files.rows(table)?;
-    let points: Vec<[f64; 3]> = rows.iter().map(|row| ["x", "y", "z"].map(|axis| value(row, axis))).collect();
-    let pressures: Vec<f64> = rows.iter().map(|row| value(row, "pressure")).collect();
-    let [low, high] = bounds(points.iter().copied());
-    let mut axes = [0, 1, 2];
-    axes.sort_by(|&i, &j| (high[j] - low[j]).total_cmp(&(high[i] - low[i])).then(i.cmp(&j)));
-    let pressure = label("contact pressure", units.map(|units| units.stress));
-    if !is_space {
-        let along = label(["x", "y", "z"][axes[0]], units.map(|units| units.length));
-        let curve = points.iter().zip(&pressures).map(|(x, &p)| (x[axes[0]], p)).collect();
-        let plot = Plot::pressure(&title, &along, &pressure, vec![Series::new("", curve, Style::Line)]);
-        return Ok(PressurePicture { kind: "plot", svg: plot.svg().map_err(failed)?, note: None });
-    }
-    // the two longest directions, in alphabetical order
-    let axes = [axes[0].min(axes[1]), axes[0].max(axes[1])];
-    let title = format!("{title}: {pressure}");
-    // the facets show more than the points, if the run wrote them
-    let file = format!("{}.vtu", table.strip_suffix(".csv").unwrap_or(table));
-    let has_facets = files.path(&file).is_file();
-    let every = if has_facets { 1 } else { points.len().div_ceil(POINTS).max(1) };
-    let surface = match has_facets {
-        true => Part::read(files, &file, &title, "pressure")?,
-        false => discs(&title, points.iter().zip(&pressures).step_by(every), axes),
-    };
-    let values: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
-    let [_, most] = range(values.iter());
-    let (levels, view) = (Levels { range: [0.0, most], squares: false, opens: true }, View::flat(axes));
-    let drawing = Picture { title: &title, levels, view, magnification: None, outlines: has_facets, alone };
-    let svg = drawing.svg(&[surface], &[values]).map_err(failed)?;
-    let note = (every > 1).then(|| format!("One of {every} contact points; the table has all."));
-    Ok(PressurePicture { kind: "map", svg, note })
-}
 
 /// Return points with pressures as hexagons in the plane of two coordinates, which together cover about their box.
 fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>, axes: [usize; 2]) -> Part {
@@ -441,8 +423,13 @@ fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>,
     disc
 }
 
+/// Return a plot as SVG.
+fn svg(plot: &Plot) -> Result<String> {
+    plot.svg().map_err(failed)
+}
+
 /// Return the error for a picture that cannot be drawn.
-pub fn failed(cause: impl std::fmt::Display) -> Error {
+fn failed(cause: impl std::fmt::Display) -> Error {
     Error::new(Kind::File, "a picture cannot be drawn").because(cause.to_string())
 }
 
@@ -453,7 +440,7 @@ const NONE: u16 = u16::MAX;
 ///
 /// Each part has points relative to the least coordinates and displacements (float32), triangles (uint32), and a value at each
 /// point (uint16). Values are scaled to the range of the parts; 65535 stands for none.
-pub fn data(bodies: &[Part], surfaces: &[Part], scale: f64, is_space: bool) -> Value {
+fn data(bodies: &[Part], surfaces: &[Part], scale: f64, is_space: bool) -> Value {
     let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
     json!({
         "bodies": parts(bodies, low),

@@ -1,35 +1,33 @@
 //! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, method,
 //! iteration. All ranks must read the same scene, and a problem takes over what the run of another scene before it has left.
 
-use super::inner::Inner;
-use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
-use super::{steps, warnings};
-use crate::contact::pieces::{self, Cut};
+use crate::contact::pieces::{Cut, self};
+use crate::ddm::{Method, Outcome, Start, Status, first_springs, self};
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
-use crate::ddm::{self, Method, Outcome, Start, Status, first_springs};
-use crate::discretize::{self, Verified, point};
+use crate::discretize::{Verified, point, self};
 use crate::error::{Error, Kind, Result, few};
-use crate::estimate::{self, Estimate};
+use crate::estimate::{Estimate, self};
 use crate::exchange::Plain;
-use crate::fem::Interpolation;
 use crate::file::digest;
 use crate::interrupt::Interrupt;
-use crate::mesh::{self, Loaded};
-use crate::model::{BodySlot, LinearStep, Model};
+use crate::mesh::{Loaded, self};
+use crate::model::{BodySlot, LinearStep};
 use crate::parallel::{Ranks, collectively, differences};
 use crate::petsc::{Session, keep_apart, keep_at_hand};
 use crate::problem::Order;
 use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
-use crate::solver::options::{self, Chosen};
-use crate::solver::{Dense, Krylov, Monolithic, Union};
+use crate::solver::{Dense, Krylov, Monolithic, Union, options};
 use serde_json::{Map, Value};
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
+use super::{steps, warnings};
+use super::inner::Inner;
+use super::recorder::{Recorder, self};
+use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;
@@ -388,42 +386,31 @@ fn keys_and_values(mut contents: Value) -> Vec<(String, String)> {
 
 /// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
 /// automatic start, it is stored in `start`.
-pub fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
-    let Built { scene, discrete, linear, options, interpolation, .. } = built;
-    let model = &mut discrete.model;
-    let coefficient = || Coefficient::new(scene.method.psi.clone(), scene.method.robin);
+fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
+    let (scene, coefficient) = (built.scene.clone(), coefficient_of(&built.scene));
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
-            return Ok(Method::Newton(linear_step(
-                session,
-                scene,
-                model,
-                (*linear, options, interpolation.take()),
-                coefficient(),
-                start,
-            )?));
+            return linear_step(session, built, start).map(Method::Newton);
         }
-        MethodName::Robin => Box::new(Relaxed::new(rule(scene)?)),
+        MethodName::Robin => Box::new(Relaxed::new(rule(&scene)?)),
         MethodName::Ncg => Box::new(Conjugate::default()),
         MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
     };
-    crate::robin::prepare(model)?;
-    Ok(Method::Sweeps { acceleration, coefficient: coefficient(), linear: Box::new(Sweeps::carried()) })
+    crate::robin::prepare(&mut built.discrete.model)?;
+    Ok(Method::Sweeps { acceleration, coefficient, linear: Box::new(Sweeps::carried()) })
 }
 
-/// Return the solver of the linear steps of Newton's method. The tuple has its kind, the options of all solvers of PETSc, and the
-/// interpolation of the matrix of all bodies.
-fn linear_step(
-    session: &Session,
-    scene: &Scene,
-    model: &mut Model,
-    (linear, options, interpolation): (Linear, &[Chosen], Option<Interpolation>),
-    coefficient: Coefficient,
-    start: &mut Start,
-) -> Result<Box<dyn LinearStep>> {
+fn coefficient_of(scene: &Scene) -> Coefficient {
+    Coefficient::new(scene.method.psi.clone(), scene.method.robin)
+}
+
+/// Return the solver of the linear steps of Newton's method.
+fn linear_step(session: &Session, built: &mut Built, start: &mut Start) -> Result<Box<dyn LinearStep>> {
+    let Built { scene, discrete, linear, options, interpolation, .. } = built;
+    let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
     if linear == Linear::Sweeps {
         crate::robin::prepare(model)?;
-        return Ok(Box::new(Sweeps::new(coefficient)));
+        return Ok(Box::new(Sweeps::new(coefficient_of(scene))));
     }
     model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
     // Multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows.
