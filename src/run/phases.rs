@@ -1,17 +1,21 @@
 //! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, method,
 //! iteration. All ranks must read the same scene, and a problem takes over what the run of another scene before it has left.
 
-use crate::contact::pieces::{Cut, self};
-use crate::ddm::{Method, Outcome, Start, Status, first_springs, self};
+use super::inner::Inner;
+use super::recorder::{self, Recorder};
+use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
+use super::{steps, warnings};
+use crate::contact::pieces::{self, Cut};
 use crate::ddm::acceleration::{Acceleration, Anderson, Conjugate, Relaxed};
 use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Schedule, Spectral, Stationary};
-use crate::discretize::{Verified, point, self};
+use crate::ddm::{self, Method, Outcome, Start, Status, first_springs};
+use crate::discretize::{self, Verified, point};
 use crate::error::{Error, Kind, Result, few};
-use crate::estimate::{Estimate, self};
+use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::file::digest;
 use crate::interrupt::Interrupt;
-use crate::mesh::{Loaded, self};
+use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, LinearStep};
 use crate::parallel::{Ranks, collectively, differences};
 use crate::petsc::{Session, keep_apart, keep_at_hand};
@@ -24,10 +28,6 @@ use serde_json::{Map, Value};
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
-use super::{steps, warnings};
-use super::inner::Inner;
-use super::recorder::{Recorder, self};
-use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
 const LARGE_FRONTS: usize = 30_000;

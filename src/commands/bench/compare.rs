@@ -2,11 +2,10 @@
 
 use super::plan::Plan;
 use super::plan::usage;
+use crate::commands::transfer::{Planes, mean};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::scene::Scene;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -117,7 +116,10 @@ pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points])
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
         let known: Vec<f64> = match dimension {
             2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
-            _ => on_surface(other, &own.at),
+            _ => {
+                let planes = Planes::exact(&other.at);
+                own.at.iter().map(|x| mean(&planes.weights(x), &other.pressure)).collect()
+            }
         };
         squares.add(own, &known);
     }
@@ -173,35 +175,6 @@ fn on_curve(curve: &Points, x: &[f64; 3]) -> f64 {
         }
     }
     pressure
-}
-
-/// Number of points that a plane is fitted through.
-const NEIGHBOURS: usize = 8;
-
-/// Return the pressures at places on a surface of scattered points.
-///
-/// They are those of the plane of least squares through the nearest points, whose equations are weighted by the inverse distances.
-fn on_surface(surface: &Points, places: &[[f64; 3]]) -> Vec<f64> {
-    let points = surface.at.iter().zip(&surface.pressure);
-    let tree = RTree::bulk_load(points.map(|(&x, &p)| GeomWithData::new(x, p)).collect());
-    places.iter().map(|x| plane_at(&tree, x)).collect()
-}
-
-/// Return the value at `x` of the plane through the nearest points, which have their pressures as data.
-fn plane_at(tree: &RTree<GeomWithData<[f64; 3], f64>>, x: &[f64; 3]) -> f64 {
-    let near: Vec<_> = tree.nearest_neighbor_iter_with_distance_2(*x).take(NEIGHBOURS).collect();
-    let Some(&(_, far)) = near.last() else { return f64::NAN };
-    // distances are squared; the small term keeps the weight of a point at `x` itself finite
-    let weight = |squared: f64| 1.0 / (squared + 1e-20 * far).max(f64::MIN_POSITIVE).sqrt();
-    let row = |k: usize| -> [f64; 4] {
-        let y = near[k].0.geom();
-        [1.0, y[0] - x[0], y[1] - x[1], y[2] - x[2]].map(|value| weight(near[k].1) * value)
-    };
-    let matrix = nalgebra::DMatrix::from_fn(near.len(), 4, |k, c| row(k)[c]);
-    let right = nalgebra::DVector::from_fn(near.len(), |k, _| weight(near[k].1) * near[k].0.data);
-    let svd = matrix.svd(true, true);
-    let small = 1e-9 * svd.singular_values.max();
-    svd.solve(&right, small).map_or(f64::NAN, |plane| plane[0])
 }
 
 #[cfg(test)]
