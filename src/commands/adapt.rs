@@ -348,7 +348,6 @@ impl Plan {
         true
     }
 
-    /// Add the report of this round.
     fn record(&mut self, done: &Done, estimate: &Estimate, clock: &mut Clock) {
         let (discrete, total) = (&done.built.discrete, clock.total());
         self.rounds.push(RoundReport {
@@ -419,7 +418,6 @@ fn sized(
     Ok(built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies))))
 }
 
-/// Return sizes as a view of Gmsh.
 fn view(sizes: &Sizes) -> String {
     mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
 }

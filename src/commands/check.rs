@@ -102,7 +102,6 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
     })
 }
 
-/// Return the least and the largest gap.
 fn gap_range(gap: &[f64]) -> (f64, f64) {
     (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }

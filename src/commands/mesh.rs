@@ -164,7 +164,6 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<Value>> {
     Ok(bodies)
 }
 
-/// Return what is printed about a group.
 fn group_facts<const D: usize>(mesh: &Mesh<D>, group: &Group) -> Value {
     let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
     let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());

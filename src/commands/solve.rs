@@ -45,7 +45,6 @@ pub struct Request {
 }
 
 impl Request {
-    /// Return all overrides of the scene.
     fn overrides(&self) -> Vec<String> {
         let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
         let checkpoint = self.checkpoint.iter().map(|minutes| format!("--checkpoint {minutes}"));
@@ -236,7 +235,6 @@ impl Solver<'_> {
         }
     }
 
-    /// Print how the run ended.
     fn print(&self, report: &Report, done: &Done, code: i32) -> Result<()> {
         if self.terminal.json {
             return say(to_json(report)?.trim_end());

@@ -85,7 +85,6 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     Ok(exit)
 }
 
-/// One run of the sweep.
 struct Case {
     /// Values of the keys, in the order of the axes.
     values: Vec<String>,
@@ -183,7 +182,6 @@ impl Sweep<'_> {
     }
 }
 
-/// Return the columns of the table.
 fn header(axes: &[Axis], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (results::pair_names(built), results::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
@@ -199,7 +197,6 @@ fn header(axes: &[Axis], built: &Built) -> Vec<String> {
     header
 }
 
-/// Return the row of a run.
 fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
     let mut line = values.to_vec();

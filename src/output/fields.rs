@@ -357,7 +357,6 @@ impl Grid {
         write!(out, "\n$EndEntities\n")
     }
 
-    /// Write the points.
     fn write_nodes(&self, tag: i32, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
         let (_, _, dimension, _) = self.cell.facts();
         let (count, first) = (self.points.len(), tags.points + 1);
@@ -370,7 +369,6 @@ impl Grid {
         write!(out, "\n$EndNodes\n")
     }
 
-    /// Write the cells.
     fn write_elements(&self, tag: i32, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
         let (_, _, dimension, kind) = self.cell.facts();
         let cells = self.connectivity.chunks_exact(self.cell.stride());

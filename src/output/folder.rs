@@ -239,7 +239,6 @@ pub struct Lock {
     _file: File,
 }
 
-/// A process on a host.
 #[derive(Debug, PartialEq, Eq)]
 struct Holder {
     process: u32,
@@ -362,7 +361,6 @@ const SUMS_TITLE: &str = "# the files of this run as it wrote them: sha256sum -c
 /// Page and pictures that belong to a report.
 const WITH_REPORT: [&str; 3] = ["report.html", "convergence.svg", "force-approach.svg"];
 
-/// The report of a run.
 const REPORT: &str = "report.json";
 
 /// The collection of the fields of a run.

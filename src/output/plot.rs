@@ -183,7 +183,6 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 /// A position on the picture in units of plotters.
 type At = (i32, i32);
 
-/// An area of the picture.
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 impl Plot {
@@ -203,7 +202,6 @@ impl Plot {
         Ok(text.replacen(&format!("width=\"{width}\" height=\"{height}\""), &shown, 1))
     }
 
-    /// Draw axes, curves and legend.
     fn draw(&self, area: &Area) -> Result<(), Failure> {
         area.fill(&WHITE)?;
         let pens = pens(&self.series);
@@ -262,7 +260,6 @@ impl Plot {
     }
 }
 
-/// Draw the legend.
 fn draw_legend(area: &Area, entries: &[(String, Pen)]) -> Result<(), Failure> {
     // plotters draws a legend only on a chart: this one is empty
     let mut chart = ChartBuilder::on(area).build_cartesian_2d(0.0..1.0, 0.0..1.0)?;
@@ -287,7 +284,6 @@ struct Pen {
     mark: &'static [(f64, f64)],
 }
 
-/// Return the pens of all series.
 fn pens(series: &[Series]) -> Vec<Pen> {
     let (mut next, mut pens) = (0, Vec::new());
     for (index, series) in series.iter().enumerate() {
@@ -366,7 +362,6 @@ fn is_drawable(value: f64, log: bool) -> bool {
     if log { (1e-150..1e150).contains(&value) } else { value.abs() < 1e290 }
 }
 
-/// The scale of an axis.
 enum Scale {
     /// An even scale; plotters sees values in units of this power of ten.
     Linear(RangedCoordf64, i32),

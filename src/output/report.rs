@@ -610,12 +610,10 @@ pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
     lines
 }
 
-/// Format the coordinates of a point.
 fn point(x: [f64; 3]) -> String {
     format!("({})", x.map(|x| readable(x, 4)).join(", "))
 }
 
-/// Format a vector.
 fn vector(v: [f64; 3]) -> String {
     format!("({})", v.map(|v| readable(v, 6)).join(", "))
 }

@@ -118,7 +118,6 @@ fn is_shown(k: usize) -> bool {
     k <= 20 || k <= 200 && k.is_multiple_of(10) || k.is_multiple_of(100)
 }
 
-/// A column of the table.
 struct Column {
     heading: &'static str,
     width: usize,

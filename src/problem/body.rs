@@ -251,7 +251,6 @@ pub fn fault(name: &str) -> Option<[&'static str; 2]> {
         .then_some(["a word of PETSc's own options", "choose another name, also for the physical group in the mesh"])
 }
 
-/// Names of components, for supports.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Return the kind of value that is a number or an expression, or a list with one for each component.

@@ -139,7 +139,6 @@ fn has_common(body: &BodySpec) -> bool {
 /// The most steps that a number may stand for.
 const MOST_STEPS: usize = 1000;
 
-/// The name of the column of times.
 const TIME: &str = "time";
 
 /// Return the shape of `steps` from a file.

@@ -174,7 +174,6 @@ const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffn
 /// What a table of points is, and the advice for wrong points.
 const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
 
-/// Return the shape of `layer`.
 fn shape() -> TableShape {
     use ValueKind::{Number, Text};
     let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();

@@ -207,7 +207,6 @@ impl Points {
         Ok(())
     }
 
-    /// Return the part with its triangles.
     fn part(self, name: &str) -> Part {
         let Self { points, displacement, value, cells, .. } = self;
         let is_solid = cells.iter().any(|(kind, _)| matches!(*kind, TETRA | QUADRATIC_TETRA));
@@ -274,7 +273,6 @@ pub fn magnification(parts: &[Part]) -> f64 {
 /// A value, or a description of what is wrong with the file.
 type Parsed<T> = std::result::Result<T, String>;
 
-/// The attributes of an element by name.
 type Attributes = HashMap<String, String>;
 
 /// The content of a file: a grid, or the names of the files with its parts.
@@ -302,7 +300,6 @@ struct Encoding {
     is_compressed: bool,
 }
 
-/// A piece that is being read.
 #[derive(Default)]
 struct OpenPiece {
     /// Numbers of points and cells.
@@ -406,12 +403,10 @@ impl Document {
     }
 }
 
-/// Return the name of an element.
 fn name_of(tag: &BytesStart) -> String {
     String::from_utf8_lossy(tag.name().as_ref()).into_owned()
 }
 
-/// Return the attributes of an element.
 fn attributes(tag: &BytesStart) -> Parsed<Attributes> {
     let attribute = |one: std::result::Result<quick_xml::events::attributes::Attribute, _>| {
         let one = one.map_err(|cause: quick_xml::events::attributes::AttrError| cause.to_string())?;
@@ -444,7 +439,6 @@ fn encoding_of(attributes: &Attributes) -> Parsed<Encoding> {
     Ok(Encoding { is_big, is_compressed })
 }
 
-/// Decode an array of floating-point numbers.
 fn reals(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<f64>> {
     let bytes = bytes(attributes, data, encoding)?;
     match text(attributes, "type") {
@@ -457,7 +451,6 @@ fn reals(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec
     }
 }
 
-/// Decode an array of whole numbers.
 fn wholes(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<u64>> {
     let bytes = bytes(attributes, data, encoding)?;
     match text(attributes, "type") {

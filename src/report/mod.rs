@@ -49,7 +49,6 @@ pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// The results in a folder.
 struct Results {
     files: Files,
     report: Value,
@@ -88,7 +87,6 @@ impl Results {
         Ok(Self { files, report, units })
     }
 
-    /// Whether the scene is in space.
     fn is_space(&self) -> bool {
         self.report["settings"]["dimension"] == 3
     }
@@ -265,7 +263,6 @@ impl Results {
         }
     }
 
-    /// Return the text of the page.
     fn page(&self) -> Result<String> {
         let report = &self.report;
         let bodies = self.bodies()?;
@@ -303,7 +300,6 @@ impl Results {
     }
 }
 
-/// Names of the pictures.
 const WHAT: [&str; 5] = ["stress", "displacement", "pressure", "convergence", "area"];
 
 /// Draw one of the pictures `stress`, `displacement`, `pressure`, `convergence` and `area` from a folder of results, and return the
@@ -423,7 +419,6 @@ fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>,
     disc
 }
 
-/// Return a plot as SVG.
 fn svg(plot: &Plot) -> Result<String> {
     plot.svg().map_err(failed)
 }

@@ -170,7 +170,6 @@ impl Surface<'_> {
         facets
     }
 
-    /// Return the outline of all triangles.
     fn outline(&self) -> String {
         let all = [f64::NEG_INFINITY, f64::INFINITY];
         path(self.part.triangles.iter().map(|&nodes| self.cut(nodes, all)))

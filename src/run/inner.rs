@@ -110,7 +110,6 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Return whether a body has quadratic elements.
     fn is_quadratic(&self) -> bool {
         self.plans.iter().any(|plan| plan.order == Order::P2)
     }

@@ -68,7 +68,6 @@ fn reported_error(row: &Row) -> f64 {
     [row.residual, row.error].into_iter().filter(|error| error.is_finite()).fold(0.0, f64::max)
 }
 
-/// The energies of a result.
 struct Energy {
     /// u'Ku over all bodies.
     strain: f64,

@@ -78,7 +78,6 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
     report.f1 = last.and_then(|row| finite(row.energy));
 }
 
-/// Return a number if it is finite.
 fn finite(value: f64) -> Option<f64> {
     Some(value).filter(|value| value.is_finite())
 }
@@ -132,7 +131,6 @@ fn add_lost_digits(report: &mut Report, message: String, status: &Status) {
     }
 }
 
-/// Return the last look for the report.
 fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
     let at = match look.whose {
         Whose::Body(body) => vec![body],
@@ -256,7 +254,6 @@ impl Shared {
         all_gather(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()
     }
 
-    /// Merge the data of another rank.
     fn merged(mut self, other: Self) -> Self {
         self.counts += other.counts;
         self.assemblies += other.assemblies;
@@ -279,7 +276,6 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
     }
 }
 
-/// Return the report of pair `i`.
 fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));

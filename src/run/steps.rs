@@ -164,7 +164,6 @@ impl<'a> Steps<'a> {
         row
     }
 
-    /// End a step with this outcome.
     fn end_step(&mut self, done: &mut Done, of_step: &Outcome) {
         done.earlier.extend(of_step.rows.iter().map(|row| self.in_scene(row)));
         self.iterations += of_step.iterations;
@@ -227,7 +226,6 @@ impl<'a> Steps<'a> {
     }
 }
 
-/// Return the laws of the pairs.
 fn laws(model: &Model) -> Vec<Rc<dyn LayerLaw>> {
     model.pairs.iter().map(|pair| pair.law.clone()).collect()
 }

@@ -178,7 +178,6 @@ fn is_trusted(tree: &Node, keys: &Keys) -> Result<bool> {
     entry.node.boolean()
 }
 
-/// A number for a script of Gmsh.
 struct NamedNumber {
     place: Place,
     name: String,
@@ -313,7 +312,6 @@ fn of_spec(spec: &DataSpec) -> Json {
     .into()
 }
 
-/// Return a number that is not 0.
 fn unit(node: &Node) -> Result<f64> {
     match node.number()? {
         0.0 => Err(node.refuse("the unit is 0").label("all heights would be 0")),

@@ -151,7 +151,6 @@ fn set(tree: &mut Node, source: &Arc<Source>, start: usize) -> Result<()> {
     Ok(())
 }
 
-/// One key of a dotted path.
 struct Step<'a> {
     /// The key: a name, or the number of an item.
     name: &'a str,

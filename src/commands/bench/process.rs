@@ -109,7 +109,6 @@ impl Runner {
         Ok(runs)
     }
 
-    /// Run a case once.
     fn run(&self, case: &Case) -> Result<Run> {
         let folder = self.folder(case);
         let mut command = match case.ranks {
@@ -223,7 +222,6 @@ pub(super) fn folder_of(runs: &Path, key: &[String]) -> PathBuf {
     runs.join(format!("{start}-{:.12}", digest(&name)))
 }
 
-/// A process that has ended.
 struct Ended {
     /// Resources that it used; `None` if it could not be started or waited for.
     used: Option<ResUse>,

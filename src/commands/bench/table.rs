@@ -267,7 +267,6 @@ impl Row {
         self.values.get(name).map_or("", String::as_str)
     }
 
-    /// Return the number of a column.
     fn number(&self, name: &str) -> Option<f64> {
         self.text(name).parse().ok()
     }
@@ -318,7 +317,6 @@ fn is_good(status: &str) -> bool {
     matches!(status, "converged" | "roundoff-limited" | LINEAR)
 }
 
-/// The runs of a case.
 struct Runs<'a> {
     all: &'a [Run],
     /// The first that failed, else the first.
@@ -451,7 +449,6 @@ pub(super) fn plots(rows: &[Row], plan: &Plan) -> Vec<(String, Plot)> {
     plots
 }
 
-/// The rows of one scene.
 struct Chart<'a> {
     rows: &'a [&'a Row],
     plan: &'a Plan,
