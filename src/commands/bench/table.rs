@@ -393,8 +393,11 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     }
 }
 
+/// A function that returns a number as a text.
+type Format = fn(f64) -> String;
+
 /// Columns with a number: heading, name in the rows, format.
-const SHOWN: [(&str, &str, fn(f64) -> String); 8] = [
+const SHOWN: [(&str, &str, Format); 8] = [
     ("dofs", "dofs", |value| format!("{value:.0}")),
     ("iterations", "iterations", |value| format!("{value:.0}")),
     ("sweeps", "sweeps", |value| format!("{value:.0}")),
