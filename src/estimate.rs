@@ -54,9 +54,16 @@ pub struct Estimate {
     pub displacement: f64,
 }
 
+impl Estimate {
+    /// Return the squared energy error of all bodies and layers.
+    pub fn squared_energy(&self) -> f64 {
+        self.bodies.iter().chain(&self.layers).sum()
+    }
+}
+
 /// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
 /// factor is usual for errors extrapolated from three meshes (Roache 1994).
-const SAFETY: f64 = 1.25;
+pub const SAFETY: f64 = 1.25;
 
 /// Relative error of the response in the solve for the nodal errors. The error of conjugate gradients is orthogonal to their iterate, so the energy norm is
 /// wrong by half of the square of this. Pressures changed by at most 0.3 % from those with a tolerance of 0.01.
