@@ -1,13 +1,13 @@
 //! The command line: arguments -> request -> command -> exit code.
-
-mod ranks;
+//!
+//! Ranks that were started with different command lines are refused, since they would wait for each other without end.
 
 use crate::commands::{bench, check, mesh, new, solve, sweep};
-use crate::error::{Error, Kind, Result};
-use crate::exchange::broadcast;
+use crate::error::{Error, Kind, Result, few};
+use crate::exchange::{all_gather, broadcast};
 use crate::interrupt::Interrupt;
 use crate::output::{make_folder, say};
-use crate::parallel::{Ranks, collectively};
+use crate::parallel::{Ranks, collectively, differences};
 use crate::petsc::Session;
 use crate::report;
 use crate::solver::options;
@@ -15,6 +15,7 @@ use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -187,7 +188,7 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Err(error) => return complain(&error),
     };
     let is_first = session.as_ref().is_none_or(|session| session.rank() == 0);
-    let are_alike = session.as_ref().map_or(Ok(()), |session| ranks::refuse_other_words(session, &words));
+    let are_alike = session.as_ref().map_or(Ok(()), |session| refuse_other_words(session, &words));
     let (cli, petsc) = match are_alike.map_err(Refusal::Ours).and_then(|()| parse(words)) {
         Ok(parsed) => parsed,
         Err(refusal) => return if is_first { refusal.print() } else { refusal.exit_code() },
@@ -208,9 +209,6 @@ pub fn run(words: Vec<OsString>) -> i32 {
 }
 
 /// Parse the words of a command line into a command and the options of PETSc.
-///
-/// # Errors
-/// Refusals of the command line, among them the text of help and the version.
 fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusal> {
     let refuse = |message: String, help: String| Err(Refusal::Ours(Error::new(Kind::Usage, message).help(help)));
     let mut words = words.into_iter();
@@ -346,4 +344,65 @@ fn complain(error: &Error) -> i32 {
         eprintln!("`winkler --help` shows the command line");
     }
     error.kind().exit_code()
+}
+
+/// Variables with options of PETSc, which uses those of the first rank on all ranks.
+const VARIABLES: [&str; 2] = ["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"];
+
+/// Refuse ranks that differ in the version of the program, in the words of the command line after the program's name, or in the options of PETSc
+/// in the environment. Collective.
+fn refuse_other_words(session: &Session, words: &[OsString]) -> Result<()> {
+    let words = words.iter().skip(1).map(shown).collect::<Vec<_>>().join(" ");
+    let mut facts =
+        BTreeMap::from([(PROGRAM.to_owned(), env!("CARGO_PKG_VERSION").to_owned()), (WORDS.to_owned(), words)]);
+    let variables = VARIABLES.map(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()));
+    let first = broadcast(&Ranks::new(session), || Ok(variables.clone()))?;
+    for ((name, own), first) in VARIABLES.iter().zip(variables).zip(first) {
+        // a launcher need not pass variables on to other machines: a rank without a variable has that of the first rank
+        facts.extend(own.or(first).map(|value| ((*name).to_owned(), value)));
+    }
+    let different: BTreeSet<String> = differences(session, &facts).into_iter().map(|found| found.what).collect();
+    let Some(what) = [PROGRAM, WORDS].into_iter().chain(VARIABLES).find(|what| different.contains(*what)) else {
+        return Ok(());
+    };
+    let values = all_gather(&Ranks::new(session), facts.remove(what).unwrap_or_default());
+    let kind = if VARIABLES.contains(&what) { Kind::Solver } else { Kind::Usage };
+    let mut error = Error::new(kind, format!("the ranks were started with different {}", plural(what)));
+    for text in few(groups(&values)) {
+        error = error.because(text);
+    }
+    Err(error.help("start all ranks alike: mpiexec -n 2 winkler solve SCENE").common())
+}
+
+const PROGRAM: &str = "version";
+const WORDS: &str = "command line";
+
+fn plural(what: &str) -> String {
+    if VARIABLES.contains(&what) { format!("values of {what}") } else { format!("{what}s") }
+}
+
+/// Return a line for each different value with the ranks that have it, in the order of the first such rank.
+fn groups(values: &[String]) -> Vec<String> {
+    let mut groups: Vec<(&String, Vec<usize>)> = Vec::new();
+    for (rank, value) in values.iter().enumerate() {
+        match groups.iter_mut().find(|(known, _)| *known == value) {
+            Some((_, ranks)) => ranks.push(rank),
+            None => groups.push((value, vec![rank])),
+        }
+    }
+    let line = |(value, ranks): (&String, Vec<usize>)| {
+        let word = if ranks.len() == 1 { "rank" } else { "ranks" };
+        format!("{word} {}: {}", few(ranks).join(", "), if value.is_empty() { "nothing" } else { value })
+    };
+    groups.into_iter().map(line).collect()
+}
+
+/// Return a word as it could be typed.
+fn shown(word: &OsString) -> String {
+    match word.to_str() {
+        Some(text) if !text.is_empty() && !text.contains(|c: char| c.is_whitespace() || "\"'\\".contains(c)) => {
+            text.to_owned()
+        }
+        _ => format!("{word:?}"),
+    }
 }

@@ -1,10 +1,6 @@
-//! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own.
+//! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own. The sizes of
+//! the mesh that an adaptation ended with are saved: the next run begins with them, and `winkler mesh --adapted` makes the mesh of them.
 
-mod sized;
-#[cfg(test)]
-mod tests;
-
-use super::adapted;
 use super::checkpoint::{Checkpoint, Head, settings_digest};
 use super::transfer::{self, EstimatedSolution};
 use crate::ddm::{Start, Status};
@@ -14,6 +10,7 @@ use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
 use crate::exchange::broadcast;
 use crate::interrupt::Interrupt;
+use crate::mesh;
 use crate::output::{ContactTable, RoundReport};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -21,8 +18,7 @@ use crate::problem::history::History;
 use crate::problem::{MeshSource, MethodName, method};
 use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Scene};
-use crate::solver::options;
-use sized::{follow, sized, view};
+use serde_json::Value;
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -46,7 +42,6 @@ const MOST_WORSE: usize = 2;
 
 /// The state of a run on several meshes. A round is one mesh, with the solution on it.
 pub struct Plan {
-    /// The scene of this round.
     pub scene: Rc<Scene>,
     /// Reports of the rounds so far.
     pub rounds: Vec<RoundReport>,
@@ -60,7 +55,7 @@ pub struct Plan {
     resumed: Option<Checkpoint>,
     /// The scene as it was requested.
     requested: Rc<Scene>,
-    /// The key under which sizes are kept for later runs: see [`adapted::purpose`].
+    /// The key under which sizes are kept for later runs: see [`purpose`].
     purpose: String,
     /// The solution that the next round starts from; empty without one.
     start_from: Vec<ContactTable>,
@@ -90,7 +85,6 @@ struct Best {
     view: Option<Arc<str>>,
     /// The sizes that its errors lead to.
     next: Sizes,
-    /// The solution on it.
     tables: Vec<ContactTable>,
     /// Number of meshes since then, all worse.
     worse: usize,
@@ -131,7 +125,7 @@ impl Plan {
     /// Return the plan of a scene that has made no mesh yet, or none since the checkpoint.
     fn of(scene: Rc<Scene>, resumed: Option<Checkpoint>) -> Self {
         Self {
-            purpose: adapted::purpose(&scene),
+            purpose: purpose(&scene),
             goal: scene.adapt.clone(),
             requested: scene.clone(),
             scene,
@@ -165,7 +159,7 @@ impl Plan {
     /// Begin an adaptation with the mesh that an earlier adaptation ended with, or with a coarse one.
     fn begin_coarse(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
         // the cache of another rank may have other sizes
-        let mut view = broadcast(&Ranks::new(session), || Ok(adapted::recall(&self.purpose, true)))?;
+        let mut view = broadcast(&Ranks::new(session), || Ok(recall(&self.purpose, true)))?;
         if view.is_none() {
             let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
             view = sized(session, &self.scene, coarse, interrupt, clock)?;
@@ -207,13 +201,12 @@ impl Plan {
     }
 
     /// End the adaptation on the mesh of this round. Return whether another round makes all load steps on it.
-    fn end_meshes(&mut self, session: &Session) -> Result<bool> {
-        let Some(steps) = self.later_steps.take() else { return Ok(false) };
+    fn end_meshes(&mut self) -> bool {
+        let Some(steps) = self.later_steps.take() else { return false };
         // the first step has another load than the largest one, so that it finds its own start
         self.start_from.clear();
         Rc::make_mut(&mut self.scene).method.steps = steps;
-        options::withdraw(session)?;
-        Ok(true)
+        true
     }
 
     /// Refuse a mesh that is a file, since it cannot follow sizes.
@@ -234,27 +227,25 @@ impl Plan {
     pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
         loop {
             match run::build(session, self.scene.clone(), interrupt, clock) {
-                Err(error) if error.kind() == Kind::Mesh && self.best.is_some() => self.coarsen(session, &error)?,
+                Err(error) if error.kind() == Kind::Mesh && self.best.is_some() => self.coarsen(&error),
                 built => return built,
             }
         }
     }
 
     /// Follow coarser sizes, or the best mesh once more, after sizes that gave no mesh.
-    fn coarsen(&mut self, session: &Session, error: &Error) -> Result<()> {
-        let Some(best) = &mut self.best else { return Ok(()) };
+    fn coarsen(&mut self, error: &Error) {
+        let Some(best) = &mut self.best else { return };
         best.next.refine(1.0 / GROWTH);
         if best.next.cells > self.rounds[best.round - 1].cells as f64 {
-            return self.go_from_best(session).map(drop);
+            self.go_from_best();
+            return;
         }
         self.limit = Some(format!("no mesh comes of the sizes after mesh {}: {}", best.round, error.message()));
-        self.end_with_best(session, f64::INFINITY).map(drop)
+        self.end_with_best(f64::INFINITY);
     }
 
     /// Return where this round begins: where a checkpoint or an earlier round ended.
-    ///
-    /// # Errors
-    /// The checkpoint is of another mesh.
     pub fn begin(&mut self, built: &Built) -> Result<Begin> {
         match self.resumed.take() {
             Some(checkpoint) => checkpoint.resume(built),
@@ -284,19 +275,10 @@ impl Plan {
         })
     }
 
-    /// Make the plan of the next round. Return whether there is one. Collective.
-    ///
-    /// # Errors
-    /// Failures of PETSc.
-    pub fn advance(
-        &mut self,
-        session: &Session,
-        done: &Done,
-        estimate: Option<&Estimate>,
-        clock: &mut Clock,
-    ) -> Result<bool> {
+    /// Make the plan of the next round. Return whether there is one.
+    pub fn advance(&mut self, done: &Done, estimate: Option<&Estimate>, clock: &mut Clock) -> bool {
         if matches!(done.outcome.status, Status::Paused { .. }) || self.is_stepping() {
-            return Ok(false);
+            return false;
         }
         let is_solved = done.outcome.status.is_solved();
         let (discrete, model) = (&done.built.discrete, done.model());
@@ -305,28 +287,27 @@ impl Plan {
                 self.start_from = contact_tables(done);
             }
             self.scene = finer;
-            options::withdraw(session)?;
-            return Ok(true);
+            return true;
         }
         let (Some(goal), Some(estimate), Some(meshes)) = (self.goal.clone(), estimate, &discrete.meshes) else {
-            return Ok(false);
+            return false;
         };
         self.record(done, estimate, clock);
         if !is_solved || self.repeats_best {
-            return Ok(false);
+            return false;
         }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
         if error <= goal.error.value {
-            return self.end_meshes(session);
+            return self.end_meshes();
         }
         if self.rounds.len() >= goal.rounds {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
-            return self.end_with_best(session, error);
+            return self.end_with_best(error);
         }
         // coarse meshes may miss a singularity of the pressure: on the first mesh that resolves it the estimated error of pressures grows,
         // while that in energy falls
         if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
-            return self.follow_best(session);
+            return self.follow_best();
         }
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
@@ -337,38 +318,36 @@ impl Plan {
         let next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: GROWTH, most });
         if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {
             self.limit = Some(format!("a mesh has {cells} cells: allow more (adapt.cells)"));
-            return self.end_with_best(session, error);
+            return self.end_with_best(error);
         }
         let (round, view, tables) = (self.rounds.len(), self.sizes(), contact_tables(done));
         self.best = Some(Best { error, energy: estimate.energy, round, view, next, tables, worse: 0 });
-        self.go_from_best(session)
+        self.go_from_best()
     }
 
     /// After a mesh that is worse than the best one, let another mesh with more cells follow the best one, or end the run.
-    fn follow_best(&mut self, session: &Session) -> Result<bool> {
-        let Some(best) = &mut self.best else { return Ok(false) };
+    fn follow_best(&mut self) -> bool {
+        let Some(best) = &mut self.best else { return false };
         best.worse += 1;
         if best.worse == MOST_WORSE {
             let Best { round, error, .. } = best;
             self.limit =
                 Some(format!("mesh {round} has an error of {error:.1e}, and {MOST_WORSE} more meshes are no better"));
-            return self.end_with_best(session, f64::INFINITY);
+            return self.end_with_best(f64::INFINITY);
         }
         best.next.refine(GROWTH);
-        self.go_from_best(session)
+        self.go_from_best()
     }
 
     /// Let the next mesh follow the sizes that the errors of the best one lead to, and start from the solution on the best one.
-    fn go_from_best(&mut self, session: &Session) -> Result<bool> {
-        let Some(best) = &self.best else { return Ok(false) };
+    fn go_from_best(&mut self) -> bool {
+        let Some(best) = &self.best else { return false };
         self.start_from = best.tables.clone();
         self.predicted_cells = Some(best.next.cells);
         follow(Rc::make_mut(&mut self.scene), Some(view(&best.next)));
-        options::withdraw(session)?;
-        Ok(true)
+        true
     }
 
-    /// Add the report of this round.
     fn record(&mut self, done: &Done, estimate: &Estimate, clock: &mut Clock) {
         let (discrete, total) = (&done.built.discrete, clock.total());
         self.rounds.push(RoundReport {
@@ -384,25 +363,22 @@ impl Plan {
     }
 
     /// End the run with the best mesh. Return whether there is one more round on it: not if this round, with this `error`, is no worse.
-    fn end_with_best(&mut self, session: &Session, error: f64) -> Result<bool> {
-        let Some(best) = self.best.take().filter(|best| best.error < error) else { return self.end_meshes(session) };
+    fn end_with_best(&mut self, error: f64) -> bool {
+        let Some(best) = self.best.take().filter(|best| best.error < error) else { return self.end_meshes() };
         self.repeats_best = true;
         self.start_from = best.tables;
         follow(Rc::make_mut(&mut self.scene), best.view.as_deref().map(str::to_owned));
         if self.later_steps.is_some() {
-            return self.end_meshes(session);
+            return self.end_meshes();
         }
-        options::withdraw(session)?;
-        Ok(true)
+        true
     }
 
-    /// Save the sizes of the mesh with which the run has ended, on the rank that writes.
-    ///
-    /// # Errors
-    /// The cache of meshes cannot be written.
+    /// Save the sizes of the mesh with which the run has ended, on the rank that writes. The next run begins with them only if the mesh has the
+    /// error that was asked for.
     pub fn save_mesh(&self, done: &Done) -> Result<()> {
         let sizes = self.sizes().filter(|_| self.adapts() && done.outcome.status.is_solved());
-        sizes.map_or(Ok(()), |sizes| adapted::save(&self.purpose, self.limit.is_none(), &sizes))
+        sizes.map_or(Ok(()), |sizes| mesh::keep_final(&key(&self.purpose, self.limit.is_none()), &sizes))
     }
 
     /// Return the view of the sizes that the mesh of this round follows.
@@ -427,4 +403,75 @@ impl Plan {
 /// Return the solution on the contact surfaces, one table for each pair.
 fn contact_tables(done: &Done) -> Vec<ContactTable> {
     (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
+}
+
+/// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
+fn sized(
+    session: &Session,
+    scene: &Scene,
+    sizing: fn(&dyn Meshes, usize) -> Sizes,
+    interrupt: &Interrupt,
+    clock: &mut Clock,
+) -> Result<Option<String>> {
+    let built = run::build(session, scene.clone(), interrupt, clock)?;
+    let bodies = built.discrete.bodies.len();
+    Ok(built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies))))
+}
+
+fn view(sizes: &Sizes) -> String {
+    mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
+}
+
+/// Let the mesh of a scene follow a view of sizes.
+fn follow(scene: &mut Scene, view: Option<String>) {
+    if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
+        *sizes = view.map(Into::into);
+    }
+}
+
+/// Return the settings that an adapted mesh depends on, as a text: the key under which its sizes are saved.
+///
+/// Load steps are among them, since they choose the load under which meshes are adapted.
+pub fn purpose(scene: &Scene) -> String {
+    let mut settings = scene.settings();
+    let steps = settings["method"]["steps"].take();
+    ["output", "solver", "estimate"].iter().for_each(|key| settings[*key] = Value::Null);
+    settings["method"] = steps;
+    settings.to_string()
+}
+
+/// Return the saved sizes of the mesh of an earlier run: one with the error that was asked for, or (not `is_reached`) of the best mesh of a run that did not reach it.
+pub fn recall(purpose: &str, is_reached: bool) -> Option<String> {
+    mesh::recall_final(&key(purpose, is_reached))
+}
+
+fn key(purpose: &str, is_reached: bool) -> String {
+    if is_reached { purpose.to_owned() } else { format!("best of {purpose}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::load;
+    use std::path::Path;
+
+    /// Return the plan of a scene that is adapted, without load steps.
+    fn plan() -> Plan {
+        let scene =
+            load(Path::new("meshes/groove-held/scene.toml"), &["adapt.error=1e-3".to_owned()]).expect("a scene");
+        Plan::of(Rc::new(scene), None)
+    }
+
+    /// A run that was interrupted on its best mesh once more ends there after a restart, with its reason. On any other mesh it goes on with the adaptation.
+    #[test]
+    fn a_restart_on_the_best_mesh_ends_there() {
+        for repeats_best in [true, false] {
+            let mut interrupted = plan();
+            (interrupted.repeats_best, interrupted.limit) = (repeats_best, repeats_best.then(|| "no mesh".to_owned()));
+            let head = interrupted.head().expect("a head");
+            let mut restarted = plan();
+            restarted.resume(&head);
+            assert_eq!((restarted.repeats_best, restarted.limit), (repeats_best, interrupted.limit));
+        }
+    }
 }

@@ -52,21 +52,16 @@ pub struct Head {
 
 /// A checkpoint that was read.
 pub struct Checkpoint {
-    /// The file.
     path: PathBuf,
     /// The part that is JSON.
     pub head: Head,
     /// Rows of the history of earlier load steps.
     earlier: Vec<Row>,
-    /// The state of the iteration.
     state: State,
 }
 
 impl Checkpoint {
     /// Write the state of a paused run into a folder. Collective; the rank with `writes` writes the file.
-    ///
-    /// # Errors
-    /// The file cannot be written, on the rank that writes it.
     pub fn write(folder: &Path, head: Head, done: &Done, writes: bool) -> Result<()> {
         let (model, Done { built, outcome, steps, earlier, .. }) = (done.model(), done);
         let states = gather(model, &outcome.iterate);
@@ -112,9 +107,6 @@ impl Checkpoint {
     }
 
     /// Return the state from which a problem goes on, restricted to the bodies of this rank.
-    ///
-    /// # Errors
-    /// The problem has another mesh.
     pub fn resume(self, built: &Built) -> Result<Begin> {
         // only the first rank has read the mesh
         if built.mesh.is_some() && self.head.mesh != mesh_digest(built) {

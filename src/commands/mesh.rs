@@ -1,6 +1,6 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use super::{adapted, flags};
+use super::{adapt, flags};
 use crate::discretize::{Verified, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
@@ -8,8 +8,8 @@ use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::linalg::bounds;
 use crate::mesh::{Group, Loaded, Mesh, Origin};
-use crate::output::progress::Line;
 use crate::output::report::readable;
+use crate::output::terminal::Line;
 use crate::output::{CellKind, Encoding, Grid, say, write_whole};
 use crate::problem::{MeshSource, Order};
 use crate::run::{in_parts, made_straight};
@@ -65,11 +65,8 @@ pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
 }
 
 /// Let the mesh of a scene follow the sizes with which the last run that adapted it ended. Return whether that run reached its error.
-///
-/// # Errors
-/// A scene that is not adapted, or has not been.
 fn follow_adapted(scene: &mut Scene) -> Result<bool> {
-    let purpose = adapted::purpose(scene);
+    let purpose = adapt::purpose(scene);
     let (MeshSource::Geo { file, sizes, .. }, Some(adapt)) = (&mut scene.mesh, &scene.adapt) else {
         let error = Error::new(Kind::Usage, format!("{} adapts no mesh", scene.path.display()));
         return Err(
@@ -77,7 +74,7 @@ fn follow_adapted(scene: &mut Scene) -> Result<bool> {
         );
     };
     for is_reached in [true, false] {
-        if let Some(view) = adapted::recall(&purpose, is_reached) {
+        if let Some(view) = adapt::recall(&purpose, is_reached) {
             *sizes = Some(view.into());
             return Ok(is_reached);
         }
@@ -144,9 +141,6 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
 }
 
 /// Return what is printed about each body.
-///
-/// # Errors
-/// A body without cells.
 fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<Value>> {
     let mesh = &verified.mesh;
     let mut checked = verified.checked.iter();
@@ -170,7 +164,6 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<Value>> {
     Ok(bodies)
 }
 
-/// Return what is printed about a group.
 fn group_facts<const D: usize>(mesh: &Mesh<D>, group: &Group) -> Value {
     let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
     let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());

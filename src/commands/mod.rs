@@ -1,26 +1,20 @@
 //! The commands, one file each: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`], [`new`](mod@new). This file has what
 //! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
-pub mod adapt;
-mod adapted;
-pub mod bench;
-mod cases;
-pub mod check;
+mod adapt;
+pub(crate) mod bench;
+pub(crate) mod check;
 pub mod checkpoint;
-pub mod mesh;
-pub mod new;
-mod plots;
-mod series;
-pub mod solve;
-pub mod surfaces;
-pub mod sweep;
-pub mod transfer;
-mod watcher;
-pub mod write;
+pub(crate) mod mesh;
+pub(crate) mod new;
+pub(crate) mod solve;
+pub(crate) mod sweep;
+mod transfer;
+mod write;
 
 use crate::error::Result;
 use crate::output::LISTED;
-use crate::output::progress::Line;
+use crate::output::terminal::Line;
 use crate::petsc::Session;
 use crate::problem::MethodName;
 use crate::run::report::{Shared, solvers_in_words};
@@ -68,11 +62,39 @@ impl Terminal {
     }
 
     /// Return the lines of `--verbose` to be printed on this rank: what was decided and why, and the PETSc options of each body. Collective.
-    ///
-    /// # Errors
-    /// When PETSc is out of memory.
     fn decisions(&self, session: &Session, ready: &Prepared) -> Result<Vec<String>> {
-        let lines = if self.is_verbose { decisions(session, ready)? } else { Vec::new() };
+        if !self.is_verbose {
+            return Ok(Vec::new());
+        }
+        let built = &ready.built;
+        let (scene, discrete) = (&built.scene, &built.discrete);
+        let solvers = Shared::gather(discrete).solvers;
+        let mut lines = vec![format!("{}: decided", scene.title)];
+        let name = scene.method.name.name();
+        let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
+        let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
+        lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));
+        lines.push(format!("  inner solver: {} ({})", solvers_in_words(&solvers), built.choice));
+        lines.push(format!("  {} ranks, {}", session.size(), session.blas_name()));
+        for (body, solver) in discrete.bodies.iter().zip(&solvers).take(LISTED) {
+            lines.push(format!("  body {}: {} dofs on rank {}: {solver}", body.name, body.dofs, body.rank));
+        }
+        for pair in discrete.model.pairs.iter().take(LISTED) {
+            let [carrier, other] = &pair.surfaces;
+            lines.push(format!(
+                "  {carrier} - {other}: {} points on `{carrier}`, whose mesh is finer or alike",
+                pair.len()
+            ));
+        }
+        for chosen in built.options.iter().take(LISTED) {
+            // PETSc's table has the options of a solver only while they are lent to it
+            let all = chosen.lend(session, || session.options().all())?;
+            let prefix = format!("-{}_", chosen.prefix());
+            let own = all.into_iter().filter(|(name, _)| name.starts_with(&prefix));
+            let own: Vec<String> =
+                own.map(|(name, value)| value.map_or(name.clone(), |value| format!("{name} {value}"))).collect();
+            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
+        }
         Ok(if self.is_first { lines } else { Vec::new() })
     }
 }
@@ -166,36 +188,4 @@ fn line_after(ended: &str, estimate: Option<f64>) -> Option<Line> {
         "discretize" => Some(Line::new("factorisations and start", estimate)),
         _ => None,
     }
-}
-
-/// Do the work of [`Terminal::decisions`].
-fn decisions(session: &Session, ready: &Prepared) -> Result<Vec<String>> {
-    let built = &ready.built;
-    let (scene, discrete) = (&built.scene, &built.discrete);
-    let solvers = Shared::gather(discrete).solvers;
-    let mut lines = vec![format!("{}: decided", scene.title)];
-    let name = scene.method.name.name();
-    let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
-    let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
-    lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));
-    lines.push(format!("  inner solver: {} ({})", solvers_in_words(&solvers), built.choice));
-    lines.push(format!("  {} ranks, {}", session.size(), session.blas_name()));
-    for (body, solver) in discrete.bodies.iter().zip(&solvers).take(LISTED) {
-        lines.push(format!("  body {}: {} dofs on rank {}: {solver}", body.name, body.dofs, body.rank));
-    }
-    for pair in discrete.model.pairs.iter().take(LISTED) {
-        let [carrier, other] = &pair.surfaces;
-        lines
-            .push(format!("  {carrier} - {other}: {} points on `{carrier}`, whose mesh is finer or alike", pair.len()));
-    }
-    for chosen in built.options.iter().take(LISTED) {
-        // PETSc's table has the options of a solver only while they are lent to it
-        let all = chosen.lend(session, || session.options().all())?;
-        let prefix = format!("-{}_", chosen.prefix());
-        let own = all.into_iter().filter(|(name, _)| name.starts_with(&prefix));
-        let own: Vec<String> =
-            own.map(|(name, value)| value.map_or(name.clone(), |value| format!("{name} {value}"))).collect();
-        lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
-    }
-    Ok(lines)
 }

@@ -2,18 +2,19 @@
 
 use super::adapt::Plan;
 use super::checkpoint::{self, Checkpoint};
-use super::watcher::{Tables, Watcher};
-use super::write::{ResultFiles, to_json};
+use super::write::{ResultFiles, to_json, write_fields};
 use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
+use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::interrupt::Interrupt;
-use crate::output::progress::Line;
-use crate::output::{Checksums, Folder, IterationTable, Report, say, warning_lines};
+use crate::output::terminal::Line;
+use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
-use crate::run::{self, Clock, Done, Prepared, Requests, report};
+use crate::run::recorder::{is_snapshot, signal};
+use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results};
 use std::path::{Path, PathBuf};
 
 /// The command line of `winkler solve`.
@@ -44,7 +45,6 @@ pub struct Request {
 }
 
 impl Request {
-    /// Return all overrides of the scene.
     fn overrides(&self) -> Vec<String> {
         let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
         let checkpoint = self.checkpoint.iter().map(|minutes| format!("--checkpoint {minutes}"));
@@ -64,48 +64,58 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
     let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
-    let mut plan = Plan::new(session, scene, checkpoint, interrupt, &mut clock)?;
-    // only one rank measures the time between checkpoints
-    let asking = Requests::new(interrupt, plan.scene.output.checkpoint.filter(|_| terminal.is_first));
+    let plan = Plan::new(session, scene, checkpoint, interrupt, &mut clock)?;
     let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
     let mut solver = Solver {
         session,
         interrupt,
-        asking: &asking,
-        folder: &folder,
+        // only one rank measures the time between checkpoints
+        requests: Requests::new(interrupt, plan.scene.output.checkpoint.filter(|_| terminal.is_first)),
+        folder,
         terminal,
         clock,
+        plan,
+        table: IterationTable::new(false, "", None),
+        tables: Tables::default(),
         has_checkpoint,
         has_tables: false,
         unwritten: Vec::new(),
+        unwritten_before: Vec::new(),
     };
     let last = loop {
-        let round = solver.solve(&mut plan)?;
-        if !plan.advance(session, &round.done, round.estimate.as_ref(), &mut solver.clock)? {
+        let round = solver.solve()?;
+        if !solver.plan.advance(&round.done, round.estimate.as_ref(), &mut solver.clock) {
             break round;
         }
-        if plan.adapts() {
-            solver.write_round(&plan, round);
+        if solver.plan.adapts() {
+            solver.write_round(round);
         }
     };
-    solver.finish(&plan, last)
+    solver.finish(last)
 }
 
-/// The state of the command over its rounds, one for each mesh.
+/// The state of the command over its rounds, one for each mesh. It is the observer of each round: it writes iterations and load steps to the
+/// terminal and to tables, passes requests of the user on, and writes checkpoints and snapshots.
 struct Solver<'s> {
     session: &'s Session,
     interrupt: &'s Interrupt,
-    asking: &'s Requests,
-    folder: &'s Folder,
+    requests: Requests,
+    folder: Folder,
     terminal: Terminal,
     clock: Clock,
+    plan: Plan,
+    /// The table of iterations on the terminal.
+    table: IterationTable,
+    tables: Tables,
     /// Whether the folder has a checkpoint of this run.
     has_checkpoint: bool,
     /// Whether the folder has the tables of this run.
     has_tables: bool,
-    /// Messages about files of earlier meshes that could not be written.
+    /// Messages about files of this mesh that could not be written.
     unwritten: Vec<String>,
+    /// Those about files of earlier meshes.
+    unwritten_before: Vec<String>,
 }
 
 /// A round that has ended: the solution on one mesh.
@@ -118,92 +128,80 @@ struct Round {
 
 impl Solver<'_> {
     /// Solve on the next mesh of the plan, and estimate the error.
-    fn solve(&mut self, plan: &mut Plan) -> Result<Round> {
-        let Self { session, interrupt, folder, .. } = *self;
-        let built = plan.build(session, interrupt, &mut self.clock)?;
-        let begin = collectively(session, plan.begin(&built))?;
+    fn solve(&mut self) -> Result<Round> {
+        let Self { session, interrupt, .. } = *self;
+        let built = self.plan.build(session, interrupt, &mut self.clock)?;
+        let begin = collectively(session, self.plan.begin(&built))?;
         let ready = run::set_up(session, built, begin, &mut self.clock)?;
         let all = session.options().all()?;
         let is_monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         self.terminal.decisions(session, &ready)?.iter().for_each(|line| eprintln!("{line}"));
-        let tables = self.open_tables(&ready)?;
-        let stop = &plan.scene.method.stop;
-        let mut watcher = Watcher {
-            table: IterationTable::new(
-                self.terminal.is_loud() && !is_monitored,
-                &run::targets(&plan.scene),
-                stop.residual,
-            ),
-            tables,
-            folder,
-            asking: self.asking,
-            session,
-            plan,
-            clock: self.clock.clone(),
-            has_checkpoint: self.has_checkpoint,
-            unwritten: Vec::new(),
-        };
+        self.open_tables(&ready)?;
+        let scene = &self.plan.scene;
+        let is_shown = self.terminal.is_loud() && !is_monitored;
+        self.table = IterationTable::new(is_shown, &run::targets(scene), scene.method.stop.residual);
         let stage = session.stage("iterate");
-        let mut done = run::iterate(ready, interrupt, &mut watcher, &mut self.clock)?;
+        let mut clock = self.clock.clone();
+        let mut done = run::iterate(ready, interrupt, self, &mut clock)?;
+        self.clock = clock;
         drop(stage);
-        done.warnings.append(&mut watcher.unwritten);
-        done.warnings.extend(self.unwritten.drain(..).map(|what| format!("of an earlier mesh: {what}")));
-        self.has_checkpoint = watcher.has_checkpoint;
+        done.warnings.append(&mut self.unwritten);
+        done.warnings.extend(self.unwritten_before.drain(..).map(|what| format!("of an earlier mesh: {what}")));
         let stage = session.stage("estimate");
         let mut estimate = run::estimate(&mut done, &mut self.clock)?;
         drop(stage);
-        watcher.table.finish();
-        let tables = watcher.tables.finish();
-        estimate.iter_mut().for_each(|estimate| plan.correct(&done, estimate));
+        self.table.finish();
+        let tables = std::mem::take(&mut self.tables).finish();
+        estimate.iter_mut().for_each(|estimate| self.plan.correct(&done, estimate));
         Ok(Round { done, estimate, tables })
     }
 
     /// Open the tables of a round. If those of a later mesh cannot be written, the run goes on without them, since its results are worth more.
-    fn open_tables(&mut self, ready: &Prepared) -> Result<Tables> {
+    fn open_tables(&mut self, ready: &Prepared) -> Result<()> {
         if !self.terminal.is_first {
-            return Ok(Tables::default());
+            return Ok(());
         }
         // nothing can be refused any more: from here on the folder has this run alone
         if !self.has_tables {
-            prepare_folder(self.folder, self.has_checkpoint)?;
+            prepare_folder(&self.folder, self.has_checkpoint)?;
         }
         let is_later = std::mem::replace(&mut self.has_tables, true);
-        match Tables::open(self.folder, ready) {
-            Err(error) if is_later => {
-                self.unwritten.push(error.message().to_owned());
-                Ok(Tables::default())
-            }
-            opened => opened,
+        match Tables::open(&self.folder, ready) {
+            Err(error) if is_later => self.unwritten_before.push(error.message().to_owned()),
+            opened => self.tables = opened?,
         }
+        Ok(())
     }
 
     /// Write the results of a mesh that is not the last, so that they exist whatever happens on the next mesh.
-    fn write_round(&mut self, plan: &Plan, Round { done, estimate, tables }: Round) {
-        let (session, path) = (self.session, self.folder.path());
-        let estimate = estimate.as_ref();
-        let files = ResultFiles { session, path, plan, done: &done, estimate, fields: false, is_last: false };
-        let ended = match plan.is_stepping() {
+    fn write_round(&mut self, Round { done, estimate, tables }: Round) {
+        let ended = match self.plan.is_stepping() {
             true => "ended while load steps were at work on the last mesh",
             false => "ended while the next mesh was at work: the error asked for is not reached",
         };
-        let (_, written) = files.write(&mut self.clock, |report| {
+        let mut clock = self.clock.clone();
+        let (_, written) = self.files(&done, estimate.as_ref(), false).write(&mut clock, |report| {
             (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
         });
+        self.clock = clock;
         // the run goes on with what it computed: a disk that is full now may have room at the end
         if let Err(error) = tables.and(written) {
-            self.unwritten.push(error.message().to_owned());
+            self.unwritten_before.push(error.message().to_owned());
         }
     }
 
+    /// Return the results of a round that are to be written.
+    fn files<'a>(&'a self, done: &'a Done, estimate: Option<&'a Estimate>, fields: bool) -> ResultFiles<'a> {
+        let (session, path, plan) = (self.session, self.folder.path(), &self.plan);
+        ResultFiles { session, path, plan, done, estimate, fields, is_last: false }
+    }
+
     /// Write all results of the last mesh, and return the exit code.
-    fn finish(mut self, plan: &Plan, Round { done, estimate, tables }: Round) -> Result<i32> {
-        let Self { session, folder, terminal, .. } = self;
-        let first = terminal.is_first;
-        let path = folder.path();
-        let line = terminal.is_loud().then(|| Line::new("stresses and files", None));
-        let estimate = estimate.as_ref();
-        let files = ResultFiles { session, path, plan, done: &done, estimate, fields: true, is_last: true };
-        let (report, written) = files.write(&mut self.clock, |report| {
+    fn finish(self, Round { done, estimate, tables }: Round) -> Result<i32> {
+        let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
+        let line = self.terminal.is_loud().then(|| Line::new("stresses and files", None));
+        let files = ResultFiles { is_last: true, ..self.files(&done, estimate.as_ref(), true) };
+        let (report, written) = files.write(&mut self.clock.clone(), |report| {
             if let Some(limit) = &plan.limit {
                 report.status = "mesh-limit".to_owned();
                 report.message = format!("the error asked for is not reached: {limit}");
@@ -223,11 +221,20 @@ impl Solver<'_> {
             self.print(&report, &done, code)?;
         }
         tables.and(written)?;
-        collectively(session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
+        collectively(self.session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
         Ok(code)
     }
 
-    /// Print how the run ended.
+    /// Note a failure to write, each message once. The run goes on: a disk that is full now may have room later.
+    fn note_failure(&mut self, what: &str, written: Result<()>) {
+        if let Err(error) = written {
+            let text = format!("{what} was not written: {}", error.message());
+            if !self.unwritten.contains(&text) {
+                self.unwritten.push(text);
+            }
+        }
+    }
+
     fn print(&self, report: &Report, done: &Done, code: i32) -> Result<()> {
         if self.terminal.json {
             return say(to_json(report)?.trim_end());
@@ -277,4 +284,80 @@ fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
 fn write_page(done: &Done, path: &Path, first: bool) -> Result<()> {
     all_gather(&*done.model().exchange, ());
     if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
+}
+
+/// The tables that grow while a round iterates. They are open only on the rank that writes.
+#[derive(Default)]
+struct Tables {
+    /// Rows of the iterations.
+    history: Option<HistoryWriter>,
+    /// Rows of the load steps, if there are any.
+    steps: Option<StepTable>,
+}
+
+impl Tables {
+    /// Open the tables of a round. The table of load steps begins with those of another process.
+    fn open(folder: &Folder, ready: &Prepared) -> Result<Self> {
+        let (built, history) = (&ready.built, &ready.built.scene.method.steps);
+        let bodies: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
+        let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
+        let mut tables = Self { history: Some(rows), steps: None };
+        if !history.is_empty() {
+            let (pairs, reactions) = (results::pair_names(built), results::reaction_names(built));
+            let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
+            let mut steps = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
+            ready.steps.iter().for_each(|step| steps.row(&history.names, step));
+            tables.steps = Some(steps);
+        }
+        Ok(tables)
+    }
+
+    fn finish(self) -> Result<()> {
+        let files = [self.history.map(|history| history.rows), self.steps.map(|steps| steps.rows)];
+        files.into_iter().flatten().map(RowFile::finish).fold(Ok(()), Result::and)
+    }
+}
+
+impl Observer for Solver<'_> {
+    fn row(&mut self, row: &Row) {
+        self.table.row(row);
+        if let Some(history) = &mut self.tables.history {
+            history.row(row);
+            history.rows.complaint().iter().for_each(|text| self.table.warn(text));
+        }
+    }
+
+    fn asked(&self) -> u8 {
+        self.requests.asked()
+    }
+}
+
+impl Recorder for Solver<'_> {
+    fn state(&mut self, done: &Done) {
+        let Status::Paused { asked } = done.outcome.status else { return };
+        let is_due = signal(asked).is_some() || !is_snapshot(asked);
+        let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
+        let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
+        self.has_checkpoint |= written.is_ok();
+        self.note_failure("a checkpoint", written);
+    }
+
+    fn step(&mut self, done: &Done, recovered: &All) {
+        let scene = &done.built.scene;
+        let history = &scene.method.steps;
+        if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
+            table.row(&history.names, step);
+            table.rows.complaint().iter().for_each(|text| self.table.warn(text));
+        }
+        let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
+        if !ends {
+            let written = write_fields(done, recovered, &self.folder, false);
+            self.note_failure("a field of a load step", written);
+        }
+    }
+
+    fn results(&mut self, done: &mut Done) {
+        let (_, written) = self.files(done, None, true).write(&mut self.clock.clone(), |_| {});
+        self.note_failure("a snapshot", written);
+    }
 }

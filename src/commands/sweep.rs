@@ -1,19 +1,17 @@
 //! `winkler sweep`: solve a scene for every combination of values of its keys, one row of a table for each run.
-//! A run takes over what it can from the run before it.
+//! A run takes over what it can from the run before it. Axes and their combinations are also those of `bench`.
 
-use super::cases::{Axis, Choice, combinations, named};
-use super::plots::Plots;
 use super::solve::claim;
-use super::write::to_json;
+use super::write::{Plots, to_json};
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
-use crate::ddm::{Observer, Row, Status};
+use crate::ddm::Status;
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::steps::{contact_column, vector_columns, vector_fields};
-use crate::output::{Folder, LISTED, Report, RowFile, busiest, progress, say, sci};
+use crate::output::tables::{contact_column, vector_columns, vector_fields};
+use crate::output::{Folder, LISTED, Report, RowFile, busiest, say, sci, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::run::{self, Begin, Built, Clock, Done, Prepared, Recorder, Requests, measure, report, results};
+use crate::run::{self, Begin, Built, Clock, Done, Prepared, Requests, report, results};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
@@ -48,7 +46,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     run::refuse_other_scenes(session, &scenes)?;
     let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
-    let bar = progress::runs(cases.len(), terminal.is_loud());
+    let bar = terminal::runs(cases.len(), terminal.is_loud());
     let mut sweep = Sweep {
         session,
         interrupt,
@@ -61,13 +59,13 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         plots: Plots::default(),
         reports: Vec::new(),
     };
-    let mut watcher = Watcher(Requests::new(interrupt, None));
+    let mut requests = Requests::new(interrupt, None);
     let (mut exit, mut before) = (0, None);
     for case in &cases {
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
         let ready = sweep.prepare(&axes, case, before.take(), &mut clock)?;
-        let done = run::iterate(ready, interrupt, &mut watcher, &mut clock)?;
+        let done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
         exit = exit.max(report::exit_code(&done));
@@ -87,7 +85,6 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     Ok(exit)
 }
 
-/// One run of the sweep.
 struct Case {
     /// Values of the keys, in the order of the axes.
     values: Vec<String>,
@@ -109,19 +106,6 @@ impl Case {
     }
 }
 
-/// An observer that passes signals on, and writes no rows.
-struct Watcher(Requests);
-
-impl Observer for Watcher {
-    fn row(&mut self, _row: &Row) {}
-
-    fn asked(&self) -> u8 {
-        self.0.bits()
-    }
-}
-
-impl Recorder for Watcher {}
-
 /// The sweep under way: what it prints and the table that it writes.
 struct Sweep<'a> {
     session: &'a Session,
@@ -141,9 +125,6 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     /// Build the problem of a run, with what the run before has left, and set up its method. Collective.
-    ///
-    /// # Errors
-    /// Refusals of the problem; a run whose row would have other columns than those before; failures of the file system.
     fn prepare(&mut self, axes: &[Axis], case: &Case, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
         let session = self.session;
         let built = run::build_after(session, case.scene.clone(), before, self.interrupt, clock)?;
@@ -201,10 +182,9 @@ impl Sweep<'_> {
     }
 }
 
-/// Return the columns of the table.
 fn header(axes: &[Axis], built: &Built) -> Vec<String> {
-    let (pairs, reactions) = (measure::pair_names(built), measure::reaction_names(built));
-    let (dimension, measure) = (built.scene.dimension.value, measure::of_points(built));
+    let (pairs, reactions) = (results::pair_names(built), results::reaction_names(built));
+    let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
     let mut header: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
     let columns = "status iterations sweeps factorizations dense_factorizations inner_iterations residual increment F1 dofs seconds";
     header.extend(columns.split_whitespace().map(str::to_owned));
@@ -217,7 +197,6 @@ fn header(axes: &[Axis], built: &Built) -> Vec<String> {
     header
 }
 
-/// Return the row of a run.
 fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:?}"));
     let mut line = values.to_vec();
@@ -233,7 +212,7 @@ fn line(values: &[String], report: &Report, dimension: usize) -> Vec<String> {
         line.extend(vector_fields(&pair.force[0], dimension));
         line.push(number(pair.approach));
     }
-    let reactions = measure::reported(&report.bodies);
+    let reactions = results::reported(&report.bodies);
     line.extend(reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, dimension)));
     line
 }
@@ -249,4 +228,114 @@ fn refuse_other_columns(columns: &[String], header: &[String], label: &str) -> R
     )
     .because("all rows of sweep.csv have the same columns")
     .help("sweep over values that leave them as they are; the rows so far are kept"))
+}
+
+/// What varies between runs.
+pub struct Axis {
+    pub name: String,
+    /// Values in the order of the runs.
+    pub choices: Vec<Choice>,
+}
+
+/// A value of an axis, and what it means for a run.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Choice {
+    /// Its text in the table.
+    pub text: String,
+    pub overrides: Vec<String>,
+    pub petsc: Vec<String>,
+}
+
+impl Choice {
+    /// Return a value that overrides keys of the scene.
+    pub fn of_scene(text: impl Into<String>, overrides: Vec<String>) -> Self {
+        Self { text: text.into(), overrides, petsc: Vec::new() }
+    }
+}
+
+impl Axis {
+    /// Return an axis.
+    pub fn new(name: &str, choices: Vec<Choice>) -> Self {
+        Self { name: name.to_owned(), choices }
+    }
+
+    /// Read the axes of `--over KEY=V1,V2,...`.
+    pub fn all_over(typed: &[String]) -> Result<Vec<Self>> {
+        typed.iter().map(|text| Self::over(text)).collect()
+    }
+
+    /// Read `KEY=V1,V2,...`. Commas inside brackets, braces, parentheses or quotes do not separate values.
+    fn over(text: &str) -> Result<Self> {
+        let refuse = || {
+            Error::new(Kind::Usage, format!("`--over {text}` is not KEY=V1,V2,..."))
+                .help("for example --over method.gamma=0.3,0.6,0.9")
+        };
+        let (key, list) = text.split_once('=').ok_or_else(refuse)?;
+        let (key, values) = (key.trim(), split(list));
+        if key.is_empty() || values.iter().any(|value| value.trim().is_empty()) {
+            return Err(refuse());
+        }
+        let choice = |value: &String| Choice::of_scene(value.trim(), vec![format!("{key}={}", value.trim())]);
+        Ok(Self::new(key, values.iter().map(choice).collect()))
+    }
+}
+
+/// Split a list at its commas.
+fn split(list: &str) -> Vec<String> {
+    let mut values = vec![String::new()];
+    let (mut depth, mut quote) = (0, None);
+    for c in list.chars() {
+        match (quote, c) {
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(open), c) if c == open => quote = None,
+            (None, '[' | '{' | '(') => depth += 1,
+            (None, ']' | '}' | ')') => depth -= 1,
+            (None, ',') if depth == 0 => {
+                values.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        if let Some(value) = values.last_mut() {
+            value.push(c);
+        }
+    }
+    values
+}
+
+/// Return all combinations with one choice of each axis; those of the last axis change first.
+pub fn combinations(axes: &[Axis]) -> Vec<Vec<&Choice>> {
+    axes.iter().fold(vec![Vec::new()], |combinations, Axis { choices, .. }| {
+        combinations
+            .iter()
+            .flat_map(|before| choices.iter().map(move |choice| [before.clone(), vec![choice]].concat()))
+            .collect()
+    })
+}
+
+/// Return a value with the last word of its key, or with the whole key where two of the `keys` have the same last word.
+pub fn named(key: &str, value: &str, keys: &[String]) -> String {
+    let last = |key: &str| key.rsplit('.').next().unwrap_or(key).to_owned();
+    let is_ambiguous = keys.iter().filter(|other| last(other) == last(key)).count() > 1;
+    format!("{} = {value}", if is_ambiguous { key.to_owned() } else { last(key) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
+        let texts = |axis: &Axis| axis.choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
+        let a = Axis::over("method.gamma=0.3, 0.6").expect("two numbers");
+        assert_eq!((a.name.as_str(), texts(&a)), ("method.gamma", vec!["0.3".to_owned(), "0.6".to_owned()]));
+        assert_eq!(a.choices[1].overrides, ["method.gamma=0.6"]);
+        let b = Axis::over("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
+        assert_eq!(texts(&b), ["\"max(x, 1)\"", "0"]);
+        assert!(Axis::over("method.gamma").is_err() && Axis::over("method.gamma=1,,2").is_err());
+        let axes = [a, b];
+        let runs = combinations(&axes);
+        assert_eq!(runs.len(), 4);
+        assert_eq!(runs[1].iter().map(|choice| choice.text.as_str()).collect::<Vec<_>>(), ["0.3", "0"]);
+    }
 }

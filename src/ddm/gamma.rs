@@ -4,7 +4,7 @@ use super::robin::{Acceleration, Iterate, Step, best_factor, best_gamma, relaxed
 use crate::error::Result;
 use crate::linalg::dot;
 use crate::model::line::{Line, Unbounded};
-use crate::problem::own::Own;
+use crate::problem::Own;
 use crate::robin::Ritz;
 use std::collections::VecDeque;
 

@@ -11,7 +11,7 @@ use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 use crate::model::origin::Origin;
-use crate::problem::stop::StopRule;
+use crate::problem::method::StopRule;
 use crate::robin::{Sweep, Sweeper};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;

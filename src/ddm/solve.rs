@@ -15,7 +15,7 @@ use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 use crate::model::origin::Origin;
 use crate::model::surface::{meeting_slopes, surface_slopes};
-use crate::problem::stop::StopRule;
+use crate::problem::method::StopRule;
 use crate::robin::spectrum::{Interval, interval};
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
 use std::time::Instant;

@@ -4,7 +4,7 @@
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::expression::Field;
 use crate::fem::element;
-use crate::output::vtu::{CellKind, Grid};
+use crate::output::fields::{CellKind, Grid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};

@@ -1,6 +1,10 @@
 //! Laws of layers p(c), pressure p over compression c: their forms and parameters.
 
-use crate::expression::{Expression, Field};
+use crate::data::{Grid, Summits};
+use crate::error::{Error, Result};
+use crate::expression::{Expression, Field, Scope};
+use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, ValueKind};
+use serde_json::{Value as Json, json};
 use std::sync::Arc;
 
 /// The law of a Winkler layer.
@@ -164,3 +168,164 @@ static CUBIC: LawForm = LawForm {
 
 /// All forms.
 pub static FORMS: [&LawForm; 4] = [&POWER, &LINEAR, &EXPONENTIAL, &CUBIC];
+
+/// Advice for a layer without a law.
+const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
+/// What a table of points is, and the advice for wrong points.
+const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
+
+fn shape() -> TableShape {
+    use ValueKind::{Number, Text};
+    let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
+    FORMS
+        .into_iter()
+        .fold(TableShape::new("the layer"), with_form)
+        .optional("table", Number.list().list(), POINTS)
+        .optional("pressure", Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
+        .optional("asperities", asperities_shape(), "a law of summits: asperities = { modulus = E*, data = \"NAME\" }")
+        .optional("up_to", Number, "compression beyond which the expression goes on linearly")
+        .at_most_one(&laws)
+}
+
+/// Add the key of a law with parameters.
+fn with_form(table: TableShape, form: &'static LawForm) -> TableShape {
+    let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
+    let advice = format!("write {} = {{ {} }}", form.name, values.join(", "));
+    table.optional(form.name, form_shape(form), advice)
+}
+
+/// Return the shape of a law with parameters.
+fn form_shape(form: &'static LawForm) -> TableShape {
+    use ValueKind::Field;
+    let table = TableShape::new(format!("the {} layer", form.name));
+    form.parameters.iter().fold(table, |table, known| table.required(known.key, Field, known.what))
+}
+
+fn asperities_shape() -> TableShape {
+    use ValueKind::{Number, Text};
+    TableShape::new("the layer of asperities")
+        .required("modulus", Number, "E* of both bodies: 1/E* is the sum of (1 - nu^2)/E")
+        .optional("data", Text, "data whose summits these are")
+        .optional("density", Number, "summits per area")
+        .optional("radius", Number, "their radius")
+        .optional("deviation", Number, "standard deviation of their heights")
+        .optional("highest", Number, "height of the highest above the mean; 4 deviations")
+        .not_both(&["data"], &["density", "radius", "deviation", "highest"])
+}
+
+/// Standard deviations from the mean to the highest summit by default; a share of 3e-5 of a normal distribution lies above.
+const HIGHEST: f64 = 4.0;
+
+impl Setting for LayerSpec {
+    fn kind() -> ValueKind {
+        shape().into()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        let keys = Keys::open(node, &shape())?;
+        if let (Some(entry), None) = (keys.entry("up_to"), keys.get("pressure")) {
+            return Err(Error::scene(&entry.key_place, "`up_to` without an expression")
+                .help("it says how far `pressure = \"...\"` goes; other laws need no end"));
+        }
+        if let Some(points) = keys.get("table") {
+            return table(points);
+        }
+        if let Some(summits) = keys.get("asperities") {
+            return asperities(summits, context);
+        }
+        if let Some(law) = keys.get("pressure") {
+            let scope = Scope { variables: &["c", "x", "y", "z"][..=context.dimension], data: &context.data };
+            let law = Expression::parse(law.string()?, &law.place, scope)?;
+            return Ok(LayerSpec::Pressure { law, up_to: keys.read("up_to", Node::number)? });
+        }
+        match FORMS.into_iter().find_map(|form| Some((form, keys.get(form.name)?))) {
+            Some((form, node)) => read_form(form, node, context),
+            None => Err(keys.node.refuse("the layer has no law").help(EXAMPLE)),
+        }
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        match self {
+            Self::Form { form, values } => {
+                let named = form.parameters.iter().zip(values);
+                let values = named.map(|(known, value)| (known.key.to_owned(), value.echo(dimension)));
+                json!({ form.name: values.collect::<Entries>() })
+            }
+            Self::Table(points) => json!({ "table": points }),
+            Self::Own(name) => json!({ "own": name }),
+            Self::Asperities(spec) => json!({ "asperities": spec.echo() }),
+            Self::Pressure { law, up_to: None } => json!({ "pressure": law.text() }),
+            Self::Pressure { law, up_to } => json!({ "pressure": law.text(), "up_to": up_to }),
+        }
+    }
+}
+
+impl AsperitySpec {
+    fn echo(&self) -> Json {
+        let Self { density, radius, modulus, depths, data } = self;
+        let mut map = json!({ "density": density, "radius": radius, "modulus": modulus });
+        match depths {
+            Depths::Normal { deviation, highest } => {
+                (map["deviation"], map["highest"]) = (json!(deviation), json!(highest));
+            }
+            Depths::Measured(depths) => map["summits"] = json!(depths.len()),
+        }
+        if let Some(data) = data {
+            map["data"] = json!(data);
+        }
+        map
+    }
+}
+
+/// Return a law with the values of its parameters.
+fn read_form(form: &'static LawForm, node: &Node, context: &Context) -> Result<LayerSpec> {
+    let keys = Keys::open(node, &form_shape(form))?;
+    let value = |parameter: &Parameter| Field::read(keys.require(parameter.key)?, context);
+    let values = form.parameters.iter().map(value).collect::<Result<_>>()?;
+    Ok(LayerSpec::Form { form, values })
+}
+
+/// Return the summits that numbers describe, or those of data.
+fn asperities(node: &Node, context: &Context) -> Result<LayerSpec> {
+    let keys = Keys::open(node, &asperities_shape())?;
+    let missing = "give modulus = E* and data = \"NAME\", or modulus, density, radius and deviation of the summits";
+    let number = |key: &str| keys.require(key).map_err(|error| error.help(missing))?.number();
+    let modulus = number("modulus")?;
+    let Some(named) = keys.get("data") else {
+        let deviation = number("deviation")?;
+        let highest = keys.read("highest", Node::number)?.unwrap_or(HIGHEST * deviation);
+        let depths = Depths::Normal { deviation, highest };
+        let (density, radius) = (number("density")?, number("radius")?);
+        return Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: None }));
+    };
+    let name = named.string()?;
+    let Some(data) = context.data.get(name) else {
+        let otherwise = || format!("write [data.{name}] and below it file = \"surface.csv\"");
+        let error = named.refuse(format!("there are no data `{name}`"));
+        return Err(error.suggest(name, context.data.keys().map(String::as_str), otherwise));
+    };
+    data.load()?;
+    let Some(summits) = data.grid().and_then(Grid::summits) else {
+        return Err(named
+            .refuse(format!("data `{name}` have no summits"))
+            .help("summits are points of a regular grid that are higher than the eight around them"));
+    };
+    let Summits { density, radius, heights } = summits;
+    let depths = Depths::Measured(heights.iter().map(|height| heights[0] - height).collect());
+    Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: Some(name.to_owned()) }))
+}
+
+/// Return the law through points (c, p).
+fn table(node: &Node) -> Result<LayerSpec> {
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    for item in node.list()? {
+        let [c, p] = item.list().map_err(|error| error.help(POINTS))? else {
+            return Err(item.refuse("a point of the table is a compression and a pressure").help(POINTS));
+        };
+        points.push([c.number()?, p.number()?]);
+    }
+    if points.first() == Some(&[0.0, 0.0]) {
+        points.remove(0); // every law begins at the origin
+    }
+    Ok(LayerSpec::Table(points))
+}

@@ -1,11 +1,12 @@
-//! The outer iteration: methods by name, and their settings.
+//! The outer iteration, its rules, and inner solvers by name.
 
 use super::history::History;
-use super::robin::{RobinRule, Zone};
-use super::stop::StopRule;
+use super::name_of;
+use crate::error::Result;
 use crate::expression::Field;
-use crate::setting::{keys, words};
+use crate::setting::{Context, Keys, Node, Setting, TableShape, Value, ValueKind, choose, keys, word, words};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value as Json, json};
 
 keys! {
     /// The outer iteration.
@@ -128,4 +129,267 @@ pub enum Start {
     Nested,
     /// Outer normal displacement on every contact surface.
     Normal(Field),
+}
+
+/// The rule for the Robin coefficient kappa on the zone. p is the law of the layer and c^k the compression at iterate k.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RobinRule {
+    /// kappa = p'(c^k), as in the paper.
+    Tangent,
+    /// The coefficient of the start in every iteration, made safe as in `Auto`. It needs one factorisation in a run. Theorem 3 allows it.
+    Frozen,
+    /// kappa = max(p'(c^k), F) everywhere on the contact surfaces; F > 0 is this number.
+    Floor(f64),
+    /// The tangent on the zone, and more for a body that the tangent does not constrain safely.
+    Auto,
+}
+
+/// The Robin zone: psi of (38), a characteristic function of a part of the contact surfaces. c is the compression of the layer.
+#[derive(Debug, Clone)]
+pub enum Zone {
+    /// psi = 0: Neumann-Neumann.
+    None,
+    /// psi = 1: full Robin.
+    Full,
+    /// psi = chi = \[c > 0\], equation (36).
+    Active,
+    /// psi = 1 where the expression in x, y, z and the iteration k = 0, 1, ... is > 0 (true is 1).
+    Subset(Field),
+}
+
+keys! {
+    /// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
+    #[derive(Debug, Clone, PartialEq)]
+    pub struct StopRule "the stop rule" {
+        optional {
+            /// relative residual, or error of Newton's method
+            ///
+            /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md). In a
+            /// scene file there is no default if `increment` is given.
+            pub residual: Option<f64> = Some(1e-8),
+            /// the paper's rule on the increment
+            ///
+            /// Tolerance of the relative increment of normal displacements, in every body.
+            pub increment: Option<f64> = None,
+            /// whether a tenth of the mesh's error is enough
+            ///
+            /// The run then stops where the error of the iteration is a tenth of the error of the discretisation.
+            pub balanced: bool = false,
+            /// most iterations
+            pub iterations: usize = 2000,
+        }
+    }
+}
+
+impl Default for StopRule {
+    fn default() -> Self {
+        Self::with_defaults()
+    }
+}
+
+impl Setting for StopRule {
+    fn kind() -> ValueKind {
+        Self::shape().into()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        let stop = Self::decode(&Keys::open(node, &Self::shape())?, context)?;
+        let by_increment = stop.increment.is_some() && !node.has_key("residual");
+        Ok(Self { residual: stop.residual.filter(|_| !by_increment), ..stop })
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        let mut entries = self.entries(dimension);
+        if !self.balanced {
+            entries.remove("balanced");
+        }
+        entries.into()
+    }
+}
+
+impl StopRule {
+    /// Return the tolerance that relative errors inside a run refer to. It is that of the residual, or the square root of machine epsilon
+    /// where the increment alone ends the run.
+    pub fn tolerance(&self) -> f64 {
+        self.residual.unwrap_or(f64::EPSILON.sqrt())
+    }
+
+    /// Return whether an iterate meets a rule. `residual` and `increment` are relative; the increment is NaN before the first update.
+    pub fn is_met(&self, residual: f64, increment: f64) -> bool {
+        self.residual.is_some_and(|tolerance| residual <= tolerance)
+            || self.increment.is_some_and(|tolerance| increment <= tolerance)
+    }
+}
+
+/// The inner solver that the scene requests. PETSc options override it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SolverSpec {
+    /// The preset; the program chooses if `None`.
+    pub preset: Option<Preset>,
+    /// PETSc options of the scene, as words. Those of the command line win.
+    pub options: Vec<String>,
+}
+
+words! {
+    /// The presets of inner solvers.
+    #[derive(Serialize, Deserialize)]
+    pub enum Preset "solver" {
+        /// Sparse Cholesky factorisation by MUMPS.
+        Mumps = "mumps",
+        /// Interior dofs eliminated once by MUMPS, and a dense system on the contact in each sweep.
+        Condensed = "condensed",
+        /// Conjugate gradients preconditioned by hypre's BoomerAMG.
+        Hypre = "hypre",
+        /// Conjugate gradients preconditioned by PETSc's GAMG.
+        Gamg = "gamg",
+        /// Conjugate gradients preconditioned by an incomplete Cholesky factorisation.
+        Icc = "icc",
+    }
+}
+
+/// A table without a name, but with `psi`, `gamma`, `robin` or `stop.increment`, is the method `robin`.
+impl Setting for MethodSpec {
+    fn kind() -> ValueKind {
+        Self::shape().into()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        let mut method = Self::decode(&Keys::open(node, &Self::shape())?, context)?;
+        let is_paper_rule = method.stop.increment.is_some();
+        if !node.has_key("name") && (is_paper_rule || ["psi", "gamma", "robin"].iter().any(|key| node.has_key(key))) {
+            method.name = MethodName::Robin;
+        }
+        if !node.has_key("robin") {
+            method.robin = Self::new(method.name).robin;
+        }
+        Ok(method)
+    }
+
+    /// Leave out keys of other methods, which change nothing.
+    fn echo(&self, dimension: usize) -> Json {
+        let mut entries = self.entries(dimension);
+        let is_robin = self.name == MethodName::Robin;
+        entries.retain(|key, _| match key.as_str() {
+            "gamma" => is_robin,
+            "interval" => is_robin && self.interval,
+            "depth" => self.name == MethodName::Anderson,
+            _ => true,
+        });
+        entries.into()
+    }
+}
+
+impl Setting for Gamma {
+    fn kind() -> ValueKind {
+        ValueKind::Either(vec![ValueKind::Number, ValueKind::Number.list(), word(&Self::NAMED)])
+    }
+
+    fn read(node: &Node, _: &Context) -> Result<Self> {
+        match &node.value {
+            Value::String(_) => choose(node, "rule for gamma", &Self::NAMED),
+            Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(Self::Schedule),
+            _ => node.number().map(Self::Stationary),
+        }
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        match self {
+            Self::Stationary(gamma) => json!(gamma),
+            Self::Schedule(list) => json!(list),
+            Self::Own(name) => json!({ "own": name }),
+            rule => json!(name_of(&Self::NAMED, rule)),
+        }
+    }
+}
+
+/// Rules for the Robin coefficient by name.
+const COEFFICIENTS: [(&str, RobinRule); 3] =
+    [("tangent", RobinRule::Tangent), ("frozen", RobinRule::Frozen), ("auto", RobinRule::Auto)];
+
+impl Setting for RobinRule {
+    fn kind() -> ValueKind {
+        ValueKind::Either(vec![word(&COEFFICIENTS), floor_shape().into()])
+    }
+
+    fn read(node: &Node, _: &Context) -> Result<Self> {
+        if let Value::String(_) = node.value {
+            return choose(node, "Robin coefficient", &COEFFICIENTS);
+        }
+        Keys::open(node, &floor_shape())?.require("floor")?.number().map(Self::Floor)
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        match self {
+            Self::Floor(floor) => json!({ "floor": floor }),
+            rule => json!(name_of(&COEFFICIENTS, rule)),
+        }
+    }
+}
+
+fn floor_shape() -> TableShape {
+    let about = "least coefficient everywhere on the contact";
+    TableShape::new("the Robin coefficient").required("floor", ValueKind::Number, about)
+}
+
+/// The echo is a text, as the key takes no number.
+impl Setting for Zone {
+    fn kind() -> ValueKind {
+        ValueKind::Text
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        let text = node.string()?;
+        match text {
+            "none" => return Ok(Self::None),
+            "full" => return Ok(Self::Full),
+            "active" => return Ok(Self::Active),
+            _ => {}
+        }
+        // a single word of more than two letters is a slip of one of the three, not of a variable
+        if text.len() > 2 && text.chars().all(char::is_alphabetic) {
+            let otherwise = || "psi is none, full, active, or a condition such as \"x > 1 && k < 5\"".to_owned();
+            let error = node.refuse(format!("unknown zone `{text}`"));
+            return Err(error.suggest(text, ["none", "full", "active"], otherwise));
+        }
+        Field::parse(text, &node.place, context.dimension, true, &context.data).map(Self::Subset)
+    }
+
+    fn echo(&self, _: usize) -> Json {
+        match self {
+            Self::None => json!("none"),
+            Self::Full => json!("full"),
+            Self::Active => json!("active"),
+            Self::Subset(condition) => json!(condition.text()),
+        }
+    }
+}
+
+impl Setting for Start {
+    fn kind() -> ValueKind {
+        ValueKind::Either(vec![ValueKind::Word(vec!["auto", "zero", "nested"]), start_shape().into()])
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        if let Value::String(_) = node.value {
+            let all = "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }";
+            let starts = [("auto", Self::Auto), ("zero", Self::Zero), ("nested", Self::Nested)];
+            return choose(node, "start", &starts).map_err(|error| error.help(all));
+        }
+        let keys = Keys::open(node, &start_shape())?;
+        Field::read(keys.require("normal")?, context).map(Self::Normal)
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        match self {
+            Self::Auto => json!("auto"),
+            Self::Zero => json!("zero"),
+            Self::Nested => json!("nested"),
+            Self::Normal(normal) => json!({ "normal": normal.echo(dimension) }),
+        }
+    }
+}
+
+fn start_shape() -> TableShape {
+    let about = "outer normal displacement on every contact surface";
+    TableShape::new("the start").required("normal", ValueKind::Field, about)
 }

@@ -40,9 +40,6 @@ pub type Rank = [usize; 4];
 
 impl<'a> Pattern<'a> {
     /// Read a name or a pattern.
-    ///
-    /// # Errors
-    /// What is wrong with the pattern, in words.
     pub fn new(text: &'a str) -> Result<Self, &'static str> {
         let glob = if is_pattern(text) { Some(Glob::new(text).map_err(|error| error.msg)?) } else { None };
         Ok(Self { text, glob })

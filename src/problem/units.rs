@@ -4,55 +4,29 @@ use crate::error::{Result as Checked, suggestion};
 use crate::setting::{Context, Node, Setting, ValueKind};
 use serde_json::Value as Json;
 
-/// The quantity that a unit measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Quantity {
-    Length,
-    Stress,
-}
+/// A name, and the power of ten by which the unit is larger than m or Pa; `None` for units of the inch's system.
+type Unit = (&'static str, Option<i32>);
 
-/// A known unit.
-struct Unit {
-    name: &'static str,
-    quantity: Quantity,
-    /// Power of ten by which it is larger than m or Pa; `None` for units of the inch's system.
-    power: Option<i32>,
-}
-
-const fn unit(name: &'static str, quantity: Quantity, power: Option<i32>) -> Unit {
-    Unit { name, quantity, power }
-}
-
-/// The known units: of the SI, and of the inch's system.
-static KNOWN: [Unit; 15] = [
-    unit("m", Quantity::Length, Some(0)),
-    unit("cm", Quantity::Length, Some(-2)),
-    unit("mm", Quantity::Length, Some(-3)),
-    unit("um", Quantity::Length, Some(-6)),
-    unit("µm", Quantity::Length, Some(-6)),
-    unit("nm", Quantity::Length, Some(-9)),
-    unit("in", Quantity::Length, None),
-    unit("Pa", Quantity::Stress, Some(0)),
-    unit("kPa", Quantity::Stress, Some(3)),
-    unit("MPa", Quantity::Stress, Some(6)),
-    unit("N/mm2", Quantity::Stress, Some(6)),
-    unit("N/mm²", Quantity::Stress, Some(6)),
-    unit("GPa", Quantity::Stress, Some(9)),
-    unit("psi", Quantity::Stress, None),
-    unit("ksi", Quantity::Stress, None),
+const LENGTHS: [Unit; 7] = [
+    ("m", Some(0)),
+    ("cm", Some(-2)),
+    ("mm", Some(-3)),
+    ("um", Some(-6)),
+    ("µm", Some(-6)),
+    ("nm", Some(-9)),
+    ("in", None),
 ];
 
-impl Unit {
-    /// Return the unit of a name, or a message and advice.
-    fn named(name: &str) -> Result<&'static Self, (String, String)> {
-        KNOWN.iter().find(|unit| unit.name == name).ok_or_else(|| {
-            let all: Vec<&str> = KNOWN.iter().map(|unit| unit.name).collect();
-            let advice =
-                suggestion(name, all.iter().copied()).unwrap_or_else(|| format!("known are {}", all.join(", ")));
-            (format!("no unit is called `{name}`"), advice)
-        })
-    }
-}
+const STRESSES: [Unit; 8] = [
+    ("Pa", Some(0)),
+    ("kPa", Some(3)),
+    ("MPa", Some(6)),
+    ("N/mm2", Some(6)),
+    ("N/mm²", Some(6)),
+    ("GPa", Some(9)),
+    ("psi", None),
+    ("ksi", None),
+];
 
 /// The units of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -76,20 +50,24 @@ impl Units {
         let [first, second] = names[..] else {
             return Err(("expected a length and a stress, with a comma between".to_owned(), example()));
         };
-        let (first, second) = (Unit::named(first)?, Unit::named(second)?);
-        let (length, stress) = match (first.quantity, second.quantity) {
-            (Quantity::Length, Quantity::Stress) => (first, second),
-            (Quantity::Stress, Quantity::Length) => (second, first),
-            (both, _) => {
-                let what = if both == Quantity::Length { "lengths" } else { "stresses" };
-                return Err((format!("`{}` and `{}` are both {what}", first.name, second.name), example()));
+        let all = || LENGTHS.iter().chain(&STRESSES).map(|(name, _)| *name);
+        if let Some(name) = [first, second].into_iter().find(|name| all().all(|known| known != *name)) {
+            let list = || format!("known are {}", all().collect::<Vec<_>>().join(", "));
+            return Err((format!("no unit is called `{name}`"), suggestion(name, all()).unwrap_or_else(list)));
+        }
+        let find = |units: &[Unit]| units.iter().find(|(name, _)| [first, second].contains(name)).copied();
+        let (length, stress) = match (find(&LENGTHS), find(&STRESSES)) {
+            (Some(length), Some(stress)) => (length, stress),
+            (length, _) => {
+                let what = if length.is_some() { "lengths" } else { "stresses" };
+                return Err((format!("`{first}` and `{second}` are both {what}"), example()));
             }
         };
         let force = force(length, stress).ok_or_else(|| {
-            let message = format!("`{}` and `{}` are of different systems of units", length.name, stress.name);
+            let message = format!("`{}` and `{}` are of different systems of units", length.0, stress.0);
             (message, "for example \"mm, MPa\" or \"in, psi\"".to_owned())
         })?;
-        Ok(Self { length: length.name, stress: stress.name, force })
+        Ok(Self { length: length.0, stress: stress.0, force })
     }
 
     /// Return the units for plane bodies, whose forces are per length of thickness.
@@ -118,8 +96,8 @@ impl Setting for Units {
 }
 
 /// Return the unit of force that belongs to a length and a stress; `None` for units of different systems.
-fn force(length: &Unit, stress: &Unit) -> Option<String> {
-    let name = match (length.power, stress.power) {
+fn force((length, length_power): Unit, (stress, stress_power): Unit) -> Option<String> {
+    let name = match (length_power, stress_power) {
         (Some(length_power), Some(stress_power)) => match stress_power + 2 * length_power {
             -6 => "µN",
             -3 => "mN",
@@ -127,9 +105,9 @@ fn force(length: &Unit, stress: &Unit) -> Option<String> {
             3 => "kN",
             6 => "MN",
             9 => "GN",
-            _ => return Some(format!("{}·{}²", stress.name, length.name)),
+            _ => return Some(format!("{stress}·{length}²")),
         },
-        (None, None) if stress.name == "psi" => "lbf",
+        (None, None) if stress == "psi" => "lbf",
         (None, None) => "kip",
         _ => return None,
     };

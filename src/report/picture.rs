@@ -1,10 +1,13 @@
 //! The one picture of triangles as SVG: bodies in the plane and in space after deformation, and contact surfaces, in bands of equal value.
+//! The templates of pictures and of the page format values by the filters here.
 
-use super::bands::{self, Band, Levels};
-use super::body::Part;
+use super::files::Part;
 use crate::linalg::bounds;
-use minijinja::context;
+use crate::output::trimmed;
+use minijinja::value::{Rest, ValueKind};
+use minijinja::{Environment, Value, context};
 use nalgebra::Vector3;
+use plotters::style::colors::colormaps::{ColorMap, ViridisRGB};
 use serde::Serialize;
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
@@ -50,9 +53,7 @@ impl View {
 pub struct Picture<'a> {
     /// Name of the field with its unit.
     pub title: &'a str,
-    /// Levels between the colours.
     pub levels: Levels,
-    /// Directions.
     pub view: View,
     /// Factor of the displacements; none for surfaces without displacements.
     pub magnification: Option<f64>,
@@ -75,7 +76,6 @@ struct Region {
 struct Shape {
     /// Name, shown under the pointer; empty for none.
     name: String,
-    /// Regions from back to front.
     regions: Vec<Region>,
     /// Outline as an SVG path; empty for none.
     outline: String,
@@ -124,9 +124,9 @@ impl Picture<'_> {
 
     /// Return shapes with title and legend as SVG.
     fn render(&self, shapes: &[Shape], is_open: bool, [width, height]: [f64; 2]) -> Result<String, minijinja::Error> {
-        let colors = bands::colors().map(bands::hex).to_vec();
+        let colors = colors().map(hex).to_vec();
         let Self { title, alone, magnification, .. } = self;
-        super::words::environment().render_named_str(
+        environment().render_named_str(
             "picture.svg.html",
             include_str!("picture.svg"),
             context! {
@@ -144,7 +144,6 @@ struct Surface<'a> {
     seen: &'a [[f64; 3]],
     /// Points in steps of the picture.
     places: Vec<[f64; 2]>,
-    /// Values at the points.
     values: Vec<f64>,
 }
 
@@ -171,7 +170,6 @@ impl Surface<'_> {
         facets
     }
 
-    /// Return the outline of all triangles.
     fn outline(&self) -> String {
         let all = [f64::NEG_INFINITY, f64::INFINITY];
         path(self.part.triangles.iter().map(|&nodes| self.cut(nodes, all)))
@@ -220,7 +218,7 @@ fn regions(mut facets: Vec<Facet>) -> Vec<Region> {
 fn fill(color: Option<[usize; 2]>) -> String {
     let Some([band, shade]) = color else { return OPEN.to_owned() };
     let brightness = RIM + (1.0 - RIM) * shade as f64 / (SHADES - 1) as f64;
-    bands::hex(bands::colors()[band].map(|part| (f64::from(part) * brightness).round() as u8))
+    hex(colors()[band].map(|part| (f64::from(part) * brightness).round() as u8))
 }
 
 /// Return the border of the union of polygons of the same orientation as an SVG path. Edges that two polygons share are left out, so that the
@@ -254,6 +252,132 @@ fn path(polygons: impl Iterator<Item = Vec<Corner>>) -> String {
         }
     }
     text
+}
+
+/// Number of colours in a picture.
+const BANDS: usize = 12;
+
+/// Fraction of the largest pressure below which a contact is shown as open. Open points have no pressure, and sums of ten facets leave a rounding of
+/// 1e-15. The pressures of an iteration are known to 1e-8 of the largest by default, so that no smaller one means contact.
+const LEAST_PRESSURE: f64 = 1e-9;
+
+/// Return the colours from the smallest to the largest value: viridis, which colour-blind readers can follow.
+pub fn colors() -> [[u8; 3]; BANDS] {
+    std::array::from_fn(|band| {
+        let color = ViridisRGB.get_color_normalized(band as f32, 0.0, (BANDS - 1) as f32);
+        [color.0, color.1, color.2]
+    })
+}
+
+/// Return a colour as `#rrggbb`.
+pub fn hex([r, g, b]: [u8; 3]) -> String {
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// Return the smallest and the largest finite value. They are never equal.
+pub fn range<'a>(values: impl Iterator<Item = &'a f64>) -> [f64; 2] {
+    let finite = values.filter(|value| value.is_finite());
+    let [low, high] = finite.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &v| [low.min(v), high.max(v)]);
+    if low < high {
+        [low, high]
+    } else if low == high {
+        [low, low + low.abs().max(1e-300)]
+    } else {
+        [0.0, 1.0]
+    }
+}
+
+/// The values of a band: from the first on, below the second.
+type Band = [f64; 2];
+
+/// The levels between the bands of a picture.
+pub struct Levels {
+    /// Smallest and largest value.
+    pub range: [f64; 2],
+    /// Whether the levels grow as squares. A stress peaks at contacts, and with equal steps most of a body would have the first colour.
+    pub squares: bool,
+    /// Whether values that are not positive have no band: contacts are open there.
+    pub opens: bool,
+}
+
+impl Levels {
+    /// Return the smallest value of each band, and the largest of all.
+    pub fn levels(&self) -> Vec<f64> {
+        let [least, most] = self.range;
+        let fractions = (0..=BANDS).map(|band| band as f64 / BANDS as f64);
+        fractions.map(|part| least + (most - least) * if self.squares { part * part } else { part }).collect()
+    }
+
+    /// Return whether a value is that of an open contact.
+    pub fn is_open(&self, value: f64) -> bool {
+        self.opens && value < LEAST_PRESSURE * self.range[1]
+    }
+
+    /// Return the bands with their numbers; an open contact is a band without a number, before the others. Together they have all values.
+    pub fn bands(&self) -> Vec<(Option<usize>, Band)> {
+        let levels = self.levels();
+        let first = if self.opens { LEAST_PRESSURE * self.range[1] } else { f64::NEG_INFINITY };
+        let open = self.opens.then_some((None, [f64::NEG_INFINITY, first]));
+        let band = |band: usize| {
+            let from = if band == 0 { first } else { levels[band] };
+            (Some(band), [from, if band + 1 < BANDS { levels[band + 1] } else { f64::INFINITY }])
+        };
+        open.into_iter().chain((0..BANDS).map(band)).collect()
+    }
+}
+
+/// Return an environment of templates with the filters `num`, `words` and `without`.
+pub fn environment() -> Environment<'static> {
+    let mut environment = Environment::new();
+    environment.add_filter("num", number);
+    environment.add_filter("words", words);
+    environment.add_filter("without", without);
+    environment
+}
+
+/// Format a number with five digits; other values become a dash.
+fn number(value: &Value) -> String {
+    let Ok(value) = f64::try_from(value.clone()) else { return "–".to_owned() };
+    match value.abs() {
+        0.0 => "0".to_owned(),
+        size if !(1e-3..1e6).contains(&size) => {
+            let text = format!("{value:.3e}");
+            let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+            format!("{}e{power}", trimmed(digits)).replace('-', "−")
+        }
+        size => {
+            let digits = (4.0 - size.log10().floor()).clamp(0.0, 7.0) as usize;
+            trimmed(&format!("{value:.digits$}")).replace('-', "−")
+        }
+    }
+}
+
+/// Format a table as `key = value, ...` and a list as `(a, b)`, with the numbers of [`number`].
+fn words(value: &Value) -> String {
+    let list = || value.try_iter().into_iter().flatten();
+    match value.kind() {
+        ValueKind::Map => {
+            let item = |key: Value| {
+                let item = value.get_item(&key).unwrap_or_default();
+                match item.kind() {
+                    ValueKind::Map => format!("{key}: {}", words(&item)),
+                    _ => format!("{key} = {}", words(&item)),
+                }
+            };
+            list().map(item).collect::<Vec<_>>().join(", ")
+        }
+        ValueKind::Seq => format!("({})", list().map(|item| words(&item)).collect::<Vec<_>>().join(", ")),
+        ValueKind::Number => number(value),
+        ValueKind::Bool => if value.is_true() { "true" } else { "false" }.to_owned(),
+        _ => value.to_string(),
+    }
+}
+
+/// Return a table without some of its keys.
+fn without(value: &Value, keys: Rest<String>) -> Value {
+    let kept =
+        value.try_iter().into_iter().flatten().filter(|key| !keys.iter().any(|other| key.as_str() == Some(other)));
+    kept.map(|key| (key.to_string(), value.get_item(&key).unwrap_or_default())).collect()
 }
 
 #[cfg(test)]
@@ -329,5 +453,19 @@ mod tests {
         let fills: Vec<&str> = svg.split("<path fill=\"").skip(1).map(|rest| &rest[..7]).collect();
         // y = 0 and x + y + z = 1 face (0.52, -0.74, 0.43); z = 0 and x = 0 do not; cosines 0.74 and 0.12: shades 4 and 0 of 6
         assert_eq!(fills, [fill(Some([4, 0])), fill(Some([4, 4]))]);
+    }
+
+    #[test]
+    fn values_are_short() {
+        let number = |value: f64| number(&Value::from(value));
+        assert_eq!(
+            [0.0, 1.0, 93.108797, -5e-7, 2.1e5, 1e6, 0.05].map(number),
+            ["0", "1", "93.109", "−5e−7", "210000", "1e6", "0.05"]
+        );
+        assert_eq!(super::number(&Value::from(())), "–");
+        assert_eq!(words(&Value::from(false)), "false");
+        let value = Value::from_serialize(serde_json::json!({ "power": { "B": 1e-3, "a": 0.5 }, "at": [1, 2.5] }));
+        assert_eq!(words(&without(&value, Rest(vec!["at".into()]))), "power: B = 0.001, a = 0.5");
+        assert_eq!(words(&value.get_attr("at").unwrap()), "(1, 2.5)");
     }
 }

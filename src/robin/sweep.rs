@@ -10,7 +10,7 @@ use crate::model::layer::Layer;
 use crate::model::linear::Failure;
 use crate::model::rigid::{Moved, TOLERANCE, combined};
 use crate::model::{BodySlot, Model};
-use crate::problem::robin::{RobinRule, Zone};
+use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
 // Positions of the numbers that a body adds to the message of a sweep.

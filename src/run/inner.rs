@@ -1,26 +1,26 @@
 //! The inner solvers: those requested, or the program's choice with its reason. Newton's method joins the bodies in one matrix if all are condensed,
 //! factored, or solved by multigrid; they then need no solver of their own. Otherwise every body has one, and sweeps solve the linear steps.
+//! The first rank makes the choice, and the other ranks follow its plan.
 
-mod factory;
-
-pub use factory::Decisions;
-
-use super::plan::{DENSE, Plan, agree};
-use super::words::in_words;
-use crate::discretize::Outline;
-use crate::error::Result;
+use super::in_words;
+use crate::discretize::{Assembled, Factory, Outline};
+use crate::error::{Error, Kind, Result};
 use crate::fem::Interpolation;
 use crate::file::available_memory;
-use crate::model::BodySlot;
-use crate::petsc::Session;
+use crate::linalg::Csr;
+use crate::model::{Body, BodySlot};
+use crate::parallel::owners;
+use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
 use crate::solver::cost::{self, Candidate, Comparison, Step};
 use crate::solver::names::WHOLE;
 use crate::solver::options::{Chosen, Typed};
-use crate::solver::preset::{self, Size};
+use crate::solver::preset::{self, Size, Smoother};
+use crate::solver::{CondensedBody, Krylov, Retained, SparseBody};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// A factory that chooses and makes the inner solvers of a scene's bodies.
@@ -112,7 +112,6 @@ impl<'a> Inner<'a> {
         }
     }
 
-    /// Return whether a body has quadratic elements.
     fn is_quadratic(&self) -> bool {
         self.plans.iter().any(|plan| plan.order == Order::P2)
     }
@@ -275,5 +274,337 @@ impl<'a> Inner<'a> {
             }
             _ => Linear::Direct,
         })
+    }
+}
+
+impl Inner<'_> {
+    /// Set the PETSc options of the plan.
+    fn apply(&mut self) {
+        let is_quadratic = self.is_quadratic();
+        match self.linear {
+            Linear::Dense => {}
+            Linear::Direct => preset::apply(&mut self.whole, Preset::Mumps, None),
+            Linear::Multigrid => {
+                preset::made_often(&mut self.whole);
+                let smoother = if self.session.size() > 1 { Smoother::Chebyshev } else { Smoother::GaussSeidel };
+                preset::apply(&mut self.whole, Preset::Hypre, Some(smoother).filter(|_| is_quadratic));
+            }
+            Linear::Sweeps => {
+                for (plan, distributed) in self.plans.iter_mut().zip(&self.distributed) {
+                    let smoother = if *distributed { Smoother::Chebyshev } else { Smoother::GaussSeidel };
+                    preset::apply(&mut plan.chosen, plan.preset, Some(smoother).filter(|_| plan.order == Order::P2));
+                }
+            }
+        }
+    }
+}
+
+/// The choice of solvers of all bodies, made by the first rank.
+#[derive(Serialize, Deserialize)]
+pub struct Decisions {
+    linear: Linear,
+    /// Whether each body is distributed over the ranks, if sweeps solve linear steps.
+    distributed: Vec<bool>,
+    bodies: Vec<Plan>,
+}
+
+impl Factory for Inner<'_> {
+    type Plan = Decisions;
+
+    fn plan(&mut self, outlines: &[Outline]) -> Result<Decisions> {
+        preset::check(self.asked, HAS_HYPRE)?;
+        let mut plans = Vec::new();
+        // This marks the bodies for which the program is to choose.
+        let mut open = Vec::new();
+        for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
+            let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
+            let chosen = self.typed.of(name);
+            // A KSP for all bodies together needs them uncondensed.
+            let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());
+            let condensable = (1..dofs).contains(&retained.dofs.len()) && !typed;
+            let asked = self.asked_for(typed, condensable);
+            open.push(asked.is_none());
+            let (preset, reason) =
+                asked.map_or((Preset::Mumps, String::new()), |(preset, why)| (preset, why.to_owned()));
+            let (name, retained) = (name.to_owned(), Some(retained));
+            self.places.insert(name.clone(), index);
+            plans.push(Plan { name, chosen, preset, reason, dimension, order, dofs, condensable, retained });
+        }
+        let (mut plans_open, outlines_open): (Vec<&mut Plan>, Vec<&Outline>) =
+            plans.iter_mut().zip(outlines).zip(open).filter_map(|(both, open)| open.then_some(both)).unzip();
+        match outlines.first().map(|outline| outline.dimension) {
+            Some(2) => plans_open.into_iter().for_each(|plan| self.choose_in_plane(plan)),
+            _ => self.choose_in_space(&mut plans_open, &outlines_open),
+        }
+        self.plans = plans;
+        self.linear = self.join()?;
+        for plan in &mut self.plans {
+            plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
+        }
+        if self.linear == Linear::Sweeps {
+            self.distributed = distributed_bodies(&self.plans, self.session.size());
+        }
+        let (distributed, bodies) = (self.distributed.clone(), self.plans.clone());
+        self.apply();
+        Ok(Decisions { linear: self.linear, distributed, bodies })
+    }
+
+    fn adopt(&mut self, decisions: Decisions) -> Result<()> {
+        (self.linear, self.distributed, self.plans) = (decisions.linear, decisions.distributed, decisions.bodies);
+        for (index, plan) in self.plans.iter_mut().enumerate() {
+            plan.chosen = self.typed.of(&plan.name);
+            self.places.insert(plan.name.clone(), index);
+        }
+        self.apply();
+        Ok(())
+    }
+
+    fn distributed(&self) -> Vec<Vec<usize>> {
+        let bodies = 0..self.plans.len();
+        // A condensed body stays on one rank, and all ranks can have its Schur complement.
+        let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);
+        match self.linear {
+            Linear::Sweeps => bodies.filter(|&body| self.distributed[body]).map(|body| vec![body]).collect(),
+            Linear::Direct | Linear::Multigrid if self.session.size() > 1 && !is_whole => vec![bodies.collect()],
+            _ => Vec::new(),
+        }
+    }
+
+    fn wants_interpolation(&self, name: &str) -> bool {
+        let has_levels = |chosen: &Chosen| chosen.get("pc_type") == Some("mg");
+        match self.linear {
+            Linear::Multigrid => self.is_quadratic() && has_levels(&self.whole),
+            Linear::Sweeps => self.places.get(name).is_some_and(|&place| {
+                let Plan { preset, order, chosen, .. } = &self.plans[place];
+                *preset != Preset::Condensed && *order == Order::P2 && has_levels(chosen)
+            }),
+            _ => false,
+        }
+    }
+
+    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
+        let Assembled { name, dimension, body, distribution, rows, motions, left, interpolation } = assembled;
+        let Some(plan) = self.places.get(&name).map(|&place| &mut self.plans[place]) else {
+            return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
+        };
+        let (session, chosen) = (self.session.clone(), plan.chosen.clone());
+        if let Some(retained) = plan.retained.take() {
+            return Ok(Box::new(CondensedBody::new(&session, chosen, dimension, body, left, retained)));
+        }
+        let words = match self.linear {
+            Linear::Sweeps => preset::in_words(&chosen),
+            _ => preset::in_words(&self.whole),
+        };
+        let mut levels = interpolation;
+        if self.linear == Linear::Multigrid
+            && let Some(next) = levels.take()
+        {
+            let empty = || Interpolation { rows: Csr::new(0), own: 0 };
+            let whole = self.interpolation.get_or_insert_with(empty);
+            // If dofs are distributed, the columns are those of all bodies.
+            let first = if distribution.is_some() { 0 } else { whole.rows.columns };
+            whole.append(&next, first);
+        }
+        let mut modes: Vec<Vec<f64>> = match self.linear {
+            Linear::Sweeps => motions(),
+            _ => Vec::new(),
+        };
+        if let Some(distribution) = &distribution {
+            modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
+        }
+        let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes, levels);
+        Ok(Box::new(SparseBody::new(body, rows, &left, distribution, make, words)))
+    }
+
+    fn kept(&mut self, name: &str) -> Option<BodySlot> {
+        self.kept.remove(name).filter(|slot| slot.local.is_some())
+    }
+}
+
+/// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and 250 MB.
+const DENSE: usize = 3000;
+
+/// The choice of a solver for a body, made by the first rank. Other ranks do not get what is skipped here.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Plan {
+    /// Name of the body.
+    pub name: String,
+    /// PETSc options of the body, which each rank reads.
+    #[serde(skip)]
+    pub chosen: Chosen,
+    /// Preset of its solver.
+    pub preset: Preset,
+    /// Reason for the preset, in words.
+    #[serde(skip)]
+    pub reason: String,
+    /// Number of dofs of a node.
+    pub dimension: usize,
+    /// Order of the elements.
+    pub order: Order,
+    /// Number of dofs of the body.
+    pub dofs: usize,
+    /// Whether the body could be condensed.
+    #[serde(skip)]
+    pub condensable: bool,
+    /// Interface dofs of a condensed body, until it is made.
+    pub retained: Option<Retained>,
+}
+
+impl Plan {
+    /// Return the number of dofs that a condensed body would keep.
+    fn on_contact(&self) -> usize {
+        self.retained.as_ref().map_or(0, |retained| retained.dofs.len())
+    }
+}
+
+/// Give all bodies presets that Newton's method can join. They get multigrid if one of them needs it. In the plane they get one
+/// factorisation if together they have too many dofs on the contact for one dense matrix.
+pub fn agree(plans: &mut [Plan]) {
+    let dense: usize = plans.iter().filter(|plan| plan.preset == Preset::Condensed).map(Plan::on_contact).sum();
+    let needs = plans.iter().find(|plan| plan.preset == Preset::Hypre).map(|plan| plan.name.clone());
+    let (preset, why) = match needs {
+        Some(first) => (Preset::Hypre, format!("`{first}` has it, and Newton's method joins the bodies")),
+        None if dense > DENSE && plans.iter().any(|plan| plan.dimension == 2) => {
+            (Preset::Mumps, format!("{dense} of all bodies are on the contact: too many to join by dense algebra"))
+        }
+        None => return,
+    };
+    for plan in plans.iter_mut().filter(|plan| plan.preset != preset) {
+        plan.preset = preset;
+        plan.reason = format!("{} dofs; {why}", plan.dofs);
+    }
+}
+
+/// Dofs for which a rank could solve in the time of the messages of a distributed body. An iteration of conjugate gradients with
+/// multigrid takes 0.5 us per dof (docs/scaling.md, 48^3: 42 s, 116 iterations, 705 894 dofs). It has some 50 messages of 10 us:
+/// four exchanges with neighbours on each of eight levels, and a few sums.
+///
+/// Measurements on two ranks of one machine (`patch-3d`, nu = 2, `ncg`, hypre) had 3993, 10 125 and 27 783 dofs. An iteration
+/// takes -28, 80 and 339 us more than half of that of one rank, which is the work of 0, 540 and 1900 dofs.
+const MESSAGES: usize = 1000;
+
+/// Return whether each body is distributed over all ranks. The largest ones are, as many as make the sweep shortest. Each other
+/// body stays whole on one rank. If there are as many bodies as ranks and they are about equally large, all stay whole.
+fn distributed_bodies(plans: &[Plan], ranks: usize) -> Vec<bool> {
+    let loads: Vec<usize> = plans.iter().map(|plan| plan.dofs).collect();
+    let may: Vec<bool> = plans.iter().map(|plan| plan.preset != Preset::Condensed && is_for_several(plan)).collect();
+    largest(&loads, &may, ranks)
+}
+
+/// Return whether each body is distributed, from the dofs of each (`loads`) and from whether it `may` be distributed.
+fn largest(loads: &[usize], may: &[bool], ranks: usize) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..loads.len()).filter(|&body| may[body]).collect();
+    order.sort_by_key(|&body| (std::cmp::Reverse(loads[body]), body));
+    // One rank gains nothing.
+    order.truncate(if ranks > 1 { order.len() } else { 0 });
+    let among = |count: usize| {
+        let mut distributed = vec![false; loads.len()];
+        order[..count].iter().for_each(|&body| distributed[body] = true);
+        distributed
+    };
+    let time = |count: &usize| {
+        let distributed = among(*count);
+        let whole: Vec<usize> =
+            loads.iter().zip(&distributed).map(|(load, distributed)| if *distributed { 0 } else { *load }).collect();
+        let mut busy = vec![0; ranks];
+        owners(&whole, ranks).into_iter().zip(&whole).for_each(|(rank, load)| busy[rank] += load);
+        let together: usize = order[..*count].iter().map(|&body| loads[body] / ranks + MESSAGES).sum();
+        together + busy.into_iter().max().unwrap_or(0)
+    };
+    // If times are equal, the fewest bodies are distributed.
+    among((0..=order.len()).min_by_key(time).unwrap_or(0))
+}
+
+/// Return whether the solver of a body, and all solvers that the user nests in it, work with rows on several ranks.
+fn is_for_several(plan: &Plan) -> bool {
+    let chosen = &plan.chosen;
+    if chosen.typed("pc_type").is_none() && plan.preset == Preset::Icc {
+        return false;
+    }
+    let works = |name: &str, value: &str| match value {
+        "hypre" | "gamg" | "jacobi" | "pbjacobi" | "none" | "mg" => true,
+        "cholesky" | "lu" => {
+            let package = name.replace("pc_type", "pc_factor_mat_solver_type");
+            chosen.typed(&package).is_none_or(|package| package == "mumps")
+        }
+        _ => false,
+    };
+    chosen.all_typed().filter(|(name, _)| name.ends_with("pc_type")).all(|(name, value)| works(name, value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::rigid::AtDofs;
+
+    /// Return the plan of a body in space whose contact rows have `contact` dofs.
+    fn plan(name: &str, preset: Preset, contact: usize) -> Plan {
+        let mut rows = Csr::new(30_000);
+        (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
+        let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
+        let retained = Some(Retained::new(3, &rows, &prescribed, AtDofs::NONE));
+        let chosen = Typed::default().of(name);
+        Plan {
+            name: name.to_owned(),
+            chosen,
+            preset,
+            reason: "its own".to_owned(),
+            dimension: 3,
+            order: Order::P1,
+            dofs: 30_000,
+            condensable: true,
+            retained,
+        }
+    }
+
+    fn presets(plans: &[Plan]) -> Vec<Preset> {
+        plans.iter().map(|plan| plan.preset).collect()
+    }
+
+    #[test]
+    fn bodies_agree_on_multigrid_alone() {
+        let mut direct = [plan("a", Preset::Condensed, 10), plan("b", Preset::Mumps, 10)];
+        agree(&mut direct);
+        assert_eq!(presets(&direct), [Preset::Condensed, Preset::Mumps]);
+        let mut mixed = [plan("a", Preset::Condensed, 10), plan("b", Preset::Hypre, 10), plan("c", Preset::Mumps, 10)];
+        agree(&mut mixed);
+        assert_eq!(presets(&mixed), [Preset::Hypre; 3]);
+        assert_eq!(mixed[1].reason, "its own");
+        assert!(mixed[2].reason.contains("30000 dofs; `b` has it"), "{}", mixed[2].reason);
+    }
+
+    /// In the plane, two contacts of 1500 dofs are joined by dense algebra. With one dof more they are joined by one
+    /// factorisation.
+    #[test]
+    fn wide_contacts_in_the_plane_are_joined_by_a_factorisation() {
+        let pair = |more: usize| {
+            let mut pair = [plan("a", Preset::Condensed, 1500), plan("b", Preset::Condensed, 1500 + more)];
+            pair.iter_mut().for_each(|plan| plan.dimension = 2);
+            pair
+        };
+        let mut narrow = pair(0);
+        agree(&mut narrow);
+        assert_eq!(presets(&narrow), [Preset::Condensed; 2]);
+        let mut flat = pair(1);
+        agree(&mut flat);
+        assert_eq!(presets(&flat), [Preset::Mumps; 2]);
+    }
+
+    /// A single body is distributed. If bodies are unequal, the large one is distributed, and the other one if that gains more
+    /// than its messages take. If there are as many equal bodies as ranks, none is distributed. With one body too many, one is.
+    #[test]
+    fn large_bodies_are_distributed() {
+        let distributed = |loads: &[usize], ranks| largest(loads, &vec![true; loads.len()], ranks);
+        assert_eq!(distributed(&[100_000], 2), [true]);
+        assert_eq!(distributed(&[100_000], 1), [false]);
+        assert_eq!(distributed(&[1_500, 80_000], 2), [false, true]);
+        assert_eq!(distributed(&[10_000, 80_000], 2), [true, true]);
+        assert_eq!(distributed(&[50_000, 50_000], 2), [false, false]);
+        assert_eq!(distributed(&[50_000, 50_000], 3), [true, true]);
+        assert_eq!(distributed(&[50_000; 3], 2), [true, false, false]);
+        assert_eq!(distributed(&[50_000; 64], 8), [false; 64]);
+        // The messages take longer than the gain.
+        assert_eq!(distributed(&[600, 600], 3), [false, false]);
+        assert_eq!(largest(&[80_000, 10_000], &[false, true], 4), [false, false]);
     }
 }

@@ -10,8 +10,8 @@
 //! where kappa are the tangent stiffnesses of the layers. The trial displacements v come from no solver: one is what the force on
 //! each node alone would cause, others are what forces on hats of coarser and coarser grids would cause (docs/theory.md).
 
-use super::ended::{All, Look, Recovered};
 use super::stages::Done;
+use super::stages::{All, Look, Recovered};
 use crate::ddm::{Inaccuracy, Row, Status, Whose, resisting};
 use crate::discretize::Unbalanced;
 use crate::exchange::all_gather;
@@ -67,7 +67,6 @@ fn reported_error(row: &Row) -> f64 {
     [row.residual, row.error].into_iter().filter(|error| error.is_finite()).fold(0.0, f64::max)
 }
 
-/// The energies of a result.
 struct Energy {
     /// u'Ku over all bodies.
     strain: f64,

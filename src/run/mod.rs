@@ -3,34 +3,60 @@
 //!
 //! Errors are failures of the solver library, but for what functions say of their own.
 
-mod alike;
-mod balance;
-pub mod clock;
-mod distributed;
-pub mod ended;
 pub mod inner;
 pub mod look;
-pub mod measure;
-pub mod method;
-mod pairs;
-mod phases;
-mod plan;
-pub mod preflight;
+pub mod phases;
 pub mod recorder;
 pub mod report;
-pub mod requests;
 pub mod results;
-mod reuse;
 pub mod stages;
 pub mod steps;
 pub mod verdict;
-pub mod words;
+mod warnings;
 
-pub use alike::refuse_other_scenes;
-pub use clock::Clock;
-pub use ended::{All, Recovered};
-pub use phases::{build, estimate, in_parts, iterate, made_straight, set_up, targets};
-pub use recorder::Recorder;
-pub use requests::Requests;
-pub use reuse::build_after;
-pub use stages::{Begin, Built, Done, Prepared};
+pub use phases::{build, build_after, estimate, iterate, refuse_other_scenes, set_up, targets};
+pub use recorder::{Recorder, Requests};
+pub use stages::{All, Begin, Built, Clock, Done, Prepared, Recovered};
+pub use warnings::{in_parts, made_straight};
+
+use crate::error::few;
+use std::collections::HashMap;
+
+/// Return the names of bodies as part of a sentence.
+pub fn in_words<'a>(names: impl Iterator<Item = &'a String>) -> String {
+    let mut names = few(names.map(|name| format!("`{name}`")));
+    match names.pop() {
+        Some(last) if !names.is_empty() => format!("{} and {last}", names.join(", ")),
+        last => last.unwrap_or_default(),
+    }
+}
+
+/// Return the names made unique: a name gets a number from its second occurrence on.
+pub fn numbered(names: impl Iterator<Item = String>) -> Vec<String> {
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    let unique = |name: String| match counts.entry(name.clone()).and_modify(|count| *count += 1).or_insert(1) {
+        1 => name,
+        count => format!("{name}-{count}"),
+    };
+    names.map(unique).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lists_are_cut() {
+        let names = |count: usize| (0..count).map(|i| format!("b{i}")).collect::<Vec<_>>();
+        let text = |count: usize| in_words(names(count).iter());
+        assert_eq!([text(0), text(1), text(3)], ["", "`b0`", "`b0`, `b1` and `b2`"]);
+        assert!(text(13).ends_with("`b11` and `b12`"));
+        assert!(text(4096).ends_with("`b11` and 4084 others"));
+    }
+
+    #[test]
+    fn every_name_is_there_once() {
+        let names = ["a-b", "a-c", "a-b", "a-b"].map(str::to_owned);
+        assert_eq!(numbered(names.into_iter()), ["a-b", "a-c", "a-b-2", "a-b-3"]);
+    }
+}

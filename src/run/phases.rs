@@ -1,27 +1,32 @@
-//! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options,
-//! iteration.
+//! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, method,
+//! iteration. All ranks must read the same scene, and a problem takes over what the run of another scene before it has left.
 
-use super::clock::Clock;
 use super::inner::Inner;
 use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Done, Legs, Prepared};
-use super::words::in_words;
-use super::{method, pairs, steps};
+use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
+use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::{self, Outcome, Start, Status};
-use crate::discretize::{self, Balanced, Discrete, Verified, point};
-use crate::error::Result;
-use crate::estimate::{self, Cause, Estimate};
+use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Relaxed, Schedule, Spectral, Stationary};
+use crate::ddm::robin::{Acceleration, Anderson, Conjugate};
+use crate::ddm::{self, Method, Outcome, Start, Status, first_springs};
+use crate::discretize::{self, Verified, point};
+use crate::error::{Error, Kind, Result, few};
+use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
+use crate::file::digest;
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
-use crate::model::{BodySlot, Mechanism, Model};
-use crate::output::sci;
-use crate::parallel::{Ranks, collectively};
-use crate::petsc::{Schur, Session, has_metis, keep_apart, keep_at_hand};
+use crate::model::{BodySlot, LinearStep};
+use crate::parallel::{Ranks, collectively, differences};
+use crate::petsc::{Session, keep_apart, keep_at_hand};
 use crate::problem::Order;
+use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec};
+use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
-use crate::solver::options;
+use crate::solver::{Dense, Krylov, Monolithic, Union, options};
+use serde_json::{Map, Value};
+use std::borrow::Borrow;
+use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
@@ -37,17 +42,34 @@ pub fn build(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    build_with(session, scene.into(), Vec::new(), interrupt, clock)
+    build_after(session, scene.into(), None, interrupt, clock)
 }
 
-/// Build the discrete problem as [`build`] does, with the bodies `kept` from an earlier scene.
-pub fn build_with(
+/// Build a scene with what the run of another scene before it has left. Collective.
+///
+/// The stiffness matrix of a body does not depend on method, layers, gaps and the values of loads and supports: then a condensed body is
+/// reused. Where only the method changes, the whole problem is reused.
+pub fn build_after(
     session: &Session,
     scene: Rc<Scene>,
-    kept: Vec<BodySlot>,
+    before: Option<Done>,
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
+    let mut kept = Vec::new();
+    if let Some(Done { built: mut last, .. }) = before {
+        if serves(&last, &scene) {
+            let discrete = &mut last.discrete;
+            discrete.model.exchange = Rc::new(Ranks::new(session));
+            let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+            discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
+            discrete.assemblies = 0;
+            return Ok(Built { scene, ..last });
+        }
+        if settings(&last.scene, without_values) == settings(&scene, without_values) {
+            kept = last.into_condensed();
+        }
+    }
     collectively(session, options::refuse_log(session))?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
@@ -129,7 +151,7 @@ where
         clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
-        let mut warnings = warnings(session, &discrete, D);
+        let mut warnings = warnings::of_problem(session, &discrete, D);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
         let mut built = Built {
@@ -145,14 +167,18 @@ where
             warnings,
             legs: None,
         };
-        built.warnings.extend(pairs::swapped_tables(&built));
+        let pairs = 0..built.discrete.model.pairs.len();
+        let swapped: Vec<String> = pairs.filter_map(|i| warnings::swapped_table(&built, i)).collect();
+        built.warnings.extend(swapped);
         Ok(built)
     }
 
     /// Return the warnings about the mesh and its file.
     fn of_mesh(&self) -> Vec<String> {
         let Self { verified, read, .. } = self;
-        let changed = in_parts(verified.mesh.split).into_iter().chain(made_straight(verified.mesh.straightened));
+        let changed = warnings::in_parts(verified.mesh.split)
+            .into_iter()
+            .chain(warnings::made_straight(verified.mesh.straightened));
         let of_file = read.iter().flat_map(|read| &read.warnings).chain(&verified.notes);
         changed.chain(of_file.cloned()).collect()
     }
@@ -188,97 +214,6 @@ fn verified<const D: usize>(
     Ok((collectively(session, verified)?, file))
 }
 
-fn warnings(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<String> {
-    let mut warnings = Vec::new();
-    if session.blas_name() == "reference BLAS" {
-        warnings.push(
-            "the reference BLAS is in use: factorisations are up to ten times slower; run scripts/setup for OpenBLAS"
-                .to_owned(),
-        );
-    }
-    if let Some(kernels) = session.faster_blas_kernels() {
-        warnings.push(format!(
-            "{} does not use the vector instructions of this processor: factorisations take up to three times as long; set \
-             OPENBLAS_CORETYPE={kernels}",
-            session.blas_name()
-        ));
-    }
-    if discrete.bodies.iter().any(|body| Schur::is_large(dimension, body.dofs)) && !has_metis() {
-        warnings.push(
-            "METIS was not found: large bodies are factored in the order of minimum degree, with a fifth more memory or more; \
-             `apt-get install libmetis5`, or a PETSc with METIS"
-                .to_owned(),
-        );
-    }
-    warnings.extend(session.left_out().iter().map(|file| {
-        format!(
-            "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
-        )
-    }));
-    if session.size() > discrete.bodies.len() && !discrete.model.is_distributed() {
-        warnings.push(format!(
-            "{} of {} ranks have no body to solve",
-            session.size() - discrete.bodies.len(),
-            session.size()
-        ));
-    }
-    for body in discrete.bodies.iter().filter(|body| !body.gauged.fixed.is_empty()) {
-        let motions = body.gauged.fixed.join("; ");
-        warnings.push(format!(
-            "body {}: nothing holds its {motions}, and no load works on it: it is fixed at one node",
-            body.name
-        ));
-    }
-    for body in discrete.bodies.iter().filter(|body| !body.gauged.spinning.is_empty()) {
-        let motions = body.gauged.spinning.join("; ");
-        warnings.push(format!(
-            "body {}: only the facets of the mesh resist its {motions}, and loads work on it: its displacements mean nothing; hold it, or load it through its centre",
-            body.name
-        ));
-    }
-    warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
-    warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
-    warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(pairs::of_surfaces(&discrete.model.pairs, &discrete.contacts));
-    warnings
-}
-
-/// Return the warning of elements that were split, if any.
-pub fn in_parts(split: usize) -> Option<String> {
-    let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";
-    (split > 0).then(|| format!("{split} {what}"))
-}
-
-/// Return the warning of quadratic cells that were made straight, if any.
-pub fn made_straight(cells: usize) -> Option<String> {
-    let why = "were folded by the curved boundary and have straight edges now, so that gaps there are those of chords: a finer mesh follows the boundary";
-    (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
-}
-
-/// Return the warning of loads that were balanced.
-fn balanced_in_words(discrete: &Discrete, Balanced { bodies, motion, share }: &Balanced) -> String {
-    let names = in_words(bodies.iter().map(|&body| &discrete.bodies[body].name));
-    format!(
-        "{} {names}: nothing holds {} in {motion}, and loads lack balance there by {} of what forces of their sizes could do: no more than facets \
-         and quadrature may miss of them, so that the loads were changed by that share to balance",
-        if bodies.len() == 1 { "body" } else { "bodies" },
-        if bodies.len() == 1 { "it" } else { "them" },
-        sci(*share, 1)
-    )
-}
-
-/// Return the warning of a free motion of several bodies.
-fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
-    let name = |&body: &usize| &discrete.bodies[body].name;
-    let bodies = in_words(mechanism.bodies.iter().map(name));
-    let end = match mechanism.fixed.as_ref().map(name) {
-        Some(body) => format!("and no load works on it: they are fixed at nodes of `{body}`"),
-        None if mechanism.work == 0.0 => "and no load works on it: displacements are free up to it".to_owned(),
-        None => "and loads work on it: there is no solution".to_owned(),
-    };
-    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
-}
-
 /// Make the method and factor every body for the start. Then refuse options that no solver has read.
 ///
 /// # Errors
@@ -293,7 +228,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         None => Start::Automatic,
     };
     let mut full = start.clone();
-    let method = collectively(session, method::make(session, &mut built, &mut full))?;
+    let method = collectively(session, make(session, &mut built, &mut full))?;
     if scene.method.steps.is_empty() {
         // The start that the set-up found is that of the run. Load steps have other loads.
         start = full;
@@ -320,7 +255,7 @@ pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, 
     };
     keep_apart();
     let mut done = done?;
-    pairs::note_ends(&mut done);
+    warnings::note_ends(&mut done);
     clock.phase("iterate");
     Ok(done)
 }
@@ -339,44 +274,10 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
              cells smaller there, or less flat"
         ));
     }
-    let warnings = of_pressures(&discrete.model, &estimate);
+    let warnings = warnings::of_pressures(&discrete.model, &estimate);
     done.warnings.extend(warnings);
     clock.phase("estimate");
     Ok(Some(estimate))
-}
-
-/// Least change of the pressures with the side of the normals that is worth a warning: one per cent.
-const ONE_SIDED: f64 = 0.01;
-
-/// Return warnings of pressures whose estimated error is a guess, or that depend on the side that gives the normals by more than that error.
-fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for (i, pair) in model.pairs.iter().enumerate() {
-        let [a, b] = &pair.surfaces;
-        if let Some(guess) = estimate.guesses[i] {
-            let place = point(guess.place);
-            let reason = match guess.cause {
-                Cause::Rim => {
-                    format!("most of it is at the edge of the contact, at {place}, where pressures may be singular")
-                }
-                Cause::FewFacets => {
-                    format!(
-                        "contact ends within the facets that carry most of the pressure, around {place}: make them smaller"
-                    )
-                }
-            };
-            warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
-        }
-        let change = estimate.sides[i];
-        if change > estimate.pressure[i].max(ONE_SIDED) {
-            warnings.push(format!(
-                "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
-                 than by their estimated error: the surfaces slide or tilt too far for small displacements",
-                100.0 * change
-            ));
-        }
-    }
-    warnings
 }
 
 /// Return the stopping rules in words.
@@ -386,4 +287,162 @@ pub fn targets(scene: &Scene) -> String {
     let rules = rules.iter().filter_map(|(name, value)| value.map(|value| format!("{name} <= {value:e}")));
     let balanced = stop.balanced.then(|| format!("error <= {} of the discretisation's", ddm::SHARE));
     rules.chain(balanced).collect::<Vec<_>>().join(" or ")
+}
+
+/// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.
+fn serves(last: &Built, scene: &Scene) -> bool {
+    let both = [&*last.scene, scene];
+    // an estimate of the error needs the meshes, which are kept only for it
+    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate || scene.method.stop.balanced);
+    // how linear steps are solved was chosen for the method
+    let [old_joint, new_joint] = both.map(|scene| {
+        let MethodSpec { name, linear, .. } = &scene.method;
+        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
+    });
+    last.condensed.len() == last.discrete.bodies.len()
+        && old_meshes == new_meshes
+        // tables of factors change the loads of bodies
+        && both.iter().all(|scene| !scene.method.steps.is_table())
+        && old_joint == new_joint
+        && settings(&last.scene, |_| ()) == settings(scene, |_| ())
+}
+
+/// Return the settings of a scene on which bodies can depend, changed by `edit`.
+fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
+    let mut settings = scene.settings();
+    if let Value::Object(map) = &mut settings {
+        ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
+    }
+    edit(&mut settings);
+    settings
+}
+
+/// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
+fn without_values(settings: &mut Value) {
+    each(settings.get_mut("contact"), |contact| without(contact, &["gap", "layer", "reference"]));
+    each(settings.get_mut("body"), |body| {
+        without(body, &["force", "path"]);
+        if let Some(Value::Array(loads)) = body.get_mut("load") {
+            // only rigid surfaces change the dofs: they join them
+            loads.retain(|load| load["rigid"] == true);
+        }
+        for key in ["load", "fix"] {
+            each(body.get_mut(key), |item| {
+                without(item, &["path"]);
+                for key in ["force", "moment", "x", "y", "z", "normal"] {
+                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
+                }
+            });
+        }
+    });
+}
+
+fn without(table: &mut Map<String, Value>, keys: &[&str]) {
+    keys.iter().for_each(|key| drop(table.remove(*key)));
+}
+
+/// Edit each table of a list in the settings.
+fn each(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
+    let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
+    tables.filter_map(Value::as_object_mut).for_each(edit);
+}
+
+/// Refuse, on all ranks, scenes that differ between ranks, data and tables included. Files of the mesh are not compared, as only the
+/// first rank reads them. Collective.
+///
+/// # Errors
+/// [`Kind::Scene`] with the ranks, and the keys whose values differ.
+pub fn refuse_other_scenes(session: &Session, scenes: &[impl Borrow<Scene>]) -> Result<()> {
+    if session.size() == 1 {
+        return Ok(());
+    }
+    let mut values: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for scene in scenes {
+        for (key, value) in keys_and_values(scene.borrow().contents()) {
+            values.entry(key).or_default().push(value);
+        }
+    }
+    let digests = values.into_iter().map(|(key, values)| (key, digest(&values))).collect();
+    let differences = differences(session, &digests);
+    if differences.is_empty() {
+        return Ok(());
+    }
+    let ranks: BTreeSet<usize> = differences.iter().map(|difference| difference.rank).collect();
+    let keys: BTreeSet<String> = differences.into_iter().map(|difference| format!("`{}`", difference.what)).collect();
+    let (word, reads) = if ranks.len() == 1 { ("rank", "reads") } else { ("ranks", "read") };
+    let (ranks, keys) = (few(ranks).join(", "), few(keys).join(", "));
+    let message = format!("{word} {ranks} {reads} another scene than rank 0: other values of {keys}");
+    let help = "start all ranks in the same folder, where they find the same scene, data and tables";
+    Err(Error::new(Kind::Scene, message).help(help).common())
+}
+
+/// Return the values of the keys of a scene as text. Each table of data has a key of its own.
+fn keys_and_values(mut contents: Value) -> Vec<(String, String)> {
+    let data = contents["data"].take();
+    let data = data.as_object().into_iter().flatten().map(|(name, table)| (format!("data.{name}"), table.to_string()));
+    let keys = contents.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), value.to_string()));
+    data.chain(keys).collect()
+}
+
+/// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
+/// automatic start, it is stored in `start`.
+fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
+    let (scene, coefficient) = (built.scene.clone(), coefficient_of(&built.scene));
+    let acceleration: Box<dyn Acceleration> = match scene.method.name {
+        MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
+            return linear_step(session, built, start).map(Method::Newton);
+        }
+        MethodName::Robin => Box::new(Relaxed::new(rule(&scene)?)),
+        MethodName::Ncg => Box::new(Conjugate::default()),
+        MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
+    };
+    crate::robin::prepare(&mut built.discrete.model)?;
+    Ok(Method::Sweeps { acceleration, coefficient, linear: Box::new(Sweeps::carried()) })
+}
+
+fn coefficient_of(scene: &Scene) -> Coefficient {
+    Coefficient::new(scene.method.psi.clone(), scene.method.robin)
+}
+
+/// Return the solver of the linear steps of Newton's method.
+fn linear_step(session: &Session, built: &mut Built, start: &mut Start) -> Result<Box<dyn LinearStep>> {
+    let Built { scene, discrete, linear, options, interpolation, .. } = built;
+    let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
+    if linear == Linear::Sweeps {
+        crate::robin::prepare(model)?;
+        return Ok(Box::new(Sweeps::new(coefficient_of(scene))));
+    }
+    model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
+    // Multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows.
+    let nodes = linear == Linear::Multigrid || model.is_distributed();
+    let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };
+    let Some(union) = union else {
+        return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));
+    };
+    let block = if nodes { scene.dimension.value } else { 1 };
+    let mut step: Box<dyn LinearStep> = match linear {
+        Linear::Dense => Box::new(Monolithic::new(union.without_zeros(), |stiffness| Ok(Dense::new(stiffness)))?),
+        _ => {
+            let krylov = |stiffness| Krylov::new(session, options[0].clone(), block, stiffness, &[], interpolation);
+            let monolithic = Monolithic::new(union, krylov)?;
+            model.joint = nodes.then(|| monolithic.joint());
+            Box::new(monolithic)
+        }
+    };
+    if let Some(springs) = first_springs(model, start) {
+        step.set_up(&springs)?;
+    }
+    Ok(step)
+}
+
+fn rule(scene: &Scene) -> Result<Box<dyn GammaRule>> {
+    Ok(match &scene.method.gamma {
+        Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),
+        Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
+        Gamma::LineSearch => Box::new(LineSearch),
+        Gamma::Aitken => Box::new(Aitken::default()),
+        Gamma::BarzilaiBorwein => Box::new(BarzilaiBorwein::default()),
+        Gamma::Spectral => Box::new(Spectral::default()),
+        Gamma::Own(name) => scene.rules.get("rule for gamma", name)?(),
+    })
 }

@@ -1,10 +1,8 @@
 //! The report and the contact tables of a run, from its outcome.
 
-use super::clock::Clock;
-use super::ended::{All, Look};
-use super::stages::{Built, Done};
+use super::stages::{All, Built, Clock, Done, Look};
 use super::verdict::{self, forecast, message, status_name};
-use super::{balance, measure, pairs, preflight, requests, results};
+use super::{recorder, results, warnings};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Reached, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
@@ -14,7 +12,7 @@ use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, LookReport, PairReport,
-    PairRow, Report, sci,
+    Report, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -24,7 +22,7 @@ use std::collections::BTreeMap;
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
         Status::Converged | Status::RoundoffLimited if verdict::step_warnings(&done.steps).is_empty() => 0,
-        Status::Paused { asked } => requests::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
+        Status::Paused { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
@@ -44,10 +42,12 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
-    report.warnings.extend(too_large.into_iter().chain(pairs::beyond_laws(done)));
-    let approaches = measure::approaches(done, recovered);
+    report
+        .warnings
+        .extend(too_large.into_iter().chain((0..model.pairs.len()).filter_map(|i| warnings::beyond_law(done, i))));
+    let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
-    let balances = balance::gather(done, recovered);
+    let balances = results::balances(done, recovered);
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     if let Some(message) = lost_digits(done) {
         add_lost_digits(&mut report, message, &outcome.status);
@@ -78,7 +78,6 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
     report.f1 = last.and_then(|row| finite(row.energy));
 }
 
-/// Return a number if it is finite.
 fn finite(value: f64) -> Option<f64> {
     Some(value).filter(|value| value.is_finite())
 }
@@ -132,7 +131,6 @@ fn add_lost_digits(report: &mut Report, message: String, status: &Status) {
     }
 }
 
-/// Return the last look for the report.
 fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
     let at = match look.whose {
         Whose::Body(body) => vec![body],
@@ -256,7 +254,6 @@ impl Shared {
         all_gather(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()
     }
 
-    /// Merge the data of another rank.
     fn merged(mut self, other: Self) -> Self {
         self.counts += other.counts;
         self.assemblies += other.assemblies;
@@ -279,13 +276,12 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
     }
 }
 
-/// Return the report of pair `i`.
 fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let sides = discrete.sides(i);
-    let coupling = preflight::coupling(&done.built, i);
+    let coupling = results::coupling(&done.built, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
         surfaces: discrete.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
@@ -300,21 +296,15 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],
-        force: sides.map(|side| measure::resultant(force, &pair.resultant[side])),
-        moment: sides.map(|side| measure::resultant(force, &pair.moment[side])),
+        force: sides.map(|side| results::resultant(force, &pair.resultant[side])),
+        moment: sides.map(|side| results::resultant(force, &pair.moment[side])),
         approach,
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
-        peak_compression: measure::peak(c),
+        peak_compression: results::peak(c),
         extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
     }
-}
-
-/// Return the further columns of `contacts.csv` for pair `i`.
-pub fn pair_row(done: &Done, i: usize) -> PairRow {
-    let pair = &done.model().pairs[i];
-    PairRow::new(&pair.weight, &pair.gap, &done.outcome.layer.compression[done.model().range(i)])
 }
 
 /// Return the zeros of the compression c between neighbouring points of a curve, interpolated linearly.

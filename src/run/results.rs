@@ -1,16 +1,19 @@
-//! Results from the displacements of the bodies: largest stresses and strains with their positions, and errors against a known
-//! solution.
+//! Results from the displacements of the bodies: largest stresses and strains with their positions, errors against a known solution, forces,
+//! approach and contact size of each pair, and reactions and balance of each body. Before the first sweep there are estimates ([`coupling`]).
 
-use super::ended::{All, Recovered};
-use super::stages::Done;
-use crate::discretize::{BodyInfo, Discrete};
+use super::numbered;
+use super::stages::{All, Built, Done, Recovered};
+use crate::contact::{ContactPair, moment_in_scene};
+use crate::discretize::{Balance, BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::strain::{self, Strained};
-use crate::linalg::{around, bounds};
-use crate::model::{Body, BodySlot};
+use crate::linalg::{around, bounds, dot};
+use crate::model::{Body, BodySlot, Model};
 use crate::output::report::readable;
-use crate::output::{BodyReport, sci};
+use crate::output::{BalanceReport, BodyReport, Extent, ForceReport, ReactionReport, StepPairReport, StepReport, sci};
+use crate::problem::history::History;
+use crate::problem::method::Gamma;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
@@ -48,13 +51,10 @@ struct Extremes {
     von_mises: f64,
     /// Point of the largest von Mises stress.
     at: [f64; 3],
-    /// Least and largest principal stress.
     principal: [f64; 2],
-    /// Largest displacement.
     displacement: f64,
     /// Bounding box of the points: least and largest coordinates.
     extent: [[f64; 3]; 2],
-    /// Largest strain.
     strain: Strained,
     /// Norms of the error and of the known displacements: L2, H1 seminorm, energy.
     norms: Option<[[f64; 3]; 2]>,
@@ -184,4 +184,272 @@ fn strain_in_words(name: &str, strain: &Strained) -> String {
     let [x, y, z] = strain.at.map(|x| readable(x, 4));
     let percentage = readable(100.0 * large / all, 1);
     format!("`{name}` up to {} at ({x}, {y}, {z}), in {percentage} per cent of the body", sci(strain.most, 1))
+}
+
+/// Least length of the integrated normal of a pair relative to its area: below this ratio the pair has no mean normal.
+///
+/// Around a closed surface the integral is zero except for facets without a partner, and one such facet in a thousand does not
+/// define a direction of the contact. Half a circle has the ratio 0.64.
+const CANCELS: f64 = 1e-3;
+
+/// Return the names of the pairs in the order of the scene, made unique.
+pub fn pair_names(built: &Built) -> Vec<String> {
+    let model = &built.discrete.model;
+    let names = (0..model.pairs.len()).map(|i| {
+        let [a, b] = built.discrete.sides(i).map(|side| &model.bodies[model.pairs[i].bodies[side]].name);
+        format!("{a}-{b}")
+    });
+    numbered(names)
+}
+
+/// Return the measure of the contact points: `"length"`, or `"area"` in space and for bodies of revolution.
+pub fn of_points(built: &Built) -> &'static str {
+    built.discrete.model.pairs.first().map_or("length", |pair| pair.measure)
+}
+
+/// Return the names of the supports, springs and rigid surfaces, body by body, made unique.
+pub fn reaction_names(built: &Built) -> Vec<String> {
+    numbered(built.discrete.bodies.iter().flat_map(|body| {
+        let all = body.supports.iter().chain(&body.springs).chain(&body.rigid);
+        all.map(|on| format!("{}:{on}", body.name))
+    }))
+}
+
+/// Return the reactions of bodies with these names and balances, in the order of [`reaction_names`].
+fn reactions<'a>(bodies: impl Iterator<Item = (&'a String, BalanceReport)>) -> Vec<ReactionReport> {
+    let of_body = |(name, balance): (&String, BalanceReport)| {
+        let BalanceReport { supports, springs, rigid, .. } = balance;
+        let all = supports.into_iter().chain(springs).chain(rigid);
+        all.map(|part| ReactionReport { body: name.clone(), on: part.on, force: part.force }).collect::<Vec<_>>()
+    };
+    bodies.flat_map(of_body).collect()
+}
+
+/// Return the reactions from the reports of bodies, in the order of [`reaction_names`].
+pub fn reported(bodies: &[BodyReport]) -> Vec<ReactionReport> {
+    reactions(bodies.iter().map(|body| (&body.name, body.balance.clone())))
+}
+
+/// Return the report of the load step `number` of a history, counted from 0, which has ended with these displacements. Collective.
+pub fn step(
+    done: &Done,
+    recovered: &All,
+    history: &History,
+    number: usize,
+    iterations: usize,
+    status: &str,
+    message: String,
+) -> StepReport {
+    let approaches = approaches(done, recovered);
+    let balances = balances(done, recovered);
+    let names = done.built.discrete.bodies.iter().map(|body| &body.name);
+    let last = done.outcome.rows.last();
+    let step = &history.steps[number];
+    StepReport {
+        time: step.time,
+        factors: history.names.iter().cloned().zip(step.factors.iter().copied()).collect(),
+        status: status.to_owned(),
+        message,
+        iterations,
+        residual: last.map(|row| row.residual).filter(|residual| residual.is_finite()),
+        pairs: approaches.into_iter().enumerate().map(|(i, approach)| pair(done, i, approach)).collect(),
+        reactions: reactions(names.zip(balances)),
+    }
+}
+
+/// Return the resultant force or moment of contact forces (n) on a side: minus the sum of the forces times the `rows` (n x 3) of their
+/// points.
+pub fn resultant(force: &[f64], rows: &[[f64; 3]]) -> [f64; 3] {
+    std::array::from_fn(|k| force.iter().zip(rows).fold(0.0, |sum, (force, row)| sum - force * row[k]))
+}
+
+/// Return the largest compression of a layer, negative if all of it is open.
+pub fn peak(compression: &[f64]) -> f64 {
+    compression.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Return the report of pair `i` in a load step.
+fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
+    let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
+    let (pair, range) = (&model.pairs[i], model.range(i));
+    let (c, force) = (&layer.compression[range.clone()], &layer.force[range.clone()]);
+    StepPairReport {
+        force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
+        approach,
+        extent: Extent::new(pair.measure, &pair.weight, c),
+        peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
+        peak_compression: peak(c),
+        closed: c.iter().filter(|c| **c > 0.0).count(),
+    }
+}
+
+/// Return the approach of the bodies of each pair along its mean normal, none without a mean normal. Collective, one message.
+pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
+    let (discrete, model) = (&done.built.discrete, done.model());
+    let directions: Vec<Option<[f64; 3]>> = (0..model.pairs.len()).map(|i| direction(model, i)).collect();
+    let mut message = vec![0.0; model.pairs.len()];
+    for (i, &n) in directions.iter().enumerate() {
+        let Some(n) = n else { continue };
+        for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            let body = model.pairs[i].bodies[side];
+            message[i] += match &recovered[body] {
+                None => 0.0,
+                Some(Err(_)) => f64::NAN,
+                Some(Ok(Recovered { state, .. })) => {
+                    let u = discrete.bodies[body].post().outer(state, n);
+                    sign * (0..3).map(|k| u[k] * n[k]).sum::<f64>()
+                }
+            };
+        }
+    }
+    model.exchange.sum(&mut message);
+    let finite = |(n, value): (Option<[f64; 3]>, f64)| n.map(|_| value).filter(|value| value.is_finite());
+    directions.into_iter().zip(message).map(finite).collect()
+}
+
+/// Return the mean normal of pair `i` from side a to side b, if there is one.
+fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
+    let pair = &model.pairs[i];
+    let points = || pair.weight.iter().zip(&pair.resultant[0]);
+    let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(weight, n)| weight * n[k]).sum());
+    let (size, total) = (sum.iter().map(|n| n * n).sum::<f64>().sqrt(), pair.weight.iter().sum::<f64>());
+    (size > CANCELS * total).then(|| sum.map(|n| n / size))
+}
+
+/// Numbers of a resultant: force and moment.
+const WIDTH: usize = 6;
+
+/// Return the forces on every body of the result. Collective.
+pub fn balances(done: &Done, recovered: &All) -> Vec<BalanceReport> {
+    let discrete = &done.built.discrete;
+    let mut message = Vec::new();
+    for (body, info) in discrete.bodies.iter().enumerate() {
+        let mut mine = vec![0.0; WIDTH * names(info).len() + 2];
+        match &recovered[body] {
+            None => {}
+            // a solver that failed leaves the forces unknown, but the run itself is over
+            Some(Err(_)) => mine.fill(f64::NAN),
+            Some(Ok(recovered)) => add_forces(done, body, recovered, &mut mine),
+        }
+        message.extend(mine);
+    }
+    discrete.model.exchange.sum(&mut message);
+    let (mut rest, mut reports) = (&message[..], Vec::new());
+    for info in &discrete.bodies {
+        let numbers;
+        (numbers, rest) = rest.split_at(WIDTH * names(info).len() + 2);
+        reports.push(balance(info, numbers));
+    }
+    reports
+}
+
+/// Return the names of the resultants on a body: loads, contacts, then each support, spring and rigid surface.
+fn names(info: &BodyInfo) -> Vec<String> {
+    let all = info.supports.iter().chain(&info.springs).chain(&info.rigid).cloned();
+    ["loads", "contacts"].map(str::to_owned).into_iter().chain(all).collect()
+}
+
+/// Write this rank's part of the resultants on a body, and of the sums of sizes of forces and moments, to `mine`.
+fn add_forces(done: &Done, body: usize, recovered: &Recovered, mine: &mut [f64]) {
+    let (model, info) = (done.model(), &done.built.discrete.bodies[body]);
+    // bodies expect values at the full load
+    let full = |values: &[f64]| values.iter().map(|v| v / done.share).collect::<Vec<_>>();
+    let force = model.at_rows(body, &done.outcome.layer.force);
+    let Balance { parts, size } = info.post().balance(&full(&recovered.bent), &full(&force));
+    let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
+    mine.iter_mut().zip(numbers).for_each(|(mine, number)| *mine = done.share * number);
+}
+
+/// Return the report of the forces on a body from the numbers of its resultants, and the sums of sizes of forces and moments.
+fn balance(info: &BodyInfo, numbers: &[f64]) -> BalanceReport {
+    let names = names(info);
+    let (resultants, sizes) = numbers.split_at(WIDTH * names.len());
+    let resultant =
+        |(on, n): (String, &[f64])| ForceReport { on, force: [n[0], n[1], n[2]], moment: [n[3], n[4], n[5]] };
+    let mut parts: Vec<ForceReport> = names.into_iter().zip(resultants.chunks_exact(WIDTH)).map(resultant).collect();
+    let force_imbalance = imbalance(parts.iter().map(|part| part.force), sizes[0]);
+    let moment_imbalance = imbalance(parts.iter().map(|part| part.moment), sizes[1]);
+    for part in &mut parts {
+        part.moment = moment_in_scene(&info.datum, part.force, part.moment);
+    }
+    let rigid = parts.split_off(2 + info.supports.len() + info.springs.len());
+    let springs = parts.split_off(2 + info.supports.len());
+    let supports = parts.split_off(2);
+    let contacts = parts.pop().unwrap_or_default();
+    let loads = parts.pop().unwrap_or_default();
+    BalanceReport { loads, contacts, supports, springs, rigid, force_imbalance, moment_imbalance }
+}
+
+/// Return the norm of the sum of vectors, relative to the sum of the sizes of all nodal contributions; zero if that is zero.
+fn imbalance(vectors: impl Iterator<Item = [f64; 3]> + Clone, size: f64) -> f64 {
+    let sum = |c: usize| vectors.clone().map(|vector| vector[c]).sum::<f64>();
+    let norm = (0..3).map(|c| sum(c).powi(2)).sum::<f64>().sqrt();
+    if size > 0.0 { norm / size } else { 0.0 }
+}
+
+/// The estimates for a pair.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coupling {
+    /// Mean pressure that the loads give.
+    pub pressure: f64,
+    /// theta of side a and side b.
+    pub theta: [f64; 2],
+    /// Expected sweeps to a relative residual of 1e-8, by method. The number is infinite where the estimate predicts no
+    /// convergence.
+    pub sweeps: Vec<(&'static str, f64)>,
+}
+
+/// Logarithm ln(1e8) of the reduction of the residual in the estimates.
+const DIGITS: f64 = 18.42;
+
+/// Return the coupling of pair `i`.
+pub fn coupling(built: &Built, i: usize) -> Coupling {
+    let Built { scene, discrete, .. } = built;
+    let pair = &discrete.model.pairs[i];
+    let area: f64 = pair.weight.iter().sum();
+    let pressure =
+        pair.bodies.map(|body| pressing(pair, discrete.bodies[body].load)).into_iter().fold(0.0, f64::max) / area;
+    let tangent = tangent_at(pair, pressure);
+    let theta = pair.bodies.map(|body| {
+        let stiffness = discrete.bodies[body].stiffness;
+        if tangent == 0.0 { 0.0 } else { tangent / (stiffness + tangent) }
+    });
+    let both = (theta[0] * theta[1]).sqrt();
+    let gamma = match scene.method.gamma {
+        Gamma::Stationary(gamma) => gamma,
+        _ => 1.0,
+    };
+    let factor = (1.0 - gamma * (1.0 - both)).abs().max((1.0 - gamma * (1.0 + both)).abs());
+    let relaxed = if factor < 1.0 { (DIGITS / -factor.ln()).max(2.0) } else { f64::INFINITY };
+    let condition = (1.0 + both) / (1.0 - both);
+    let gradients = if both < 1.0 { (0.5 * condition.sqrt() * (DIGITS + 0.7)).max(2.0) } else { f64::INFINITY };
+    let sweeps = vec![("robin", relaxed), ("ncg", gradients), ("newton-robin", 1.5 * gradients + 5.0), ("newton", 6.0)];
+    Coupling { pressure, theta, sweeps }
+}
+
+/// Return the part of a load that presses the surface of a pair: along the mean normal where the surface faces one way, and the whole
+/// load where its normals turn around, as those of a pin in a hole do.
+///
+/// On a flat surface the load along the mean normal is the mean of |n.F|. Where it is less than half of that mean, the normals cancel.
+fn pressing(pair: &ContactPair, load: [f64; 3]) -> f64 {
+    let mean = |value: &dyn Fn(&[f64; 3]) -> f64| {
+        pair.weight.iter().zip(&pair.normal).map(|(weight, normal)| weight * value(normal)).sum::<f64>()
+            / pair.weight.iter().sum::<f64>()
+    };
+    let along_each = mean(&|normal| dot(&load, normal).abs());
+    let size = dot(&load, &load).sqrt();
+    // A load across all normals leaves rounding along them, which is treated as zero.
+    if along_each <= f64::EPSILON.sqrt() * size {
+        return 0.0;
+    }
+    let normal: [f64; 3] = std::array::from_fn(|c| mean(&|normal| normal[c]));
+    let along_mean = dot(&load, &normal).abs() / dot(&normal, &normal).sqrt().max(f64::MIN_POSITIVE);
+    if along_mean < 0.5 * along_each { size } else { along_mean }
+}
+
+/// Return the tangent p' of the layer at the pair's first point where it carries `pressure`. The result is zero for a pressure
+/// that the layer cannot reach.
+fn tangent_at(pair: &ContactPair, pressure: f64) -> f64 {
+    let compression = pair.law.compression(0, pressure);
+    if compression > 0.0 && compression.is_finite() { pair.law.response(0, compression).tangent } else { 0.0 }
 }

@@ -1,18 +1,20 @@
-//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`].
+//! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock that measures its phases.
 
-use super::clock::Clock;
-use super::ended::{All, Look};
-use crate::ddm::{Discretisation, Method, Outcome, Row, Start};
-use crate::discretize::Discrete;
-use crate::error::Result;
+use crate::ddm::{Discretisation, Method, Outcome, Reached, Row, Start, Whose};
+use crate::discretize::{BodyInfo, Discrete};
+use crate::error::{Error, Result};
 use crate::estimate::Nodal;
 use crate::fem::Interpolation;
+use crate::file::bytes_in_proc;
 use crate::model::{BodySlot, Model};
-use crate::output::StepReport;
+use crate::output::{BodyField, StepReport};
 use crate::problem::method::Linear;
 use crate::scene::Scene;
 use crate::solver::options::Chosen;
+use std::cell::OnceCell;
+use std::collections::BTreeMap;
 use std::rc::Rc;
+use std::time::Instant;
 
 /// A scene with its discrete problem. Bodies have their inner solvers, but nothing is factorised yet.
 pub struct Built {
@@ -43,9 +45,6 @@ pub struct Built {
 /// A scene with its mesh, from which the problem of each leg of its load history is prepared.
 pub trait Legs {
     /// Prepare the problem of the leg that begins with a step. Condensed bodies of the leg before are reused. Collective.
-    ///
-    /// # Errors
-    /// Loads that a body cannot have, and failures of the solver library.
     fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared>;
 }
 
@@ -124,5 +123,100 @@ impl Done {
     /// Return the model of the discrete problem.
     pub fn model(&self) -> &Model {
         &self.built.discrete.model
+    }
+}
+
+/// The displacements of a body at the end of a run, on a rank that has nodes of it.
+pub struct Recovered {
+    /// Displacements of the owned and ghost nodes, one entry per dof.
+    pub state: Vec<f64>,
+    /// Displacements without the rigid motions that supports leave or impose, which cause no strain.
+    pub bent: Vec<f64>,
+    field: OnceCell<BodyField>,
+}
+
+impl Recovered {
+    /// Store displacements of the nodes, and those without rigid motion.
+    pub fn new(state: Vec<f64>, bent: Vec<f64>) -> Self {
+        Self { state, bent, field: OnceCell::new() }
+    }
+
+    /// Return displacements and stresses on the cells that this rank writes. They are computed at the first call.
+    pub fn field(&self, info: &BodyInfo) -> &BodyField {
+        self.field.get_or_init(|| info.post().field(&self.state, &self.bent))
+    }
+}
+
+/// The displacements of every body: none for bodies of other ranks, or the failure of the solver that recovers the interior.
+pub type All = Vec<Option<Result<Recovered>>>;
+
+/// Return the displacements of all bodies, multiplied by a factor.
+pub fn scaled(all: &All, factor: f64) -> All {
+    let times = |v: &[f64]| v.iter().map(|u| factor * u).collect();
+    let scaled = |recovered: &Result<Recovered>| match recovered {
+        Ok(Recovered { state, bent, .. }) => Ok(Recovered::new(times(state), times(bent))),
+        Err(error) => Err(Error::new(error.kind(), error.message())),
+    };
+    all.iter().map(|recovered| recovered.as_ref().map(scaled)).collect()
+}
+
+/// The errors that the last look found.
+#[derive(Debug, Clone)]
+pub struct Look {
+    /// Relative errors.
+    pub reached: Reached,
+    /// Body or pair with the largest error.
+    pub whose: Whose,
+    /// Wall seconds of the last look.
+    pub seconds: f64,
+}
+
+/// The clock of a run, which measures its phases.
+#[derive(Clone)]
+pub struct Clock {
+    began: Instant,
+    last: Instant,
+    /// Wall seconds by phase.
+    pub times: BTreeMap<String, f64>,
+    /// Peak resident memory of this process at the end of each phase, 10^6 bytes; empty where the system does not report it.
+    pub memory: BTreeMap<String, f64>,
+    /// Estimated seconds of set-up and iteration, if the choice of the solvers made an estimate.
+    pub estimate: Option<f64>,
+    /// Function that is called at the end of each phase with its name, and at the beginning of the first with an empty name.
+    pub watch: Option<Rc<Watch>>,
+}
+
+/// A function of the name of a phase that has ended, and of the estimate.
+type Watch = dyn Fn(&str, Option<f64>);
+
+impl Default for Clock {
+    fn default() -> Self {
+        let now = Instant::now();
+        let (times, memory) = (BTreeMap::new(), BTreeMap::new());
+        Self { began: now, last: now, times, memory, estimate: None, watch: None }
+    }
+}
+
+impl Clock {
+    /// Report the beginning of the first phase of a mesh.
+    pub fn begin(&self) {
+        self.watch.iter().for_each(|watch| watch("", None));
+    }
+
+    /// End a phase, which began when the one before ended.
+    pub fn phase(&mut self, name: &str) {
+        let now = Instant::now();
+        *self.times.entry(name.to_owned()).or_default() += (now - self.last).as_secs_f64();
+        self.last = now;
+        let peak = bytes_in_proc("/proc/self/status", "VmHWM");
+        self.memory.extend(peak.map(|bytes| (name.to_owned(), bytes as f64 / 1e6)));
+        self.watch.iter().for_each(|watch| watch(name, self.estimate));
+    }
+
+    /// Return the seconds since the run began, and store them as `total`.
+    pub fn total(&mut self) -> f64 {
+        let total = self.began.elapsed().as_secs_f64();
+        self.times.insert("total".to_owned(), total);
+        total
     }
 }

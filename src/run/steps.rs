@@ -5,15 +5,12 @@
 //! compression c. A step within a leg therefore changes gaps and laws alone, and no body is assembled, reduced or factorised again.
 //! Another leg is another problem on the same mesh, which reuses condensed bodies.
 
-use super::clock::Clock;
-use super::ended::{self, All};
-use super::measure;
-use super::pairs;
 use super::recorder::{self, Recorder};
 use super::report::Shared;
 use super::results;
-use super::stages::{Begin, Done, Prepared};
+use super::stages::{self, All, Begin, Clock, Done, Prepared};
 use super::verdict::{message, status_name};
+use super::warnings;
 use crate::contact::law::{LayerLaw, Scaled};
 use crate::ddm::{Method, Observer, Outcome, Row, Start, Status};
 use crate::discretize::{self, Discrete};
@@ -51,13 +48,13 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
         }
         let of_step = done.outcome.clone();
         let recovered = all.complete(&mut done);
-        pairs::note_ends(&mut done);
+        warnings::note_ends(&mut done);
         all.keep.step(&done, &recovered);
         drop(recovered);
         if last || interrupted {
             return Ok(done);
         }
-        let usable = measure::is_usable(&of_step.status);
+        let usable = of_step.status.is_solved() || of_step.status == Status::IterationLimit;
         if history.leg(all.step).contains(&(all.step - 1)) {
             all.end_step(&mut done, &of_step);
             done.recovered = None;
@@ -167,7 +164,6 @@ impl<'a> Steps<'a> {
         row
     }
 
-    /// End a step with this outcome.
     fn end_step(&mut self, done: &mut Done, of_step: &Outcome) {
         done.earlier.extend(of_step.rows.iter().map(|row| self.in_scene(row)));
         self.iterations += of_step.iterations;
@@ -222,15 +218,14 @@ impl<'a> Steps<'a> {
             let compression = outcome.layer.compression.iter().map(|c| self.factor * c).collect();
             outcome.layer = Layer::new(&built.discrete.model, compression);
         }
-        done.recovered = done.recovered.take().map(|all| Rc::new(ended::scaled(&all, self.factor)));
+        done.recovered = done.recovered.take().map(|all| Rc::new(stages::scaled(&all, self.factor)));
         let recovered = results::recover(done);
-        let step = measure::step(done, &recovered, &self.history, self.step - 1, iterations, status, message);
+        let step = results::step(done, &recovered, &self.history, self.step - 1, iterations, status, message);
         done.steps.push(step);
         recovered
     }
 }
 
-/// Return the laws of the pairs.
 fn laws(model: &Model) -> Vec<Rc<dyn LayerLaw>> {
     model.pairs.iter().map(|pair| pair.law.clone()).collect()
 }

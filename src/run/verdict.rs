@@ -1,7 +1,7 @@
 //! The end of a run in words: the name of its status, and a message with the cause and with advice.
 
-use super::requests;
-use super::words::in_words;
+use super::in_words;
+use super::recorder;
 use crate::ddm::robin::{best_factor, best_gamma};
 use crate::ddm::{Inaccuracy, Outcome, Status, Whose};
 use crate::model::{Mechanism, Model, Moved};
@@ -20,7 +20,7 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
         Status::Inaccurate(_) => "inaccurate",
-        Status::Paused { asked } if requests::signal(*asked).is_some() => "interrupted",
+        Status::Paused { asked } if recorder::signal(*asked).is_some() => "interrupted",
         Status::Paused { .. } => "running",
     }
 }
@@ -69,7 +69,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
         }
         Status::Inaccurate(inaccuracy) => inaccurate(inaccuracy, model),
         Status::Paused { asked } => {
-            let what = match requests::signal_name(*asked) {
+            let what = match recorder::signal_name(*asked) {
                 "" => "snapshot".to_owned(),
                 name => format!("interrupted by {name}"),
             };

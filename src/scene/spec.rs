@@ -1,14 +1,16 @@
-//! The checked scene: a problem, how to solve it, and what to write.
+//! The scene as data that declares its keys, and how it is built in Rust and compared between ranks and runs.
 
-use crate::contact::law::OwnLaws;
+use crate::contact::law::{LayerLaw, OwnLaws};
 use crate::data::Library;
-use crate::ddm::gamma::OwnRules;
-use crate::error::{Located, Result};
-use crate::output::vtu::Encoding;
+use crate::ddm::gamma::{GammaRule, OwnRules};
+use crate::error::{Located, Place, Result};
+use crate::file::digest;
+use crate::output::fields::Encoding;
 use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, table, word, words};
-use serde_json::{Value as Json, json};
+use serde_json::{Value, Value as Json, json};
 use std::path::PathBuf;
+use std::rc::Rc;
 
 keys! {
     /// A checked scene.
@@ -143,7 +145,7 @@ const ALL: [(&str, Most); 1] = [("all", Most(usize::MAX))];
 
 impl Setting for Most {
     fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::NonNegativeInteger, word(&ALL)])
+        ValueKind::Either(vec![ValueKind::Integer(0), word(&ALL)])
     }
 
     fn read(node: &Node, _: &Context) -> Result<Self> {
@@ -155,5 +157,78 @@ impl Setting for Most {
 
     fn echo(&self, _: usize) -> Json {
         if self.0 == usize::MAX { json!("all") } else { json!(self.0) }
+    }
+}
+
+impl Scene {
+    /// Return a scene without bodies, in the plane (`dimension` 2, plane strain) or in space (3), solved by Newton's method. Settings
+    /// without a method of their own are fields of the scene.
+    #[track_caller]
+    pub fn new(dimension: usize, mesh: impl Into<MeshSource>) -> Self {
+        let place = Place::here(&dimension.to_string());
+        let path = place.source.name.clone().into();
+        Self::with_defaults(mesh.into(), Vec::new(), path, "scene".to_owned(), Located::new(dimension, place))
+    }
+
+    /// Add a body.
+    pub fn body(mut self, body: BodySpec) -> Self {
+        self.bodies.push(body);
+        self
+    }
+
+    /// Add a pair of contact surfaces.
+    pub fn contact(mut self, contact: ContactSpec) -> Self {
+        self.contacts.push(ContactSpec { table: self.contacts.len(), ..contact });
+        self
+    }
+
+    /// Set the outer iteration.
+    pub fn method(self, method: MethodSpec) -> Self {
+        Self { method, ..self }
+    }
+
+    /// Add a law of a layer, which [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) uses by its name. `maker` gets the contact
+    /// points (x, y, z) of a pair and returns the law for all of them. The law is checked at the first point: it must increase, and have
+    /// its derivative and its integral.
+    pub fn law<L: LayerLaw + 'static>(mut self, name: &str, maker: impl Fn(&[[f64; 3]]) -> L + 'static) -> Self {
+        self.laws.insert(name, Rc::new(move |points: &[[f64; 3]]| Box::new(maker(points)) as _));
+        self
+    }
+
+    /// Add a rule for gamma, which [`Gamma::Own`](crate::problem::method::Gamma::Own) uses by its name. `maker` returns a new rule for
+    /// each run.
+    pub fn rule<R: GammaRule + 'static>(mut self, name: &str, maker: impl Fn() -> R + 'static) -> Self {
+        self.rules.insert(name, Rc::new(move || Box::new(maker()) as _));
+        self
+    }
+}
+
+impl Scene {
+    /// Return the settings without the names of files and folders. The name of each data file is replaced by a digest of its numbers;
+    /// the settings have the numbers of tables themselves. The contents of the mesh's files are not included.
+    pub fn contents(&self) -> Value {
+        let mut settings = self.settings();
+        let mut remove = |place: &str, keys: &[&str]| {
+            if let Some(table) = settings.pointer_mut(place).and_then(Value::as_object_mut) {
+                keys.iter().for_each(|key| drop(table.remove(*key)));
+            }
+        };
+        remove("", &["scene"]);
+        remove("/mesh", &["geo", "msh"]);
+        remove("/method/steps", &["table"]);
+        remove("/output", &["dir"]);
+        for data in self.data.values() {
+            settings["data"][&data.spec.name]["file"] = json!(digest(&data.numbers().collect::<Vec<f64>>()));
+        }
+        settings
+    }
+
+    /// Return the contents without the keys that change neither problem nor method: title, units and output.
+    pub fn problem(&self) -> Value {
+        let mut contents = self.contents();
+        if let Some(table) = contents.as_object_mut() {
+            ["title", "units", "output"].iter().for_each(|key| drop(table.remove(*key)));
+        }
+        contents
     }
 }

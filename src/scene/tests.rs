@@ -1,4 +1,5 @@
 use super::*;
+use crate::error::caret;
 use crate::expression::Field;
 use crate::problem::{
     BodySpec, Constants, Gamma, LawKind, LayerSpec, LoadKind, MeshSource, MethodName, Order, Plane, Preset, RobinRule,
@@ -182,4 +183,245 @@ fn a_scene_is_utf_8() {
     assert!(error.message().ends_with("is not UTF-8 text, see line 2"), "{error}");
 }
 
-mod refusals;
+/// Replacement in the groove scene; text under the caret; message; part of the help (empty: whatever).
+type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);
+
+#[rustfmt::skip]
+const CASES: &[Case] = &[
+    // Syntax.
+    ("dimension = 2", "dimension = two", "two", "this is not TOML: ", "need quotes: \"two\""),
+    ("gamma = 0.7", "gamma = 0.7\ngamma = 0.8", "gamma", "this is not TOML: duplicate key", ""),
+    ("[method]", "[method", "", "this is not TOML: unclosed table", ""),
+    ("n = 32", "n = 99999999999999999999", "99999999999999999999", "the number is too large", ""),
+    // Keys.
+    ("young = 2.1e5", "yuong = 2.1e5", "yuong", "unknown key `yuong` in [[body]]", "did you mean `young`?"),
+    ("young = 2.1e5", "density = 2.1e5", "density", "unknown key `density` in [[body]]", "its keys are name, young, poisson, "),
+    ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, mesh, body"),
+    ("[method]", "[methods]", "methods", "unknown key `methods` in the scene", "`method`"),
+    ("B = 2.5e-5", "b = 2.5e-5", "b", "unknown key `b` in the power layer", "`B`"),
+    ("increment", "incremnt", "incremnt", "unknown key `incremnt` in the stop rule", "`increment`"),
+    ("pressure = 10", "presure = 10", "presure", "unknown key `presure` in a load", "`pressure`"),
+    ("young = 2.1e5\n", "", "[[body]]", "[[body]] has no `young`", ""),
+    ("name = \"upper\"\n", "", "[[body]]", "[[body]] has no `name`", ""),
+    ("dimension = 2 ", "", "t", "the scene has no `dimension`", ""),
+    ("B = 2.5e-5, ", "", "{ a = 0.5 }", "the power layer has no `B`", ""),
+    ("on = \"lower_face\", ", "", "{ pressure = 10 }", "a load has no `on`", ""),
+    // Kinds of value.
+    ("order = 1", "order = \"1\"", "\"1\"", "expected a whole number, found a string", "without quotes"),
+    ("young = 2.1e5", "young = [1]", "[1]", "expected a number or an expression, found a list", ""),
+    ("young = 2.1e5", "young = inf", "inf", "the number is not finite", ""),
+    ("name = \"upper\"", "name = 7", "7", "expected a string, found a whole number", "quotes"),
+    ("name = \"upper\"", "name = 1979-05-27", "1979-05-27", "expected a string, found a date", ""),
+    ("dimension = 2 ", "dimension = 2.0 ", "2.0", "expected a whole number, found a number", ""),
+    ("pressure = 10", "pressure = true", "true", "expected a number or an expression, found true or false", ""),
+    ("layer = { power = { B = 2.5e-5, a = 0.5 } }", "layer = \"power\"", "\"power\"", "expected a table, found a string", "power = { B = 2.5e-5, a = 0.5 }"),
+    ("mesh = { geo = \"groove.geo\", set = { n = 32 } }", "mesh = 3", "3", "expected a string or a table", "a file name"),
+    ("[[contact]]", "[contact]", "[contact]", "expected a list, found a table", "[[contact]]"),
+    // Impossible values.
+    ("dimension = 2 ", "dimension = 4 ", "4", "`dimension` is 4", ""),
+    ("young = 2.1e5", "young = -2.1e5", "-2.1e5", "Young's modulus is -210000", ""),
+    ("poisson = 0.3\norder", "poisson = 0.5\norder", "0.5", "Poisson's ratio is 0.5", "incompressible"),
+    ("poisson = 0.3\norder", "poisson = -1\norder", "-1", "Poisson's ratio is -1", ""),
+    ("poisson = 0.3\norder", "order", "[[body]]", "[[body]] has no `poisson`", ""),
+    ("young = 2.1e5\npoisson = 0.3\norder", "order", "[[body]]", "[[body]] has no `young`", "orthotropic = { E1 = ... }"),
+    ("order = 1", "axes = { angle = 1 }\norder = 1", "{ angle = 1 }", "axes of an isotropic material", "remove them"),
+    ("order = 1", "orthotropic = { E1 = 1 }\norder = 1", "orthotropic", "[[body]] has both `young` and `orthotropic`", ""),
+    ("young = 2.1e5\n", "anisotropic = [1]\n", "poisson", "[[body]] has both `poisson` and `anisotropic`", ""),
+    ("young = 2.1e5\npoisson = 0.3\norder", "anisotropic = [1, 2]\norder", "[1, 2]", "an anisotropic material has 21 constants, not 2", "upper triangle"),
+    ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { E1 = 1 }\norder", "{ E1 = 1 }", "the orthotropic material has no `E2`", ""),
+    ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { e1 = 1 }\norder", "e1", "unknown key `e1` in the orthotropic material", "`E1`"),
+    ("order = 1", "region = [{ on = \"core\", young = 1 }]\norder = 1", "{ on = \"core\", young = 1 }", "[[body.region]] has no `poisson`", ""),
+    ("order = 1", "region = [{ young = 1, poisson = 0 }]\norder = 1", "{ young = 1, poisson = 0 }", "[[body.region]] has no `on`", ""),
+    ("order = 1", "order = 3", "3", "`order` is 3", ""),
+    ("gamma = 0.7", "gamma = 0", "0", "gamma is 0", ""),
+    ("a = 0.5", "a = 1.5", "1.5", "a is 1.5", "p'(0) = infinity"),
+    ("a = 0.5", "a = 0", "0", "a is 0", ""),
+    ("B = 2.5e-5", "B = -1", "-1", "B is -1", ""),
+    ("increment = 1e-3", "residual = 0", "0", "the tolerance is 0", ""),
+    ("increment = 1e-3", "iterations = 0", "0", "`iterations` is 0", ""),
+    ("increment = 1e-3", "iterations = -3", "-3", "`iterations` is -3", ""),
+    ("[method]", "plane = 1\n[method]", "plane", "unknown key `plane` in [[contact]]", ""),
+    // Words.
+    ("psi = \"active\"", "psi = \"actve\"", "\"actve\"", "unknown zone `actve`", "`active`"),
+    ("psi = \"active\"", "psi = \"robin\"", "\"robin\"", "unknown zone `robin`", "none, full, active"),
+    ("psi = \"active\"", "psi = \"z > 0\"", "z", "unknown variable `z`", "x, y, k"),
+    ("start = { normal = 1e-4 }", "start = \"none\"", "\"none\"", "unknown start `none`", "\"zero\""),
+    ("[method]", "[solver]\npreset = \"mumpz\"\n[method]", "\"mumpz\"", "unknown solver `mumpz`", "`mumps`"),
+    ("[method]", "[solver]\noptions = \"ksp_rtol 1\"\n[method]", "\"ksp_rtol 1\"", "`ksp_rtol` is no PETSc option", "dash"),
+    ("dimension = 2 ", "dimension = 2\nplane = \"strein\" ", "\"strein\"", "unknown plane `strein`", "`strain`"),
+    ("dimension = 2 ", "dimension = 3\nplane = \"strain\" ", "plane", "`plane` in a problem in space", ""),
+    // Bodies.
+    ("name = \"upper\"", "name = \"lower\"", "\"lower\"", "two bodies are called `lower`", ""),
+    ("name = \"upper\"", "name = \"LOWER\"", "\"LOWER\"", "two bodies are called `lower`", ""),
+    ("name = \"upper\"", "name = \"ksp\"", "\"ksp\"", "`ksp` cannot be the name of a body", "another name"),
+    ("name = \"upper\"", "name = \"upper_sub\"", "\"upper_sub\"", "`upper_sub` cannot be the name of a body", "another name"),
+    ("name = \"upper\"", "name = \"up**\"", "\"up**\"", "`up**` is no pattern", "`*` is any text"),
+    ("\"lower_face\"", "\"lower_***\"", "\"lower_***\"", "`lower_***` is no pattern", ""),
+    ("\"upper_bottom\"", "\"upper_*\"", "\"upper_*\"", "the pattern `upper_*` for one surface", "of = ["),
+    ("gap = ", "of = [\"upper\", \"lower\"]\ngap = ", "of", "`of` for surfaces with names", "which bodies"),
+    ("[\"lower_top\", \"upper_bottom\"]", "\"auto\"\ndistance = 1\nof = [\"upper\"]", "[\"upper\"]", "pairs are of two bodies", "of = ["),
+    ("[\"lower_top\", \"upper_bottom\"]", "\"auto\"\ndistance = 1\nof = [\"u*\", \"KSP\"]", "\"KSP\"", "`ksp` cannot be the name of a body", ""),
+    ("[method]", "[[contact]]\nbetween = \"auto\"\ndistance = 1\nof = [\"u*\", \"l*\"]\nlayer = { linear = { stiffness = 1 } }\n[[contact]]\nbetween = \"auto\"\ndistance = 2\nof = [\"l*\", \"u*\"]\nlayer = { linear = { stiffness = 1 } }\n[method]", "\"l*\"", "a second contact between \"auto\" of `l*` and `u*`", "remove one"),
+    ("name = \"upper\"", "name = \"\"", "\"\"", "the name is empty", ""),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\" }", "{ on = \"lower_axis\" }", "the support on `lower_axis` holds no component", "x, y: x = 0"),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", z = 0 }", "0", "a support in `z` in a plane problem", ""),
+    ("pressure = 10 ", "", "{ on = \"lower_face\", }", "the load on `lower_face` has no component", "[tx, ty]"),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", x = 0, symmetry = true }", "symmetry", "a support has both `x` and `symmetry`", ""),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", normal = 0, symmetry = true }", "symmetry", "a support has both `normal` and `symmetry`", ""),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", symmetry = false }", "false", "`symmetry = false` holds nothing", ""),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", x = \"2*u\" }", "u", "unknown variable `u`", ""),
+    ("pressure = 10", "pressure = 10, force = [0, 0]", "force", "a load has both `pressure` and `force`", ""),
+    ("pressure = 10", "pressure = 10, rigid = true", "rigid", "`rigid` without a force or a moment", "force = [0, -10]"),
+    ("pressure = 10", "force = [0, 1], moment = 2", "2", "a load has both `force` and `moment`", "two loads, or rigid = true"),
+    ("pressure = 10", "traction = [0, 1], moment = 2", "moment", "a load has both `moment` and `traction`", ""),
+    ("pressure = 10", "force = [0, \"2*x\"]", "\"2*x\"", "a total force or moment does not depend on the place", "traction"),
+    ("order = 1", "spring = [{ on = \"lower_face\" }]", "{ on = \"lower_face\" }", "the spring on `lower_face` has no stiffness", "normal = k"),
+    ("order = 1", "spring = [{ on = \"lower_face\", normal = 0 }]", "0", "the stiffness is 0", ""),
+    ("order = 1", "spring = [{ on = \"lower_face\", stiffness = [0, 0] }]", "[0, 0]", "the spring has no stiffness", ""),
+    ("pressure = 10", "pressure = 10, traction = [0, 0]", "traction", "a load has both `pressure` and `traction`", ""),
+    ("force = [0, ", "force = [0, 0, ", "\"-9.81e-6 * (1 + y)\"", "a vector has 2 components here, not 3", "dimension"),
+    ("traction = [\"2*x\", -10]", "traction = []", "[]", "a vector has 2 components here, not 0", ""),
+    // Expressions.
+    ("(x - 4)^2", "(u - 4)^2", "u", "unknown variable `u`", "known are x, y, pi"),
+    ("max(0", "maximum(0", "maximum", "unknown function `maximum`", "max, min"),
+    ("\"2*x\"", "\"1/0\"", "\"1/0\"", "the expression is not a finite number but inf", ""),
+    ("\"2*x\"", "\"2*\\u0078 + q\"", "\"2*\\u0078 + q\"", "unknown variable `q`", ""),
+    ("\"2*x\"", "'''\n2*x + q'''", "q", "unknown variable `q`", ""),
+    // Contacts.
+    ("\"upper_bottom\"", "\"lower_top\"", "\"lower_top\"", "a contact between `lower_top` and itself", ""),
+    (", \"upper_bottom\"", "", "[\"lower_top\"]", "a contact is between two surfaces", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "", "{  }", "the layer has no law", "linear = { stiffness = 1e5 }"),
+    ("a = 0.5 } }", "a = 0.5 }, linear = { stiffness = 1 } }", "linear", "the layer has both `power` and `linear`", ""),
+    ("B = 2.5e-5", "B = \"w\"", "w", "unknown variable `w`", "known are x, y, pi"),
+    ("power = { B = 2.5e-5, a = 0.5 }", "exponential = { p0 = 1, c0 = 0 }", "0", "c0 is 0", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "exponential = { p0 = 1 }", "{ p0 = 1 }", "the exponential layer has no `c0`", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "cubic = { k1 = 1, k3 = -1 }", "-1", "k3 is -1", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "cubik = { k1 = 1, k3 = 1 }", "cubik", "unknown key `cubik` in the layer", "did you mean `cubic`?"),
+    ("power = { B = 2.5e-5, a = 0.5 }", "table = []", "[]", "the table has no point", "table = ["),
+    ("power = { B = 2.5e-5, a = 0.5 }", "table = [[1, 2, 3]]", "[1, 2, 3]", "a point of the table is a compression and a pressure", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "table = [[0, 0], [1, 2], [2, 1]]", "[[0, 0], [1, 2], [2, 1]]", "the pressure 1 of the table does not exceed 2", "increases"),
+    ("power = { B = 2.5e-5, a = 0.5 }", "table = [[-1, 2]]", "[[-1, 2]]", "the compression -1 of the table does not exceed 0", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "table = [[1, 2]], pressure = \"c\"", "pressure", "the layer has both `table` and `pressure`", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "pressure = \"1e5*d\"", "d", "unknown variable `d`", "known are c, x, y, pi"),
+    ("power = { B = 2.5e-5, a = 0.5 }", "pressure = 7", "7", "expected a string, found a whole number", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "pressure = \"c\", up_to = 0", "0", "the end of the law is 0", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "linear = { stiffness = 1 }, up_to = 1", "up_to", "`up_to` without an expression", ""),
+    ("[method]", "[[contact]]\nbetween = [\"upper_bottom\", \"lower_top\"]\nlayer.linear.stiffness = 1\n[method]", "\"upper_bottom\"", "a second contact of `upper_bottom` and `lower_top`", ""),
+    // The method.
+    ("[method]", "[method]\nname = \"ncg\"\ninterval = true", "true", "only the method `robin` has an interval of gamma", "name = \"robin\""),
+    ("[method]", "[method]\nsteps = [0.5, 0.9]", "[0.5, 0.9]", "the last load step is not the full load", "end the list with 1"),
+    ("[method]", "[method]\nsteps = [0, 1]", "0", "the factor is 0", ""),
+    ("[method]", "[method]\nsteps = 0", "0", "`steps` is 0", ""),
+    ("start = { normal = 1e-4 }", "start = \"nested\"\nsteps = 3", "3", "load steps after a start from a coarser mesh", "nested"),
+    ("[[contact]]", "adapt = { error = 1e-3 }\n[[contact]]", "", "", ""),
+    // The mesh.
+    ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "msh", "the mesh has both `geo` and `msh`", ""),
+    ("geo = \"groove.geo\"", "msh = \"groove.msh\"", "set", "`set` for a finished mesh", ""),
+    ("geo = \"groove.geo\"", "geo = \"grove.geo\"", "\"grove.geo\"", "/grove.geo", "did you mean `groove.geo`?"),
+    ("geo = \"groove.geo\"", "geo = \"no/such.geo\"", "\"no/such.geo\"", "/no/such.geo", "relative"),
+    ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
+    ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
+    ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` is 0", ""),
+    ("n = 32 }", "n = 32 }, memory = \"all\"", "\"all\"", "expected a number, found a string", ""),
+    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", memory = 1", "memory", "`memory` for a finished mesh", ""),
+    ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
+    ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
+];
+
+/// Asserts that a scene with these overrides is refused with a caret under `marked` and these words; returns what is shown.
+fn refused(text: &str, overrides: &[&str], change: &str, [marked, message, help]: [&str; 3]) -> String {
+    let error = load_text(text, overrides).expect_err(change);
+    assert_eq!(error.kind(), Kind::Scene);
+    assert!(error.message().contains(message), "{change}: not {message:?} in\n{error}");
+    assert!(error.advice().unwrap_or_default().contains(help), "{change}: not {help:?} in\n{error}");
+    if !marked.is_empty() {
+        assert_eq!(caret(&error), marked, "{change}:\n{error}");
+    }
+    error.render(false)
+}
+
+#[test]
+fn refusals_point_at_the_word() {
+    for &(from, to, marked, message, help) in CASES {
+        assert!(GROOVE.contains(from), "{from}");
+        let shown = refused(&GROOVE.replacen(from, to, 1), &[], &format!("{from} -> {to}"), [marked, message, help]);
+        assert!(shown.contains("scene.toml:"), "{shown}");
+    }
+}
+
+#[test]
+fn empty_scenes_are_refused() {
+    for (text, message) in [
+        ("", "the scene has no `dimension`"),
+        ("dimension = 2", "the scene has no `mesh`"),
+        ("dimension = 2\nmesh = 'groove.msh'", "the scene has no `body`"),
+        ("dimension = 2\nmesh = 'groove.msh'\nbody = []", "the scene has no body"),
+    ] {
+        assert_eq!(load_text(text, &[]).expect_err(text).message(), message);
+    }
+}
+
+#[test]
+fn refusals_of_overrides_point_into_them() {
+    #[rustfmt::skip]
+    let cases = [
+        ("contact.7.layer=1", "7", "`contact` has 1 item, there is no number 7", "number 0"),
+        // a blank that has two bytes
+        ("contact.\u{a0}7.layer=1", "7", "`contact` has 1 item, there is no number 7", "number 0"),
+        ("body.2.young=1", "2", "`body` has 2 items, there is no number 2", "0 to 1"),
+        ("body.uper.young=1", "uper", "`body` is a list of 2 items; `uper` is no number", "their names: lower, upper"),
+        ("contact.0.between.lower=1", "lower", "`contact.0.between` is a list of 2 items; `lower` is no number", "0 to 1"),
+        ("body.upper.yung=1", "yung", "unknown key `yung` in [[body]]", "`young`"),
+        ("body.0.load.1.pressure=3", "1", "`body.0.load` has 1 item, there is no number 1", ""),
+        ("body.1.fix.0.x=3", "fix", "`fix` has no items to choose from", ""),
+        ("metod.gamma=1", "metod", "unknown key `metod` in the scene", "`method`"),
+        ("method.gama=1", "gama", "unknown key `gama` in [method]", "`gamma`"),
+        ("method.gamma = -1", "-1", "gamma is -1", ""),
+        ("method.gamma=much", "much", "unknown rule for gamma `much`", "line-search"),
+        ("method.gamma=", "", "the value is missing", ""),
+        ("method..gamma=1", "method..gamma", "this is not a key of the scene", "joined by points"),
+        ("mesh.msh=groove.msh", "msh", "the mesh has both `geo` and `msh`", ""),
+        ("contact.0.layer.linear.stiffness=1", "linear", "the layer has both `power` and `linear`", ""),
+        ("contact.0.layer={linear={stiffness=0}}", "0", "the stiffness is 0", ""),
+        ("contact.0.layer={linear={stiffness=1}", "", "this is not TOML: unclosed inline table", ""),
+        ("contact.0.gap=1e-4 * max(0, w)", "w", "unknown variable `w`", ""),
+        ("mesh.geo=other.geo", "other.geo", "/other.geo", ""),
+        ("mesh.set.n=99999999999999999999", "99999999999999999999", "the number is too large", ""),
+        ("title.main=x", "main", "expected a string, found a table", ""),
+    ];
+    for (text, marked, message, help) in cases {
+        let shown = refused(GROOVE, &[text], text, [marked, message, help]);
+        assert!(shown.contains(format!("1 | --set {text}").trim_end()) && !shown.contains("-->"), "{shown}");
+    }
+    let error = load_text(GROOVE, &["gamma"]).expect_err("no =");
+    assert_eq!(error.kind(), Kind::Usage);
+}
+
+#[test]
+fn refusals_of_short_options_point_into_what_was_typed() {
+    for (text, marked, message) in [
+        ("--tolerance -1", "-1", "the error is -1"),
+        ("--tolerance 5", "5", "the error is 5"),
+        ("--tolerance ", "", "the value is missing"),
+        ("--tolerance much", "much", "expected a number, found a string"),
+        ("--method newtn", "newtn", "unknown method `newtn`"),
+        ("--over method.gamma=-1", "-1", "gamma is -1"),
+    ] {
+        let shown = refused(GROOVE, &[text], text, [marked, message, ""]);
+        assert!(shown.contains(&format!("1 | {}", text.trim_end())), "{shown}");
+    }
+}
+
+/// A scene that came from somebody else cannot let its script run programs.
+#[test]
+fn only_the_command_line_trusts_a_script() {
+    use crate::problem::mesh::MeshSource;
+    let trusted = |text: &str, more: &[&str]| match load_text(text, more).expect("a scene").mesh {
+        MeshSource::Geo { guard, .. } => guard.trusted,
+        _ => false,
+    };
+    assert!(!trusted(GROOVE, &[]) && trusted(GROOVE, &["--trust-geo"]) && trusted(GROOVE, &["trust_geo=true"]));
+    let error = load_text(&format!("trust_geo = true\n{GROOVE}"), &[]).expect_err("a scene that trusts itself");
+    assert!(error.message().contains("cannot say that it is trusted"), "{error}");
+    assert_eq!(caret(&error), "trust_geo");
+}

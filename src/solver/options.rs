@@ -277,7 +277,7 @@ pub fn check_of_scene(name: &str, value: Option<&str>) -> Result<()> {
 /// An option is not one that a scene may have, or PETSc refuses the name.
 pub fn set_of_scene(session: &Session, bodies: &[&str], words: &[String]) -> Result<()> {
     let options = session.options();
-    withdraw(session)?;
+    OF_SCENE.take().iter().try_for_each(|name| options.clear(name))?;
     for (name, value) in pairs(words)? {
         check_of_scene(name, value)?;
         let of_scene =
@@ -288,11 +288,6 @@ pub fn set_of_scene(session: &Session, bodies: &[&str], words: &[String]) -> Res
         }
     }
     Ok(())
-}
-
-/// Take the options of a scene out of PETSc's table.
-pub fn withdraw(session: &Session) -> Result<()> {
-    OF_SCENE.take().iter().try_for_each(|name| session.options().clear(name))
 }
 
 /// Split the arguments (without the program's name) into words of the program and words of PETSc, each in order.

@@ -4,7 +4,7 @@ use super::cost;
 use super::options::Chosen;
 use crate::error::{Error, Kind, Result};
 use crate::petsc::HAS_HYPRE;
-use crate::problem::solver::Preset;
+use crate::problem::method::Preset;
 
 /// Options of hypre's algebraic multigrid for elasticity with many solves for each set-up. docs/solvers.md has the
 /// measurements behind them.
@@ -181,7 +181,7 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
 #[cfg(test)]
 mod tests {
     use super::check;
-    use crate::problem::solver::Preset;
+    use crate::problem::method::Preset;
 
     #[test]
     fn hypre_is_refused_only_where_it_is_missing_and_asked_for() {

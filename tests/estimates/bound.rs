@@ -9,10 +9,9 @@ use winkler::model::field::{apply_stiffness, local_dot, residual};
 use winkler::model::{Field, Model};
 use winkler::petsc::Session;
 use winkler::run;
-use winkler::run::clock::Clock;
 use winkler::run::stages::Begin;
+use winkler::run::stages::Clock;
 use winkler::scene;
-use winkler::solver::options;
 
 /// Every law, stiff and soft beside blocks of 2.1e5 of height 1 under pressures of 10.
 const LAWS: [&str; 14] = [
@@ -53,7 +52,6 @@ fn solve(session: &Session, path: &Path, sets: &[String]) -> Result<Ended> {
     let built = run::build(session, scene, &interrupt, &mut clock)?;
     let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
     let done = run::iterate(ready, &interrupt, &mut Silent, &mut clock)?;
-    options::withdraw(session)?;
     Ok(Ended { model: done.built.discrete.model, outcome: done.outcome })
 }
 

@@ -9,11 +9,10 @@ use winkler::error::Result;
 use winkler::interrupt::Interrupt;
 use winkler::petsc::Session;
 use winkler::run;
-use winkler::run::clock::Clock;
 use winkler::run::stages::Begin;
+use winkler::run::stages::Clock;
 use winkler::run::{report, results};
 use winkler::scene;
-use winkler::solver::options;
 
 /// Relative residual that methods are asked for.
 pub const RESIDUAL: f64 = 1e-8;
@@ -113,7 +112,6 @@ pub struct Answer {
 /// Failures of the session that make further runs pointless; a refusal of the scene is an answer.
 pub fn solve(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Result<Answer> {
     let answer = attempt(session, path, recipe, residual);
-    options::withdraw(session)?;
     Ok(answer.unwrap_or_else(|error| Answer {
         status: "refused".to_owned(),
         message: error.message().to_owned(),

@@ -1,12 +1,11 @@
 //! The error of a contact pressure, against a table or against the closed form of the scene.
 
 use super::plan::Plan;
-use super::request::usage;
+use super::plan::usage;
+use crate::commands::transfer::{Planes, mean};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::scene::Scene;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -19,7 +18,6 @@ pub(super) struct Points {
     at: Vec<[f64; 3]>,
     /// Areas (lengths in the plane), n.
     weight: Vec<f64>,
-    /// Pressures, n.
     pressure: Vec<f64>,
 }
 
@@ -73,9 +71,6 @@ impl References {
 }
 
 /// Read the contact tables in a folder of results, in the order of their names.
-///
-/// # Errors
-/// A folder or table that cannot be read.
 pub(super) fn tables(folder: &Path) -> Result<Vec<Points>> {
     let entries = std::fs::read_dir(folder).map_err(|cause| Error::file(folder, "read", &cause))?;
     let is_table = |path: &PathBuf| {
@@ -121,7 +116,10 @@ pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points])
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
         let known: Vec<f64> = match dimension {
             2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
-            _ => on_surface(other, &own.at),
+            _ => {
+                let planes = Planes::exact(&other.at);
+                own.at.iter().map(|x| mean(&planes.weights(x), &other.pressure)).collect()
+            }
         };
         squares.add(own, &known);
     }
@@ -177,35 +175,6 @@ fn on_curve(curve: &Points, x: &[f64; 3]) -> f64 {
         }
     }
     pressure
-}
-
-/// Number of points that a plane is fitted through.
-const NEIGHBOURS: usize = 8;
-
-/// Return the pressures at places on a surface of scattered points.
-///
-/// They are those of the plane of least squares through the nearest points, whose equations are weighted by the inverse distances.
-fn on_surface(surface: &Points, places: &[[f64; 3]]) -> Vec<f64> {
-    let points = surface.at.iter().zip(&surface.pressure);
-    let tree = RTree::bulk_load(points.map(|(&x, &p)| GeomWithData::new(x, p)).collect());
-    places.iter().map(|x| plane_at(&tree, x)).collect()
-}
-
-/// Return the value at `x` of the plane through the nearest points, which have their pressures as data.
-fn plane_at(tree: &RTree<GeomWithData<[f64; 3], f64>>, x: &[f64; 3]) -> f64 {
-    let near: Vec<_> = tree.nearest_neighbor_iter_with_distance_2(*x).take(NEIGHBOURS).collect();
-    let Some(&(_, far)) = near.last() else { return f64::NAN };
-    // distances are squared; the small term keeps the weight of a point at `x` itself finite
-    let weight = |squared: f64| 1.0 / (squared + 1e-20 * far).max(f64::MIN_POSITIVE).sqrt();
-    let row = |k: usize| -> [f64; 4] {
-        let y = near[k].0.geom();
-        [1.0, y[0] - x[0], y[1] - x[1], y[2] - x[2]].map(|value| weight(near[k].1) * value)
-    };
-    let matrix = nalgebra::DMatrix::from_fn(near.len(), 4, |k, c| row(k)[c]);
-    let right = nalgebra::DVector::from_fn(near.len(), |k, _| weight(near[k].1) * near[k].0.data);
-    let svd = matrix.svd(true, true);
-    let small = 1e-9 * svd.singular_values.max();
-    svd.solve(&right, small).map_or(f64::NAN, |plane| plane[0])
 }
 
 #[cfg(test)]

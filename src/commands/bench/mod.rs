@@ -1,33 +1,27 @@
 //! `winkler bench`: run a scene with every mesh, order, inner solver, method and number of ranks that was asked for, each in a process of its
 //! own. Times, memory, counters and errors are written as a table and plots.
 
-mod charts;
 mod compare;
 mod plan;
 mod process;
-mod request;
-mod row;
-mod summary;
 mod table;
 
-pub use request::Request;
+pub use plan::Request;
 
 use super::folder_of;
 use crate::error::Result;
 use crate::file::digest;
 use crate::interrupt::Interrupt;
-use crate::output::{Folder, progress, say};
+use crate::output::{Folder, say, terminal};
 use crate::petsc::Session;
 use crate::scene::Scene;
 use compare::References;
-use plan::{Case, Plan};
+use plan::{Case, Plan, usage};
 use process::Runner;
-use request::usage;
-use row::Row;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
-use table::Table;
+use table::{Row, SKIPPED, Table};
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -46,7 +40,7 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     let reference = References::read(request.against.as_deref(), &plan)?;
     let mut table = Table::open(&folder, &plan, request, &reference)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
-    let bar = progress::runs(plan.cases.len(), !request.quiet);
+    let bar = terminal::runs(plan.cases.len(), !request.quiet);
     let mut meshed = BTreeSet::new();
     let began = Instant::now();
     for case in &plan.cases {
@@ -57,11 +51,13 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         let is_new = old.is_none();
         let mut row = match old {
             Some(row) => row,
-            None if table.is_beyond(case) => Row::skipped(case, "an earlier mesh took too long"),
-            None if began.elapsed().as_secs_f64() >= request.budget => Row::skipped(case, "the budget is spent"),
+            None if table.is_beyond(case) => Row::unsolved(case, SKIPPED, "an earlier mesh took too long"),
+            None if began.elapsed().as_secs_f64() >= request.budget => {
+                Row::unsolved(case, SKIPPED, "the budget is spent")
+            }
             None => measure(case, scene, &runner, &reference, &mut meshed)?,
         };
-        row.inputs = inputs.unwrap_or_default();
+        row.set("inputs", inputs.unwrap_or_default());
         if !(request.quiet && row.is_good()) {
             bar.suspend(|| say(row.line(&case.label, is_new)))?;
         }
@@ -70,11 +66,11 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     }
     bar.finish_and_clear();
     let mut written = table.complete();
-    for (name, plot) in charts::all(&table.rows, &plan) {
+    for (name, plot) in table::plots(&table.rows, &plan) {
         written = written.and(folder.write(&name, |out| plot.write(out)));
     }
     if !request.quiet {
-        say(summary::of(&table.rows, &plan))?;
+        say(table::summary(&table.rows, &plan))?;
     }
     say(format_args!("results in {}", folder.path().display()))?;
     written?;

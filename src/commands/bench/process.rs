@@ -1,7 +1,7 @@
 //! One run as a process of its own: its messages, its time and its memory.
 
 use super::plan::Case;
-use super::request::{Request, usage};
+use super::plan::{Request, usage};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
@@ -22,7 +22,6 @@ use wait4::{ResUse, Wait4};
 pub(super) struct Run {
     /// Status of the report, or `refused`, `timeout`, `killed` or `failed`.
     pub status: String,
-    /// The status in words.
     pub message: String,
     /// Wall seconds from start to end of the process.
     pub seconds: f64,
@@ -89,9 +88,6 @@ impl Runner {
     }
 
     /// Make the mesh of a run. A failure is not reported here, since the run itself fails in the same way.
-    ///
-    /// # Errors
-    /// A file system that refuses.
     pub fn mesh(&self, case: &Case) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg("mesh").arg(&case.scene);
@@ -100,9 +96,6 @@ impl Runner {
     }
 
     /// Run a case as often as asked for, or until it fails.
-    ///
-    /// # Errors
-    /// A file system that refuses.
     pub fn repeat(&self, case: &Case) -> Result<Vec<Run>> {
         let mut runs = Vec::new();
         for _ in 0..self.repeat {
@@ -116,7 +109,6 @@ impl Runner {
         Ok(runs)
     }
 
-    /// Run a case once.
     fn run(&self, case: &Case) -> Result<Run> {
         let folder = self.folder(case);
         let mut command = match case.ranks {
@@ -230,11 +222,9 @@ pub(super) fn folder_of(runs: &Path, key: &[String]) -> PathBuf {
     runs.join(format!("{start}-{:.12}", digest(&name)))
 }
 
-/// A process that has ended.
 struct Ended {
     /// Resources that it used; `None` if it could not be started or waited for.
     used: Option<ResUse>,
-    /// Whether its time was over.
     is_late: bool,
     seconds: f64,
     /// Its standard output and standard error.

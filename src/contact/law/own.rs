@@ -3,7 +3,7 @@
 use super::typed::HUGE;
 use super::{LayerLaw, Response};
 use crate::error::{Error, Kind, Result, shown};
-use crate::problem::own::Own;
+use crate::problem::Own;
 use std::rc::Rc;
 
 /// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.

@@ -1,7 +1,10 @@
-//! TOML as a tree of values with their places, and getters that refuse a wrong value with its place and advice.
+//! TOML as a tree of values with their places, and the shapes of tables: which keys a table may have, which kinds of value they take, and what
+//! they mean. [`Keys::open`] refuses a table that does not fit its shape. Getters refuse a wrong value with its place and advice.
+//! The [JSON schema](crate::scene::schema) is made of the same shapes.
 
-use super::shape::{TableShape, ValueKind};
 use crate::error::{Error, Located, Place, Result, Source, nearest, shown};
+use serde_json::Value as Json;
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
@@ -46,9 +49,6 @@ pub fn document(source: &Arc<Source>) -> Result<Node> {
 }
 
 /// Parse the value that reaches from byte `offset` of the source to its end.
-///
-/// # Errors
-/// Those of [`document`].
 pub fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
     let value = DeValue::parse(&source.text[offset..]).map_err(|error| syntax(source, offset, &error))?;
     Convert { source, offset }.node(&value)
@@ -248,7 +248,7 @@ impl ValueKind {
             Self::Text | Self::Word(_) => matches!(value, Value::String(_)),
             Self::Flag => matches!(value, Value::Boolean(_)),
             Self::Number => matches!(value, Value::Integer(_) | Value::Float(_)),
-            Self::NonNegativeInteger | Self::PositiveInteger | Self::OneOf(_) => matches!(value, Value::Integer(_)),
+            Self::Integer(_) | Self::OneOf(_) => matches!(value, Value::Integer(_)),
             Self::Field => matches!(value, Value::Integer(_) | Value::Float(_) | Value::String(_)),
             Self::List(_) => matches!(value, Value::List(_)),
             Self::Table(_) | Self::Map(_) => matches!(value, Value::Table(_)),
@@ -259,8 +259,7 @@ impl ValueKind {
     /// Return what a whole number must be instead; `None` if it is in range.
     fn breach(&self, number: i64) -> Option<String> {
         match self {
-            Self::NonNegativeInteger if number < 0 => Some("must be 0 or more".to_owned()),
-            Self::PositiveInteger if number < 1 => Some("must be 1 or more".to_owned()),
+            Self::Integer(least) if number < *least => Some(format!("must be {least} or more")),
             Self::OneOf(known) if !known.contains(&number) => {
                 let known: Vec<String> = known.iter().map(i64::to_string).collect();
                 Some(format!("must be {}", known.join(" or ")))
@@ -375,4 +374,148 @@ fn unknown_key(name: &str, place: &Place, shape: &TableShape) -> Error {
 fn key_list(shape: &TableShape) -> String {
     let names: Vec<&str> = shape.documented().map(|key| key.name).collect();
     format!("its keys are {}", names.join(", "))
+}
+
+/// The shape of a table.
+pub struct TableShape {
+    /// Name of the table in messages.
+    pub name: Cow<'static, str>,
+    /// The keys, in the order in which messages list them.
+    pub keys: Vec<KeyShape>,
+    /// Pairs of keys that exclude each other.
+    pub exclusive: Vec<[&'static str; 2]>,
+}
+
+/// The shape of a key.
+pub struct KeyShape {
+    /// Name of the key.
+    pub name: &'static str,
+    /// The kind of value that it takes.
+    pub kind: ValueKind,
+    /// What the key means, and its default. It is the description in the JSON schema, and the advice where a value is of the wrong
+    /// kind. A key without a description is set by the command line only, so that neither messages nor the schema mention it.
+    pub description: Cow<'static, str>,
+    /// Whether the table must have the key.
+    pub required: bool,
+}
+
+/// A kind of value.
+pub enum ValueKind {
+    /// A text.
+    Text,
+    /// True or false.
+    Flag,
+    /// A number.
+    Number,
+    /// A whole number that is at least this.
+    Integer(i64),
+    /// One of these whole numbers.
+    OneOf(&'static [i64]),
+    /// A number, or an expression in the coordinates.
+    Field,
+    /// One of these words. The check of the kind accepts any text; the decoder looks the word up and suggests the nearest one.
+    Word(Vec<&'static str>),
+    /// A list of values of one kind.
+    List(Box<ValueKind>),
+    /// A table of a known shape.
+    Table(TableShape),
+    /// A table whose keys are names that the user chooses.
+    Map(Box<ValueKind>),
+    /// A value of any of these kinds.
+    Either(Vec<ValueKind>),
+}
+
+impl TableShape {
+    /// Return the shape of a table without keys.
+    pub fn new(name: impl Into<Cow<'static, str>>) -> Self {
+        Self { name: name.into(), keys: Vec::new(), exclusive: Vec::new() }
+    }
+
+    /// Add a key that may be left out; `about` is its description.
+    pub fn optional(self, name: &'static str, kind: impl Into<ValueKind>, about: impl Into<Cow<'static, str>>) -> Self {
+        self.with(KeyShape { name, kind: kind.into(), description: about.into(), required: false })
+    }
+
+    /// Add a key that must be there; `about` is its description.
+    pub fn required(self, name: &'static str, kind: impl Into<ValueKind>, about: impl Into<Cow<'static, str>>) -> Self {
+        self.with(KeyShape { name, kind: kind.into(), description: about.into(), required: true })
+    }
+
+    /// Add a key whose description is the first paragraph of its doc comment, with the default behind it. A key without a default must
+    /// be there.
+    pub fn key(self, name: &'static str, doc: &[&str], kind: ValueKind, default: Option<Json>) -> Self {
+        let paragraph: Vec<&str> = doc.iter().map(|line| line.trim()).take_while(|line| !line.is_empty()).collect();
+        let required = default.is_none();
+        let default = match default {
+            Some(Json::Number(number)) => format!("; {}", number.to_string().trim_end_matches(".0")),
+            Some(scalar @ (Json::Bool(_) | Json::String(_))) => format!("; {scalar}"),
+            _ => String::new(),
+        };
+        let description = format!("{}{default}", paragraph.join(" ")).into();
+        self.with(KeyShape { name, kind, description, required })
+    }
+
+    fn with(mut self, key: KeyShape) -> Self {
+        self.keys.push(key);
+        self
+    }
+
+    /// Add all keys of another table.
+    pub fn and(mut self, other: Self) -> Self {
+        self.keys.extend(other.keys);
+        self
+    }
+
+    /// Let at most one of these keys be given.
+    pub fn at_most_one(self, names: &[&'static str]) -> Self {
+        (1..names.len()).fold(self, |table, end| table.not_both(&names[end - 1..end], &names[end..]))
+    }
+
+    /// Let each key of `some` exclude each key of `others`.
+    pub fn not_both(mut self, some: &[&'static str], others: &[&'static str]) -> Self {
+        self.exclusive.extend(some.iter().flat_map(|one| others.iter().map(|other| [*one, *other])));
+        self
+    }
+
+    /// Iterate over the keys that a scene file may have.
+    pub fn documented(&self) -> impl Iterator<Item = &KeyShape> {
+        self.keys.iter().filter(|key| !key.description.is_empty())
+    }
+
+    /// Return the kind of value that is a list of tables of this shape.
+    pub fn list(self) -> ValueKind {
+        ValueKind::Table(self).list()
+    }
+}
+
+impl From<TableShape> for ValueKind {
+    fn from(shape: TableShape) -> Self {
+        Self::Table(shape)
+    }
+}
+
+/// Return the kind of value that is one word of a list of choices.
+pub fn word<T>(choices: &[(&'static str, T)]) -> ValueKind {
+    ValueKind::Word(choices.iter().map(|(name, _)| *name).collect())
+}
+
+impl ValueKind {
+    /// Return the kind of value that is a list of values of this kind.
+    pub fn list(self) -> Self {
+        Self::List(Box::new(self))
+    }
+
+    /// Return what this kind is called in messages.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Text | Self::Word(_) => "a string".to_owned(),
+            Self::Flag => "true or false".to_owned(),
+            Self::Number => "a number".to_owned(),
+            Self::Integer(_) | Self::OneOf(_) => "a whole number".to_owned(),
+            Self::Field => "a number or an expression".to_owned(),
+            Self::List(_) => "a list".to_owned(),
+            Self::Table(_) | Self::Map(_) => "a table".to_owned(),
+            Self::Either(kinds) => kinds.iter().map(Self::words).collect::<Vec<_>>().join(" or "),
+        }
+    }
 }

@@ -1,16 +1,146 @@
-//! Warnings of pairs of surfaces: what has no partner, how edges and facets of the meshes matter, and where layers and pairs end.
+//! The warnings of a run: on the problem and its mesh, on surfaces without a partner, on edges and facets, on the ends of layers and pairs, and on
+//! estimates that are guesses.
 
-use super::measure::peak;
-use super::preflight::coupling;
+use super::in_words;
+use super::results::{coupling, peak};
 use super::stages::{Built, Done};
 use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, End, Left, LostPieces};
-use crate::discretize::ContactInfo;
+use crate::discretize::{Balanced, ContactInfo, Discrete, point};
 use crate::error::few;
+use crate::estimate::{Cause, Estimate};
 use crate::linalg::bounds;
+use crate::model::{Mechanism, Model};
 use crate::output::sci;
+use crate::petsc::{Schur, Session, has_metis};
 use crate::problem::LayerSpec;
 use std::collections::BTreeMap;
+
+/// Return the warnings about a problem before it is solved.
+pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if session.blas_name() == "reference BLAS" {
+        warnings.push(
+            "the reference BLAS is in use: factorisations are up to ten times slower; run scripts/setup for OpenBLAS"
+                .to_owned(),
+        );
+    }
+    if let Some(kernels) = session.faster_blas_kernels() {
+        warnings.push(format!(
+            "{} does not use the vector instructions of this processor: factorisations take up to three times as long; set \
+             OPENBLAS_CORETYPE={kernels}",
+            session.blas_name()
+        ));
+    }
+    if discrete.bodies.iter().any(|body| Schur::is_large(dimension, body.dofs)) && !has_metis() {
+        warnings.push(
+            "METIS was not found: large bodies are factored in the order of minimum degree, with a fifth more memory or more; \
+             `apt-get install libmetis5`, or a PETSc with METIS"
+                .to_owned(),
+        );
+    }
+    warnings.extend(session.left_out().iter().map(|file| {
+        format!(
+            "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
+        )
+    }));
+    if session.size() > discrete.bodies.len() && !discrete.model.is_distributed() {
+        warnings.push(format!(
+            "{} of {} ranks have no body to solve",
+            session.size() - discrete.bodies.len(),
+            session.size()
+        ));
+    }
+    for body in discrete.bodies.iter().filter(|body| !body.gauged.fixed.is_empty()) {
+        let motions = body.gauged.fixed.join("; ");
+        warnings.push(format!(
+            "body {}: nothing holds its {motions}, and no load works on it: it is fixed at one node",
+            body.name
+        ));
+    }
+    for body in discrete.bodies.iter().filter(|body| !body.gauged.spinning.is_empty()) {
+        let motions = body.gauged.spinning.join("; ");
+        warnings.push(format!(
+            "body {}: only the facets of the mesh resist its {motions}, and loads work on it: its displacements mean nothing; hold it, or load it through its centre",
+            body.name
+        ));
+    }
+    warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
+    warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
+    warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
+    warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.contacts));
+    warnings
+}
+
+/// Return the warning of elements that were split, if any.
+pub fn in_parts(split: usize) -> Option<String> {
+    let what = "quadrangles, hexahedra, prisms or pyramids of the mesh were split into triangles or tetrahedra";
+    (split > 0).then(|| format!("{split} {what}"))
+}
+
+/// Return the warning of quadratic cells that were made straight, if any.
+pub fn made_straight(cells: usize) -> Option<String> {
+    let why = "were folded by the curved boundary and have straight edges now, so that gaps there are those of chords: a finer mesh follows the boundary";
+    (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
+}
+
+/// Return the warning of loads that were balanced.
+fn balanced_in_words(discrete: &Discrete, Balanced { bodies, motion, share }: &Balanced) -> String {
+    let names = in_words(bodies.iter().map(|&body| &discrete.bodies[body].name));
+    format!(
+        "{} {names}: nothing holds {} in {motion}, and loads lack balance there by {} of what forces of their sizes could do: no more than facets \
+         and quadrature may miss of them, so that the loads were changed by that share to balance",
+        if bodies.len() == 1 { "body" } else { "bodies" },
+        if bodies.len() == 1 { "it" } else { "them" },
+        sci(*share, 1)
+    )
+}
+
+/// Return the warning of a free motion of several bodies.
+fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
+    let name = |&body: &usize| &discrete.bodies[body].name;
+    let bodies = in_words(mechanism.bodies.iter().map(name));
+    let end = match mechanism.fixed.as_ref().map(name) {
+        Some(body) => format!("and no load works on it: they are fixed at nodes of `{body}`"),
+        None if mechanism.work == 0.0 => "and no load works on it: displacements are free up to it".to_owned(),
+        None => "and loads work on it: there is no solution".to_owned(),
+    };
+    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
+}
+
+/// Least change of the pressures with the side of the normals that is worth a warning: one per cent.
+const ONE_SIDED: f64 = 0.01;
+
+/// Return warnings of pressures whose estimated error is a guess, or that depend on the side that gives the normals by more than that error.
+pub fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (i, pair) in model.pairs.iter().enumerate() {
+        let [a, b] = &pair.surfaces;
+        if let Some(guess) = estimate.guesses[i] {
+            let place = point(guess.place);
+            let reason = match guess.cause {
+                Cause::Rim => {
+                    format!("most of it is at the edge of the contact, at {place}, where pressures may be singular")
+                }
+                Cause::FewFacets => {
+                    format!(
+                        "contact ends within the facets that carry most of the pressure, around {place}: make them smaller"
+                    )
+                }
+            };
+            warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
+        }
+        let change = estimate.sides[i];
+        if change > estimate.pressure[i].max(ONE_SIDED) {
+            warnings.push(format!(
+                "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
+                 than by their estimated error: the surfaces slide or tilt too far for small displacements",
+                100.0 * change
+            ));
+        }
+    }
+    warnings
+}
 
 /// Return the names of the surfaces of a pair, in the order of the scene.
 fn names(contact: &ContactInfo) -> [&str; 2] {
@@ -18,7 +148,7 @@ fn names(contact: &ContactInfo) -> [&str; 2] {
 }
 
 /// Return the warnings of the surfaces of all pairs.
-pub fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
+fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
     let mut warnings = split_pairs(contacts);
     for (pair, contact) in pairs.iter().zip(contacts) {
         warnings.extend(left_out(pair, contact));
@@ -103,18 +233,13 @@ fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     })
 }
 
-/// Return a warning for each pair whose table is probably written as (p, c).
-pub fn swapped_tables(built: &Built) -> Vec<String> {
-    (0..built.discrete.model.pairs.len()).filter_map(|i| swapped_table(built, i)).collect()
-}
-
-/// Return the warning for pair `i`, if its layer is a table that makes sense the other way round alone.
+/// Return the warning for pair `i`, if its layer is a table that makes sense as (p, c) alone.
 ///
 /// Numbers have no units here, so that two facts of the bodies decide. The stiffness of the layer, p/c at the end of the table, is compared
 /// with that of the stiffer body against a uniform pressure, its modulus over its depth: c/p is nearer to it than p/c. And the table does not
 /// fit: its largest pressure is below the mean pressure of the loads, or without loads its largest compression exceeds the contact surface.
 /// A layer that is really as soft as that has a table which reaches to its loads.
-fn swapped_table(built: &Built, i: usize) -> Option<String> {
+pub fn swapped_table(built: &Built, i: usize) -> Option<String> {
     let (pair, contact) = (&built.discrete.model.pairs[i], &built.discrete.contacts[i]);
     let LayerSpec::Table(points) = &contact.spec.layer else { return None };
     let &[c, p] = points.last()?;
@@ -144,14 +269,9 @@ fn extent(points: &[[f64; 3]]) -> f64 {
     (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Return a warning for each pair whose layer is compressed beyond the end of its law, at the solution or in a load step. There the
+/// Return the warning for pair `i`, if its layer is compressed beyond the end of its law, at the solution or in a load step. There the
 /// law is extrapolated by a straight line from the end of a table, or of an expression with `up_to`, without measured data.
-pub fn beyond_laws(done: &Done) -> Vec<String> {
-    (0..done.model().pairs.len()).filter_map(|i| beyond_law(done, i)).collect()
-}
-
-/// Return the warning for pair `i`, if its layer is beyond the end of its law.
-fn beyond_law(done: &Done, i: usize) -> Option<String> {
+pub fn beyond_law(done: &Done, i: usize) -> Option<String> {
     let pair = &done.model().pairs[i];
     let end = (0..pair.len()).map(|q| pair.law.end(q)).fold(f64::INFINITY, f64::min);
     let Compressed { most, pressure, step } = most_compressed(done, i)?;

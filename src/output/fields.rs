@@ -1,7 +1,5 @@
-//! `<body>.vtu`: meshes and fields for ParaView.
+//! Meshes with fields: for ParaView (`.vtu`, with names of components, and the `.pvd` collection over time), and for Gmsh (`.msh` 4.1, binary).
 
-use super::collection::escape;
-use super::tags::TagWriter;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Write};
 use vtkio::model::{
@@ -40,25 +38,18 @@ impl CellKind {
 
     /// Return the number of points per cell.
     pub fn stride(self) -> usize {
-        match self {
-            CellKind::Line => 2,
-            CellKind::QuadraticLine => 3,
-            CellKind::Triangle => 3,
-            CellKind::QuadraticTriangle => 6,
-            CellKind::Tetra => 4,
-            CellKind::QuadraticTetra => 10,
-        }
+        self.facts().0
     }
 
-    /// Return the type of a cell in VTK.
-    fn vtk(self) -> CellType {
+    /// Return the number of points, the type in VTK, the dimension, and the type in Gmsh of a cell.
+    fn facts(self) -> (usize, CellType, i32, i32) {
         match self {
-            CellKind::Line => CellType::Line,
-            CellKind::QuadraticLine => CellType::QuadraticEdge,
-            CellKind::Triangle => CellType::Triangle,
-            CellKind::QuadraticTriangle => CellType::QuadraticTriangle,
-            CellKind::Tetra => CellType::Tetra,
-            CellKind::QuadraticTetra => CellType::QuadraticTetra,
+            CellKind::Line => (2, CellType::Line, 1, 1),
+            CellKind::QuadraticLine => (3, CellType::QuadraticEdge, 1, 8),
+            CellKind::Triangle => (3, CellType::Triangle, 2, 2),
+            CellKind::QuadraticTriangle => (6, CellType::QuadraticTriangle, 2, 9),
+            CellKind::Tetra => (4, CellType::Tetra, 3, 4),
+            CellKind::QuadraticTetra => (10, CellType::QuadraticTetra, 3, 11),
         }
     }
 }
@@ -109,9 +100,6 @@ impl BodyField {
 
     /// Write VTK's XML format with binary (base64) data and the point arrays `displacement` (3 components), `stress` (6),
     /// `von_mises` (1) and `principal` (3).
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         self.into_grid().write(encoding, out)
     }
@@ -132,9 +120,6 @@ impl BodyField {
     }
 
     /// Write the `.pvtu` file that joins the parts of a body in `files` of the same folder.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn join(files: &[String], encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let kind = if encoding.single { "Float32" } else { "Float64" };
         let mut out = TagWriter::new(out);
@@ -172,9 +157,6 @@ pub struct Grid {
 
 impl Grid {
     /// Write VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let numbers = |data: Vec<f64>| -> IOBuffer {
             if encoding.single { data.into_iter().map(|x| x as f32).collect::<Vec<_>>().into() } else { data.into() }
@@ -194,7 +176,7 @@ impl Grid {
                     connectivity: self.connectivity.into_iter().map(u64::from).collect(),
                     offsets: (1..=cells).map(|cell| (cell * stride) as u64).collect(),
                 },
-                types: vec![self.cell.vtk(); cells],
+                types: vec![self.cell.facts().1; cells],
             },
             data: Attributes { point: arrays(self.at_points), cell: arrays(self.at_cells) },
         };
@@ -214,6 +196,228 @@ impl Grid {
             None => written.map_err(io::Error::other),
         }
     }
+}
+
+/// An entry of a collection: the file of a body or a contact surface at a time.
+pub struct Entry<'a> {
+    /// Time.
+    pub time: f64,
+    /// Number of the body or surface.
+    pub part: usize,
+    /// Name of the body or surface.
+    pub name: &'a str,
+    /// File, relative to the collection.
+    pub file: String,
+}
+
+/// Write the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
+pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
+    writeln!(out, r#"<?xml version="1.0"?>"#)?;
+    writeln!(out, r#"<VTKFile type="Collection" version="1.0">"#)?;
+    writeln!(out, "  <Collection>")?;
+    for Entry { time, part, name, file } in entries {
+        let (file, name) = (escape(file), escape(name));
+        writeln!(out, r#"    <DataSet timestep="{time}" group="" part="{part}" name="{name}" file="{file}"/>"#)?;
+    }
+    writeln!(out, "  </Collection>")?;
+    writeln!(out, "</VTKFile>")
+}
+
+/// Escape a text for the value of an XML attribute.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
+}
+
+/// Names of the components of arrays that have several.
+const COMPONENTS: [(&str, &[&str]); 4] = [
+    ("displacement", &["x", "y", "z"]),
+    ("stress", &["xx", "yy", "zz", "xy", "yz", "xz"]),
+    ("principal", &["first", "second", "third"]),
+    ("normal", &["x", "y", "z"]),
+];
+
+/// A writer that passes all bytes on, adds the names of components to the tags of arrays, and keeps the first failure.
+///
+/// vtkio 0.7.0-rc2 writes no such names. It also ignores short writes and failures of its last flush, which on a full disk would
+/// leave half a file without an error.
+struct TagWriter<'a> {
+    out: &'a mut dyn Write,
+    /// Bytes of the current tag from its `<` on, none outside of tags.
+    tag: Option<Vec<u8>>,
+    failure: Option<io::Error>,
+}
+
+impl<'a> TagWriter<'a> {
+    /// Return a writer that passes its bytes on to `out`.
+    pub fn new(out: &'a mut dyn Write) -> Self {
+        Self { out, tag: None, failure: None }
+    }
+
+    /// Return the first failure.
+    pub fn failure(self) -> Option<io::Error> {
+        self.failure
+    }
+
+    /// Pass bytes on, with names in the tags. Base64 has no `<`, so every `<` begins a tag that ends at the next `>`.
+    fn pass(&mut self, mut bytes: &[u8]) -> io::Result<()> {
+        while !bytes.is_empty() {
+            let end = if self.tag.is_some() { b'>' } else { b'<' };
+            let at = bytes.iter().position(|&byte| byte == end);
+            let (head, rest) = bytes.split_at(at.unwrap_or(bytes.len()));
+            bytes = rest;
+            match &mut self.tag {
+                Some(tag) => tag.extend_from_slice(head),
+                None => self.out.write_all(head)?,
+            }
+            match (at, self.tag.take()) {
+                (Some(_), None) => self.tag = Some(Vec::new()),
+                (Some(_), Some(tag)) => self.out.write_all(&with_component_names(&tag))?,
+                (None, tag) => self.tag = tag,
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Return a tag; that of an array gets the names of its components after the name of the array.
+fn with_component_names(tag: &[u8]) -> Vec<u8> {
+    let mut text = String::from_utf8_lossy(tag).into_owned();
+    for (array, components) in COMPONENTS {
+        let name = format!(" Name=\"{array}\"");
+        let is_array = text.starts_with("<DataArray ") || text.starts_with("<PDataArray ");
+        if let Some(at) = text.find(&name).filter(|_| is_array) {
+            let names =
+                components.iter().enumerate().map(|(i, component)| format!(" ComponentName{i}=\"{component}\""));
+            text.insert_str(at + name.len(), &names.collect::<String>());
+        }
+    }
+    text.into_bytes()
+}
+
+impl Write for TagWriter<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.failure.is_none() {
+            self.failure = self.pass(bytes).err();
+        }
+        match &self.failure {
+            None => Ok(bytes.len()),
+            Some(failure) => Err(failure.kind().into()),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+/// The entities, points and cells of earlier files. Tags go on from there, so that Gmsh can open the files of a run together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tags {
+    /// Files before this one.
+    pub entity: usize,
+    /// Points in them.
+    pub points: usize,
+    /// Cells in them.
+    pub cells: usize,
+}
+
+impl Grid {
+    /// Write the grid as `.msh`. Its cells are a physical group with the title as name, and each array at its points becomes a
+    /// view `title: name`. Symmetric tensors become full ones. Nodes with a NaN are left out of a view.
+    pub fn write_msh(&self, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
+        let (_, _, dimension, _) = self.cell.facts();
+        let tag = tags.entity as i32 + 1;
+        let name = self.title.replace('"', "'");
+        write!(out, "$MeshFormat\n4.1 1 8\n")?;
+        write_i32(out, &[1])?;
+        write!(out, "\n$EndMeshFormat\n$PhysicalNames\n1\n{dimension} {tag} \"{name}\"\n$EndPhysicalNames\n")?;
+        self.write_entity(tag, out)?;
+        self.write_nodes(tag, tags, out)?;
+        self.write_elements(tag, tags, out)?;
+        // principal stresses are no vector
+        for (array, components, values) in self.at_points.iter().filter(|(array, ..)| array != "principal") {
+            write_view(&format!("{name}: {array}"), *components as usize, values, tags.points + 1, out)?;
+        }
+        Ok(())
+    }
+
+    /// Write the one entity that has all cells, with its bounding box and its physical group.
+    fn write_entity(&self, tag: i32, out: &mut dyn Write) -> io::Result<()> {
+        let (_, _, dimension, _) = self.cell.facts();
+        let corner = |pick: fn(f64, f64) -> f64| -> [f64; 3] {
+            std::array::from_fn(|k| self.points.iter().map(|x| x[k]).reduce(pick).unwrap_or(0.0))
+        };
+        writeln!(out, "$Entities")?;
+        write_u64(out, &[0, 1, 2, 3].map(|other| usize::from(other == dimension)))?;
+        write_i32(out, &[tag])?;
+        write_f64(out, [corner(f64::min), corner(f64::max)].as_flattened())?;
+        write_u64(out, &[1])?;
+        write_i32(out, &[tag])?;
+        write_u64(out, &[0])?;
+        write!(out, "\n$EndEntities\n")
+    }
+
+    fn write_nodes(&self, tag: i32, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
+        let (_, _, dimension, _) = self.cell.facts();
+        let (count, first) = (self.points.len(), tags.points + 1);
+        writeln!(out, "$Nodes")?;
+        write_u64(out, &[1, count, first, tags.points + count])?;
+        write_i32(out, &[dimension, tag, 0])?;
+        write_u64(out, &[count])?;
+        write_u64(out, &(first..first + count).collect::<Vec<_>>())?;
+        write_f64(out, self.points.as_flattened())?;
+        write!(out, "\n$EndNodes\n")
+    }
+
+    fn write_elements(&self, tag: i32, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
+        let (_, _, dimension, kind) = self.cell.facts();
+        let cells = self.connectivity.chunks_exact(self.cell.stride());
+        writeln!(out, "$Elements")?;
+        write_u64(out, &[1, cells.len(), tags.cells + 1, tags.cells + cells.len()])?;
+        write_i32(out, &[dimension, tag, kind])?;
+        write_u64(out, &[cells.len()])?;
+        for (number, cell) in cells.enumerate() {
+            let mut line = vec![tags.cells + 1 + number];
+            line.extend(cell.iter().map(|&point| tags.points + 1 + point as usize));
+            if self.cell == CellKind::QuadraticTetra {
+                // Gmsh has the mid-edge 23 before 13
+                line.swap(9, 10);
+            }
+            write_u64(out, &line)?;
+        }
+        write!(out, "\n$EndElements\n")
+    }
+}
+
+/// Write a view of the values at the points, `components` per point; the first point has the tag `first`.
+fn write_view(name: &str, components: usize, values: &[f64], first: usize, out: &mut dyn Write) -> io::Result<()> {
+    // xx yy zz xy yz xz to the rows of a tensor
+    const TENSOR: [usize; 9] = [0, 3, 5, 3, 1, 4, 5, 4, 2];
+    let width = if components == 6 { TENSOR.len() } else { components };
+    let has_value = |(_, value): &(usize, &[f64])| value.iter().all(|x| !x.is_nan());
+    let points = || values.chunks_exact(components).enumerate().filter(has_value);
+    write!(out, "$NodeData\n1\n\"{name}\"\n1\n0\n3\n0\n{width}\n{}\n", points().count())?;
+    for (point, value) in points() {
+        write_i32(out, &[(first + point) as i32])?;
+        match components {
+            6 => write_f64(out, &TENSOR.map(|place| value[place]))?,
+            _ => write_f64(out, value)?,
+        }
+    }
+    write!(out, "\n$EndNodeData\n")
+}
+
+fn write_i32(out: &mut dyn Write, numbers: &[i32]) -> io::Result<()> {
+    numbers.iter().try_for_each(|number| out.write_all(&number.to_ne_bytes()))
+}
+
+/// Write sizes and tags, which have 8 bytes in the format.
+fn write_u64(out: &mut dyn Write, numbers: &[usize]) -> io::Result<()> {
+    numbers.iter().try_for_each(|number| out.write_all(&(*number as u64).to_ne_bytes()))
+}
+
+fn write_f64(out: &mut dyn Write, numbers: &[f64]) -> io::Result<()> {
+    numbers.iter().try_for_each(|number| out.write_all(&number.to_ne_bytes()))
 }
 
 #[cfg(test)]
@@ -354,5 +558,17 @@ mod tests {
             assert_eq!(error.kind(), io::ErrorKind::StorageFull, "{room} of {}", bytes.len());
         }
         body(CellKind::Tetra).write(Encoding::default(), &mut Disk(bytes.len())).unwrap();
+    }
+
+    #[test]
+    fn the_collection_names_every_body() {
+        let mut bytes = Vec::new();
+        let piece =
+            |(part, name, file): (usize, &'static str, &str)| Entry { time: 0.5, part, name, file: file.into() };
+        let entries: Vec<_> = [(0, "upper", "upper.vtu"), (1, "a<b", "a_b.vtu")].into_iter().map(piece).collect();
+        write_pvd(&entries, &mut bytes).unwrap();
+        let text = String::from_utf8(bytes).unwrap();
+        assert!(text.contains(r#"timestep="0.5" group="" part="0" name="upper" file="upper.vtu""#));
+        assert!(text.contains(r#"part="1" name="a&lt;b" file="a_b.vtu""#), "{text}");
     }
 }
