@@ -16,8 +16,8 @@ mod square;
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::{Meshes, Recovered};
 use crate::error::{Error, Kind, Result};
-use crate::fem::InterpolationError;
-use crate::linalg::{axpy, dot};
+use crate::fem::Errors;
+use crate::linalg::axpy;
 use crate::model::field::residual;
 use crate::model::surface::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
@@ -76,7 +76,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = LocalErrors::of_bodies(meshes, &recovered, &displacements);
+    let mut local = LocalErrors::of_bodies(meshes, &recovered);
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, pair);
     }
@@ -191,19 +191,17 @@ struct LocalErrors {
 }
 
 impl LocalErrors {
-    /// Return the errors of the bodies, without those of the layers. `displacements` are those from which `recovered` was made.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, displacements: &[Option<Vec<f64>>]) -> Self {
+    /// Return the errors of the bodies, without those of the layers.
+    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, strips, loads) = (none(), none(), none());
         let mut local = Self { cells, strips, loads, layers: Vec::new(), sides: Vec::new(), mean_error: Vec::new() };
-        for (body, (recovered, u)) in recovered.iter().zip(displacements).enumerate() {
-            if let (Some(recovered), Some(u)) = (recovered, u) {
-                let (cells, mut loads) = errors_and_loads(&**recovered, u);
-                recovered.add_strip(&mut loads);
-                loads.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
-                (local.cells[body], local.loads[body]) = (cells, loads);
-                local.strips[body] = recovered.strip_energies();
+        for (body, recovered) in recovered.iter().enumerate() {
+            if let Some(recovered) = recovered {
+                let Errors { cells, strips, mut load } = recovered.errors();
+                load.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
+                (local.cells[body], local.strips[body], local.loads[body]) = (cells, strips, load);
             }
         }
         local
@@ -252,28 +250,6 @@ impl LocalErrors {
         self.layers.push(of_layer.energy);
         self.mean_error.extend(mean_error);
     }
-}
-
-/// Return the squared energy error of each cell of a body, and the load whose response is the error of its displacements, at all nodes.
-///
-/// The discrete solution is the best approximation. If the recovered displacement is exact, its distance from any discrete displacement bounds the error.
-/// The nodal interpolant is closer than the discrete solution where quadratic elements meet a singular one.
-///
-/// The load of the interpolation error does the work eta^2 on `u`, the discrete displacement, except where the solution is singular. The missing work
-/// is done by a multiple, at most one, of [`Recovered::softening`].
-fn errors_and_loads(recovered: &dyn Recovered, u: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let InterpolationError { residual: mut loads, cells: of_interpolant } = recovered.interpolation_error();
-    let of_solution = recovered.energy_errors();
-    let total = |cells: &[f64]| cells.iter().sum::<f64>();
-    let is_closer = !of_interpolant.is_empty() && total(&of_interpolant) < total(&of_solution);
-    let cells = if is_closer { of_interpolant } else { of_solution };
-    let softening = recovered.softening(&cells);
-    let work = dot(&softening, u);
-    if work > 0.0 {
-        let lacking = (total(&cells) - dot(&loads, u)) / work;
-        axpy(lacking.clamp(0.0, 1.0), &softening, &mut loads);
-    }
-    (cells, loads)
 }
 
 /// Turn loads at the nodes of each body into those at its dofs, on all ranks that have a part of the body. Collective.

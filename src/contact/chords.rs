@@ -3,7 +3,7 @@
 use super::pair::ContactPair;
 use super::pieces::Common;
 use super::side::Side;
-use crate::fem::{assemble, minus};
+use crate::fem::{element, minus};
 use crate::linalg::dot;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
@@ -72,7 +72,7 @@ fn largest_sagitta<const D: usize>(side: &Side<D>, facets: &HashSet<usize>) -> f
     let mut largest: f64 = 0.0;
     for &facet in facets {
         let x = side.facets.coordinates(facet, side.space);
-        if !assemble::is_straight(&x, D) {
+        if !element::is_straight(&x, D) {
             continue;
         }
         let normals: Vec<[f64; D]> = side.facets.facet(facet)[..D].iter().map(|node| side.normals[node]).collect();

@@ -3,8 +3,8 @@
 use super::basis::Carriers;
 use super::pieces::{Common, Refused};
 use super::side::{Side, length};
-use crate::fem::quadrature::{self, Rule};
-use crate::fem::{area_vector, assemble, element};
+use crate::fem::area_vector;
+use crate::fem::element::{self, Rule};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 
@@ -45,7 +45,7 @@ impl Coverage {
     pub(super) fn of<const D: usize>(a: &Side<D>, common: &Common<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
-        let rule = quadrature::simplex(D, if a.facets.order == Order::P2 { 5 } else { 2 });
+        let rule = element::rule(D, if a.facets.order == Order::P2 { 5 } else { 2 });
         let of_facet = |i: usize| {
             let share = covered[i] / measure(a, i, &rule);
             let left = Left::of(share, &common.refused[i]);
@@ -60,7 +60,7 @@ impl Coverage {
 fn measure<const D: usize>(a: &Side<D>, i: usize, rule: &Rule) -> f64 {
     let x = a.facets.coordinates(i, a.space);
     let density = |l: &[f64]| {
-        let at = assemble::interpolate(&x, &element::values(a.facets.order, l));
+        let at = a.facets.point(i, a.space, l);
         length(area_vector(a.facets.order, &x, l)) * a.space.circle(&at)
     };
     rule.iter().map(|(l, weight)| weight * density(l)).sum()

@@ -10,7 +10,7 @@ use super::pieces::{Common, Shared};
 use super::rim::facets_at_rim;
 use super::side::{Side, length, unit};
 use crate::exchange::Plain;
-use crate::fem::{Facets, assemble, element};
+use crate::fem::{Facets, element};
 use crate::linalg::Csr;
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
@@ -142,8 +142,7 @@ impl<const D: usize> Fine<D> {
 
 /// Return the gap at an integration point. A distance below `rounding`, or below that of the facet's size, counts as zero.
 fn gap_at<const D: usize>(a: &Side<D>, point: &Shared<D>, rounding: f64, gap: &dyn Fn([f64; 3]) -> f64) -> f64 {
-    let x = a.facets.coordinates(point.facet_a, a.space);
-    let at = assemble::interpolate(&x, &element::values(a.facets.order, &point.at_a));
+    let at = a.facets.point(point.facet_a, a.space, &point.at_a);
     let rounding = rounding.max(1e-12 * length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
     let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
     distance + gap(a.space.in_scene(at))

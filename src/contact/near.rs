@@ -4,8 +4,7 @@ use super::pair::ContactPair;
 use super::pieces::Common;
 use super::side::{Side, length};
 use crate::exchange::Plain;
-use crate::fem::assemble::interpolate;
-use crate::fem::{element, minus};
+use crate::fem::minus;
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
@@ -69,8 +68,7 @@ fn nearest_facets<const D: usize>(
     let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
     let mut nearest = vec![(f64::INFINITY, 0); pair.len()];
     for point in &common.points {
-        let x = a.facets.coordinates(point.facet_a, a.space);
-        let from = interpolate(&x, &element::values(a.facets.order, &point.at_a));
+        let from = a.facets.point(point.facet_a, a.space, &point.at_a);
         for q in a.facets.facet(point.facet_a).iter().filter_map(|node| point_of.get(node).copied()) {
             let distance = length(minus(position(q), from));
             if distance < nearest[q].0 {
@@ -93,9 +91,7 @@ fn project<const D: usize>(b: &Side<D>, facet: usize, from: [f64; D], normal: [f
 
 /// Return the distance along a normal from a point to the surface at the barycentric coordinates `at` of a facet.
 fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
-    let x = b.facets.coordinates(facet, b.space);
-    let to: [f64; D] = interpolate(&x, &element::values(b.facets.order, at));
-    dot(&normal, &minus(to, from)) - rise(b, facet, at)
+    dot(&normal, &minus(b.facets.point(facet, b.space, at), from)) - rise(b, facet, at)
 }
 
 /// Return the height of the surface of a side above a facet at barycentric coordinates.

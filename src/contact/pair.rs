@@ -6,7 +6,6 @@ use super::law::{LayerLaw, Linear};
 use super::pieces::Common;
 use super::side::{Side, length};
 use crate::error::{Error, Result};
-use crate::fem::assemble::interpolate;
 use crate::fem::{cross, element, pad};
 use crate::linalg::Csr;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -121,7 +120,7 @@ impl LostPieces {
         let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.left == Left::Lost);
         let (worst, _) = lost().max_by(|p, q| uncovered(p).total_cmp(&uncovered(q)))?;
         let whole = a.mean_measure() * coverage.len() as f64;
-        let middle = interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
+        let middle = element::interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
         Some(Self {
             pieces: lost().map(|(_, facet)| facet.lost).sum(),
             share: lost().map(|facet| uncovered(&facet)).sum::<f64>() / whole,

@@ -3,7 +3,6 @@
 use super::find::point;
 use crate::contact::pieces::{Common, Cut, Reach};
 use crate::contact::{ROUNDING, Side, unit};
-use crate::fem::{assemble, element};
 use crate::linalg::dot;
 use crate::problem::contact::ContactSpec;
 use std::collections::BTreeMap;
@@ -67,8 +66,7 @@ impl Nearest {
             behind.cmp(&other).then(p.total_cmp(&q))
         };
         let nearest = common.points.iter().min_by(|p, q| less(p.gap, q.gap))?;
-        let x = a.facets.coordinates(nearest.facet_a, a.space);
-        let at = assemble::interpolate(&x, &element::values(a.facets.order, &nearest.at_a));
+        let at = a.facets.point(nearest.facet_a, a.space, &nearest.at_a);
         Some(Self { gap: nearest.gap, at: point(a.space.in_scene(at)) })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::supports::Constraints;
 use crate::contact::Fine;
-use crate::fem::{Elasticity, InterpolationError, Recovery, RigidMotion, Space, element};
+use crate::fem::{Elasticity, Errors, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
 use crate::problem::order::Order;
 use std::rc::Rc;
@@ -85,20 +85,8 @@ pub struct FinePoints<'a> {
 
 /// A displacement of a body with the fields recovered from it.
 pub trait Recovered {
-    /// Return the squared energy norm of the recovered minus the discrete stress, for each cell.
-    fn energy_errors(&self) -> Vec<f64>;
-
-    /// Return the energy of the strip between straight facets and a curved boundary at each cell, see [`Recovery::strip_energies`].
-    fn strip_energies(&self) -> Vec<f64>;
-
-    /// Compute the residual and the energy of the interpolation error, see [`Recovery::interpolation_error`].
-    fn interpolation_error(&self) -> InterpolationError;
-
-    /// Return the load of a body that is too stiff by these squared energy errors of its cells, see [`Recovery::softening`].
-    fn softening(&self, errors: &[f64]) -> Vec<f64>;
-
-    /// Add the load on the strip between straight facets and a curved boundary to `r`, see [`Recovery::add_strip`].
-    fn add_strip(&self, r: &mut [f64]);
+    /// Return the errors of the body, see [`Recovery::errors`].
+    fn errors(&self) -> Errors;
 
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
@@ -149,7 +137,7 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a> {
         let shape = &self.shapes[body];
-        Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, u) })
+        Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, &shape.elasticity, u) })
     }
 
     fn unloaded(&self, body: usize) -> &[f64] {
@@ -232,16 +220,6 @@ struct OnBody<'a, const D: usize> {
     recovery: Recovery<'a, D>,
 }
 
-impl<const D: usize> OnBody<'_, D> {
-    /// Return the stress of a strain at an integration point of a cell. Assembly evaluated the law there, so it has a value.
-    fn stress(&self, cell: usize, x: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
-        self.shape
-            .elasticity
-            .at(cell, self.shape.space.in_scene(x))
-            .map_or([0.0; 6], |material| material.stress(strain))
-    }
-}
-
 /// Factors of the normal for side a and side b. The outer normal of side b is minus that of side a.
 const SIGN: [f64; 2] = [1.0, -1.0];
 
@@ -267,24 +245,8 @@ impl<const D: usize> OnBody<'_, D> {
 }
 
 impl<const D: usize> Recovered for OnBody<'_, D> {
-    fn energy_errors(&self) -> Vec<f64> {
-        self.recovery.energy_errors(&|cell, x, strain| self.stress(cell, x, strain))
-    }
-
-    fn strip_energies(&self) -> Vec<f64> {
-        self.recovery.strip_energies(&|cell, x, strain| self.stress(cell, x, strain))
-    }
-
-    fn interpolation_error(&self) -> InterpolationError {
-        self.recovery.interpolation_error(&|cell, x, strain| self.stress(cell, x, strain))
-    }
-
-    fn softening(&self, errors: &[f64]) -> Vec<f64> {
-        self.recovery.softening(&|cell, x, strain| self.stress(cell, x, strain), errors)
-    }
-
-    fn add_strip(&self, r: &mut [f64]) {
-        self.recovery.add_strip(&|cell, x, strain| self.stress(cell, x, strain), r);
+    fn errors(&self) -> Errors {
+        self.recovery.errors()
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {

@@ -4,7 +4,7 @@ use super::find::find_group;
 use super::interface::Interface;
 use super::part::Part;
 use crate::contact::ContactPair;
-use crate::fem::{RigidMotion, turn};
+use crate::fem::{RigidMotion, surface};
 use crate::mesh::Mesh;
 
 /// Ratio of the error of a quadrature to the difference between it and the same rule on halves of the elements. Where a load
@@ -12,7 +12,7 @@ use crate::mesh::Mesh;
 /// smooth, the ratio is nearly one.
 const HALVES: f64 = 2.0;
 
-/// Return the share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all
+/// Return the share of the loads of a body that facets may miss ([`surface::missed`]). A body force acts on the volume within all
 /// surfaces, and the surfaces in contact represent them.
 pub fn by_facets<const D: usize>(
     part: &Part<D>,
@@ -21,13 +21,13 @@ pub fn by_facets<const D: usize>(
     mesh: &Mesh<D>,
 ) -> f64 {
     let groups = part.spec.load.iter().filter_map(|load| find_group(mesh, &load.on, &[D - 1], "load").ok());
-    let on_groups = groups.map(|group| turn::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
+    let on_groups = groups.map(|group| surface::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
     if part.spec.force.is_none() {
         return on_groups;
     }
     let points = interface.segments.iter().flat_map(|segment| &pairs[segment.pair].surface[segment.side]);
     // Facets differ from their mean by half of the angle between them.
-    points.map(|point| turn::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
+    points.map(|point| surface::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
 }
 
 /// Return a bound of the work on a motion of the nodal forces that the quadrature of surface loads misses.

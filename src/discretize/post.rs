@@ -8,7 +8,7 @@ use super::unbalanced::Unbalanced;
 use crate::contact::pad;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
-use crate::fem::{norms, strain, strain::Strained, stress};
+use crate::fem::displacement::{self, Strained};
 use crate::output::{BodyField, CellKind};
 use crate::problem::BodySpec;
 
@@ -48,7 +48,7 @@ pub trait Post {
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
 
     /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are
-    /// the L2 norm, the H1 seminorm and the energy norm ([`norms::error`]) on the cells that this rank writes. The result is
+    /// the L2 norm, the H1 seminorm and the energy norm ([`displacement::norms_of_error`]) on the cells that this rank writes. The result is
     /// `None` if the scene has no known displacements.
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
@@ -92,7 +92,7 @@ impl<const D: usize> Post for OnPart<D> {
         let Forces { part, elasticity, .. } = &self.forces;
         let (u, space) = (self.nodal(v), &part.space);
         let (owned, shown) = space.part(part.owned());
-        let stress = stress::nodal(space, elasticity, &self.nodal(bent));
+        let stress = displacement::nodal_stresses(space, elasticity, &self.nodal(bent));
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
@@ -101,15 +101,15 @@ impl<const D: usize> Post for OnPart<D> {
             cell: CellKind::simplex(D, space.order.degree()),
             connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
-            von_mises: stress.iter().map(stress::von_mises).collect(),
-            principal: stress.iter().map(stress::principal).collect(),
+            von_mises: stress.iter().map(displacement::von_mises).collect(),
+            principal: stress.iter().map(displacement::principal).collect(),
             stress,
         }
     }
 
     fn strain(&self, bent: &[f64]) -> Strained {
         let part = &self.forces.part;
-        strain::largest(&part.space, part.owned(), &self.nodal(bent))
+        displacement::largest_strain(&part.space, part.owned(), &self.nodal(bent))
     }
 
     fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
@@ -148,12 +148,12 @@ impl<const D: usize> Post for OnPart<D> {
         let (exact, Forces { part, elasticity, .. }) = (self.exact.as_ref()?, &self.forces);
         let at = |x: [f64; D]| {
             let x = &part.space.in_scene(x)[..D];
-            norms::Exact {
+            displacement::Exact {
                 value: std::array::from_fn(|i| exact[i].eval(x)),
                 gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
             }
         };
-        let norms = norms::error(&part.space, part.owned(), elasticity, &self.nodal(v), &at);
+        let norms = displacement::norms_of_error(&part.space, part.owned(), elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
     }
 }

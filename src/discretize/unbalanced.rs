@@ -1,7 +1,8 @@
 //! Unbalanced forces of a body at given displacements, and displacements that show how much energy is in these forces.
 
 use super::balance::Forces;
-use crate::fem::{Extent, internal, internal::Internal};
+use crate::fem::Extent;
+use crate::fem::displacement::{self, Internal};
 use crate::linalg::dot;
 
 /// The unbalanced forces on the nodes of a part of a body.
@@ -84,7 +85,7 @@ impl<const D: usize> Forces<D> {
     pub fn unbalanced(&self, u: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
         let space = &*self.part.space;
         let Internal { force: inner, rounding, mut diagonal, bulk } =
-            internal::forces(space, &self.elasticity, 0..space.cell_count(), u);
+            displacement::internal_forces(space, &self.elasticity, 0..space.cell_count(), u);
         let mut sum = Sum { force: self.load.clone(), size: rounding };
         let mut resisting = vec![0.0; bulk.len()];
         for (row, (force, spring)) in force.iter().zip(springs).enumerate() {
@@ -193,7 +194,7 @@ impl<const D: usize> Forces<D> {
     pub fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
         let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.held.frame.displacements(field)).collect();
         let n = fields.len();
-        let mut products = internal::products(&self.part.space, &self.elasticity, self.part.owned(), &nodal);
+        let mut products = displacement::energy_products(&self.part.space, &self.elasticity, self.part.owned(), &nodal);
         for block in self.springs.iter().flatten().filter(|block| self.part.own[block.nodes[0] as usize]) {
             let [a, b] = block.nodes.map(|node| D * node as usize);
             for (i, row) in block.block.iter().enumerate() {

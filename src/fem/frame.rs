@@ -1,13 +1,17 @@
 //! The coordinates v in which a body is solved. Nodal displacements are u = T v.
 //!
 //! A support along an inclined direction rotates the axes of its nodes, so that it prescribes one component there. A rigid
-//! surface ties its nodes to one of them, the master, whose dofs move all of them; where the surface turns, the dofs of a second node,
-//! the pole, are its rotation. In v every support is a prescribed dof, and the blocks of K keep their size.
+//! surface ties its nodes to one of them, the master, whose dofs move all of them. In v every support is a prescribed dof, and the
+//! blocks of K keep their size.
+//!
+//! The nodes i of a rigid surface that turns move by u_i = u_A + theta x (x_i - x_A), where A is the master. The rotation has the dofs of
+//! a second node, the pole: v = L theta, with the distance L of the pole from the master. So v is a displacement like all other dofs, and
+//! with the farthest node as the pole no node moves by more than v. In the plane theta is the first dof, and the other one is zero.
 
-use super::lever::{Levers, Rotation};
-use super::minus;
+use super::{cross, length, minus, pad, unit};
 use crate::exchange::Plain;
-use crate::linalg::Csr;
+use crate::linalg::{Csr, dot};
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -188,10 +192,130 @@ fn vector<const D: usize>(all: &[f64], node: u32) -> [f64; D] {
     std::array::from_fn(|c| all[D * node as usize + c])
 }
 
+/// The levers of a rigid surface that turns.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct Levers<const D: usize> {
+    /// Node whose dofs v are those of the rotation.
+    pub pole: u32,
+    /// Matrix R of each tied node, also of the pole: the rotation moves the node by R v.
+    pub matrix: BTreeMap<u32, SMatrix<f64, D, D>>,
+    /// Weights G of a few tied nodes, which give the rotation of a rigid displacement: v is the sum of G (u - u_master).
+    pub weights: BTreeMap<u32, SMatrix<f64, D, D>>,
+    /// Distance L of the pole from the master.
+    length: f64,
+    /// Vector from the master to the centre of the surface.
+    arm: [f64; D],
+}
+
+/// The rotation that moves a node.
+#[derive(Clone, Copy)]
+pub struct Rotation<'a, const D: usize> {
+    /// Node whose dofs v are the rotation.
+    pub pole: u32,
+    /// Matrix R: the displacement of the node has the summand R v.
+    pub matrix: &'a SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Rotation<'_, D> {
+    /// Return a force at the node as a force R'f at the dofs of the rotation.
+    pub fn turning(&self, force: [f64; D]) -> [f64; D] {
+        self.matrix.tr_mul(&SVector::from(force)).into()
+    }
+}
+
+impl<const D: usize> Levers<D> {
+    /// Make the levers of a surface with these `nodes`, the first of which is its master. `x` gives the place of a node. The nodes of a
+    /// surface in space must not lie on one line.
+    pub fn new(nodes: &[u32], x: impl Fn(u32) -> [f64; D], centre: [f64; D]) -> Self {
+        let (master, tied) = (nodes[0], &nodes[1..]);
+        let arm = |node: u32| minus(x(node), x(master));
+        let farthest = |distance: &dyn Fn(u32) -> f64| {
+            tied.iter().copied().max_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(master)
+        };
+        let pole = farthest(&|node| length(arm(node)));
+        let size = length(arm(pole));
+        let along = pad(unit(arm(pole)));
+        let third = farthest(&|node| length(cross(along, pad(arm(node)))));
+        let matrix: BTreeMap<u32, _> = tied.iter().map(|&node| (node, rotation(arm(node), size))).collect();
+        let used = if D == 2 { vec![pole] } else { vec![pole, third] };
+        // Least squares; in the plane the second dof does not move anything.
+        let mut normal: SMatrix<f64, D, D> = used.iter().map(|node| matrix[node].transpose() * matrix[node]).sum();
+        if D == 2 {
+            normal[(1, 1)] = 1.0;
+        }
+        let inverse = normal.cholesky().map(|factor| factor.inverse()).unwrap_or(SMatrix::repeat(f64::NAN));
+        let weight = |node: &u32| (*node, inverse * matrix[node].transpose());
+        Self { pole, weights: used.iter().map(weight).collect(), matrix, length: size, arm: minus(centre, x(master)) }
+    }
+
+    /// Return the levers with other numbers of nodes. Tied nodes without a number are left out; the result is `None` if the pole has
+    /// no number, or a node with weights.
+    fn renumbered(&self, number: impl Fn(&u32) -> Option<u32>) -> Option<Self> {
+        let matrix = self.matrix.iter().filter_map(|(node, matrix)| Some((number(node)?, *matrix)));
+        let weights = self.weights.iter().map(|(node, weight)| Some((number(node)?, *weight)));
+        Some(Self {
+            pole: number(&self.pole)?,
+            matrix: matrix.collect(),
+            weights: weights.collect::<Option<_>>()?,
+            ..*self
+        })
+    }
+
+    /// Return the rotation that moves a node, if it is a tied node of the surface.
+    fn rotation_of(&self, node: u32) -> Option<Rotation<'_, D>> {
+        self.matrix.get(&node).map(|matrix| Rotation { pole: self.pole, matrix })
+    }
+
+    /// Return nodal forces, given by `force`, as a force at the dofs of the rotation.
+    fn turning(&self, force: impl Fn(u32) -> [f64; D]) -> [f64; D] {
+        let of_node = |(&node, matrix): (&u32, &SMatrix<f64, D, D>)| matrix.tr_mul(&SVector::from(force(node)));
+        self.matrix.iter().map(of_node).sum::<SVector<f64, D>>().into()
+    }
+
+    /// Return the dofs v of the rotation of a rigid displacement. `relative` is the displacement of a node relative to the master.
+    fn dofs(&self, relative: impl Fn(u32) -> [f64; D]) -> [f64; D] {
+        let of_node = |(&node, weight): (&u32, &SMatrix<f64, D, D>)| weight * SVector::from(relative(node));
+        self.weights.iter().map(of_node).sum::<SVector<f64, D>>().into()
+    }
+
+    /// Return the displacement of a node by the rotation with the dofs v.
+    fn displacement(&self, node: u32, v: [f64; D]) -> [f64; D] {
+        self.matrix.get(&node).map_or([0.0; D], |matrix| (matrix * SVector::from(v)).into())
+    }
+
+    /// Return nodal forces with the total `force` that acts at the centre and the `moment` (x, y, z) about the centre. `master` is the
+    /// master of the surface.
+    pub fn forces(&self, master: u32, force: [f64; D], moment: [f64; 3]) -> Vec<(u32, [f64; D])> {
+        let about_master = cross(pad(self.arm), pad(force));
+        let moment: [f64; 3] = std::array::from_fn(|c| moment[c] + about_master[c]);
+        let at_pole = SVector::from_fn(|k, _| dot(&moment, &axis::<D>(k)) / self.length);
+        let couple = |(node, weight): (&u32, &SMatrix<f64, D, D>)| (*node, weight.tr_mul(&at_pole).into());
+        let mut forces: Vec<(u32, [f64; D])> = self.weights.iter().map(couple).collect();
+        // The force of the couple at the master is last, so that without a total force the sum is zero to the last digit.
+        let opposite = forces.iter().fold([0.0; D], |sum, entry| minus(sum, entry.1));
+        forces.extend([(master, opposite), (master, force)]);
+        forces
+    }
+}
+
+/// Return the axis of rotation of a dof of the pole. It is zero for the second one in the plane.
+fn axis<const D: usize>(dof: usize) -> [f64; 3] {
+    let about = if D == 2 { dof + 2 } else { dof };
+    std::array::from_fn(|c| if c == about { 1.0 } else { 0.0 })
+}
+
+/// Return the matrix R of a node at `arm` from the master, where the pole is at the distance `length`.
+fn rotation<const D: usize>(arm: [f64; D], length: f64) -> SMatrix<f64, D, D> {
+    SMatrix::from_fn(|c, dof| cross(axis::<D>(dof), pad(arm))[c] / length)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::dot;
+    use crate::fem::space::sample::block;
+    use crate::fem::{Elasticity, Extent, NodeGraph, RigidMotion, Space, assemble, rigid};
+    use crate::problem::{BodySpec, Order, Plane};
 
     #[test]
     fn forces_do_the_same_work_in_both_coordinates() {
@@ -236,5 +360,104 @@ mod tests {
         frame.turn_matrix(&mut k);
         assert!((quadratic(&k, &v) - before).abs() < 1e-13 * before.abs());
         assert!((0..6).all(|i| k.row(i).all(|(j, a)| (a - k.values[k.position(j, i).unwrap()]).abs() < 1e-14)));
+    }
+
+    /// Return a space, and the frame in which its nodes at the end of the first axis turn about the `centre`.
+    fn turning<const D: usize>(order: Order, centre: [f64; D]) -> (Space<D>, Frame<D>) {
+        let space = block::<D>(2, order);
+        let places = space.nodes.clone();
+        let at_end = |node: &u32| (places[*node as usize][0] - 0.2 * places[*node as usize][1] - 1.0).abs() < 0.05;
+        let nodes: Vec<u32> = (0..places.len() as u32).filter(at_end).collect();
+        let levers = Levers::new(&nodes, |node| places[node as usize], centre);
+        let master = nodes[1..].iter().map(|&node| (node, nodes[0])).collect();
+        (space, Frame { master, levers: [(nodes[0], levers)].into(), ..Frame::default() })
+    }
+
+    /// Return dofs of all kinds: those of tied nodes are zero, except for the rotation.
+    fn some<const D: usize>(space: &Space<D>, frame: &Frame<D>, phase: f64) -> Vec<f64> {
+        let pole = frame.levers.values().next().map(|levers| levers.pole).expect("levers");
+        let is_free = |dof: usize| match (dof / D) as u32 {
+            node if node == pole => D == 3 || dof.is_multiple_of(D),
+            node => !frame.master.contains_key(&node),
+        };
+        (0..space.dofs()).map(|dof| if is_free(dof) { (dof as f64 * 0.7 + phase).sin() } else { 0.0 }).collect()
+    }
+
+    fn near(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-11 * (1.0 + a.abs()), "{a} {b}");
+    }
+
+    /// The matrix in the dofs is that of the displacements: v'(T'KT)w = (Tv)'K(Tw).
+    fn same_form<const D: usize>(order: Order) {
+        let (space, frame) = turning::<D>(order, [0.3; D]);
+        let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
+        let elasticity = Elasticity::new(&[&spec], Vec::new(), D, Plane::Strain).expect("a material");
+        let form = |frame: &Frame<D>, v: &[f64], w: &[f64]| {
+            let graph = NodeGraph::new(&space, &[], frame);
+            let matrix = assemble::stiffness(&space, &graph, frame, &elasticity).expect("a matrix");
+            let mut of_w = vec![0.0; w.len()];
+            matrix.multiply(w, &mut of_w);
+            dot(v, &of_w)
+        };
+        let [v, w] = [0.0, 1.0].map(|phase| some(&space, &frame, phase));
+        let [u_v, u_w] = [&v, &w].map(|v| frame.displacements(v));
+        near(form(&frame, &v, &w), form(&Frame::default(), &u_v, &u_w));
+        assert!(frame.dofs(&u_v).iter().zip(&v).all(|(a, b)| (a - b).abs() < 1e-13));
+    }
+
+    #[test]
+    fn matrices_displacements_and_forces_belong_together() {
+        for order in [Order::P1, Order::P2] {
+            same_form::<2>(order);
+            same_form::<3>(order);
+        }
+    }
+
+    /// A force at the centre and a moment about it do the work of both on a rigid motion about the centre, as forces at nodes and at dofs.
+    fn work<const D: usize>(moment: [f64; 3]) {
+        let centre = std::array::from_fn(|c| 0.4 + 0.1 * c as f64);
+        let (space, frame) = turning::<D>(Order::P2, centre);
+        let (&master, levers) = frame.levers.iter().next().expect("levers");
+        let force = std::array::from_fn(|c| 2.0 - c as f64);
+        let mut at_nodes = vec![0.0; space.dofs()];
+        let mut at_dofs = at_nodes.clone();
+        for (node, force) in levers.forces(master, force, moment) {
+            (0..D).for_each(|c| at_nodes[D * node as usize + c] += force[c]);
+            for (node, force) in frame.force(node, force) {
+                (0..D).for_each(|c| at_dofs[D * node as usize + c] += force[c]);
+            }
+        }
+        let motions: Vec<RigidMotion<D>> = rigid::modes(&Extent::of(space.nodes.iter().copied()));
+        for motion in &motions {
+            let u = motion.nodal(space.nodes.iter().copied());
+            let v = frame.dofs(&u);
+            assert!(
+                frame
+                    .master
+                    .keys()
+                    .filter(|node| **node != levers.pole)
+                    .all(|&node| { (0..D).all(|c| v[D * node as usize + c].abs() < 1e-14) })
+            );
+            // The curl of the displacement is twice the rotation.
+            let turned = |c: usize| {
+                let [i, j] = [(c + 1) % 3, (c + 2) % 3];
+                let along = |axis: usize, of: usize| {
+                    let moved: [f64; D] = std::array::from_fn(|k| centre[k] + f64::from(u8::from(k == axis)));
+                    if axis < D && of < D { motion.at(&moved)[of] - motion.at(&centre)[of] } else { 0.0 }
+                };
+                0.5 * (along(i, j) - along(j, i))
+            };
+            let expected = dot(&motion.at(&centre), &force) + (0..3).map(|c| moment[c] * turned(c)).sum::<f64>();
+            near(dot(&at_nodes, &u), expected);
+            near(dot(&at_dofs, &v), expected);
+        }
+        frame.forces(&mut at_nodes);
+        at_nodes.iter().zip(&at_dofs).for_each(|(a, b)| near(*a, *b));
+    }
+
+    #[test]
+    fn loads_do_the_work_of_force_and_moment() {
+        work::<2>([0.0, 0.0, 1.5]);
+        work::<3>([0.7, -1.1, 1.5]);
     }
 }

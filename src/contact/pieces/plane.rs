@@ -2,7 +2,7 @@
 
 use super::{AWAY, Common, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
 use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, element, minus, quadrature};
+use crate::fem::{area_vector, element, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
@@ -10,7 +10,7 @@ use crate::problem::order::Order;
 pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
+    let rule = element::gauss(if quadratic { 4 } else { 3 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Curve::of(a, i);
@@ -122,7 +122,7 @@ impl Curve {
     }
 
     fn at(&self, s: f64) -> [f64; 2] {
-        crate::fem::assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - s, s]))
+        element::interpolate(&self.x, &element::values(self.order, &[1.0 - s, s]))
     }
 
     fn tangent(&self, s: f64) -> [f64; 2] {

@@ -11,7 +11,7 @@ use super::polygon::{self, Polygon};
 use super::{AWAY, Common, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
 use crate::contact::cover::WHOLE;
 use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, assemble, cross, element, minus, quadrature};
+use crate::fem::{area_vector, cross, element, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
@@ -34,7 +34,7 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = quadrature::simplex(3, if quadratic { 5 } else { 2 });
+    let rule = element::rule(3, if quadratic { 5 } else { 2 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
@@ -136,7 +136,7 @@ impl Facet {
         Self {
             order: side.facets.order,
             from,
-            straight: assemble::is_straight(&x, 3),
+            straight: element::is_straight(&x, 3),
             size: x.iter().map(|&x| length(x)).fold(0.0, f64::max),
             direction: unit(area_vector(side.facets.order, &x, &[1.0 / 3.0; 3])),
             normals: [0, 1, 2].map(|k| side.normals[&nodes[k]]),
@@ -145,7 +145,7 @@ impl Facet {
     }
 
     fn at(&self, u: f64, v: f64) -> [f64; 3] {
-        assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - u - v, u, v]))
+        element::interpolate(&self.x, &element::values(self.order, &[1.0 - u - v, u, v]))
     }
 
     /// Return a bound of the sum of the sizes of the terms that [`Facet::at`] adds.
