@@ -1,11 +1,13 @@
-//! The law that a scene asks for, at the points of a pair.
+//! The law that a scene asks for, at the points of a pair, and the check of laws that a Rust program supplies.
 
-use super::asperities::asperities;
-use super::own::{self, OwnLaws};
-use super::{Cubic, Exponential, LayerLaw, Linear, PerPoint, Power, Table, Typed};
+use super::forms::{Cubic, Exponential, Linear, Power};
+use super::table::{Table, asperities};
+use super::typed::{HUGE, Typed};
+use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
 use crate::problem::layer::{LawForm, LawKind, LayerSpec, Parameter};
+use crate::problem::own::Own;
 use std::rc::Rc;
 
 /// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.
@@ -23,7 +25,7 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
             LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
         },
         LayerSpec::Asperities(spec) => Ok(Rc::new(asperities(spec))),
-        LayerSpec::Own(name) => own::make(laws, name, position, extent(position)),
+        LayerSpec::Own(name) => own(laws, name, position, extent(position)),
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {
             let size = extent(position);
@@ -81,13 +83,139 @@ fn extent(position: &[[f64; 3]]) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
+/// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.
+pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
+
+/// Number of checked compressions in a factor of ten.
+const STEPS: i32 = 8;
+/// Number of factors of ten that are checked below the extent of the surfaces.
+const DECADES: i32 = 9;
+/// Share of a compression over which a tangent is compared with a difference of pressures. For p ~ c^n the difference has a relative error
+/// of n^2/6 times the square of this share, and a rounding error of 1e-16 divided by it.
+const CLOSE: f64 = 1e-4;
+/// Largest relative error of a tangent. It allows for n up to 700, where e^c overflows.
+const OFF: f64 = 1e-3;
+/// Rounding of an energy, as a share of the largest one: a formula may be a difference of terms that are 1e6 times the energy.
+const ROUNDING: f64 = 1e-10;
+
+/// Return the law of this name for the contact points `position`. It is checked at the first point for compressions up to `size`, the
+/// extent of the surfaces.
+///
+/// # Errors
+/// An unknown name, and a function that is not the law of a layer.
+fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<Rc<dyn LayerLaw>> {
+    let law = laws.get("law of a layer", name)?(position);
+    let refuse = |what| Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"));
+    check(&*law, size).map_err(refuse)?;
+    Ok(law.into())
+}
+
+/// Check that p(c) increases from 0, that the tangent is its derivative where the law is smooth, and that the energy is its integral.
+/// A law may end with values that are not finite, at a rigid stop.
+///
+/// # Errors
+/// A message that says what is wrong.
+fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
+    let mut samples: Vec<(f64, Response)> = vec![(0.0, Response::default())];
+    for step in 0..=DECADES * STEPS {
+        let c = size * 10f64.powf(f64::from(step) / f64::from(STEPS) - f64::from(DECADES));
+        let response = law.compressed(0, c);
+        if step > 0 && (response.pressure.is_nan() || response.pressure >= HUGE) {
+            break;
+        }
+        samples.push((c, response));
+    }
+    let rounding = ROUNDING * samples[samples.len() - 1].1.energy.abs();
+    let (mut kinks, mut mismatch) = (0, String::new());
+    for two in samples.windows(2) {
+        let [(before, last), (c, response)] = [two[0], two[1]];
+        if !(response.pressure > last.pressure && response.pressure.is_finite()) {
+            return Err(format!(
+                "p is {} at c = {c:.3e} and {} before",
+                shown(response.pressure),
+                shown(last.pressure)
+            ));
+        }
+        if !(response.tangent >= 0.0 && response.tangent.is_finite()) {
+            return Err(format!("p' is {} at c = {c:.3e}", shown(response.tangent)));
+        }
+        // Since p increases, its integral lies between two rectangles.
+        let (work, width) = (response.energy - last.energy, c - before);
+        if !(work >= width * last.pressure - rounding && work <= width * response.pressure + rounding) {
+            return Err(format!("the energy is not the integral of p at c = {c:.3e}"));
+        }
+        let [low, high] = [-CLOSE, CLOSE].map(|share| law.pressure(0, c * (1.0 + share)));
+        let slope = (high - low) / (2.0 * CLOSE * c);
+        let agrees = (slope - response.tangent).abs() <= OFF * slope.max(response.tangent);
+        if !agrees {
+            kinks += 1;
+            mismatch =
+                format!("p' is {:.3e} at c = {c:.3e}, where differences of p give {slope:.3e}", response.tangent);
+        }
+    }
+    // A law may have kinks, but not at most of its points.
+    if 2 * kinks > samples.len() { Err(mismatch) } else { Ok(()) }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::extent;
+    use super::*;
 
     #[test]
     fn the_extent_is_a_diagonal() {
         assert_eq!(extent(&[[1.0, -2.0, 5.0], [2.0, 2.0, 5.0], [-2.0, 1.0, 5.0]]), 32f64.sqrt());
         assert_eq!(extent(&[[1.0; 3]]), 1.0);
+    }
+
+    /// The law p = c^2 with mistakes.
+    #[derive(Debug, Default)]
+    struct Wrong {
+        pressure: f64,
+        tangent: f64,
+        energy: f64,
+        end: f64,
+    }
+
+    impl LayerLaw for Wrong {
+        fn compressed(&self, _point: usize, c: f64) -> Response {
+            let Wrong { pressure: cubic, tangent, energy, end } = *self;
+            let pressure = if end > 0.0 && c > end { f64::INFINITY } else { c * c * (1.0 - cubic * c) };
+            let tangent = (2.0 * c - 3.0 * cubic * c * c) * (1.0 + tangent);
+            Response { pressure, tangent, energy: c * c * c * (1.0 / 3.0 - cubic * c / 4.0) * (1.0 + energy) }
+        }
+    }
+
+    #[test]
+    fn laws_pass() {
+        let table = Table::new(&[[0.1, 1.0], [0.2, 1.5], [0.5, 30.0]]);
+        let laws: [Box<dyn LayerLaw>; 6] = [
+            Box::new(Power::new(2.5e-5, 0.2)),
+            Box::new(Exponential::new(1e-3, 2e-3)),
+            Box::new(Cubic { k1: 1.0, k3: 1e9 }),
+            Box::new(table),
+            Box::new(Wrong::default()),
+            Box::new(Wrong { end: 1e-2, ..Wrong::default() }),
+        ];
+        for law in laws {
+            assert_eq!(check(&*law, 1.0), Ok(()), "{law:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_law_is_refused() {
+        for (law, words) in [
+            (Wrong { pressure: 2.0, ..Wrong::default() }, "before"),
+            (Wrong { tangent: 0.01, ..Wrong::default() }, "where differences of p give"),
+            (Wrong { tangent: -2.0, ..Wrong::default() }, "p' is -2e-9"),
+            (Wrong { energy: 0.6, ..Wrong::default() }, "the energy is not the integral"),
+            (Wrong { end: 1e-20, ..Wrong::default() }, "p is inf at c = 1.000e-9"),
+        ] {
+            let message = check(&law, 1.0).expect_err(words);
+            assert!(message.contains(words), "{message}");
+        }
+        let mut laws = OwnLaws::default();
+        laws.insert("film", Rc::new(|_| Box::new(Wrong::default())));
+        let error = own(&laws, "flim", &[[0.0; 3]], 1.0).expect_err("a slip");
+        assert!(error.to_string().contains("did you mean `film`?"), "{error}");
     }
 }

@@ -1,7 +1,6 @@
 //! Laws that are typed as expressions in the scene.
 
-use super::quadrature::integral;
-use super::root::{meeting, root};
+use super::numeric::{integral, meeting, root};
 use super::{LayerLaw, Response};
 use crate::error::{Error, Result, shown};
 use crate::expression::Expression;
