@@ -4,14 +4,9 @@
 //! the energy norm. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
 //! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
 
-mod field;
-mod guess;
 mod held;
-mod layer;
-mod rim;
-mod sides;
+mod pressure;
 pub mod sizes;
-mod square;
 
 use crate::ddm::{Discretisation, linear};
 use crate::discretize::meshes::{Meshes, Recovered};
@@ -19,13 +14,11 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Errors;
 use crate::linalg::axpy;
 use crate::model::field::residual;
-use crate::model::surface::meeting_slopes;
+use crate::model::layer::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
-pub use guess::{Cause, Guess};
 use held::HoldingSprings;
-use layer::LayerError;
-use rim::RimError;
-use square::square;
+pub use pressure::{Cause, Guess};
+use pressure::{LayerError, PressureErrors, SAFETY};
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
@@ -53,10 +46,6 @@ pub struct Estimate {
     /// Relative error of the normal displacements of all contact surfaces, measured likewise.
     pub displacement: f64,
 }
-
-/// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
-/// factor is usual for errors extrapolated from three meshes (Roache 1994).
-const SAFETY: f64 = 1.25;
 
 /// Relative error of the response in the solve for the nodal errors. The error of conjugate gradients is orthogonal to their iterate, so the energy norm is
 /// wrong by half of the square of this. Pressures changed by at most 0.3 % from those with a tolerance of 0.01.
@@ -96,8 +85,7 @@ pub fn estimate(
     // the error of nodal values is a part of the whole error
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
-    let pressure_error = pressure_errors(model, layer, &closing);
-    let rims = rim::of_pairs(meshes, model, layer);
+    let pressures = PressureErrors::new(meshes, model, layer, &closing);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
     let at = |i: usize| (model.weight[i % model.points()], field.trace[i], trace[i]);
@@ -105,9 +93,9 @@ pub fn estimate(
     Ok(Estimate {
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
-        pressure: relative_errors(model, layer, &pressure_error, &rims),
-        guesses: guess::of_pairs(meshes, model, layer, &pressure_error, &rims),
-        pressure_error,
+        pressure: pressures.relative,
+        guesses: pressures.guesses,
+        pressure_error: pressures.error,
         displacement: SAFETY * displacement,
         cells,
         bodies,
@@ -229,7 +217,7 @@ impl LocalErrors {
         }
         model.exchange.sum(&mut compression);
         model.exchange.sum(&mut change);
-        self.sides.push(sides::dependence(pair, &points, layer, range.clone(), &change));
+        self.sides.push(pressure::change_by_normals(pair, &points, layer, range.clone(), &change));
         let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);
@@ -296,24 +284,6 @@ fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
         left += energy * rho / (rho + layer.tangent[q]);
     }
     if full > 0.0 { TOLERANCE * f64::sqrt(left / full) } else { TOLERANCE }
-}
-
-/// Return the errors of the pressures, n, from those of the compression. The response is that of springs at the closed points. So a point that opens
-/// or closes takes the resolvent of its law for the state in the response, as in a step of Newton's method. This allows for the bodies, which give way
-/// to the pressure of a point however stiff its layer is.
-fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
-    let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
-    let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
-    resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect()
-}
-
-/// Return the relative error of the pressures of each pair.
-fn relative_errors(model: &Model, layer: &Layer, error: &[f64], rims: &[RimError]) -> Vec<f64> {
-    let of_pair = |(pair, rim): (usize, &RimError)| {
-        let errors = square(model, pair, error) + rim.squared;
-        if errors == 0.0 { 0.0 } else { SAFETY * f64::sqrt(errors / square(model, pair, &layer.pressure)) }
-    };
-    rims.iter().enumerate().map(of_pair).collect()
 }
 
 /// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.
