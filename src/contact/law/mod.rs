@@ -1,7 +1,7 @@
 //! Laws of Winkler layers: pressure against compression.
 //!
 //! The paper writes sigma_n = g(w) with w = -c, where c is the compression. Here the pressure is p(c) = -g(-c). A law is monotone
-//! with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is a new file, a form in
+//! with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is a new type, a form in
 //! [`layer`](crate::problem::layer) and a line in [`make`]. A program that uses this library implements the trait alone:
 //! [`OwnLaws`].
 //!
