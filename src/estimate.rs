@@ -205,8 +205,9 @@ impl LocalErrors {
         index: usize,
     ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
-        let mut compression = vec![0.0; points.weight.len()];
-        let mut change = vec![0.0; points.weight.len()];
+        let soft = pressure::softness(model, index);
+        let mut compression = vec![0.0; points.each.len()];
+        let mut change = compression.clone();
         for side in 0..2 {
             if let Some(recovered) = &recovered[pair.bodies[side]] {
                 let normal = recovered.normal_displacement(index, side);
@@ -217,7 +218,7 @@ impl LocalErrors {
         }
         model.exchange.sum(&mut compression);
         model.exchange.sum(&mut change);
-        self.sides.push(pressure::change_by_normals(pair, &points, layer, range.clone(), &change));
+        self.sides.push(pressure::change_by_normals(pair, points, soft, layer, range.clone(), &change));
         let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);
@@ -225,8 +226,8 @@ impl LocalErrors {
         model.exchange.sum(&mut mean_error);
         let springs: Vec<f64> =
             range.clone().zip(&mean_error).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
-        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression, &mean_error);
-        let force: Vec<f64> = of_layer.pressure.iter().zip(points.weight).map(|(p, weight)| -weight * p).collect();
+        let of_layer = LayerError::new(pair, points, soft, layer, range.clone(), &compression, &mean_error);
+        let force: Vec<f64> = of_layer.pressure.iter().zip(&points.each).map(|(p, point)| -point.weight * p).collect();
         for side in 0..2 {
             let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);
             if let Some(recovered) = &recovered[body] {

@@ -13,7 +13,7 @@ mod side;
 
 pub use crate::fem::{pad, unit};
 pub use basis::Carriers;
-pub use fine::Fine;
+pub use fine::{Fine, FinePoints};
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Coverage, Fault, Left, LostPieces, OwnSurface, add, assemble, moment_in_scene};
 pub use review::{Chords, End};

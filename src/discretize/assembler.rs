@@ -96,7 +96,7 @@ impl<const D: usize> Assembler<'_, D> {
                     tell_displacements(&mut info, part, local.nodal_rows, &local.load, own)?
                 }
             };
-            shape = Some(Shape { space, held, elasticity, modulus, unloaded, motions });
+            shape = Some(Shape { space, held, elasticity, unloaded, motions });
         }
         let Made { local, scale, row_stiffness } = made;
         let name = info.name.clone();

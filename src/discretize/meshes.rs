@@ -1,10 +1,9 @@
 //! The meshes without their space dimension, as an estimate of the error uses them.
 
 use super::supports::Constraints;
-use crate::contact::Fine;
+use crate::contact::{Fine, FinePoints};
 use crate::fem::{Elasticity, Errors, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
-use crate::problem::order::Order;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -28,7 +27,7 @@ pub trait Meshes {
     fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
 
     /// Return the integration points of a pair.
-    fn points(&self, pair: usize) -> FinePoints<'_>;
+    fn points(&self, pair: usize) -> &FinePoints;
 
     /// Return the cells of a body.
     fn cells(&self, body: usize) -> Cells;
@@ -50,37 +49,6 @@ pub struct Cells {
     pub facets: Vec<u32>,
     /// Size of each cell: the edge of the regular simplex with the measure of the cell.
     pub sizes: Vec<f64>,
-}
-
-/// The integration points of a pair; see [`Fine`].
-pub struct FinePoints<'a> {
-    /// Length (area) of each point.
-    pub weight: &'a [f64],
-    /// Gap at each point.
-    pub gap: &'a [f64],
-    /// Size of the facet of side a under each point.
-    pub size: &'a [f64],
-    /// Deflection of the two bodies per pressure, for a pressure that changes its sign within a facet. It is the compliance of
-    /// the springs of two half-spaces in series, for a wave as long as the facet.
-    pub compliance: Vec<f64>,
-    /// Contact point nearest to each integration point.
-    pub nearest: &'a [usize],
-    /// Whether the contact points around each integration point are at mid-edges.
-    pub at_edges: &'a [bool],
-    /// Order of the elements of side a.
-    pub order: Order,
-    /// Facet of side a under each integration point; those of a facet follow each other.
-    pub facet: &'a [usize],
-    /// Whether this facet lies at a rim, see [`Fine::at_rim`].
-    pub at_rim: &'a [bool],
-    /// First barycentric coordinate of each integration point in this facet.
-    pub along: Vec<f64>,
-    /// Whether the pressure on this facet is a polynomial of second degree, see [`Fine::is_quadratic`].
-    pub is_quadratic: &'a [bool],
-    /// Matrix from values at the contact points to values at the integration points.
-    pub interpolation: &'a Csr,
-    /// Matrix from pressures at the contact points to the pressures of the discrete problem at the integration points.
-    pub pressing: &'a Csr,
 }
 
 /// A displacement of a body with the fields recovered from it.
@@ -108,8 +76,6 @@ pub struct Shape<const D: usize> {
     pub space: Rc<Space<D>>,
     /// Elasticity of the body.
     pub elasticity: Rc<Elasticity>,
-    /// Modulus against pressure on the contact surfaces of the body, E/(1 - nu^2) if isotropic.
-    pub modulus: f64,
     /// Supports of the body, which define its dofs.
     pub held: Rc<Constraints<D>>,
     /// See [`Meshes::unloaded`].
@@ -157,38 +123,8 @@ impl<const D: usize> Meshes for Kept<D> {
         load.chunks_exact(D).flat_map(|force| [dot(force, force).sqrt(); D]).collect()
     }
 
-    fn points(&self, pair: usize) -> FinePoints<'_> {
-        let Fine {
-            weight,
-            gap,
-            size,
-            bodies,
-            nearest,
-            at_edges,
-            at_rim,
-            is_quadratic,
-            interpolation,
-            pressing,
-            sides,
-            ..
-        } = &self.fine[pair];
-        let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
-        let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
-        FinePoints {
-            weight,
-            gap,
-            size,
-            compliance,
-            nearest,
-            at_edges,
-            order: sides[0].facets.order,
-            facet: &sides[0].facet,
-            at_rim,
-            along: sides[0].at.iter().map(|l| l[0]).collect(),
-            is_quadratic,
-            interpolation,
-            pressing,
-        }
+    fn points(&self, pair: usize) -> &FinePoints {
+        &self.fine[pair].points
     }
 
     fn cells(&self, body: usize) -> Cells {
@@ -238,7 +174,7 @@ impl<const D: usize> OnBody<'_, D> {
     fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], &[u32], &[f64; D])) {
         let fine = &self.kept.fine[pair];
         let on = &fine.sides[side];
-        for g in 0..fine.weight.len() {
+        for g in 0..fine.points.each.len() {
             visitor(g, fine.normal[g].map(|n| SIGN[side] * n), on.facets.facet(on.facet[g]), &on.at[g]);
         }
     }
@@ -250,7 +186,7 @@ impl<const D: usize> Recovered for OnBody<'_, D> {
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
-        let mut values = vec![0.0; self.kept.fine[pair].weight.len()];
+        let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
         self.visit(pair, side, |g, normal, nodes, l| {
             let u = self.displacement(nodes, l);
             values[g] = (0..D).map(|c| normal[c] * u[c]).sum();

@@ -1,10 +1,11 @@
 //! The errors of the pressures of pairs: between contact points, at rims, and if the other side gave the normals.
 
-use crate::contact::ContactPair;
-use crate::discretize::meshes::{FinePoints, Meshes};
+use crate::contact::{ContactPair, FinePoints};
+use crate::discretize::meshes::Meshes;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Layer, Model};
 use crate::problem::order::Order;
+use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
@@ -60,7 +61,7 @@ impl PressureErrors {
         let error = resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect();
         let mut errors = Self { error, relative: Vec::new(), guesses: Vec::new() };
         for pair in 0..model.pairs.len() {
-            errors.add_pair(&meshes.points(pair), model, layer, pair);
+            errors.add_pair(meshes.points(pair), model, layer, pair);
         }
         errors
     }
@@ -71,7 +72,7 @@ impl PressureErrors {
         let (pressure, tangent) = (&layer.pressure[range.clone()], &layer.tangent[range.clone()]);
         let square = |values: &[f64]| -> f64 { range.clone().map(|q| model.weight[q] * values[q] * values[q]).sum() };
         let (squared, whole) = (square(&self.error), square(&layer.pressure));
-        let rim = RimError::new(points, pressure, tangent);
+        let rim = RimError::new(points, softness(model, index), pressure, tangent);
         let errors = squared + rim.squared;
         self.relative.push(if errors == 0.0 { 0.0 } else { SAFETY * f64::sqrt(errors / whole) });
         let peak = (0..pressure.len()).max_by(|&p, &q| pressure[p].total_cmp(&pressure[q]));
@@ -85,16 +86,22 @@ impl PressureErrors {
     }
 }
 
+/// Return the sum of the compliances 1/E* of the bodies of a pair. Times the size of a facet over pi it is their compliance to a pressure that changes its sign within the facet. It is that
+/// of the springs of two half-spaces in series, for a wave as long as the facet.
+pub(super) fn softness(model: &Model, pair: usize) -> f64 {
+    model.pairs[pair].bodies.iter().map(|&body| 1.0 / model.bodies[body].modulus).sum::<f64>()
+}
+
 /// Return the share of the squared pressure at integration points between contact points that are all under pressure, one if there is no pressure.
 /// `pressure` has the pressures of the pair's contact points.
 fn share_of_whole_facets(points: &FinePoints, pressure: &[f64]) -> f64 {
     let (mut whole, mut all) = (0.0, 0.0);
-    for (g, weight) in points.weight.iter().enumerate() {
+    for (g, point) in points.each.iter().enumerate() {
         let carriers = || points.interpolation.row(g);
         let value: f64 = carriers().map(|(q, share)| share * pressure[q]).sum();
-        all += weight * value * value;
+        all += point.weight * value * value;
         if carriers().all(|(q, _)| pressure[q] > 0.0) {
-            whole += weight * value * value;
+            whole += point.weight * value * value;
         }
     }
     if all > 0.0 { whole / all } else { 1.0 }
@@ -119,23 +126,24 @@ struct RimError {
 }
 
 impl RimError {
-    /// Compute the error of a pair from the pressures and tangents of its contact points.
-    fn new(points: &FinePoints, pressure: &[f64], tangent: &[f64]) -> Self {
+    /// Compute the error of a pair from the pressures and tangents of its contact points. `soft` is the [`softness`] of its bodies.
+    fn new(points: &FinePoints, soft: f64, pressure: &[f64], tangent: &[f64]) -> Self {
         let (mut error, mut largest, mut first) = (Self::default(), 0.0, 0);
-        for chunk in points.facet.chunk_by(|f, g| f == g) {
+        for chunk in points.each.chunk_by(|p, q| p.facet == q.facet) {
             let on_facet = first..first + chunk.len();
             first = on_facet.end;
-            if !points.at_rim[on_facet.start] {
+            if !chunk[0].at_rim {
                 continue;
             }
-            let missed = missed(points, on_facet.start);
+            let missed = missed(points.order, chunk[0].is_quadratic);
             for (g, q) in on_facet.clone().zip(highest_part(points, on_facet, pressure)) {
+                let point = &points.each[g];
                 let stiffness = points.interpolation.row(g).map(|(q, _)| tangent[q]).fold(0.0, f64::max);
-                let unresolved = points.compliance[g] * stiffness / (1.0 + points.compliance[g] * stiffness);
-                let squared = points.weight[g] * (missed * unresolved * q).powi(2);
+                let resisted = point.size * soft / PI * stiffness;
+                let squared = point.weight * (missed * (resisted / (1.0 + resisted)) * q).powi(2);
                 error.squared += squared;
                 if squared > largest {
-                    (largest, error.worst) = (squared, points.nearest[g]);
+                    (largest, error.worst) = (squared, point.nearest);
                 }
             }
         }
@@ -150,10 +158,10 @@ impl RimError {
 /// show, and 0.97 times its part of degree 1, which linear pressures show. For linear elements the ratio would be 1.39 by the same rule. Their
 /// nodal pressures are means over two facets, which flattens the rise: on such a punch with 3, 6 and 12 elements a unit of length under a layer of 1e6
 /// the measured ratio is 2.8, 2.5 and 2.2.
-fn missed(points: &FinePoints, g: usize) -> f64 {
-    match points.order {
+fn missed(order: Order, is_quadratic: bool) -> f64 {
+    match order {
         Order::P1 => 2.8,
-        Order::P2 if points.is_quadratic[g] => 1.69,
+        Order::P2 if is_quadratic => 1.69,
         Order::P2 => 0.97,
     }
 }
@@ -161,14 +169,15 @@ fn missed(points: &FinePoints, g: usize) -> f64 {
 /// Return the part of the highest degree of the pressure at each integration point of a facet. `pressure` has the pressures of the contact
 /// points.
 fn highest_part(points: &FinePoints, on_facet: Range<usize>, pressure: &[f64]) -> Vec<f64> {
+    let each = &points.each;
     let value = |g: usize| points.interpolation.row(g).map(|(q, share)| share * pressure[q]).sum::<f64>();
-    let area: f64 = points.weight[on_facet.clone()].iter().sum();
-    let mean = |of: &dyn Fn(usize) -> f64| on_facet.clone().map(|g| points.weight[g] * of(g)).sum::<f64>() / area;
-    let (middle, level) = (mean(&|g| points.along[g]), mean(&value));
-    let spread = mean(&|g| (points.along[g] - middle).powi(2));
-    let is_quadratic = points.is_quadratic[on_facet.start] && spread > 0.0;
-    let slope = if is_quadratic { mean(&|g| (points.along[g] - middle) * value(g)) / spread } else { 0.0 };
-    on_facet.map(|g| value(g) - level - slope * (points.along[g] - middle)).collect()
+    let area: f64 = each[on_facet.clone()].iter().map(|point| point.weight).sum();
+    let mean = |of: &dyn Fn(usize) -> f64| on_facet.clone().map(|g| each[g].weight * of(g)).sum::<f64>() / area;
+    let (middle, level) = (mean(&|g| each[g].along), mean(&value));
+    let spread = mean(&|g| (each[g].along - middle).powi(2));
+    let is_quadratic = each[on_facet.start].is_quadratic && spread > 0.0;
+    let slope = if is_quadratic { mean(&|g| (each[g].along - middle) * value(g)) / spread } else { 0.0 };
+    on_facet.map(|g| value(g) - level - slope * (each[g].along - middle)).collect()
 }
 
 /// The error of the layer of a pair between its contact points.
@@ -189,6 +198,7 @@ impl LayerError {
     pub fn new(
         pair: &ContactPair,
         points: &FinePoints,
+        soft: f64,
         layer: &Layer,
         range: Range<usize>,
         giving: &[f64],
@@ -198,7 +208,8 @@ impl LayerError {
         let tangent = &layer.tangent[range];
         let mut error = Self { energy: 0.0, pressure: Vec::with_capacity(giving.len()) };
         for (g, giving) in giving.iter().enumerate() {
-            let (compliance, nearest) = (points.compliance[g], points.nearest[g]);
+            let point = &points.each[g];
+            let (compliance, nearest) = (point.size * soft / PI, point.nearest);
             let carriers = || points.interpolation.row(g);
             let is_whole = carriers().all(|(q, _)| compression[q] >= 0.0);
             // A curve through points of which some are open may rise above all of them, the more the faster the gap grows. No
@@ -214,9 +225,9 @@ impl LayerError {
             };
             let (c_h, p_h) = met(between(&|q| compression[q] + compliance * pressure[q]));
             let lacking: f64 = carriers().map(|(q, share)| share * beyond[q]).sum();
-            let here = giving - points.gap[g] - lacking;
+            let here = giving - point.gap - lacking;
             let (c, p) = met(here + compliance * between(&|q| pressure[q]).max(0.0));
-            error.energy += points.weight[g] * (p - p_h) * (c - c_h);
+            error.energy += point.weight * (p - p_h) * (c - c_h);
             let (mut discrete, mut amplified) = (0.0, 0.0);
             for (q, mu) in points.pressing.row(g) {
                 discrete += mu * pressure[q];
@@ -226,7 +237,7 @@ impl LayerError {
             let of_law = match () {
                 () if is_whole => weight_of_law(stiffness, 1.0),
                 // With the weight below, quadratic facets in space had 0.57 of the error under a layer of 1e8.
-                () if points.at_edges[g] => 1.0,
+                () if point.at_edges => 1.0,
                 () => weight_of_law(stiffness / (1.0 + stiffness), amplified),
             };
             error.pressure.push(discrete + of_law * (p - discrete));
@@ -256,6 +267,7 @@ fn weight_of_law(stiffness: f64, amplified: f64) -> f64 {
 pub(super) fn change_by_normals(
     pair: &ContactPair,
     points: &FinePoints,
+    soft: f64,
     layer: &Layer,
     range: Range<usize>,
     change: &[f64],
@@ -267,9 +279,10 @@ pub(super) fn change_by_normals(
     for (g, change) in change.iter().enumerate() {
         let at = |values: &[f64]| points.interpolation.row(g).map(|(q, share)| share * values[q]).sum::<f64>();
         let (p, stiffness) = (at(pressure).max(0.0), at(tangent).max(0.0));
-        let compliance = points.compliance[g] * extent / points.size[g];
-        changed += points.weight[g] * (stiffness * change / (1.0 + compliance * stiffness)).powi(2);
-        whole += points.weight[g] * p * p;
+        let point = &points.each[g];
+        let compliance = point.size * soft / PI * extent / point.size;
+        changed += point.weight * (stiffness * change / (1.0 + compliance * stiffness)).powi(2);
+        whole += point.weight * p * p;
     }
     if changed == 0.0 { 0.0 } else { f64::sqrt(changed / whole) }
 }

@@ -14,7 +14,7 @@ use crate::discretize::meshes::{Cells, Meshes};
 use crate::fem::{cross, length, minus, unit};
 use crate::linalg::dot;
 use crate::model::Model;
-use std::cmp::Ordering;
+use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
 /// Sizes of elements at the corners of the cells of all bodies.
@@ -245,27 +245,6 @@ fn limits(cells: &Cells) -> Vec<(u32, f64)> {
     limits
 }
 
-/// A node that passes its size on. The smallest size comes first.
-#[derive(PartialEq)]
-struct Front {
-    size: f64,
-    node: u32,
-}
-
-impl Eq for Front {}
-
-impl PartialOrd for Front {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Front {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.size.total_cmp(&self.size).then(other.node.cmp(&self.node))
-    }
-}
-
 /// Reduce the sizes to the largest ones whose differences along edges are at most [`GROWTH`] times the length. This is Dijkstra's
 /// algorithm from the smallest size.
 fn grade(cells: &Cells, sizes: &mut [f64]) {
@@ -276,8 +255,11 @@ fn grade(cells: &Cells, sizes: &mut [f64]) {
         }
     }
     let corners = (0..).zip(&beside).filter(|(_, beside)| !beside.is_empty());
-    let mut fronts: BinaryHeap<Front> = corners.map(|(node, _)| Front { size: sizes[node as usize], node }).collect();
-    while let Some(Front { size, node }) = fronts.pop() {
+    // Positive numbers have the order of their bits.
+    let front = |size: f64, node: u32| Reverse((size.to_bits(), node));
+    let mut fronts: BinaryHeap<_> = corners.map(|(node, _)| front(sizes[node as usize], node)).collect();
+    while let Some(Reverse((bits, node))) = fronts.pop() {
+        let size = f64::from_bits(bits);
         if size > sizes[node as usize] {
             continue;
         }
@@ -285,7 +267,7 @@ fn grade(cells: &Cells, sizes: &mut [f64]) {
             let most = size + GROWTH * distance(cells, node, other);
             if most < sizes[other as usize] {
                 sizes[other as usize] = most;
-                fronts.push(Front { size: most, node: other });
+                fronts.push(front(most, other));
             }
         }
     }

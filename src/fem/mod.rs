@@ -14,6 +14,8 @@ mod recovery;
 pub mod rigid;
 pub mod space;
 pub mod surface;
+#[cfg(test)]
+mod tests;
 
 use crate::linalg::dot;
 

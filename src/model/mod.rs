@@ -17,9 +17,14 @@ pub use linear::{LinearStep, Solution};
 pub use rigid::{Motions, Moved};
 // Names of former modules.
 pub use field as line;
-pub use layer as surface;
 pub use rigid as coarse;
 pub use rigid as origin;
+
+/// Name of a former module.
+pub mod surface {
+    pub use super::layer::{contact_slopes, in_series, meeting_slopes, surface_slopes};
+}
+
 use serde::{Deserialize, Serialize};
 
 use crate::contact::ContactPair;

@@ -17,12 +17,10 @@ mod numeric;
 mod table;
 #[cfg(test)]
 mod tests;
-mod typed;
 
 pub use forms::{Cubic, Exponential, Linear, Power};
-pub use make::{OwnLaws, make};
+pub use make::{OwnLaws, Typed, make};
 pub use table::Table;
-pub use typed::Typed;
 
 use std::rc::Rc;
 

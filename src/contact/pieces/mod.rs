@@ -2,14 +2,14 @@
 //! on which products of shape functions of both sides are integrated exactly.
 //!
 //! Normals are interpolated between the vertices of side a, so that curved surfaces are covered without gaps or
-//! overlaps between neighbouring facets. A piece is an interval ([`plane`]) or a convex polygon ([`space`]) in the
+//! overlaps between neighbouring facets. A piece is an interval ([`in_plane`]) or a convex polygon ([`in_space`]) in the
 //! parameters of one facet of side a.
 
 mod plane;
 mod space;
 
-pub use plane::plane;
-pub use space::space;
+pub use plane::in_plane;
+pub use space::in_space;
 
 use super::side::Side;
 use crate::fem::{area_vector, element, length, minus, unit};

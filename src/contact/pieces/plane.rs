@@ -7,7 +7,7 @@ use crate::linalg::dot;
 use crate::problem::order::Order;
 
 /// Return the common pieces of two plane curves.
-pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
+pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = element::gauss(if quadratic { 4 } else { 3 });

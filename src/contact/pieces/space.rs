@@ -31,7 +31,7 @@ const MIDDLE: [f64; 3] = [1.0 - 1.0 / 3.0 - 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
 const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 /// Return the common pieces of two surfaces in space.
-pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
+pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
     let facets_b: Vec<Facet<3>> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
