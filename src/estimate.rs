@@ -88,15 +88,17 @@ pub fn estimate(
     let pressures = PressureErrors::new(meshes, model, layer, &closing);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
-    let at = |i: usize| (model.weight[i % model.points()], field.trace[i], trace[i]);
-    let displacement = relative_error((0..2 * model.points()).map(at));
+    let square = |values: &[f64]| -> f64 {
+        values.iter().zip(model.weight.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
+    };
+    let (error, whole) = (square(&field.trace), square(&trace));
     Ok(Estimate {
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
         pressure: pressures.relative,
         guesses: pressures.guesses,
         pressure_error: pressures.error,
-        displacement: SAFETY * displacement,
+        displacement: if error == 0.0 { 0.0 } else { SAFETY * f64::sqrt(error / whole) },
         cells,
         bodies,
         layers,
@@ -285,16 +287,6 @@ fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
         left += energy * rho / (rho + layer.tangent[q]);
     }
     if full > 0.0 { TOLERANCE * f64::sqrt(left / full) } else { TOLERANCE }
-}
-
-/// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.
-fn relative_error(samples: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
-    let (mut errors, mut values) = (0.0, 0.0);
-    for (area, error, value) in samples {
-        errors += area * error * error;
-        values += area * value * value;
-    }
-    if errors == 0.0 { 0.0 } else { f64::sqrt(errors / values) }
 }
 
 /// The estimate as the discretisation error of a balanced stop.

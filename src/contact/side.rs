@@ -1,7 +1,7 @@
 //! One contact surface of a body: facets with averaged nodal normals, its smooth faces, and the order of nodes along it.
 
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
-use crate::linalg::{Joined, dot};
+use crate::linalg::{Joined, bounds, dot};
 use crate::mesh::datum;
 use std::collections::{HashMap, HashSet};
 
@@ -112,20 +112,13 @@ impl<'a, const D: usize> Side<'a, D> {
     }
 
     /// Return the corners of the box around all facets.
-    pub fn extent(&self) -> ([f64; D], [f64; D]) {
-        let join = |(low, high): ([f64; D], [f64; D]), (from, to): ([f64; D], [f64; D])| {
-            (std::array::from_fn(|c| low[c].min(from[c])), std::array::from_fn(|c| high[c].max(to[c])))
-        };
-        (0..self.facets.count()).map(|i| self.bounds(i)).fold(([f64::MAX; D], [f64::MIN; D]), join)
+    pub fn extent(&self) -> [[f64; D]; 2] {
+        bounds(self.facets.nodes.iter().map(|&node| self.space.nodes[node as usize]))
     }
 
     /// Return the corners of the box around facet `i`.
-    pub fn bounds(&self, i: usize) -> ([f64; D], [f64; D]) {
-        let x = self.facets.coordinates(i, self.space);
-        let corner = |pick: fn(f64, f64) -> f64| -> [f64; D] {
-            std::array::from_fn(|c| x[1..].iter().fold(x[0][c], |value, x| pick(value, x[c])))
-        };
-        (corner(f64::min), corner(f64::max))
+    pub fn bounds(&self, i: usize) -> [[f64; D]; 2] {
+        bounds(self.facets.coordinates(i, self.space))
     }
 }
 

@@ -36,20 +36,25 @@ impl Layer {
         for (i, pair) in model.pairs.iter().enumerate() {
             let mut energy = 0.0;
             for q in model.range(i) {
-                let c = compression[q];
-                let response = pair.law.response(q - model.offset[i], c);
-                let force = model.weight[q] * response.pressure;
+                let response = pair.law.response(q - model.offset[i], compression[q]);
                 energy += model.weight[q] * response.energy;
-                // zero force does no work, even where the gap is infinite
-                layer.work += if force == 0.0 { 0.0 } else { force * c };
-                layer.closed += usize::from(c > 0.0);
-                layer.pressure.push(response.pressure);
-                layer.tangent.push(response.tangent);
-                layer.force.push(force);
+                layer.push(model.weight[q], compression[q], response.pressure, response.tangent);
             }
             layer.energy.push(energy);
         }
-        Self { compression, ..layer }
+        layer
+    }
+
+    /// Append the state of the next point, whose area is `weight`.
+    fn push(&mut self, weight: f64, compression: f64, pressure: f64, tangent: f64) {
+        let force = weight * pressure;
+        // zero force does no work, even where the gap is infinite
+        self.work += if force == 0.0 { 0.0 } else { force * compression };
+        self.closed += usize::from(compression > 0.0);
+        self.compression.push(compression);
+        self.pressure.push(pressure);
+        self.tangent.push(tangent);
+        self.force.push(force);
     }
 
     /// Return the states at the compressions of a trace vector, as Robin sweeps take them.
@@ -72,13 +77,7 @@ impl Layer {
         for (i, pair) in model.pairs.iter().enumerate() {
             for q in model.range(i) {
                 let state = law::resolve(&*pair.law, q - model.offset[i], sum(q), rho[q], smoothing[q]);
-                let force = model.weight[q] * state.pressure;
-                layer.work += force * state.compression;
-                layer.closed += usize::from(state.compression > 0.0);
-                layer.compression.push(state.compression);
-                layer.pressure.push(state.pressure);
-                layer.tangent.push(state.tangent);
-                layer.force.push(force);
+                layer.push(model.weight[q], state.compression, state.pressure, state.tangent);
             }
         }
         layer

@@ -13,7 +13,7 @@ pub use space::in_space;
 
 use super::side::Side;
 use crate::fem::{area_vector, element, length, minus, unit};
-use crate::linalg::dot;
+use crate::linalg::{around, dot};
 use crate::problem::order::Order;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree, RTreeObject, SelectionFunction};
@@ -182,9 +182,8 @@ impl Reach {
 
     /// Return the limits that end at the angle alone. The distance is the diagonal of the box around both surfaces.
     pub fn anywhere<const D: usize>(a: &Side<D>, b: &Side<D>, angle: f64) -> Self {
-        let ((low, high), (from, to)) = (a.extent(), b.extent());
-        let diagonal: [f64; D] = std::array::from_fn(|c| high[c].max(to[c]) - low[c].min(from[c]));
-        let gap = length(diagonal);
+        let [low, high] = around(a.extent(), b.extent());
+        let gap = length(minus(high, low));
         Self { gap, overlap: gap, farthest: gap, facing: angle.to_radians().cos() }
     }
 
@@ -212,9 +211,6 @@ impl Refused {
     }
 }
 
-/// The corners of a box with the least and the largest coordinates.
-pub type Bounds<const D: usize> = ([f64; D], [f64; D]);
-
 /// An R-tree of the boxes of facets of side b, or of bodies.
 pub struct Search<const D: usize> {
     tree: RTree<GeomWithData<Rectangle<[f64; D]>, usize>>,
@@ -227,8 +223,8 @@ impl<const D: usize> Search<D> {
     }
 
     /// Build the tree of boxes, which are numbered in their order.
-    pub fn of_boxes(boxes: impl Iterator<Item = Bounds<D>>) -> Self {
-        let boxed = |((low, high), i): (Bounds<D>, usize)| GeomWithData::new(Rectangle::from_corners(low, high), i);
+    pub fn of_boxes(boxes: impl Iterator<Item = [[f64; D]; 2]>) -> Self {
+        let boxed = |([low, high], i): ([[f64; D]; 2], usize)| GeomWithData::new(Rectangle::from_corners(low, high), i);
         Self { tree: RTree::bulk_load(boxes.zip(0..).map(boxed).collect()) }
     }
 
@@ -238,7 +234,7 @@ impl<const D: usize> Search<D> {
     }
 
     /// Return the numbers of the boxes within `distance` of a box.
-    pub fn near_box(&self, (low, high): Bounds<D>, distance: f64) -> impl Iterator<Item = usize> + '_ {
+    pub fn near_box(&self, [low, high]: [[f64; D]; 2], distance: f64) -> impl Iterator<Item = usize> + '_ {
         self.intersecting(low.map(|x| x - distance), high.map(|x| x + distance))
     }
 
@@ -251,7 +247,7 @@ impl<const D: usize> Search<D> {
     /// The height of the prism is more than twice the distance of the nearest facet, so that tilted surfaces are found too,
     /// and at most `reach` plus the size of the facet.
     fn around(&self, a: &Side<D>, i: usize, reach: &Reach) -> Vec<usize> {
-        let (low, high) = a.bounds(i);
+        let [low, high] = a.bounds(i);
         let middle: [f64; D] = std::array::from_fn(|c| 0.5 * (low[c] + high[c]));
         let size = length(minus(high, low));
         let Some(nearest) = self.tree.nearest_neighbor(middle) else { return Vec::new() };
@@ -295,7 +291,7 @@ impl<const D: usize> Search<D> {
 
     /// Return the facets whose boxes intersect the box of a prism. It extends from `below` behind facet `i` to `above` before it.
     fn within(&self, a: &Side<D>, i: usize, below: f64, above: f64) -> Vec<usize> {
-        let (mut low, mut high) = a.bounds(i);
+        let [mut low, mut high] = a.bounds(i);
         for &node in &a.facets.facet(i)[..D] {
             let (x, n) = (a.space.nodes[node as usize], a.normals[&node]);
             for c in 0..D {
@@ -332,7 +328,7 @@ impl<const D: usize> Rays<D> {
         };
         let axis = unit(mean(&|node| a.normals[&node]));
         let differences = nodes.iter().map(|node| length(minus(a.normals[node], axis)));
-        let (low, high) = a.bounds(i);
+        let [low, high] = a.bounds(i);
         Self {
             middle: mean(&|node| a.space.nodes[node as usize]),
             axis,
