@@ -144,21 +144,17 @@ pub enum Fault {
 /// A function from the contact points of a pair to its law.
 pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
-/// Integrals over the common pieces of two surfaces.
-struct Integrals {
-    /// Integrals of each node that carries a point.
-    points: BTreeMap<u32, Accumulator>,
-    /// Coverage of each facet of side a.
-    cover: Vec<Coverage>,
-}
-
-/// Integrate over common pieces.
+/// Integrate over common pieces. Return the integrals of each node that carries a point, and the coverage of each facet of side a.
 ///
 /// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet, where
 /// phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the dual basis
 /// of the whole triangle. A partially covered facet on which this basis has unsteady means takes the hat functions of its
 /// vertices instead.
-fn integrate<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>) -> Integrals {
+fn integrate<const D: usize>(
+    a: &Side<D>,
+    b: &Side<D>,
+    common: &Common<D>,
+) -> (BTreeMap<u32, Accumulator>, Vec<Coverage>) {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut carriers = vec![None; a.facets.count()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
@@ -183,7 +179,7 @@ fn integrate<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>) -> In
             }
         }
     }
-    Integrals { points, cover: Coverage::of(a, common, &carriers) }
+    (points, Coverage::of(a, common, &carriers))
 }
 
 /// Assemble the arrays of a pair from the common pieces of its surfaces.
@@ -201,7 +197,7 @@ pub fn assemble<const D: usize>(
     gap: &dyn Fn([f64; 3]) -> f64,
     law: &LawMaker,
 ) -> Result<ContactPair, Fault> {
-    let Integrals { points, cover } = integrate(a, b, common);
+    let (points, cover) = integrate(a, b, common);
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
     let nodes = along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
     if nodes.is_empty() {

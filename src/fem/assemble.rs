@@ -236,7 +236,7 @@ impl Rules {
     /// Return the rule for a cell.
     fn of<const D: usize>(&self, space: &Space<D>, elasticity: &Elasticity, cell: usize) -> &Rule {
         let is_straight = || element::is_straight(&space.cell_nodes(cell), D + 1);
-        match elasticity.constant_in(cell).is_some() && !space.axisymmetric {
+        match elasticity.is_constant_in(cell) && !space.axisymmetric {
             false => &self.varying,
             true if space.order == Order::P1 || is_straight() => &self.affine,
             true => &self.curved,

@@ -178,6 +178,9 @@ pub fn norms_of_error<const D: usize>(
 }
 
 /// The internal forces of the cells of a body on its nodes, and the scales that these forces are compared with.
+///
+/// They check the results of solvers that use assembled matrices. Therefore they share with assembly only the integration points and
+/// Hooke's law.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Internal {
     /// K u, one entry a dof.

@@ -83,9 +83,9 @@ impl Elasticity {
         self.of_cell.get(cell).copied().unwrap_or(0)
     }
 
-    /// Return Hooke's law of a cell if it is the same in the whole cell.
-    pub fn constant_in(&self, cell: usize) -> Option<&Material> {
-        self.regions[self.region(cell)].constant.as_ref().map(|(material, _)| material)
+    /// Return whether the elasticity is the same in a whole cell.
+    pub fn is_constant_in(&self, cell: usize) -> bool {
+        self.regions[self.region(cell)].constant.is_some()
     }
 
     /// Return Hooke's law, which is coercive, in a cell at a point of the scene (z = 0 in the plane).
