@@ -122,7 +122,8 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
 }
 
 /// Solve for the errors of nodal values: the response of bodies and layers to what the elements cannot represent. Return the error of the
-/// displacements, that of the compression at each contact point, n, and the squared energy norm of both. `loads` has one entry a dof of each local body, and `mean_error` is that of [`LocalErrors`], n.
+/// displacements, that of the compression at each contact point, n, and the squared energy norm of both. `loads` has one entry a dof of each
+/// local body, and `mean_error` is that of [`LocalErrors`], n.
 fn nodal_errors(
     model: &mut Model,
     step: &mut dyn LinearStep,
