@@ -17,8 +17,8 @@ use crate::model::field::residual;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
 use held::HoldingSprings;
-pub use pressure::{Cause, Guess};
-use pressure::{LayerError, PressureErrors, SAFETY};
+pub use pressure::{Cause, Guess, SAFETY};
+use pressure::{LayerError, PressureErrors};
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
@@ -45,6 +45,13 @@ pub struct Estimate {
     pub sides: Vec<f64>,
     /// Relative error of the normal displacements of all contact surfaces, measured likewise.
     pub displacement: f64,
+}
+
+impl Estimate {
+    /// Return the squared energy error of all bodies and layers.
+    pub fn squared_energy(&self) -> f64 {
+        self.bodies.iter().chain(&self.layers).sum()
+    }
 }
 
 /// Relative error of the response in the solve for the nodal errors. The error of conjugate gradients is orthogonal to their iterate, so the energy norm is
