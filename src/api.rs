@@ -40,7 +40,7 @@ pub use crate::ddm::robin::Iterate;
 pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
-pub use crate::model::line::Unbounded;
+pub use crate::model::field::Unbounded;
 pub use crate::output::{BodyField, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{

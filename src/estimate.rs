@@ -4,28 +4,21 @@
 //! the energy norm. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
 //! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
 
-mod field;
-mod guess;
 mod held;
-mod layer;
-mod rim;
-mod sides;
+mod pressure;
 pub mod sizes;
-mod square;
 
 use crate::ddm::{Discretisation, respond};
 use crate::discretize::meshes::{Meshes, Recovered};
 use crate::error::{Error, Kind, Result};
-use crate::fem::InterpolationError;
-use crate::linalg::{axpy, dot};
+use crate::fem::Errors;
+use crate::linalg::axpy;
 use crate::model::field::residual;
-use crate::model::surface::meeting_slopes;
+use crate::model::layer::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
-pub use guess::{Cause, Guess};
 use held::HoldingSprings;
-use layer::LayerError;
-use rim::RimError;
-use square::square;
+pub use pressure::{Cause, Guess, SAFETY};
+use pressure::{LayerError, PressureErrors};
 use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
@@ -61,10 +54,6 @@ impl Estimate {
     }
 }
 
-/// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
-/// factor is usual for errors extrapolated from three meshes (Roache 1994).
-pub const SAFETY: f64 = 1.25;
-
 /// Relative error of the response in the solve for the nodal errors. The error of conjugate gradients is orthogonal to their iterate, so the energy norm is
 /// wrong by half of the square of this. Pressures changed by at most 0.3 % from those with a tolerance of 0.01.
 const TOLERANCE: f64 = 0.1;
@@ -83,7 +72,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = LocalErrors::of_bodies(meshes, &recovered, &displacements);
+    let mut local = LocalErrors::of_bodies(meshes, &recovered);
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, pair);
     }
@@ -96,26 +85,27 @@ pub fn estimate(
     let LocalErrors { cells, mut loads, layers, sides, mean_error, .. } = local;
     to_dofs(meshes, model, &mut loads);
 
-    let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
+    let (field, closing, nodal) = nodal_errors(model, step, layer, &loads, &mean_error)?;
     let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] - held.energy + layer.work;
     // the error of nodal values is a part of the whole error
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
-    let pressure_error = pressure_errors(model, layer, &closing);
-    let rims = rim::of_pairs(meshes, model, layer);
+    let pressures = PressureErrors::new(meshes, model, layer, &closing);
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
-    let at = |i: usize| (model.weight[i % model.points()], field.trace[i], trace[i]);
-    let displacement = relative_error((0..2 * model.points()).map(at));
+    let square = |values: &[f64]| -> f64 {
+        values.iter().zip(model.weight.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
+    };
+    let (error, whole) = (square(&field.trace), square(&trace));
     Ok(Estimate {
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
-        pressure: relative_errors(model, layer, &pressure_error, &rims),
-        guesses: guess::of_pairs(meshes, model, layer, &pressure_error, &rims),
-        pressure_error,
-        displacement: SAFETY * displacement,
+        pressure: pressures.relative,
+        guesses: pressures.guesses,
+        pressure_error: pressures.error,
+        displacement: if error == 0.0 { 0.0 } else { SAFETY * f64::sqrt(error / whole) },
         cells,
         bodies,
         layers,
@@ -138,31 +128,23 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
     Ok(all)
 }
 
-/// The errors of nodal values: the response of bodies and layers to what the elements cannot represent.
-struct NodalErrors {
-    /// Error of the displacements.
-    field: Field,
-    /// Error of the compression at each contact point, n.
-    closing: Vec<f64>,
-    /// Squared energy norm of the error.
-    energy: f64,
-}
-
-/// Solve for the errors of nodal values. `loads` has one entry a dof of each local body, and `mean_error` is that of [`LocalErrors`], n.
+/// Solve for the errors of nodal values: the response of bodies and layers to what the elements cannot represent. Return the error of the
+/// displacements, that of the compression at each contact point, n, and the squared energy norm of both. `loads` has one entry a dof of each
+/// local body, and `mean_error` is that of [`LocalErrors`], n.
 fn nodal_errors(
     model: &mut Model,
     step: &mut dyn LinearStep,
     layer: &Layer,
     loads: &[Vec<f64>],
     mean_error: &[f64],
-) -> Result<NodalErrors> {
+) -> Result<(Field, Vec<f64>, f64)> {
     let response = respond(model, step, layer, loads, tolerance(model, layer, mean_error))?;
     let (field, mut energy) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
     let closing: Vec<f64> = field.closing().iter().zip(mean_error).map(|(w, mean)| w + mean).collect();
     for (q, mean) in mean_error.iter().enumerate() {
         energy += model.weight[q] * layer.tangent[q] * mean * (2.0 * closing[q] - mean);
     }
-    Ok(NodalErrors { field, closing, energy })
+    Ok((field, closing, energy))
 }
 
 /// Return the relative energy norm of an error from its squared energy norm. `reference` is the energy of bodies and layers, without the energy `held` of
@@ -198,19 +180,17 @@ struct LocalErrors {
 }
 
 impl LocalErrors {
-    /// Return the errors of the bodies, without those of the layers. `displacements` are those from which `recovered` was made.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, displacements: &[Option<Vec<f64>>]) -> Self {
+    /// Return the errors of the bodies, without those of the layers.
+    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, strips, loads) = (none(), none(), none());
         let mut local = Self { cells, strips, loads, layers: Vec::new(), sides: Vec::new(), mean_error: Vec::new() };
-        for (body, (recovered, u)) in recovered.iter().zip(displacements).enumerate() {
-            if let (Some(recovered), Some(u)) = (recovered, u) {
-                let (cells, mut loads) = errors_and_loads(&**recovered, u);
-                recovered.add_strip(&mut loads);
-                loads.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
-                (local.cells[body], local.loads[body]) = (cells, loads);
-                local.strips[body] = recovered.strip_energies();
+        for (body, recovered) in recovered.iter().enumerate() {
+            if let Some(recovered) = recovered {
+                let Errors { cells, strips, mut load } = recovered.errors();
+                load.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
+                (local.cells[body], local.strips[body], local.loads[body]) = (cells, strips, load);
             }
         }
         local
@@ -226,8 +206,9 @@ impl LocalErrors {
         index: usize,
     ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
-        let mut compression = vec![0.0; points.weight.len()];
-        let mut change = vec![0.0; points.weight.len()];
+        let soft = pressure::softness(model, index);
+        let mut compression = vec![0.0; points.each.len()];
+        let mut change = compression.clone();
         for side in 0..2 {
             if let Some(recovered) = &recovered[pair.bodies[side]] {
                 let normal = recovered.normal_displacement(index, side);
@@ -238,7 +219,7 @@ impl LocalErrors {
         }
         model.exchange.sum(&mut compression);
         model.exchange.sum(&mut change);
-        self.sides.push(sides::dependence(pair, &points, layer, range.clone(), &change));
+        self.sides.push(pressure::change_by_normals(pair, points, soft, layer, range.clone(), &change));
         let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);
@@ -246,8 +227,8 @@ impl LocalErrors {
         model.exchange.sum(&mut mean_error);
         let springs: Vec<f64> =
             range.clone().zip(&mean_error).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
-        let of_layer = LayerError::new(pair, &points, layer, range.clone(), &compression, &mean_error);
-        let force: Vec<f64> = of_layer.pressure.iter().zip(points.weight).map(|(p, weight)| -weight * p).collect();
+        let of_layer = LayerError::new(pair, points, soft, layer, range.clone(), &compression, &mean_error);
+        let force: Vec<f64> = of_layer.pressure.iter().zip(&points.each).map(|(p, point)| -point.weight * p).collect();
         for side in 0..2 {
             let (body, nodal) = (pair.bodies[side], &pair.nodal[side]);
             if let Some(recovered) = &recovered[body] {
@@ -259,28 +240,6 @@ impl LocalErrors {
         self.layers.push(of_layer.energy);
         self.mean_error.extend(mean_error);
     }
-}
-
-/// Return the squared energy error of each cell of a body, and the load whose response is the error of its displacements, at all nodes.
-///
-/// The discrete solution is the best approximation. If the recovered displacement is exact, its distance from any discrete displacement bounds the error.
-/// The nodal interpolant is closer than the discrete solution where quadratic elements meet a singular one.
-///
-/// The load of the interpolation error does the work eta^2 on `u`, the discrete displacement, except where the solution is singular. The missing work
-/// is done by a multiple, at most one, of [`Recovered::softening`].
-fn errors_and_loads(recovered: &dyn Recovered, u: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let InterpolationError { residual: mut loads, cells: of_interpolant } = recovered.interpolation_error();
-    let of_solution = recovered.energy_errors();
-    let total = |cells: &[f64]| cells.iter().sum::<f64>();
-    let is_closer = !of_interpolant.is_empty() && total(&of_interpolant) < total(&of_solution);
-    let cells = if is_closer { of_interpolant } else { of_solution };
-    let softening = recovered.softening(&cells);
-    let work = dot(&softening, u);
-    if work > 0.0 {
-        let lacking = (total(&cells) - dot(&loads, u)) / work;
-        axpy(lacking.clamp(0.0, 1.0), &softening, &mut loads);
-    }
-    (cells, loads)
 }
 
 /// Turn loads at the nodes of each body into those at its dofs, on all ranks that have a part of the body. Collective.
@@ -327,34 +286,6 @@ fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
         left += energy * rho / (rho + layer.tangent[q]);
     }
     if full > 0.0 { TOLERANCE * f64::sqrt(left / full) } else { TOLERANCE }
-}
-
-/// Return the errors of the pressures, n, from those of the compression. The response is that of springs at the closed points. So a point that opens
-/// or closes takes the resolvent of its law for the state in the response, as in a step of Newton's method. This allows for the bodies, which give way
-/// to the pressure of a point however stiff its layer is.
-fn pressure_errors(model: &Model, layer: &Layer, closing: &[f64]) -> Vec<f64> {
-    let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
-    let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
-    resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect()
-}
-
-/// Return the relative error of the pressures of each pair.
-fn relative_errors(model: &Model, layer: &Layer, error: &[f64], rims: &[RimError]) -> Vec<f64> {
-    let of_pair = |(pair, rim): (usize, &RimError)| {
-        let errors = square(model, pair, error) + rim.squared;
-        if errors == 0.0 { 0.0 } else { SAFETY * f64::sqrt(errors / square(model, pair, &layer.pressure)) }
-    };
-    rims.iter().enumerate().map(of_pair).collect()
-}
-
-/// Return the root mean square of errors over that of values, from (area, error, value) at each point. Zero errors over zero values are zero.
-fn relative_error(samples: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
-    let (mut errors, mut values) = (0.0, 0.0);
-    for (area, error, value) in samples {
-        errors += area * error * error;
-        values += area * value * value;
-    }
-    if errors == 0.0 { 0.0 } else { f64::sqrt(errors / values) }
 }
 
 /// The estimate as the discretisation error of a balanced stop.

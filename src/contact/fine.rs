@@ -1,52 +1,69 @@
 //! The integration points of a pair one by one, for an estimate of the error.
 //!
-//! At these points the compression of the layer and the gap are those of the points themselves, not means around the nodes.
+//! At these points the compression of the layer and the gap are those of the points themselves, not means around the nodes. Contact
+//! points are also projected to side b, and facets at rims of the contact are marked.
 
 use super::basis::{Carriers, PressureBasis};
-use super::cover::Left;
-use super::near::{Projections, rise};
-use super::pair::ContactPair;
-use super::pieces::{Common, Shared};
-use super::rim::facets_at_rim;
-use super::side::{Side, length, unit};
+use super::pair::{ContactPair, Coverage, Left};
+use super::pieces::{Common, Shared, WHOLE};
+use super::side::Side;
 use crate::exchange::Plain;
-use crate::fem::{Facets, assemble, element};
-use crate::linalg::Csr;
+use crate::fem::{Facets, element, length, minus, unit};
+use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// The integration points that both surfaces of a pair share.
+/// An integration point that both surfaces of a pair share.
 #[derive(Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct Fine<const D: usize> {
-    /// Indices of the two bodies.
-    pub bodies: [usize; 2],
-    /// Length (area) of each point.
-    pub weight: Vec<f64>,
-    /// Gap of each point: distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces
-    /// that do not touch as wholes, it is less by the heights of both curved surfaces above their straight facets (`near::rise`).
-    pub gap: Vec<f64>,
-    /// Size of the facet of side a under each point: its length, or the side of the square that two such triangles make.
-    pub size: Vec<f64>,
-    /// Unit normal from side a to side b at each point.
-    pub normal: Vec<[f64; D]>,
-    /// Sum of the outer unit normals of both sides at each point, zero where they are opposite.
-    pub tilt: Vec<[f64; D]>,
-    /// Contact point nearest to each point, for laws that differ from point to point.
-    pub nearest: Vec<usize>,
-    /// Whether the contact points of the facet under each point are at mid-edges.
-    pub at_edges: Vec<bool>,
-    /// Whether the facet of side a under each point lies at a rim, where the pressure may be singular.
-    pub at_rim: Vec<bool>,
-    /// Whether the pressure on the facet under each point is a polynomial of second degree. It is on quadratic elements in the plane where facets
-    /// are fully covered; on a part of a facet three values do not show more than a mean.
-    pub is_quadratic: Vec<bool>,
+pub struct FinePoint {
+    /// Length (area) of the point.
+    pub weight: f64,
+    /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
+    /// less by the heights of both curved surfaces above their straight facets (`rise`).
+    pub gap: f64,
+    /// Facet of side a under the point. Points on one facet follow each other.
+    pub facet: usize,
+    /// First barycentric coordinate in this facet.
+    pub along: f64,
+    /// Size of this facet: its length, or the side of the square that two such triangles make.
+    pub size: f64,
+    /// Whether this facet lies at a rim, where the pressure may be singular.
+    pub at_rim: bool,
+    /// Whether the contact points of this facet are at mid-edges.
+    pub at_edges: bool,
+    /// Whether the pressure on this facet is a polynomial of second degree. It is on quadratic elements in the plane where facets are
+    /// fully covered; on a part of a facet three values do not show more than a mean.
+    pub is_quadratic: bool,
+    /// Contact point nearest to the point, for laws that differ from point to point.
+    pub nearest: usize,
+}
+
+/// The integration points of a pair without the space dimension.
+#[derive(Serialize, Deserialize)]
+pub struct FinePoints {
+    /// Order of the elements of side a.
+    pub order: Order,
+    /// Each point.
+    pub each: Vec<FinePoint>,
     /// Matrix from values at the contact points to values at the integration points, by the shape functions of side a.
     pub interpolation: Csr,
     /// Matrix from the pressures of the contact points to the pressures that the discrete problem has at the integration
     /// points, by the functions mu_q of the contact points.
     pub pressing: Csr,
+}
+
+/// The integration points of a pair.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct Fine<const D: usize> {
+    /// The points.
+    pub points: FinePoints,
+    /// Unit normal from side a to side b at each point.
+    pub normal: Vec<[f64; D]>,
+    /// Sum of the outer unit normals of both sides at each point, zero where they are opposite.
+    pub tilt: Vec<[f64; D]>,
     /// Location of the points on each side.
     pub sides: [FineSide<D>; 2],
     /// Location of the contact points on side b.
@@ -78,12 +95,11 @@ impl<const D: usize> Fine<D> {
         gap: &dyn Fn([f64; 3]) -> f64,
         touching: bool,
     ) -> Self {
-        let points = &common.points;
-        let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+        let shared = &common.points;
         let side = |side: &Side<D>, facet: fn(&Shared<D>) -> usize, at: fn(&Shared<D>) -> [f64; D]| FineSide {
             facets: side.facets.clone(),
-            facet: points.iter().map(facet).collect(),
-            at: points.iter().map(at).collect(),
+            facet: shared.iter().map(facet).collect(),
+            at: shared.iter().map(at).collect(),
         };
         let rounding = a.rounding_along_normals();
         let rise_of_both = |point: &Shared<D>| match touching {
@@ -91,59 +107,70 @@ impl<const D: usize> Fine<D> {
             false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover);
-        let is_quadratic =
-            |facet: usize| D == 2 && a.facets.order == Order::P2 && pair.cover[facet].left == Left::Nothing;
-        let mut fine = Self {
-            bodies: pair.bodies,
-            weight: points.iter().map(|point| point.weight).collect(),
-            gap: points.iter().map(|point| gap_at(a, point, rounding, gap) - rise_of_both(point)).collect(),
-            size: points.iter().map(|point| size_under(a, point)).collect(),
-            normal: points.iter().map(|point| normal_at(a, point.facet_a, &point.at_a)).collect(),
-            tilt: points.iter().map(|point| tilt_at(a, b, point)).collect(),
-            nearest: Vec::new(),
-            at_edges: Vec::new(),
-            at_rim: points.iter().map(|point| at_rim[point.facet_a]).collect(),
-            is_quadratic: points.iter().map(|point| is_quadratic(point.facet_a)).collect(),
+        let of_point = |point: &Shared<D>| FinePoint {
+            weight: point.weight,
+            gap: gap_at(a, point, rounding, gap) - rise_of_both(point),
+            facet: point.facet_a,
+            along: point.at_a[0],
+            size: size_under(a, point),
+            at_rim: at_rim[point.facet_a],
+            at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
+            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].left == Left::Nothing,
+            nearest: 0,
+        };
+        let normal = |point: &Shared<D>| normal_at(a, point.facet_a, &point.at_a);
+        let tilt = |point: &Shared<D>| {
+            let (n_a, n_b) = (normal(point), normal_at(b, point.facet_b, &point.at_b));
+            std::array::from_fn(|c| n_a[c] + n_b[c])
+        };
+        let mut points = FinePoints {
+            order: a.facets.order,
+            each: shared.iter().map(of_point).collect(),
             interpolation: Csr::new(pair.len()),
             pressing: Csr::new(pair.len()),
+        };
+        points.push_rows(a, b, shared, pair);
+        Self {
+            points,
+            normal: shared.iter().map(normal).collect(),
+            tilt: shared.iter().map(tilt).collect(),
             near: Projections::new(a, b, common, pair, (!touching).then_some(gap)),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
-        };
-        for chunk in points.chunk_by(|p, q| p.facet_a == q.facet_a) {
-            fine.push_rows(a, chunk, &point_of);
         }
-        fine
     }
+}
 
-    /// Append the rows of the integration points on one facet of side a. `point_of` gives the contact point of a node.
-    fn push_rows(&mut self, a: &Side<D>, chunk: &[Shared<D>], point_of: &HashMap<u32, usize>) {
-        let (order, nodes) = (a.facets.order, a.facets.facet(chunk[0].facet_a));
-        let basis = PressureBasis::on(order, nodes.len(), chunk, &self.sides[1].facets);
-        let carriers = basis.carriers();
-        let row = |values: [f64; element::MOST]| {
-            let of_point = |(node, value): (&u32, f64)| point_of.get(node).map(|&q| (q, value));
-            let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
-            let mut row: Vec<(usize, f64)> = entries.collect();
-            row.sort_unstable_by_key(|entry| entry.0);
-            row
-        };
-        for point in chunk {
-            let phi = element::values(order, &point.at_a);
-            let mu = |i| if i < nodes.len() { basis.value(i, &phi, &point.at_a) } else { 0.0 };
-            self.pressing.push_row(row(std::array::from_fn(mu)));
-            let interpolation = row(carriers.interpolation(order, &point.at_a));
-            let nearest = interpolation.iter().max_by(|p, q| p.1.total_cmp(&q.1));
-            self.nearest.push(nearest.map_or(0, |entry| entry.0));
-            self.interpolation.push_row(interpolation);
-            self.at_edges.push(carriers == Carriers::MidEdges);
+impl FinePoints {
+    /// Append the rows of the points, facet by facet of side a, and find the contact point nearest to each.
+    fn push_rows<const D: usize>(&mut self, a: &Side<D>, b: &Side<D>, shared: &[Shared<D>], pair: &ContactPair) {
+        let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+        let mut each = self.each.iter_mut();
+        for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
+            let nodes = a.facets.facet(chunk[0].facet_a);
+            let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets);
+            let row = |values: [f64; element::MOST]| {
+                let of_point = |(node, value): (&u32, f64)| point_of.get(node).map(|&q| (q, value));
+                let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
+                let mut row: Vec<(usize, f64)> = entries.collect();
+                row.sort_unstable_by_key(|entry| entry.0);
+                row
+            };
+            for (point, fine) in chunk.iter().zip(&mut each) {
+                let phi = element::values(self.order, &point.at_a);
+                let mu = |i| if i < nodes.len() { basis.value(i, &phi, &point.at_a) } else { 0.0 };
+                self.pressing.push_row(row(std::array::from_fn(mu)));
+                let interpolation = row(basis.carriers().interpolation(self.order, &point.at_a));
+                let nearest = interpolation.iter().max_by(|p, q| p.1.total_cmp(&q.1));
+                fine.nearest = nearest.map_or(0, |entry| entry.0);
+                self.interpolation.push_row(interpolation);
+            }
         }
     }
 }
 
 /// Return the gap at an integration point. A distance below `rounding`, or below that of the facet's size, counts as zero.
 fn gap_at<const D: usize>(a: &Side<D>, point: &Shared<D>, rounding: f64, gap: &dyn Fn([f64; 3]) -> f64) -> f64 {
-    let x = a.facets.coordinates(point.facet_a, a.space);
-    let at = assemble::interpolate(&x, &element::values(a.facets.order, &point.at_a));
+    let at = a.facets.point(point.facet_a, a.space, &point.at_a);
     let rounding = rounding.max(1e-12 * length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
     let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
     distance + gap(a.space.in_scene(at))
@@ -161,8 +188,168 @@ fn normal_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D]) -> [f64
     unit(std::array::from_fn(|c| (0..D).map(|k| l[k] * side.normals[&nodes[k]][c]).sum()))
 }
 
-/// Return the sum of the unit normals of both sides at an integration point.
-fn tilt_at<const D: usize>(a: &Side<D>, b: &Side<D>, point: &Shared<D>) -> [f64; D] {
-    let (n_a, n_b) = (normal_at(a, point.facet_a, &point.at_a), normal_at(b, point.facet_b, &point.at_b));
-    std::array::from_fn(|c| n_a[c] + n_b[c])
+/// The projections of the contact points of a pair to side b, one entry a point.
+#[derive(Default, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct Projections<const D: usize> {
+    /// Nearest facet of side b.
+    pub facet: Vec<usize>,
+    /// Barycentric coordinates of the projection along the normal. It lies outside of the facet by a part of the facet's size
+    /// where side b ends before.
+    pub at: Vec<[f64; D]>,
+    /// Unit normal from side a to side b.
+    pub normal: Vec<[f64; D]>,
+    /// Mean distance of the meshes around the point less the distance at the point itself.
+    pub distance: Vec<f64>,
+}
+
+impl<const D: usize> Projections<D> {
+    /// Project the points of `pair`, which was made of these sides and common pieces. `gap(x)` is the gap that the scene adds
+    /// to the distance of the meshes; with `None` all differences of distances are zero.
+    pub fn new(
+        a: &Side<D>,
+        b: &Side<D>,
+        common: &Common<D>,
+        pair: &ContactPair,
+        gap: Option<&dyn Fn([f64; 3]) -> f64>,
+    ) -> Self {
+        let rounding = a.rounding_along_normals();
+        let position = |q: usize| -> [f64; D] { std::array::from_fn(|c| pair.position[q][c] - a.space.datum[c]) };
+        let mut projections = Self::default();
+        for (q, facet) in nearest_facets(a, common, pair, position).into_iter().enumerate() {
+            let (from, normal) = (position(q), std::array::from_fn(|c| pair.normal[q][c]));
+            let at = project(b, facet, from, normal);
+            let difference = |gap: &dyn Fn([f64; 3]) -> f64| {
+                pair.gap[q] - gap(pair.position[q]) - distance(b, facet, &at, from, normal)
+            };
+            // Between planes the difference is no more than the rounding of the coordinates.
+            let rounding = rounding.max(1e-12 * length(b.area(facet)).powf(1.0 / (D - 1) as f64));
+            let difference = gap.map(difference).filter(|difference| difference.abs() >= rounding);
+            projections.distance.push(difference.unwrap_or(0.0));
+            projections.facet.push(facet);
+            projections.at.push(at);
+            projections.normal.push(normal);
+        }
+        projections
+    }
+}
+
+/// Return the facet of side b for each contact point: the partner of the nearest integration point on a facet of side a at
+/// its node. `position` gives the place of a contact point, measured from the datum of the mesh.
+fn nearest_facets<const D: usize>(
+    a: &Side<D>,
+    common: &Common<D>,
+    pair: &ContactPair,
+    position: impl Fn(usize) -> [f64; D],
+) -> Vec<usize> {
+    let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+    let mut nearest = vec![(f64::INFINITY, 0); pair.len()];
+    for point in &common.points {
+        let from = a.facets.point(point.facet_a, a.space, &point.at_a);
+        for q in a.facets.facet(point.facet_a).iter().filter_map(|node| point_of.get(node).copied()) {
+            let distance = length(minus(position(q), from));
+            if distance < nearest[q].0 {
+                nearest[q] = (distance, point.facet_b);
+            }
+        }
+    }
+    nearest.into_iter().map(|(_, facet)| facet).collect()
+}
+
+/// Return where the line from a point along a normal meets the plane of a facet's corners, in barycentric coordinates.
+fn project<const D: usize>(b: &Side<D>, facet: usize, from: [f64; D], normal: [f64; D]) -> [f64; D] {
+    let x = b.facets.coordinates(facet, b.space);
+    let matrix = DMatrix::from_fn(D, D, |c, k| if k + 1 < D { x[k + 1][c] - x[0][c] } else { normal[c] });
+    let right = DVector::from_fn(D, |c, _| from[c] - x[0][c]);
+    let Some(solution) = matrix.lu().solve(&right) else { return [1.0 / D as f64; D] };
+    let others: f64 = (0..D - 1).map(|k| solution[k]).sum();
+    std::array::from_fn(|k| if k == 0 { 1.0 - others } else { solution[k - 1] })
+}
+
+/// Return the distance along a normal from a point to the surface at the barycentric coordinates `at` of a facet.
+fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
+    dot(&normal, &minus(b.facets.point(facet, b.space, at), from)) - rise(b, facet, at)
+}
+
+/// Return the height of the surface of a side above a facet at barycentric coordinates.
+///
+/// A quadratic facet is the surface itself. Over a straight facet the surface is taken to rise by
+/// l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a curve between two normals is a parabola. Here l_i is the
+/// barycentric coordinate, n_i the normal and x_i the place of corner i.
+fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
+    if side.facets.order != Order::P1 {
+        return 0.0;
+    }
+    let x = side.facets.coordinates(facet, side.space);
+    let normals: Vec<[f64; D]> = side.facets.facet(facet).iter().map(|node| side.normals[node]).collect();
+    let mut rise = 0.0;
+    for i in 0..D {
+        for j in i + 1..D {
+            rise += 0.5 * at[i] * at[j] * dot(&minus(normals[j], normals[i]), &minus(x[j], x[i]));
+        }
+    }
+    rise
+}
+
+/// Sine below which a direction counts as constrained, and above whose complement as free. Planes of symmetry are known to
+/// rounding where facets are flat; a facet of a circle is inclined by half of its turn, which has the sine 0.26 with twelve facets.
+const INCLINED: f64 = 0.3;
+
+/// Return, for each facet of side a, whether it lies at a rim, where the pressure may be singular, since one of the surfaces ends there.
+/// `cover` is the coverage of these facets.
+///
+/// Near the edge of a contact surface the pressure of bodies without a layer is K r^(lambda - 1) at the distance r from the edge, with
+/// 1/2 <= lambda. The edge is no rim where the surface goes on as its mirror image: on an axis of revolution, and on a plane of symmetry.
+/// A facet lies at a rim if such an edge of side a bounds it. It does, too, if side b ends on it or on a facet beside it, at such an edge
+/// of b: the covered part of that facet may be a sliver.
+fn facets_at_rim<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>, cover: &[Coverage]) -> Vec<bool> {
+    let (edges_a, edges_b) = (a.facets.by_edge(), b.facets.by_edge());
+    let mut above_rim_of_b = vec![false; a.facets.count()];
+    for point in &common.points {
+        above_rim_of_b[point.facet_a] |= is_at_rim(b, &edges_b, point.facet_b);
+    }
+    let ends_on = |i: usize| cover[i].share < WHOLE;
+    let beside = |i: usize| a.facets.edges(i).into_iter().flat_map(|edge| &edges_a[&edge]).filter(move |&&k| k != i);
+    let ends_beside = |i: usize| beside(i).any(|&k| ends_on(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
+    let at_rim = |i: usize| {
+        cover[i].share > 0.0 && (is_at_rim(a, &edges_a, i) || ends_on(i) && above_rim_of_b[i] || ends_beside(i))
+    };
+    (0..a.facets.count()).map(at_rim).collect()
+}
+
+/// Return whether a surface ends at facet `i`, and does not go on as its mirror image. `facets` are those at each edge.
+fn is_at_rim<const D: usize>(side: &Side<D>, facets: &HashMap<[u32; D], Vec<usize>>, i: usize) -> bool {
+    side.facets.edges(i).into_iter().any(|edge| facets[&edge].len() == 1 && !is_mirrored(side, i, edge))
+}
+
+/// Return whether the surface goes on beyond an edge of facet `i` as its mirror image: all nodes of the edge lie on an axis of revolution, or
+/// supports hold the direction that leaves the facet there, but not its normal.
+fn is_mirrored<const D: usize>(side: &Side<D>, i: usize, edge: [u32; D]) -> bool {
+    let nodes = || edge[..D - 1].iter().copied();
+    if nodes().all(|node| side.space.on_axis(node)) {
+        return true;
+    }
+    let normal = unit(side.area(i));
+    let Some(&opposite) = side.facets.facet(i)[..D].iter().find(|node| !edge.contains(node)) else { return false };
+    let at = |node: u32| side.space.nodes[node as usize];
+    let mut outwards = minus(at(edge[0]), at(opposite));
+    let mut remove = |axis: [f64; D]| {
+        let part = dot(&outwards, &axis);
+        (0..D).for_each(|c| outwards[c] -= part * axis[c]);
+    };
+    remove(normal);
+    if D == 3 {
+        remove(unit(minus(at(edge[1]), at(edge[0]))));
+    }
+    let outwards = unit(outwards);
+    nodes().all(|node| held(side, node, outwards) >= 1.0 - INCLINED && held(side, node, normal) <= INCLINED)
+}
+
+/// Return the length of the part of a unit vector along which supports hold a node.
+fn held<const D: usize>(side: &Side<D>, node: u32, direction: [f64; D]) -> f64 {
+    let held = side.frame.force(node, direction).flat_map(|(node, components)| {
+        let dofs = (0..D).zip(components);
+        dofs.filter(move |(c, _)| side.prescribed.contains_key(&(D * node as usize + c)))
+    });
+    held.map(|(_, component)| component * component).sum::<f64>().sqrt()
 }

@@ -1,14 +1,14 @@
-//! The arrays of a contact pair, which are all that the solution methods know of two surfaces.
+//! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is paired.
 
 use super::basis::{Carriers, PressureBasis};
-use super::cover::{Coverage, Left};
 use super::law::{LayerLaw, Linear};
-use super::pieces::Common;
-use super::side::{Side, length};
+use super::pieces::{Common, Refused, WHOLE};
+use super::side::{Side, along};
 use crate::error::{Error, Result};
-use crate::fem::assemble::interpolate;
-use crate::fem::{cross, element, pad};
+use crate::fem::element::{self, Rule};
+use crate::fem::{area_vector, cross, length, pad};
 use crate::linalg::Csr;
+use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
@@ -121,7 +121,7 @@ impl LostPieces {
         let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.left == Left::Lost);
         let (worst, _) = lost().max_by(|p, q| uncovered(p).total_cmp(&uncovered(q)))?;
         let whole = a.mean_measure() * coverage.len() as f64;
-        let middle = interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
+        let middle = element::interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
         Some(Self {
             pieces: lost().map(|(_, facet)| facet.lost).sum(),
             share: lost().map(|facet| uncovered(&facet)).sum::<f64>() / whole,
@@ -144,21 +144,17 @@ pub enum Fault {
 /// A function from the contact points of a pair to its law.
 pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
-/// Integrals over the common pieces of two surfaces.
-struct Integrals {
-    /// Integrals of each node that carries a point.
-    points: BTreeMap<u32, Accumulator>,
-    /// Coverage of each facet of side a.
-    cover: Vec<Coverage>,
-}
-
-/// Integrate over common pieces.
+/// Integrate over common pieces. Return the integrals of each node that carries a point, and the coverage of each facet of side a.
 ///
 /// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet, where
 /// phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the dual basis
 /// of the whole triangle. A partially covered facet on which this basis has unsteady means takes the hat functions of its
 /// vertices instead.
-fn integrate<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>) -> Integrals {
+fn integrate<const D: usize>(
+    a: &Side<D>,
+    b: &Side<D>,
+    common: &Common<D>,
+) -> (BTreeMap<u32, Accumulator>, Vec<Coverage>) {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut carriers = vec![None; a.facets.count()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
@@ -183,7 +179,7 @@ fn integrate<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>) -> In
             }
         }
     }
-    Integrals { points, cover: Coverage::of(a, common, &carriers) }
+    (points, Coverage::of(a, common, &carriers))
 }
 
 /// Assemble the arrays of a pair from the common pieces of its surfaces.
@@ -201,9 +197,9 @@ pub fn assemble<const D: usize>(
     gap: &dyn Fn([f64; 3]) -> f64,
     law: &LawMaker,
 ) -> Result<ContactPair, Fault> {
-    let Integrals { points, cover } = integrate(a, b, common);
+    let (points, cover) = integrate(a, b, common);
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
-    let nodes = super::order::along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
+    let nodes = along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
     if nodes.is_empty() {
         return Err(Fault::NoPartner);
     }
@@ -369,5 +365,76 @@ impl ContactPair {
     /// Return whether the pair has no points, which no pair from [`assemble`] has.
     pub fn is_empty(&self) -> bool {
         self.weight.is_empty()
+    }
+}
+
+/// The coverage of a facet of side a by facets of side b.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// Share of its length (area) that is paired.
+    pub share: f64,
+    /// Why it is not fully paired.
+    pub left: Left,
+    /// Number of pieces, and of points of pieces, that the search has lost.
+    pub lost: usize,
+    /// Which of its nodes carry points; `None` where it has no partner.
+    pub carriers: Option<Carriers>,
+}
+
+/// The reason why a facet is not fully paired. If several reasons hold, `Lost` comes before `Steep`, and `Steep` before `Far`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Left {
+    /// It is fully paired.
+    Nothing,
+    /// What lies before it is inclined by too large an angle.
+    Steep,
+    /// What lies before it is too far away.
+    Far,
+    /// Nothing lies before it.
+    Bare,
+    /// The search for points on what lies before it has failed.
+    Lost,
+}
+
+impl Coverage {
+    /// Return the coverage of each facet, from the common pieces and the nodes that carry points.
+    fn of<const D: usize>(a: &Side<D>, common: &Common<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
+        let mut covered = vec![0.0; a.facets.count()];
+        common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
+        let rule = element::rule(D, if a.facets.order == Order::P2 { 5 } else { 2 });
+        let of_facet = |i: usize| {
+            let share = covered[i] / facet_measure(a, i, &rule);
+            let left = Left::of(share, &common.refused[i]);
+            let lost = if left == Left::Lost { common.refused[i].lost } else { 0 };
+            Self { share, left, lost, carriers: carriers[i] }
+        };
+        (0..covered.len()).map(of_facet).collect()
+    }
+}
+
+/// Return the length (area) of facet `i`, in bodies of revolution the area of a ring.
+fn facet_measure<const D: usize>(a: &Side<D>, i: usize, rule: &Rule) -> f64 {
+    let x = a.facets.coordinates(i, a.space);
+    let density = |l: &[f64]| {
+        let at = a.facets.point(i, a.space, l);
+        length(area_vector(a.facets.order, &x, l)) * a.space.circle(&at)
+    };
+    rule.iter().map(|(l, weight)| weight * density(l)).sum()
+}
+
+impl Left {
+    /// Return the reason for a facet with this paired share, from what was refused before it.
+    fn of(share: f64, refused: &Refused) -> Self {
+        if share > WHOLE {
+            Self::Nothing
+        } else if refused.lost > 0 {
+            Self::Lost
+        } else if refused.steep {
+            Self::Steep
+        } else if !refused.far.is_empty() {
+            Self::Far
+        } else {
+            Self::Bare
+        }
     }
 }

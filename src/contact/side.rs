@@ -1,10 +1,9 @@
-//! One contact surface of a body: facets with averaged nodal normals.
+//! One contact surface of a body: facets with averaged nodal normals, its smooth faces, and the order of nodes along it.
 
-pub use crate::fem::{length, unit};
-
-use crate::fem::{Facets, Frame, Space, area_vector, element, minus};
+use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
+use crate::linalg::{Joined, bounds, dot};
 use crate::mesh::datum;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Difference between the unit normal of a facet and the mean normal beyond which the facets form an edge.
 ///
@@ -113,19 +112,119 @@ impl<'a, const D: usize> Side<'a, D> {
     }
 
     /// Return the corners of the box around all facets.
-    pub fn extent(&self) -> ([f64; D], [f64; D]) {
-        let join = |(low, high): ([f64; D], [f64; D]), (from, to): ([f64; D], [f64; D])| {
-            (std::array::from_fn(|c| low[c].min(from[c])), std::array::from_fn(|c| high[c].max(to[c])))
-        };
-        (0..self.facets.count()).map(|i| self.bounds(i)).fold(([f64::MAX; D], [f64::MIN; D]), join)
+    pub fn extent(&self) -> [[f64; D]; 2] {
+        bounds(self.facets.nodes.iter().map(|&node| self.space.nodes[node as usize]))
     }
 
     /// Return the corners of the box around facet `i`.
-    pub fn bounds(&self, i: usize) -> ([f64; D], [f64; D]) {
-        let x = self.facets.coordinates(i, self.space);
-        let corner = |pick: fn(f64, f64) -> f64| -> [f64; D] {
-            std::array::from_fn(|c| x[1..].iter().fold(x[0][c], |value, x| pick(value, x[c])))
-        };
-        (corner(f64::min), corner(f64::max))
+    pub fn bounds(&self, i: usize) -> [[f64; D]; 2] {
+        bounds(self.facets.coordinates(i, self.space))
     }
+}
+
+/// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of
+/// coordinates over its size; so a regular polygon that turns by just the angle of an edge is smooth.
+pub const ROUNDING: f64 = 1e-9;
+
+/// The smooth faces of a surface. Facets with a common vertex at which they turn by no more than the angle of an edge are of
+/// one face.
+#[derive(Debug, Clone)]
+pub struct Faces {
+    /// Face of each facet. Faces are numbered in the order of their first facets.
+    pub of_facet: Vec<usize>,
+    /// Number of faces.
+    pub count: usize,
+}
+
+impl Faces {
+    /// Find the faces of a surface between edges at which facets turn by more than `edge` degrees.
+    pub fn new<const D: usize>(side: &Side<D>, edge: f64) -> Self {
+        let least = edge.to_radians().cos() - ROUNDING;
+        let mut joined = Joined::new(side.facets.count());
+        for around in normals_at_vertices(side).values() {
+            for (k, (facet, normal)) in around.iter().enumerate() {
+                for (other, other_normal) in &around[..k] {
+                    if dot(normal, other_normal) >= least {
+                        joined.join(*facet as u32, *other as u32);
+                    }
+                }
+            }
+        }
+        let (count, of_facet) = joined.classes();
+        Self { count, of_facet: of_facet.into_iter().map(|face| face as usize).collect() }
+    }
+
+    /// Return whether facets of different faces have a common vertex, and so meet at an edge. Only facets in `used` count.
+    pub fn meet<const D: usize>(&self, side: &Side<D>, used: &[bool]) -> bool {
+        let mut face_at: HashMap<u32, usize> = HashMap::new();
+        let facets = (0..side.facets.count()).filter(|&i| used[i]);
+        let mut vertices = facets.flat_map(|i| side.facets.facet(i)[..D].iter().map(move |&node| (node, i)));
+        vertices.any(|(node, i)| *face_at.entry(node).or_insert(self.of_facet[i]) != self.of_facet[i])
+    }
+
+    /// Return the middle of a face: the mean of the middles of its facets, weighted by their lengths (areas).
+    pub fn middle<const D: usize>(&self, side: &Side<D>, face: usize) -> [f64; D] {
+        let (mut sum, mut total) = ([0.0; D], 0.0);
+        for i in (0..self.of_facet.len()).filter(|&i| self.of_facet[i] == face) {
+            let (x, size) = (side.facets.coordinates(i, side.space), length(side.area(i)));
+            (0..D).for_each(|c| sum[c] += size * x[..D].iter().map(|x| x[c]).sum::<f64>() / D as f64);
+            total += size;
+        }
+        sum.map(|sum| sum / total)
+    }
+}
+
+/// Return the facets at each vertex, with their unit normals there.
+fn normals_at_vertices<const D: usize>(side: &Side<D>) -> HashMap<u32, Vec<(usize, [f64; D])>> {
+    let mut around: HashMap<u32, Vec<(usize, [f64; D])>> = HashMap::new();
+    let vertices = &element::nodes::<D>(side.facets.order)[..D];
+    for i in 0..side.facets.count() {
+        let x = side.facets.coordinates(i, side.space);
+        for (l, &node) in vertices.iter().zip(side.facets.facet(i)) {
+            around.entry(node).or_default().push((i, unit(area_vector(side.facets.order, &x, l))));
+        }
+    }
+    around
+}
+
+/// Sort surface nodes for plots. In the plane they follow the curve, and each chain begins at the end with the smaller
+/// coordinates. In space they are sorted by coordinates.
+pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut nodes: Vec<u32> = nodes.collect();
+    let at = |node: u32| side.space.nodes[node as usize];
+    nodes.sort_by(|&m, &n| {
+        let (x, y) = (at(m), at(n));
+        (0..D).map(|c| x[c].total_cmp(&y[c])).find(|o| o.is_ne()).unwrap_or(m.cmp(&n))
+    });
+    if D != 2 {
+        return nodes;
+    }
+    let mut neighbours: HashMap<u32, Vec<u32>> = HashMap::new();
+    for i in 0..side.facets.count() {
+        let facet = side.facets.facet(i);
+        let chain = if facet.len() == 3 { vec![facet[0], facet[2], facet[1]] } else { facet.to_vec() };
+        for link in chain.windows(2) {
+            neighbours.entry(link[0]).or_default().push(link[1]);
+            neighbours.entry(link[1]).or_default().push(link[0]);
+        }
+    }
+    let wanted: HashSet<u32> = nodes.iter().copied().collect();
+    let mut visited = HashSet::new();
+    let mut order = Vec::with_capacity(nodes.len());
+    // The ends of open chains come first, then the nodes of closed curves.
+    let is_end = |node: &u32| neighbours.get(node).is_none_or(|n| n.len() != 2);
+    let starts: Vec<u32> = nodes.iter().filter(|n| is_end(n)).chain(&nodes).copied().collect();
+    for start in starts {
+        let mut current = Some(start);
+        while let Some(node) = current {
+            if !visited.insert(node) {
+                break;
+            }
+            if wanted.contains(&node) {
+                order.push(node);
+            }
+            current = neighbours.get(&node).and_then(|n| n.iter().find(|n| !visited.contains(n)).copied());
+        }
+    }
+    order
 }

@@ -19,9 +19,9 @@ use crate::contact::LayerLaw;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::layer::Layer;
+use crate::model::layer::{in_series, meeting_slopes, surface_slopes};
 use crate::model::linear::Solution;
 use crate::model::rigid::PART;
-use crate::model::surface::{in_series, meeting_slopes, surface_slopes};
 
 /// The distance of layer states from the laws at the compressions of the bodies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

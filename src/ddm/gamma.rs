@@ -3,7 +3,7 @@
 use super::robin::{Acceleration, Iterate, Step, best_factor, best_gamma, relaxed_factor};
 use crate::error::Result;
 use crate::linalg::dot;
-use crate::model::line::{Line, Unbounded};
+use crate::model::field::{Line, Unbounded};
 use crate::problem::Own;
 use crate::robin::Ritz;
 use std::collections::VecDeque;

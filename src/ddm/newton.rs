@@ -20,9 +20,9 @@ use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
+use crate::model::layer::{meeting_slopes, surface_slopes};
 use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::rigid::Motions;
-use crate::model::surface::{meeting_slopes, surface_slopes};
 use std::collections::VecDeque;
 
 /// Relative error of a correction.

@@ -24,7 +24,7 @@ use crate::model::rigid::PART;
 pub(super) struct Progress {
     /// Pressures in equilibrium with the iterate, n; empty before the first.
     pressure: Vec<f64>,
-    /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::surface::meeting_slopes); empty before the second.
+    /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::layer::meeting_slopes); empty before the second.
     answer: Vec<f64>,
     /// The way out of slow convergence.
     pub path: Path,

@@ -10,7 +10,7 @@ use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
-use crate::model::origin::Origin;
+use crate::model::rigid::Origin;
 use crate::problem::method::StopRule;
 use crate::robin::{Sweep, Sweeper};
 use serde::{Deserialize, Serialize};

@@ -20,10 +20,10 @@
 
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
+use crate::model::field::{self, Unbounded};
 use crate::model::layer::Layer;
-use crate::model::line::{self, Unbounded};
+use crate::model::layer::{contact_slopes, in_series, surface_slopes};
 use crate::model::rigid::{Motions, Moved, PART};
-use crate::model::surface::{contact_slopes, in_series, surface_slopes};
 use nalgebra::DVector;
 
 /// The start of a run.
@@ -184,7 +184,7 @@ impl Rigid<'_> {
                 dot(&force, &closing) + first_slope + t * resisted
             };
             let first = dot(&places.force, &closing) + first_slope;
-            match line::zero(slope, first, 1e-3) {
+            match field::zero(slope, first, 1e-3) {
                 Ok(t) => amounts += t * &step,
                 Err(Unbounded) if gains => return Err(step),
                 // no load works on this way, and the energy of layers that push less and less is bounded below by zero

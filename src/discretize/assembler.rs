@@ -88,7 +88,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
                 }
             };
             let (unloaded, motions) = (local.unloaded, unsupported);
-            self.shapes.push(Shape { space, held, elasticity, modulus, unloaded, motions });
+            self.shapes.push(Shape { space, held, elasticity, unloaded, motions });
         }
         let Made { local, scale, row_stiffness } = made;
         let name = info.name.clone();

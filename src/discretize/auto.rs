@@ -337,7 +337,7 @@ impl<'a, const D: usize> Split<'a, D> {
     /// Coordinates that differ by less than a thousandth of the surface count as equal, so that numbers do not depend on the mesh.
     fn number(&self, side: usize, face: usize) -> Option<usize> {
         let all: BTreeSet<usize> = self.met.keys().map(|faces| faces[side]).collect();
-        let (low, high) = self.sides[side].extent();
+        let [low, high] = self.sides[side].extent();
         let size = (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max);
         let place = |face: usize| {
             let middle = self.faces[side].middle(self.sides[side], face);

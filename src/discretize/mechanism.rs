@@ -26,7 +26,7 @@ use super::roster::find_group;
 use super::unassembled::{Candidate, NO_WORK, Unassembled, Unconstrained};
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::fem::{Extent, RigidMotion, rigid, turn};
+use crate::fem::{Extent, RigidMotion, rigid, surface};
 use crate::linalg::{Blocks, Joined, PART, TOLERANCE, axpy, dot, fit};
 use crate::mesh::Mesh;
 use crate::model::{Mechanism, Motion, Motions, Segment};
@@ -500,18 +500,18 @@ fn balance<const D: usize>(all: &[&Moving<D>], works: &[f64], bodies: &mut [Unas
 /// smooth, the ratio is nearly one.
 const HALVES: f64 = 2.0;
 
-/// Return the share of the loads of a body that facets may miss ([`turn::missed`]). A body force acts on the volume within all
+/// Return the share of the loads of a body that facets may miss ([`surface::missed`]). A body force acts on the volume within all
 /// surfaces, and the surfaces in contact represent them.
 fn missed_by_facets<const D: usize>(body: &Unassembled<D>, pairs: &[ContactPair], mesh: &Mesh<D>) -> f64 {
     let part = &body.part;
     let groups = part.spec.load.iter().filter_map(|load| find_group(mesh, &load.on, &[D - 1], "load").ok());
-    let on_groups = groups.map(|group| turn::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
+    let on_groups = groups.map(|group| surface::missed(&part.space, &part.space.facets(group))).fold(0.0, f64::max);
     if part.spec.force.is_none() {
         return on_groups;
     }
     let points = body.segments.iter().flat_map(|segment| &pairs[segment.pair].surface[segment.side]);
     // Facets differ from their mean by half of the angle between them.
-    points.map(|point| turn::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
+    points.map(|point| surface::by_chords(2.0 * point.spread)).fold(on_groups, f64::max)
 }
 
 /// Return a bound of the work on a motion of the nodal forces that the quadrature of surface loads misses.

@@ -1,10 +1,9 @@
 //! The meshes without their space dimension, as an estimate of the error uses them.
 
 use super::supports::Constraints;
-use crate::contact::Fine;
-use crate::fem::{Elasticity, InterpolationError, Recovery, RigidMotion, Space, element};
+use crate::contact::{Fine, FinePoints};
+use crate::fem::{Elasticity, Errors, Recovery, RigidMotion, Space, element};
 use crate::linalg::{Csr, axpy, dot};
-use crate::problem::order::Order;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -28,7 +27,7 @@ pub trait Meshes {
     fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
 
     /// Return the integration points of a pair.
-    fn points(&self, pair: usize) -> FinePoints<'_>;
+    fn points(&self, pair: usize) -> &FinePoints;
 
     /// Return the cells of a body.
     fn cells(&self, body: usize) -> Cells;
@@ -52,53 +51,10 @@ pub struct Cells {
     pub sizes: Vec<f64>,
 }
 
-/// The integration points of a pair; see [`Fine`].
-pub struct FinePoints<'a> {
-    /// Length (area) of each point.
-    pub weight: &'a [f64],
-    /// Gap at each point.
-    pub gap: &'a [f64],
-    /// Size of the facet of side a under each point.
-    pub size: &'a [f64],
-    /// Deflection of the two bodies per pressure, for a pressure that changes its sign within a facet. It is the compliance of
-    /// the springs of two half-spaces in series, for a wave as long as the facet.
-    pub compliance: Vec<f64>,
-    /// Contact point nearest to each integration point.
-    pub nearest: &'a [usize],
-    /// Whether the contact points around each integration point are at mid-edges.
-    pub at_edges: &'a [bool],
-    /// Order of the elements of side a.
-    pub order: Order,
-    /// Facet of side a under each integration point; those of a facet follow each other.
-    pub facet: &'a [usize],
-    /// Whether this facet lies at a rim, see [`Fine::at_rim`].
-    pub at_rim: &'a [bool],
-    /// First barycentric coordinate of each integration point in this facet.
-    pub along: Vec<f64>,
-    /// Whether the pressure on this facet is a polynomial of second degree, see [`Fine::is_quadratic`].
-    pub is_quadratic: &'a [bool],
-    /// Matrix from values at the contact points to values at the integration points.
-    pub interpolation: &'a Csr,
-    /// Matrix from pressures at the contact points to the pressures of the discrete problem at the integration points.
-    pub pressing: &'a Csr,
-}
-
 /// A displacement of a body with the fields recovered from it.
 pub trait Recovered {
-    /// Return the squared energy norm of the recovered minus the discrete stress, for each cell.
-    fn energy_errors(&self) -> Vec<f64>;
-
-    /// Return the energy of the strip between straight facets and a curved boundary at each cell, see [`Recovery::strip_energies`].
-    fn strip_energies(&self) -> Vec<f64>;
-
-    /// Compute the residual and the energy of the interpolation error, see [`Recovery::interpolation_error`].
-    fn interpolation_error(&self) -> InterpolationError;
-
-    /// Return the load of a body that is too stiff by these squared energy errors of its cells, see [`Recovery::softening`].
-    fn softening(&self, errors: &[f64]) -> Vec<f64>;
-
-    /// Add the load on the strip between straight facets and a curved boundary to `r`, see [`Recovery::add_strip`].
-    fn add_strip(&self, r: &mut [f64]);
+    /// Return the errors of the body, see [`Recovery::errors`].
+    fn errors(&self) -> Errors;
 
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
@@ -120,8 +76,6 @@ pub struct Shape<const D: usize> {
     pub space: Rc<Space<D>>,
     /// Elasticity of the body.
     pub elasticity: Rc<Elasticity>,
-    /// Modulus against pressure on the contact surfaces of the body, E/(1 - nu^2) if isotropic.
-    pub modulus: f64,
     /// Supports of the body, which define its dofs.
     pub held: Rc<Constraints<D>>,
     /// See [`Meshes::unloaded`].
@@ -149,7 +103,7 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a> {
         let shape = &self.shapes[body];
-        Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, u) })
+        Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, &shape.elasticity, u) })
     }
 
     fn unloaded(&self, body: usize) -> &[f64] {
@@ -169,38 +123,8 @@ impl<const D: usize> Meshes for Kept<D> {
         load.chunks_exact(D).flat_map(|force| [dot(force, force).sqrt(); D]).collect()
     }
 
-    fn points(&self, pair: usize) -> FinePoints<'_> {
-        let Fine {
-            weight,
-            gap,
-            size,
-            bodies,
-            nearest,
-            at_edges,
-            at_rim,
-            is_quadratic,
-            interpolation,
-            pressing,
-            sides,
-            ..
-        } = &self.fine[pair];
-        let soft: f64 = bodies.iter().map(|&body| 1.0 / self.shapes[body].modulus).sum();
-        let compliance = size.iter().map(|size| size * soft / std::f64::consts::PI).collect();
-        FinePoints {
-            weight,
-            gap,
-            size,
-            compliance,
-            nearest,
-            at_edges,
-            order: sides[0].facets.order,
-            facet: &sides[0].facet,
-            at_rim,
-            along: sides[0].at.iter().map(|l| l[0]).collect(),
-            is_quadratic,
-            interpolation,
-            pressing,
-        }
+    fn points(&self, pair: usize) -> &FinePoints {
+        &self.fine[pair].points
     }
 
     fn cells(&self, body: usize) -> Cells {
@@ -232,16 +156,6 @@ struct OnBody<'a, const D: usize> {
     recovery: Recovery<'a, D>,
 }
 
-impl<const D: usize> OnBody<'_, D> {
-    /// Return the stress of a strain at an integration point of a cell. Assembly evaluated the law there, so it has a value.
-    fn stress(&self, cell: usize, x: [f64; D], strain: &[f64; 6]) -> [f64; 6] {
-        self.shape
-            .elasticity
-            .at(cell, self.shape.space.in_scene(x))
-            .map_or([0.0; 6], |material| material.stress(strain))
-    }
-}
-
 /// Factors of the normal for side a and side b. The outer normal of side b is minus that of side a.
 const SIGN: [f64; 2] = [1.0, -1.0];
 
@@ -260,35 +174,19 @@ impl<const D: usize> OnBody<'_, D> {
     fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], &[u32], &[f64; D])) {
         let fine = &self.kept.fine[pair];
         let on = &fine.sides[side];
-        for g in 0..fine.weight.len() {
+        for g in 0..fine.points.each.len() {
             visitor(g, fine.normal[g].map(|n| SIGN[side] * n), on.facets.facet(on.facet[g]), &on.at[g]);
         }
     }
 }
 
 impl<const D: usize> Recovered for OnBody<'_, D> {
-    fn energy_errors(&self) -> Vec<f64> {
-        self.recovery.energy_errors(&|cell, x, strain| self.stress(cell, x, strain))
-    }
-
-    fn strip_energies(&self) -> Vec<f64> {
-        self.recovery.strip_energies(&|cell, x, strain| self.stress(cell, x, strain))
-    }
-
-    fn interpolation_error(&self) -> InterpolationError {
-        self.recovery.interpolation_error(&|cell, x, strain| self.stress(cell, x, strain))
-    }
-
-    fn softening(&self, errors: &[f64]) -> Vec<f64> {
-        self.recovery.softening(&|cell, x, strain| self.stress(cell, x, strain), errors)
-    }
-
-    fn add_strip(&self, r: &mut [f64]) {
-        self.recovery.add_strip(&|cell, x, strain| self.stress(cell, x, strain), r);
+    fn errors(&self) -> Errors {
+        self.recovery.errors()
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
-        let mut values = vec![0.0; self.kept.fine[pair].weight.len()];
+        let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
         self.visit(pair, side, |g, normal, nodes, l| {
             let u = self.displacement(nodes, l);
             values[g] = (0..D).map(|c| normal[c] * u[c]).sum();

@@ -9,7 +9,7 @@ use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Common, Cut, Reach};
 use crate::contact::{self, Chords, ContactPair, End, Faces, Fault, Fine, ROUNDING, Side, unit};
 use crate::error::{Error, Located, Result};
-use crate::fem::{Facets, assemble, element};
+use crate::fem::Facets;
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
@@ -374,8 +374,7 @@ impl Nearest {
             behind.cmp(&other).then(p.total_cmp(&q))
         };
         let nearest = common.points.iter().min_by(|p, q| less(p.gap, q.gap))?;
-        let x = a.facets.coordinates(nearest.facet_a, a.space);
-        let at = assemble::interpolate(&x, &element::values(a.facets.order, &nearest.at_a));
+        let at = a.facets.point(nearest.facet_a, a.space, &nearest.at_a);
         Some(Self { gap: nearest.gap, at: point(a.space.in_scene(at)) })
     }
 }

@@ -7,9 +7,8 @@ use super::supports::Constraints;
 use crate::contact::{add, pad};
 use crate::error::{Error, Result};
 use crate::expression::Expression;
-use crate::fem::internal::{self, Internal};
-use crate::fem::strain::{self, Strained};
-use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble, norms, stress};
+use crate::fem::displacement::{self, Internal, Strained};
+use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble};
 use crate::linalg::{Csr, dot};
 use crate::output::{BodyField, CellKind};
 use std::rc::Rc;
@@ -53,7 +52,7 @@ pub trait Post {
     fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
 
     /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are
-    /// the L2 norm, the H1 seminorm and the energy norm ([`norms::error`]) on the cells that this rank writes. The result is
+    /// the L2 norm, the H1 seminorm and the energy norm ([`displacement::norms_of_error`]) on the cells that this rank writes. The result is
     /// `None` if the scene has no known displacements.
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
@@ -158,7 +157,7 @@ impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
         let (u, space) = (self.nodal(v), &self.space);
         let (owned, shown) = space.part(self.owned());
-        let stress = stress::nodal(space, &self.elasticity, &self.nodal(bent));
+        let stress = displacement::nodal_stresses(space, &self.elasticity, &self.nodal(bent));
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
@@ -167,14 +166,14 @@ impl<const D: usize> Post for OnPart<D> {
             cell: CellKind::simplex(D, space.order.degree()),
             connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
-            von_mises: stress.iter().map(stress::von_mises).collect(),
-            principal: stress.iter().map(stress::principal).collect(),
+            von_mises: stress.iter().map(displacement::von_mises).collect(),
+            principal: stress.iter().map(displacement::principal).collect(),
             stress,
         }
     }
 
     fn strain(&self, bent: &[f64]) -> Strained {
-        strain::largest(&self.space, self.owned(), &self.nodal(bent))
+        displacement::largest_strain(&self.space, self.owned(), &self.nodal(bent))
     }
 
     /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
@@ -218,7 +217,7 @@ impl<const D: usize> Post for OnPart<D> {
         let u = self.nodal(bent);
         let space = &*self.space;
         let Internal { force: inner, rounding, mut diagonal, bulk } =
-            internal::forces(space, &self.elasticity, 0..space.cell_count(), &u);
+            displacement::internal_forces(space, &self.elasticity, 0..space.cell_count(), &u);
         let mut sum = Sum { force: self.load.clone(), size: rounding };
         let mut resisting = vec![0.0; bulk.len()];
         for (row, (force, spring)) in force.iter().zip(springs).enumerate() {
@@ -311,7 +310,7 @@ impl<const D: usize> Post for OnPart<D> {
     fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
         let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.held.frame.displacements(field)).collect();
         let n = fields.len();
-        let mut products = internal::products(&self.space, &self.elasticity, self.owned(), &nodal);
+        let mut products = displacement::energy_products(&self.space, &self.elasticity, self.owned(), &nodal);
         for block in self.springs.iter().flatten().filter(|block| self.own[block.nodes[0] as usize]) {
             let [a, b] = block.nodes.map(|node| D * node as usize);
             for (i, row) in block.block.iter().enumerate() {
@@ -337,12 +336,12 @@ impl<const D: usize> Post for OnPart<D> {
         let exact = self.exact.as_ref()?;
         let at = |x: [f64; D]| {
             let x = &self.space.in_scene(x)[..D];
-            norms::Exact {
+            displacement::Exact {
                 value: std::array::from_fn(|i| exact[i].eval(x)),
                 gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
             }
         };
-        let norms = norms::error(&self.space, self.owned(), &self.elasticity, &self.nodal(v), &at);
+        let norms = displacement::norms_of_error(&self.space, self.owned(), &self.elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
     }
 }

@@ -1,17 +1,15 @@
-//! Assembly of stiffness matrix and loads by direct scatter into compressed rows.
+//! The linear system of a body: stiffness matrix and loads by direct scatter into compressed rows, and the elimination of supports.
 //!
 //! The pattern is built once from the node graph, which holds the couplings through cells and through contact rows. Positions
 //! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
-use super::elasticity::{Elasticity, Flaw};
-use super::element;
-use super::forces::NodalForces;
-use super::frame::{Frame, Movers};
-use super::lever::Rotation;
-use super::quadrature::{self, Parts, Rule};
-use super::space::Space;
+use super::elasticity::{Elasticity, Flaw, Material};
+use super::element::{self, Parts, Rule};
+use super::frame::{Frame, Movers, Rotation, place};
+use super::space::{Point, Space};
+use super::{length, pad};
 use crate::exchange::Plain;
-use crate::linalg::Csr;
+use crate::linalg::{Csr, Total, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 
@@ -123,12 +121,12 @@ impl NodeGraph {
         matrix: &mut Csr,
     ) {
         self.add_block::<D>([rows.node, columns.node], &entry, matrix);
-        let right = |rotation: &Rotation<D>, i, j| (0..D).map(|k| entry(i, k) * rotation.matrix[k][j]).sum::<f64>();
+        let right = |rotation: &Rotation<D>, i, j| (0..D).map(|k| entry(i, k) * rotation.matrix[(k, j)]).sum::<f64>();
         if let Some(column) = &columns.rotation {
             self.add_block::<D>([rows.node, column.pole], |i, j| right(column, i, j), matrix);
         }
         let Some(row) = &rows.rotation else { return };
-        let left = |k: usize, i: usize| row.matrix[k][i];
+        let left = |k: usize, i: usize| row.matrix[(k, i)];
         self.add_block::<D>([row.pole, columns.node], |i, j| (0..D).map(|k| left(k, i) * entry(k, j)).sum(), matrix);
         if let Some(column) = &columns.rotation {
             let both = |i, j| (0..D).map(|k| left(k, i) * right(column, k, j)).sum();
@@ -230,19 +228,40 @@ pub struct Rules {
 impl Rules {
     /// Make the rules for elements of this order.
     pub fn new<const D: usize>(order: Order) -> Self {
-        let of_degree = |degree: usize| quadrature::simplex(D + 1, degree);
+        let of_degree = |degree: usize| element::rule(D + 1, degree);
         let (affine, varying) = if order == Order::P1 { (1, 2) } else { (2, 5) };
         Self { affine: of_degree(affine), curved: of_degree(5), varying: of_degree(varying) }
     }
 
-    /// Return the rule for a cell with node coordinates `x`, in which Hooke's law `is_constant` or not.
-    pub fn of<const D: usize>(&self, x: &[[f64; D]], is_constant: bool, axisymmetric: bool) -> &Rule {
-        match is_constant && !axisymmetric {
+    /// Return the rule for a cell.
+    fn of<const D: usize>(&self, space: &Space<D>, elasticity: &Elasticity, cell: usize) -> &Rule {
+        let is_straight = || element::is_straight(&space.cell_nodes(cell), D + 1);
+        match elasticity.is_constant_in(cell) && !space.axisymmetric {
             false => &self.varying,
-            true if is_straight(x, D + 1) => &self.affine,
+            true if space.order == Order::P1 || is_straight() => &self.affine,
             true => &self.curved,
         }
     }
+}
+
+/// Visit the integration points of the strain energy of a cell, with Hooke's law there.
+///
+/// # Errors
+/// [`Defect`]: a point where the map of the cell is not invertible, or without elasticity.
+pub fn visit<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    rules: &Rules,
+    cell: usize,
+    mut each: impl FnMut(&Point<D>, &Material),
+) -> Result<(), Defect> {
+    for point in space.points(cell, rules.of(space, elasticity, cell)) {
+        let point = point.ok_or(Defect::Inverted(cell))?;
+        let at = space.in_scene(point.at);
+        let flawed = |flaw| Defect::Elasticity(elasticity.region(cell), at, flaw);
+        each(&point, &elasticity.at(cell, at).map_err(flawed)?);
+    }
+    Ok(())
 }
 
 /// Assemble the stiffness matrix of a space on a graph, which may have the rows of some nodes only. `frame` ties nodes; its axes are
@@ -260,72 +279,23 @@ pub fn stiffness<const D: usize>(
     elasticity: &Elasticity,
 ) -> Result<Csr, Defect> {
     let mut matrix = graph.matrix::<D>();
-    let mut integrator = CellIntegrator::new(space, elasticity);
-    for (index, cell) in space.cells.chunks_exact(space.stride).enumerate() {
-        let mut movers = [Movers { node: 0, rotation: None }; element::MOST];
-        movers.iter_mut().zip(cell).for_each(|(movers, &node)| *movers = frame.movers(node));
-        let movers = &movers[..cell.len()];
-        if movers.iter().any(|movers| graph.has(movers.node)) {
-            let blocks = integrator.stiffness(index)?;
-            scatter(graph, movers, blocks, &mut matrix);
-        }
-    }
-    Ok(matrix)
-}
-
-/// An integrator of cell stiffness matrices, with its work arrays.
-struct CellIntegrator<'a, const D: usize> {
-    space: &'a Space<D>,
-    elasticity: &'a Elasticity,
-    rules: Rules,
-    /// Node coordinates of the cell.
-    x: Vec<[f64; D]>,
-    /// Shape functions over the radius at a point of a body of revolution; empty in other bodies.
-    hoop: Vec<f64>,
-    /// Blocks of the cell's stiffness matrix, `stride` x `stride`. Only those with row <= column are set.
-    blocks: Vec<[[f64; D]; D]>,
-}
-
-impl<'a, const D: usize> CellIntegrator<'a, D> {
-    fn new(space: &'a Space<D>, elasticity: &'a Elasticity) -> Self {
-        let (rules, stride) = (Rules::new::<D>(space.order), space.stride);
-        let (x, blocks) = (vec![[0.0; D]; stride], vec![[[0.0; D]; D]; stride * stride]);
-        Self { space, elasticity, rules, x, hoop: Vec::new(), blocks }
-    }
-
-    /// Return the blocks of the stiffness matrix of cell `index`.
-    fn stiffness(&mut self, index: usize) -> Result<&[[[f64; D]; D]], Defect> {
-        let Self { space, elasticity, rules, x, hoop, blocks } = self;
-        let stride = space.stride;
-        for (x, &node) in x.iter_mut().zip(space.cell(index)) {
-            *x = space.nodes[node as usize];
+    let (rules, stride) = (Rules::new::<D>(space.order), space.stride);
+    // Only the blocks with row <= column are set.
+    let mut blocks = vec![[[0.0; D]; D]; stride * stride];
+    for index in 0..space.cell_count() {
+        let movers: Vec<Movers<D>> = space.cell(index).iter().map(|&node| frame.movers(node)).collect();
+        if !movers.iter().any(|movers| graph.has(movers.node)) {
+            continue;
         }
         blocks.fill([[0.0; D]; D]);
-        let constant = elasticity.constant_in(index);
-        for (l, weight) in rules.of(x, constant.is_some(), space.axisymmetric).iter() {
-            let (gradient, measure) = element::gradients(space.order, x, l).ok_or(Defect::Inverted(index))?;
-            let gradient = &gradient[..stride];
-            let mut weight = weight * measure;
-            if space.axisymmetric {
-                let phi = element::values(space.order, l);
-                let at = interpolate(x, &phi);
-                weight *= space.circle(&at);
-                hoop.clear();
-                hoop.extend(phi[..stride].iter().map(|&phi| space.hoop(&at, phi)));
-            }
-            match constant {
-                Some(material) => material.accumulate(gradient, hoop, weight, blocks),
-                None => {
-                    let at = space.in_scene(interpolate(x, &element::values(space.order, l)));
-                    let material = elasticity
-                        .at(index, at)
-                        .map_err(|flaw| Defect::Elasticity(elasticity.region(index), at, flaw))?;
-                    material.accumulate(gradient, hoop, weight, blocks);
-                }
-            }
-        }
-        Ok(blocks)
+        visit(space, elasticity, &rules, index, |point, material| {
+            let hoop = |phi: &f64| space.hoop(&point.at, *phi);
+            let hoops: Vec<f64> = point.phi[..stride].iter().filter(|_| space.axisymmetric).map(hoop).collect();
+            material.accumulate(&point.gradient[..stride], &hoops, point.weight, &mut blocks);
+        })?;
+        scatter(graph, &movers, &blocks, &mut matrix);
     }
+    Ok(matrix)
 }
 
 /// Add the symmetric stiffness matrix of a cell to a matrix. `movers` are the nodes that move each node of the cell.
@@ -344,13 +314,93 @@ fn scatter<const D: usize>(graph: &NodeGraph, movers: &[Movers<D>], blocks: &[[[
     }
 }
 
-/// Return whether the mid-edge nodes of a simplex with `vertices` vertices lie in the middle of straight edges, up to rounding of
-/// the coordinates `x`.
-pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
-    element::EDGES[..x.len() - vertices].iter().enumerate().all(|(k, &(i, j))| {
-        let length: f64 = (0..D).map(|c| (x[i][c] - x[j][c]).abs()).sum();
-        (0..D).all(|c| (2.0 * x[vertices + k][c] - x[i][c] - x[j][c]).abs() <= 1e-9 * length)
-    })
+/// The forces at nodes that are not zero, since most loads act on surfaces only.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct NodalForces<const D: usize> {
+    /// Nodes of the forces, sorted, each once.
+    nodes: Vec<u32>,
+    forces: Vec<[f64; D]>,
+}
+
+impl<const D: usize> NodalForces<D> {
+    /// Collect the forces at the sorted `nodes`, with `D` components each.
+    pub fn new(nodes: impl Iterator<Item = u32>, forces: &[f64]) -> Self {
+        let forces = forces.chunks_exact(D).map(|force| std::array::from_fn(|c| force[c]));
+        let (nodes, forces) = nodes.zip(forces).filter(|(_, force): &(u32, [f64; D])| *force != [0.0; D]).unzip();
+        Self { nodes, forces }
+    }
+
+    /// Return the nodes and their forces.
+    pub fn iter(&self) -> impl Iterator<Item = (u32, [f64; D])> {
+        self.nodes.iter().copied().zip(self.forces.iter().copied())
+    }
+
+    /// Return the sum of these and other forces.
+    #[must_use]
+    pub fn and(self, others: Self) -> Self {
+        if self.nodes.is_empty() || others.nodes.is_empty() {
+            return if self.nodes.is_empty() { others } else { self };
+        }
+        // At each node the force of `self` is added first.
+        self.iter().chain(others.iter()).collect()
+    }
+
+    /// Return the forces at the nodes for which `keep` holds.
+    #[must_use]
+    pub fn only(&self, keep: impl Fn(u32) -> bool) -> Self {
+        let (nodes, forces) = self.iter().filter(|(node, _)| keep(*node)).unzip();
+        Self { nodes, forces }
+    }
+
+    /// Return the resultant of the forces.
+    pub fn sum(&self) -> [f64; 3] {
+        std::array::from_fn(|c| self.forces.iter().map(|&force| pad(force)[c]).collect::<Total>().value())
+    }
+
+    /// Return the work of the forces on a displacement, and the largest work of forces and displacements of these sizes at each
+    /// node. `at` gives the displacement of a node.
+    pub fn works(&self, at: impl Fn(u32) -> [f64; D]) -> [f64; 2] {
+        let [mut work, mut largest] = [Total::default(); 2];
+        for (node, force) in self.iter() {
+            let u = at(node);
+            work.add(dot(&u, &force));
+            largest.add(length(u) * length(force));
+        }
+        [work.value(), largest.value()]
+    }
+
+    /// Return the forces at all dofs of a body with so many nodes.
+    pub fn all(&self, nodes: usize) -> Vec<f64> {
+        let mut all = vec![0.0; D * nodes];
+        self.iter().for_each(|(node, force)| all[D * node as usize..][..D].copy_from_slice(&force));
+        all
+    }
+
+    /// Return the forces at the sorted `nodes`, renumbered by their positions in this slice.
+    #[must_use]
+    pub fn on(&self, nodes: &[u32]) -> Self {
+        let (nodes, forces) = self.iter().filter_map(|(node, force)| Some((place(nodes, node)?, force))).unzip();
+        Self { nodes, forces }
+    }
+
+    /// Return whether all forces are finite.
+    pub fn is_finite(&self) -> bool {
+        self.forces.as_flattened().iter().all(|f| f.is_finite())
+    }
+}
+
+impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
+    /// Collect forces at nodes in any order. The forces at one node are added in their order.
+    fn from_iter<I: IntoIterator<Item = (u32, [f64; D])>>(forces: I) -> Self {
+        let mut all: Vec<(u32, [f64; D])> = forces.into_iter().collect();
+        all.sort_by_key(|entry| entry.0);
+        let sum = |at: &[(u32, [f64; D])]| {
+            (at[0].0, at[1..].iter().fold(at[0].1, |sum, (_, force)| std::array::from_fn(|c| sum[c] + force[c])))
+        };
+        let (nodes, forces) = all.chunk_by(|a, b| a.0 == b.0).map(sum).unzip();
+        Self { nodes, forces }
+    }
 }
 
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
@@ -362,22 +412,16 @@ pub fn body_force<const D: usize>(
     let (space, nodes) = space.part(0..space.cell_count());
     let mut load = vec![0.0; space.dofs()];
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let mut rule = quadrature::simplex(D + 1, if low { 2 } else { 5 });
+    let mut rule = element::rule(D + 1, if low { 2 } else { 5 });
     if parts == Parts::Halves {
         rule = rule.on_parts();
     }
     for index in 0..space.cell_count() {
-        let x = space.cell_nodes(index);
-        let cell = space.cell(index);
-        for (l, weight) in rule.iter() {
-            let Some((_, measure)) = element::gradients(space.order, &x, l) else { continue };
-            let phi = element::values(space.order, l);
-            let at = interpolate(&x, &phi);
-            let force = density(at);
-            let weight = weight * measure * space.circle(&at);
-            for (a, &node) in cell.iter().enumerate() {
+        for point in space.points(index, &rule).flatten() {
+            let force = density(point.at);
+            for (phi, &node) in point.phi.iter().zip(point.cell) {
                 for c in 0..D {
-                    load[D * node as usize + c] += weight * phi[a] * force[c];
+                    load[D * node as usize + c] += point.weight * phi * force[c];
                 }
             }
         }
@@ -385,25 +429,141 @@ pub fn body_force<const D: usize>(
     NodalForces::new(nodes.into_iter(), &load)
 }
 
-/// Return the point of an element with node coordinates `x` and shape function values `phi`.
-pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
-    std::array::from_fn(|i| x.iter().zip(phi).map(|(x, phi)| phi * x[i]).sum())
+/// A discretised elastic body: stiffness K, load f, and the terms that were eliminated with the prescribed dofs.
+///
+/// A prescribed dof c with the value u_c stays as a row of K with one entry, `K[c][c]` = a typical diagonal, and
+/// `f[c] = K[c][c] u_c`. Its residual then vanishes at the prescribed value. Its column is moved to the right-hand side.
+#[derive(Debug, Clone, Default)]
+pub struct ElasticBody {
+    /// Stiffness matrix K, symmetric positive semidefinite.
+    pub stiffness: Csr,
+    /// Load vector f, one entry a dof.
+    pub load: Vec<f64>,
+    /// Prescribed (dof, value), sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
+    /// K_fc u_c on the free dofs f if some prescribed value is not zero, else empty. The strain energy needs it.
+    pub lifting: Vec<f64>,
+    /// Constant to be added to u'Ku/2 - f'u to give the potential energy of the body.
+    pub energy_constant: f64,
+    /// Correction of u'Ku: u_c'K_cc u_c with the original K_cc less the value with the scaled diagonal.
+    pub strain_constant: f64,
+    /// Rigid displacement of all dofs that supports impose on the body, to be added to u; empty if there is none. All other
+    /// displacements are relative to it.
+    pub carried: Vec<f64>,
+    /// Entries of K that [`ElasticBody::reload`] needs; empty where it is not used.
+    pub held: Couplings,
+}
+
+/// The entries of K that were eliminated with the prescribed dofs. Other loads and prescribed values with the same K need them.
+#[derive(Debug, Clone, Default)]
+pub struct Couplings {
+    /// Entries (row, column, value) of K in the columns of the prescribed dofs, row by row.
+    columns: Vec<(u32, u32, f64)>,
+    /// Present value of `K[c][c]` of prescribed dofs c.
+    diagonal: f64,
+}
+
+impl ElasticBody {
+    /// Replace the loads f, one entry a dof, the values at the same prescribed dofs (dof, value), and the rigid displacement `carried`
+    /// that these values are relative to.
+    pub fn reload(&mut self, load: Vec<f64>, mut prescribed: Vec<(usize, f64)>, carried: Vec<f64>) {
+        let n = load.len();
+        let (mut value, mut has_row, scale) = (vec![None; n], vec![false; n], self.held.diagonal);
+        prescribed.iter().for_each(|&(dof, u)| value[dof] = Some(u));
+        let is_moved = prescribed.iter().any(|&(_, u)| u != 0.0);
+        self.lifting = if is_moved { vec![0.0; n] } else { Vec::new() };
+        self.energy_constant = if carried.is_empty() { 0.0 } else { -dot(&load, &carried) };
+        self.strain_constant = 0.0;
+        for &(i, j, k) in &self.held.columns {
+            let (i, j) = (i as usize, j as usize);
+            has_row[i] |= i == j;
+            let of_column = k * value[j].unwrap_or(0.0);
+            match value[i] {
+                None if is_moved => self.lifting[i] += of_column,
+                None => {}
+                Some(u) => self.strain_constant += u * of_column,
+            }
+        }
+        prescribed.retain(|entry| has_row[entry.0]);
+        self.load = load;
+        self.load.iter_mut().zip(&self.lifting).for_each(|(load, lifting)| *load -= lifting);
+        self.energy_constant += 0.5 * self.strain_constant;
+        for &(dof, u) in &prescribed {
+            self.energy_constant += 0.5 * scale * u * u - self.load[dof] * u;
+            self.strain_constant -= scale * u * u;
+            self.load[dof] = scale * u;
+        }
+        (self.prescribed, self.carried) = (prescribed, carried);
+    }
+}
+
+/// Eliminate prescribed dofs from K and f, symmetrically, and keep the terms that energies need.
+///
+/// `prescribed` holds (dof, value), sorted, without repetition. `carried` is the rigid displacement that all displacements are relative
+/// to, empty for none. Empty rows of K belong to other ranks, which also account for their energies.
+pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>, carried: Vec<f64>) -> ElasticBody {
+    let n = load.len();
+    let mut is_free = vec![true; n];
+    prescribed.iter().for_each(|entry| is_free[entry.0] = false);
+    let free: Vec<f64> =
+        (0..n).filter(|&i| is_free[i]).filter_map(|i| stiffness.position(i, i).map(|k| stiffness.values[k])).collect();
+    let diagonal = if free.is_empty() { 1.0 } else { free.iter().sum::<f64>() / free.len() as f64 };
+    let mut columns = Vec::new();
+    for i in 0..n {
+        for k in stiffness.range(i) {
+            let j = stiffness.col[k] as usize;
+            if !is_free[j] {
+                columns.push((i as u32, j as u32, stiffness.values[k]));
+            }
+            if !(is_free[i] && is_free[j]) {
+                stiffness.values[k] = if i == j { diagonal } else { 0.0 };
+            }
+        }
+    }
+    let mut body = ElasticBody { stiffness, held: Couplings { columns, diagonal }, ..ElasticBody::default() };
+    body.reload(load, prescribed, carried);
+    body
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Return the matrix K = [[3, -1], [-1, 2]] of two dofs with springs between them and to the ground.
+    fn springs() -> Csr {
+        let mut k = Csr::new(2);
+        k.push_row([(0, 3.0), (1, -1.0)]);
+        k.push_row([(0, -1.0), (1, 2.0)]);
+        k
+    }
+
     #[test]
-    fn a_cell_is_straight_if_each_edge_is() {
-        let straight = [[0.0, 0.0], [2.0, 0.0], [0.0, 4.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]];
-        assert!(is_straight(&straight, 3) && is_straight(&straight[..3], 3));
-        for (node, c) in [(3, 1), (4, 0), (5, 1)] {
-            let mut bent = straight;
-            bent[node][c] += 1e-6;
-            assert!(!is_straight(&bent, 3), "{node}");
-            bent[node][c] = straight[node][c] + 1e-10;
-            assert!(is_straight(&bent, 3), "{node}");
+    fn a_prescribed_value_keeps_energies_and_equilibrium() {
+        let body = support(springs(), vec![5.0, 0.7], vec![(1, 0.4)], Vec::new());
+        let u = [(5.0 + 0.4) / 3.0, 0.4];
+        let mut ku = [0.0; 2];
+        body.stiffness.multiply(&u, &mut ku);
+        let residual: f64 = (0..2).map(|i| (body.load[i] - ku[i]).abs()).sum();
+        assert!(residual < 1e-15, "{residual}");
+        let mut full = [0.0; 2];
+        springs().multiply(&u, &mut full);
+        let strain = dot(&u, &ku) + 2.0 * dot(&body.lifting, &u) + body.strain_constant;
+        assert!((strain - dot(&u, &full)).abs() < 1e-14);
+        let energy = 0.5 * dot(&u, &ku) - dot(&body.load, &u) + body.energy_constant;
+        let exact = 0.5 * dot(&u, &full) - 5.0 * u[0] - 0.7 * u[1];
+        assert!((energy - exact).abs() < 1e-14, "{energy} {exact}");
+    }
+
+    /// A reloaded body equals a body that is made with the other loads and prescribed values.
+    #[test]
+    fn a_body_takes_other_loads() {
+        for (u, carried) in [(0.4, vec![]), (0.0, vec![0.5, 0.5])] {
+            let mut body = support(springs(), vec![1.0, 2.0], vec![(1, -0.3)], Vec::new());
+            body.reload(vec![5.0, 0.7], vec![(1, u)], carried.clone());
+            let new = support(springs(), vec![5.0, 0.7], vec![(1, u)], carried);
+            assert_eq!((&body.load, &body.prescribed, &body.lifting), (&new.load, &new.prescribed, &new.lifting));
+            assert_eq!([body.energy_constant, body.strain_constant], [new.energy_constant, new.strain_constant]);
+            assert_eq!(new.carried.is_empty(), u != 0.0);
         }
     }
 }

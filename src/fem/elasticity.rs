@@ -1,9 +1,11 @@
-//! Elasticity of a body from the constants of the scene, which are the same everywhere, differ by region, or depend on the point.
+//! Elasticity of a body: Hooke's law sigma = C eps (2) at a point, the bounds on C (4), and constants of the scene that are the same
+//! everywhere, differ by region, or depend on the point.
 
-use super::material::{Material, Tensor};
+use super::space::{PAIRS, Slope, component};
 use super::{cross, length};
 use crate::linalg::dot;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
+use nalgebra::{Matrix3, Matrix6};
 
 /// The elasticity of a body, cell by cell.
 #[derive(Debug, Clone)]
@@ -81,9 +83,9 @@ impl Elasticity {
         self.of_cell.get(cell).copied().unwrap_or(0)
     }
 
-    /// Return Hooke's law of a cell if it is the same in the whole cell.
-    pub fn constant_in(&self, cell: usize) -> Option<&Material> {
-        self.regions[self.region(cell)].constant.as_ref().map(|(material, _)| material)
+    /// Return whether the elasticity is the same in a whole cell.
+    pub fn is_constant_in(&self, cell: usize) -> bool {
+        self.regions[self.region(cell)].constant.is_some()
     }
 
     /// Return Hooke's law, which is coercive, in a cell at a point of the scene (z = 0 in the plane).
@@ -231,5 +233,412 @@ fn unit(v: [f64; 3], otherwise: &'static str) -> Result<[f64; 3], Flaw> {
     match length(v) {
         size if size > 0.0 && size.is_finite() => Ok(v.map(|v| v / size)),
         _ => Err(Flaw::Axes(otherwise)),
+    }
+}
+
+/// Index in xx yy zz xy yz xz of each component in Voigt's order 11 22 33 23 13 12.
+const VOIGT: [usize; 6] = [0, 1, 2, 4, 5, 3];
+
+/// Least eigenvalue of a coercive matrix with ones on its diagonal; a smaller one is zero in double precision.
+const SINGULAR: f64 = 1e-13;
+
+/// Share of the largest entry of C below which an entry is the rounding of rotated axes.
+const TWISTLESS: f64 = 1e-12;
+
+/// The elasticity tensor C of space as a symmetric matrix with the unit of stress.
+///
+/// Stress (xx yy zz xy yz xz) is C times strain in the same order, where shear strains count twice (2 eps_xy).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tensor(pub [[f64; 6]; 6]);
+
+impl Tensor {
+    /// Make the isotropic tensor from Young's modulus > 0 and Poisson's ratio in (-1, 1/2).
+    pub fn isotropic(young: f64, poisson: f64) -> Self {
+        let (lambda, mu) = lame(young, poisson);
+        let mut c = [[0.0; 6]; 6];
+        for i in 0..3 {
+            c[i][..3].fill(lambda);
+            c[i][i] += 2.0 * mu;
+            c[i + 3][i + 3] = mu;
+        }
+        Self(c)
+    }
+
+    /// Make the orthotropic tensor with axes 1, 2, 3 along x, y, z from E1 E2 E3, nu12 nu13 nu23 and G12 G13 G23. Here nu12 is
+    /// the contraction along 2 under tension along 1. Return `None` if the stiffness for these moduli is not finite.
+    pub fn orthotropic(constants: &[f64; 9]) -> Option<Self> {
+        let [e1, e2, e3, nu12, nu13, nu23, g12, g13, g23] = *constants;
+        let (s12, s13, s23) = (-nu12 / e1, -nu13 / e1, -nu23 / e2);
+        let compliance = Matrix3::new(1.0 / e1, s12, s13, s12, 1.0 / e2, s23, s13, s23, 1.0 / e3);
+        let normal = compliance.try_inverse()?;
+        let mut c = [[0.0; 6]; 6];
+        for i in 0..3 {
+            for j in 0..3 {
+                c[i][j] = 0.5 * (normal[(i, j)] + normal[(j, i)]);
+            }
+        }
+        (c[3][3], c[4][4], c[5][5]) = (g12, g23, g13);
+        Some(Self(c))
+    }
+
+    /// Make the tensor from the 21 constants C11 C12 ... C16 C22 ... C66, the upper triangle by rows in Voigt's order
+    /// 11 22 33 23 13 12.
+    pub fn anisotropic(constants: &[f64; 21]) -> Self {
+        let mut c = [[0.0; 6]; 6];
+        let mut rest = constants.iter();
+        for (k, &i) in VOIGT.iter().enumerate() {
+            for (&j, &value) in VOIGT[k..].iter().zip(&mut rest) {
+                (c[i][j], c[j][i]) = (value, value);
+            }
+        }
+        Self(c)
+    }
+
+    /// Return the tensor in x, y, z of a material whose axes 1, 2, 3 have the directions `axes[0..3]` (orthonormal rows).
+    pub fn rotated(&self, axes: &[[f64; 3]; 3]) -> Self {
+        // The stress in x, y, z is `bond` times the stress in the material's axes. Since work does not depend on the axes, strains
+        // are transformed by the transpose.
+        let bond = Matrix6::from_fn(|row, column| {
+            let ((i, j), (a, b)) = (PAIRS[row], PAIRS[column]);
+            let once = axes[a][i] * axes[b][j];
+            if a == b { once } else { once + axes[b][i] * axes[a][j] }
+        });
+        let turned = bond * self.matrix() * bond.transpose();
+        Self(std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (turned[(i, j)] + turned[(j, i)]))))
+    }
+
+    /// Return whether the plane x, y is a plane of symmetry, whose strains cause no shear out of it beyond rounding.
+    pub fn keeps_plane(&self) -> bool {
+        let largest = self.0.as_flattened().iter().fold(0.0, |max: f64, c| max.max(c.abs()));
+        (0..4).all(|i| [4, 5].iter().all(|&j| self.0[i][j].abs() <= TWISTLESS * largest))
+    }
+
+    fn matrix(&self) -> Matrix6<f64> {
+        Matrix6::from_fn(|i, j| self.0[i][j])
+    }
+
+    /// Return whether C eps : eps > 0 for every strain eps (4), beyond rounding.
+    pub fn is_coercive(&self) -> bool {
+        // The matrix is scaled to ones on the diagonal. With NaN it has no Cholesky factor.
+        let root: [f64; 6] = std::array::from_fn(|i| self.0[i][i].sqrt());
+        let scaled = Matrix6::from_fn(|i, j| self.0[i][j] / root[i] / root[j]);
+        (scaled - SINGULAR * Matrix6::identity()).cholesky().is_some()
+    }
+
+    /// Return the least C eps : eps over strains with eps : eps = 1, which does not depend on the axes; NaN if C is not finite.
+    pub fn least_eigenvalue(&self) -> f64 {
+        if self.0.as_flattened().iter().any(|c| !c.is_finite()) {
+            return f64::NAN;
+        }
+        let unit = |i: usize| if i < 3 { 1.0 } else { f64::sqrt(2.0) };
+        Matrix6::from_fn(|i, j| unit(i) * unit(j) * self.0[i][j]).symmetric_eigenvalues().min()
+    }
+
+    /// Return the stiffness against uniaxial stress along x, y and z of a body that is constrained in one direction across it, as
+    /// the mean for both directions. It is E/(1 - nu^2) if the material is isotropic.
+    ///
+    /// In plane problems z is constrained (plane strain, bodies of revolution) or free (plane stress), and the z entry is zero.
+    pub fn moduli(&self, dimension: usize, plane: Plane) -> [f64; 3] {
+        let Some(s) = self.matrix().try_inverse() else { return [0.0; 3] };
+        let constrained = |i: usize, j: usize| 1.0 / (s[(i, i)] - s[(i, j)].powi(2) / s[(j, j)]);
+        std::array::from_fn(|i| match (dimension, plane) {
+            (2, _) if i == 2 => 0.0,
+            (2, Plane::Strain | Plane::Axisymmetric) => constrained(i, 2),
+            (2, Plane::Stress) => 1.0 / s[(i, i)],
+            _ => 0.5 * (constrained(i, (i + 1) % 3) + constrained(i, (i + 2) % 3)),
+        })
+    }
+
+    /// Return the tensor for the strains xx, yy, xy if the stresses zz, yz, xz vanish. Their rows and columns are zero.
+    fn plane_stress(&self) -> Self {
+        const IN: [usize; 3] = [0, 1, 3];
+        const OUT: [usize; 3] = [2, 4, 5];
+        let block = |rows: [usize; 3], columns: [usize; 3]| Matrix3::from_fn(|i, j| self.0[rows[i]][columns[j]]);
+        let mut c = [[0.0; 6]; 6];
+        // Since (4) holds, the block can be inverted.
+        if let Some(inverse) = block(OUT, OUT).try_inverse() {
+            let reduced = block(IN, IN) - block(IN, OUT) * inverse * block(OUT, IN);
+            for (i, &row) in IN.iter().enumerate() {
+                for (j, &column) in IN.iter().enumerate() {
+                    c[row][column] = 0.5 * (reduced[(i, j)] + reduced[(j, i)]);
+                }
+            }
+        }
+        Self(c)
+    }
+}
+
+/// Return Lamé's lambda and mu from Young's modulus and Poisson's ratio.
+fn lame(young: f64, poisson: f64) -> (f64, f64) {
+    (young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)), young / (2.0 * (1.0 + poisson)))
+}
+
+/// Hooke's law of a body in its dimension. Its C is that of space, which also holds for plane strain, or that of plane stress.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// Stress (xx yy zz xy yz xz) per strain.
+    stiffness: Tensor,
+    /// Lamé's lambda (for plane stress the reduced one) and mu if the material is isotropic.
+    lame: Option<(f64, f64)>,
+}
+
+impl Material {
+    /// Make the isotropic law from Young's modulus and Poisson's ratio, in `dimension` 2 or 3 (`plane` matters in 2 only).
+    pub fn isotropic(young: f64, poisson: f64, dimension: usize, plane: Plane) -> Self {
+        let (lambda, mu) = lame(young, poisson);
+        let reduced = match (dimension, plane) {
+            (2, Plane::Stress) => 2.0 * lambda * mu / (lambda + 2.0 * mu),
+            _ => lambda,
+        };
+        Self { lame: Some((reduced, mu)), ..Self::new(Tensor::isotropic(young, poisson), dimension, plane) }
+    }
+
+    /// Make the law from a coercive tensor of space.
+    pub fn new(tensor: Tensor, dimension: usize, plane: Plane) -> Self {
+        let stiffness = if dimension == 2 && plane == Plane::Stress { tensor.plane_stress() } else { tensor };
+        Self { stiffness, lame: None }
+    }
+
+    /// Add `weight` times the D x D blocks B_a' C B_b of the stiffness density for all nodes a <= b to `local[a n + b]`.
+    ///
+    /// B_a gives the strain for the displacement of node a, and n is the number of nodes. `gradient[a]` is the gradient of the
+    /// shape function of node a. In a body of revolution `hoop[a]` is this function over the radius; in others `hoop` is empty.
+    pub fn accumulate<const D: usize>(
+        &self,
+        gradient: &[[f64; D]],
+        hoop: &[f64],
+        weight: f64,
+        local: &mut [[[f64; D]; D]],
+    ) {
+        match self.lame {
+            Some((lambda, mu)) => {
+                isotropic_blocks(weight * lambda, weight * mu, gradient, local);
+                isotropic_hoops(weight * lambda, weight * mu, gradient, hoop, local);
+            }
+            None => self.blocks(gradient, hoop, weight, local),
+        }
+    }
+
+    /// Do the same as [`Material::accumulate`] for any tensor C.
+    fn blocks<const D: usize>(&self, gradient: &[[f64; D]], hoop: &[f64], weight: f64, local: &mut [[[f64; D]; D]]) {
+        let n = gradient.len();
+        for b in 0..n {
+            for j in 0..D {
+                let mut slope = Slope::<D>::ZERO;
+                slope.h[j] = gradient[b].map(|g| weight * g);
+                slope.hoop = hoop.get(b).filter(|_| j == 0).map_or(0.0, |hoop| weight * hoop);
+                let stress = self.stress(&slope.strain());
+                for a in 0..=b {
+                    let block = &mut local[a * n + b];
+                    for i in 0..D {
+                        let force: f64 = (0..D).map(|k| stress[component(i, k)] * gradient[a][k]).sum();
+                        block[i][j] += force;
+                    }
+                    block[0][j] += hoop.get(a).map_or(0.0, |hoop| stress[2] * hoop);
+                }
+            }
+        }
+    }
+
+    /// Return the largest row sum of the absolute entries of C, which is no less than its largest eigenvalue.
+    pub fn norm(&self) -> f64 {
+        self.stiffness.0.iter().map(|row| row.iter().map(|c| c.abs()).sum()).fold(0.0, f64::max)
+    }
+
+    /// Return the stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) (2).
+    pub fn stress(&self, strain: &[f64; 6]) -> [f64; 6] {
+        std::array::from_fn(|i| (0..6).map(|j| self.stiffness.0[i][j] * strain[j]).sum())
+    }
+}
+
+/// Add the blocks lambda a_i b_j + mu a_j b_i + mu (a.b) delta_ij for all pairs a, b of gradients.
+fn isotropic_blocks<const D: usize>(lambda: f64, mu: f64, gradient: &[[f64; D]], local: &mut [[[f64; D]; D]]) {
+    let n = gradient.len();
+    for (i_a, a) in gradient.iter().enumerate() {
+        for (i_b, b) in gradient.iter().enumerate().skip(i_a) {
+            let product: f64 = (0..D).map(|i| a[i] * b[i]).sum();
+            let block = &mut local[i_a * n + i_b];
+            for i in 0..D {
+                for j in 0..D {
+                    block[i][j] += lambda * a[i] * b[j] + mu * a[j] * b[i];
+                }
+                block[i][i] += mu * product;
+            }
+        }
+    }
+}
+
+/// Add what the strains u_r/r of the circles in a body of revolution contribute to lambda e e' + 2 mu (u_r/r) (u_r'/r). Here
+/// e = div u + u_r/r, and primes mark the second displacement.
+fn isotropic_hoops<const D: usize>(
+    lambda: f64,
+    mu: f64,
+    gradient: &[[f64; D]],
+    hoop: &[f64],
+    local: &mut [[[f64; D]; D]],
+) {
+    let n = hoop.len();
+    for a in 0..n {
+        for b in a..n {
+            let block = &mut local[a * n + b];
+            for i in 0..D {
+                block[0][i] += lambda * hoop[a] * gradient[b][i];
+                block[i][0] += lambda * gradient[a][i] * hoop[b];
+            }
+            block[0][0] += (lambda + 2.0 * mu) * hoop[a] * hoop[b];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::space::strain;
+
+    /// A stable material without any symmetry, the constants C11 C12 ... C66 in Voigt's order.
+    const TRICLINIC: [f64; 21] = [
+        20.0, 7.0, 6.0, 1.1, -0.7, 0.9, 15.0, 5.0, -1.3, 0.4, 0.8, 12.0, 0.6, 1.2, -0.5, 4.0, 0.3, -0.2, 5.0, 0.7, 6.0,
+    ];
+
+    const ORTHOTROPIC: [f64; 9] = [150.0, 11.0, 9.0, 0.31, 0.27, 0.41, 5.0, 4.5, 3.5];
+
+    fn material<const D: usize>(tensor: Tensor, plane: Plane) -> Material {
+        Material::new(tensor, D, plane)
+    }
+
+    /// Return C_ijkl of the constants in Voigt's order, by the definition.
+    fn full(constants: &[f64; 21], i: usize, j: usize, k: usize, l: usize) -> f64 {
+        const NUMBER: [[usize; 3]; 3] = [[0, 5, 4], [5, 1, 3], [4, 3, 2]];
+        let (p, q) = (NUMBER[i][j].min(NUMBER[k][l]), NUMBER[i][j].max(NUMBER[k][l]));
+        constants[p * 6 - p * (p + 1) / 2 + q]
+    }
+
+    /// Return orthonormal rows, rotated about two axes.
+    fn some_axes() -> [[f64; 3]; 3] {
+        let ((s, c), (t, d)) = (0.6f64.sin_cos(), 1.1f64.sin_cos());
+        [[c, s, 0.0], [-s * d, c * d, t], [s * t, -c * t, d]]
+    }
+
+    /// The matrix of 36 constants gives the same stress in rotated axes as sigma_ij = C_ijkl h_kl with all 81 constants.
+    #[test]
+    fn hookes_law_in_turned_axes() {
+        let axes = some_axes();
+        let h = [[0.3, -0.8, 0.5], [0.2, 0.7, -0.4], [1.1, 0.6, -0.9]];
+        let ours = material::<3>(Tensor::anisotropic(&TRICLINIC).rotated(&axes), Plane::Strain).stress(&strain(&h));
+        let own = |a: usize, b: usize| -> f64 {
+            (0..3).flat_map(|k| (0..3).map(move |l| (k, l))).map(|(k, l)| axes[a][k] * h[k][l] * axes[b][l]).sum()
+        };
+        for (component, (i, j)) in PAIRS.into_iter().enumerate() {
+            let mut exact = 0.0;
+            for a in 0..3 {
+                for b in 0..3 {
+                    for c in 0..3 {
+                        for d in 0..3 {
+                            exact += axes[a][i] * axes[b][j] * full(&TRICLINIC, a, b, c, d) * own(c, d);
+                        }
+                    }
+                }
+            }
+            assert!((ours[component] - exact).abs() < 1e-13 * 20.0, "{i}{j}: {} {exact}", ours[component]);
+        }
+    }
+
+    /// The blocks of the stiffness density are the stress of one shape function times the gradient of the other.
+    #[test]
+    fn blocks_are_stresses_times_gradients() {
+        let gradient = [[0.4, -1.2, 0.7], [-0.3, 0.9, 1.4]];
+        let tensor = Tensor::anisotropic(&TRICLINIC).rotated(&some_axes());
+        let isotropic = Material::isotropic(7.0, 0.2, 3, Plane::Strain);
+        for material in [material::<3>(tensor, Plane::Strain), isotropic] {
+            let mut local = [[[0.0; 3]; 3]; 4];
+            material.accumulate(&gradient, &[], 2.0, &mut local);
+            for (a, b) in [(0, 0), (0, 1), (1, 1)] {
+                for j in 0..3 {
+                    let mut h = [[0.0; 3]; 3];
+                    h[j] = gradient[b];
+                    let s = material.stress(&strain(&h));
+                    let full = [[s[0], s[3], s[5]], [s[3], s[1], s[4]], [s[5], s[4], s[2]]];
+                    for i in 0..3 {
+                        let exact: f64 = (0..3).map(|k| 2.0 * full[i][k] * gradient[a][k]).sum();
+                        assert!((local[2 * a + b][i][j] - exact).abs() < 1e-12, "{a}{b} {i}{j}");
+                    }
+                }
+            }
+        }
+        // The special formula of isotropic materials agrees with the general one.
+        let general = material::<2>(Tensor::isotropic(7.0, 0.2), Plane::Stress);
+        let short = Material::isotropic(7.0, 0.2, 2, Plane::Stress);
+        let gradient = [[0.4, -1.2], [-0.3, 0.9], [1.0, 0.1]];
+        let [mut one, mut other] = [[[[0.0; 2]; 2]; 9]; 2];
+        general.accumulate(&gradient, &[], 1.0, &mut one);
+        short.accumulate(&gradient, &[], 1.0, &mut other);
+        let apart = one.as_flattened().as_flattened().iter().zip(other.as_flattened().as_flattened());
+        assert!(apart.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 1e-14);
+    }
+
+    /// In plane stress there is no stress out of the plane. The strains zz, yz, xz for this give the same stress by the law of space.
+    #[test]
+    fn plane_stress_of_a_triclinic_material() {
+        let tensor = Tensor::anisotropic(&TRICLINIC).rotated(&some_axes());
+        let h = [[0.3, -0.8], [0.2, 0.7]];
+        let ours = material::<2>(tensor, Plane::Stress).stress(&strain(&h));
+        // Strains out of the plane follow from the compliance, eps = S sigma.
+        let compliance = tensor.matrix().try_inverse().expect("a material");
+        let all: Vec<f64> = (0..6).map(|i| (0..6).map(|j| compliance[(i, j)] * ours[j]).sum()).collect();
+        for (i, exact) in [(0, 0.3), (1, 0.7), (3, -0.6)] {
+            assert!((all[i] - exact).abs() < 1e-13, "{i}: {all:?}");
+        }
+        assert_eq!([ours[2], ours[4], ours[5]], [0.0; 3]);
+        // In plane strain the stress out of the plane follows from the law of space.
+        let h3 = [[0.3, -0.8, 0.0], [0.2, 0.7, 0.0], [0.0; 3]];
+        assert_eq!(
+            material::<2>(tensor, Plane::Strain).stress(&strain(&h)),
+            material::<3>(tensor, Plane::Strain).stress(&strain(&h3))
+        );
+    }
+
+    #[test]
+    fn coerciveness() {
+        // The least eigenvalue of an isotropic tensor is 2 mu or 3 K, in any axes.
+        for (nu, exact) in [(0.3, 2.0 * 10.0 / 2.6), (-0.5, 10.0 / 2.0)] {
+            let tensor = Tensor::isotropic(10.0, nu);
+            assert!(tensor.is_coercive() && tensor.rotated(&some_axes()).is_coercive());
+            assert!((tensor.rotated(&some_axes()).least_eigenvalue() / exact - 1.0).abs() < 1e-13);
+        }
+        // With soft shear it is 2 G, and no axes change it.
+        let mut soft = ORTHOTROPIC;
+        soft[8] = 0.2;
+        let tensor = Tensor::orthotropic(&soft).expect("a matrix");
+        for tensor in [tensor, tensor.rotated(&some_axes())] {
+            assert!((tensor.least_eigenvalue() / 0.4 - 1.0).abs() < 1e-12, "{}", tensor.least_eigenvalue());
+        }
+        assert!(Tensor::isotropic(1.0, 0.499_999_99).is_coercive());
+        assert!(Tensor::anisotropic(&TRICLINIC).is_coercive());
+        // Here 1 - nu23 nu32 < 0.
+        let mut wrong = ORTHOTROPIC;
+        wrong[5] = 1.2;
+        let tensor = Tensor::orthotropic(&wrong).expect("a matrix");
+        assert!(!tensor.is_coercive() && tensor.least_eigenvalue() < 0.0, "{}", tensor.least_eigenvalue());
+        // A singular tensor has a strain without energy.
+        let mut c = Tensor::isotropic(1.0, 0.0);
+        c.0[1][1] = 0.0;
+        assert!(!c.is_coercive() && c.least_eigenvalue() == 0.0);
+        c.0[1][1] = f64::NAN;
+        assert!(!c.is_coercive() && c.least_eigenvalue().is_nan());
+    }
+
+    #[test]
+    fn moduli_against_pressure() {
+        let near = |found: [f64; 3], exact: [f64; 3]| (0..3).all(|i| (found[i] / exact[i] - 1.0).abs() < 1e-12);
+        let constrained = 2.1e5 / 0.91;
+        assert!(near(Tensor::isotropic(2.1e5, 0.3).moduli(3, Plane::Strain), [constrained; 3]));
+        let c = Tensor::orthotropic(&ORTHOTROPIC).expect("a material");
+        let [e1, e2, e3, _, nu13, nu23, ..] = ORTHOTROPIC;
+        // Since eps_z = 0, sigma_z = nu_zi sigma_i.
+        let strain = c.moduli(2, Plane::Strain);
+        assert!((strain[0] * (1.0 / e1 - nu13 * nu13 * e3 / e1 / e1) - 1.0).abs() < 1e-12);
+        assert!((strain[1] * (1.0 / e2 - nu23 * nu23 * e3 / e2 / e2) - 1.0).abs() < 1e-12);
+        let stress = c.moduli(2, Plane::Stress);
+        assert!((stress[0] / e1 - 1.0).abs() < 1e-12 && (stress[1] / e2 - 1.0).abs() < 1e-12 && stress[2] == 0.0);
     }
 }

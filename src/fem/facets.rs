@@ -151,6 +151,31 @@ impl<const D: usize> Facets<D> {
         Self { nodes: kept.collect(), ..*self }
     }
 
+    /// Return the edges of facet `i` (in the plane its ends), each opposite to one vertex. An edge is its sorted vertices with a
+    /// `u32::MAX` at the end, in place of the opposite vertex.
+    pub fn edges(&self, i: usize) -> [[u32; D]; D] {
+        let vertices = &self.facet(i)[..D];
+        std::array::from_fn(|opposite| {
+            let mut edge = std::array::from_fn(|k| if k == opposite { u32::MAX } else { vertices[k] });
+            edge.sort_unstable();
+            edge
+        })
+    }
+
+    /// Return the facets at each edge, in their order.
+    pub fn by_edge(&self) -> HashMap<[u32; D], Vec<usize>> {
+        let mut around: HashMap<[u32; D], Vec<usize>> = HashMap::new();
+        for i in 0..self.count() {
+            self.edges(i).into_iter().for_each(|edge| around.entry(edge).or_default().push(i));
+        }
+        around
+    }
+
+    /// Return the point of facet `i` with barycentric coordinates `l`.
+    pub fn point(&self, i: usize, space: &Space<D>, l: &[f64]) -> [f64; D] {
+        element::interpolate(&self.coordinates(i, space), &element::values(self.order, l))
+    }
+
     /// Return the coordinates of the nodes of facet `i`.
     pub fn coordinates(&self, i: usize, space: &Space<D>) -> Vec<[f64; D]> {
         self.facet(i).iter().map(|&node| space.nodes[node as usize]).collect()

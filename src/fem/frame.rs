@@ -1,13 +1,17 @@
 //! The coordinates v in which a body is solved. Nodal displacements are u = T v.
 //!
 //! A support along an inclined direction rotates the axes of its nodes, so that it prescribes one component there. A rigid
-//! surface ties its nodes to one of them, the master, whose dofs move all of them; where the surface turns, the dofs of a second node,
-//! the pole, are its rotation. In v every support is a prescribed dof, and the blocks of K keep their size.
+//! surface ties its nodes to one of them, the master, whose dofs move all of them. In v every support is a prescribed dof, and the
+//! blocks of K keep their size.
+//!
+//! The nodes i of a rigid surface that turns move by u_i = u_A + theta x (x_i - x_A), where A is the master. The rotation has the dofs of
+//! a second node, the pole: v = L theta, with the distance L of the pole from the master. So v is a displacement like all other dofs, and
+//! with the farthest node as the pole no node moves by more than v. In the plane theta is the first dof, and the other one is zero.
 
-use super::lever::{Levers, Rotation};
-use super::minus;
+use super::{cross, length, minus, pad, unit};
 use crate::exchange::Plain;
-use crate::linalg::Csr;
+use crate::linalg::{Csr, dot};
+use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -188,10 +192,127 @@ fn vector<const D: usize>(all: &[f64], node: u32) -> [f64; D] {
     std::array::from_fn(|c| all[D * node as usize + c])
 }
 
+/// The levers of a rigid surface that turns.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct Levers<const D: usize> {
+    /// Node whose dofs v are those of the rotation.
+    pub pole: u32,
+    /// Matrix R of each tied node, also of the pole: the rotation moves the node by R v.
+    pub matrix: BTreeMap<u32, SMatrix<f64, D, D>>,
+    /// Weights G of a few tied nodes, which give the rotation of a rigid displacement: v is the sum of G (u - u_master).
+    pub weights: BTreeMap<u32, SMatrix<f64, D, D>>,
+    /// Distance L of the pole from the master.
+    length: f64,
+    /// Vector from the master to the centre of the surface.
+    arm: [f64; D],
+}
+
+/// The rotation that moves a node.
+#[derive(Clone, Copy)]
+pub struct Rotation<'a, const D: usize> {
+    /// Node whose dofs v are the rotation.
+    pub pole: u32,
+    /// Matrix R: the displacement of the node has the summand R v.
+    pub matrix: &'a SMatrix<f64, D, D>,
+}
+
+impl<const D: usize> Rotation<'_, D> {
+    /// Return a force at the node as a force R'f at the dofs of the rotation.
+    pub fn turning(&self, force: [f64; D]) -> [f64; D] {
+        self.matrix.tr_mul(&SVector::from(force)).into()
+    }
+}
+
+impl<const D: usize> Levers<D> {
+    /// Make the levers of a surface with these `nodes`, the first of which is its master. `x` gives the place of a node. The nodes of a
+    /// surface in space must not lie on one line.
+    pub fn new(nodes: &[u32], x: impl Fn(u32) -> [f64; D], centre: [f64; D]) -> Self {
+        let (master, tied) = (nodes[0], &nodes[1..]);
+        let arm = |node: u32| minus(x(node), x(master));
+        let farthest = |distance: &dyn Fn(u32) -> f64| {
+            tied.iter().copied().max_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(master)
+        };
+        let pole = farthest(&|node| length(arm(node)));
+        let size = length(arm(pole));
+        let along = pad(unit(arm(pole)));
+        let third = farthest(&|node| length(cross(along, pad(arm(node)))));
+        let matrix: BTreeMap<u32, _> = tied.iter().map(|&node| (node, rotation(arm(node), size))).collect();
+        let used = if D == 2 { vec![pole] } else { vec![pole, third] };
+        // Least squares; in the plane the second dof does not move anything.
+        let mut normal: SMatrix<f64, D, D> = used.iter().map(|node| matrix[node].transpose() * matrix[node]).sum();
+        if D == 2 {
+            normal[(1, 1)] = 1.0;
+        }
+        let inverse = normal.cholesky().map(|factor| factor.inverse()).unwrap_or(SMatrix::repeat(f64::NAN));
+        let weight = |node: &u32| (*node, inverse * matrix[node].transpose());
+        Self { pole, weights: used.iter().map(weight).collect(), matrix, length: size, arm: minus(centre, x(master)) }
+    }
+
+    /// Return the levers with other numbers of nodes. Tied nodes without a number are left out; the result is `None` if the pole has
+    /// no number, or a node with weights.
+    fn renumbered(&self, number: impl Fn(&u32) -> Option<u32>) -> Option<Self> {
+        let matrix = self.matrix.iter().filter_map(|(node, matrix)| Some((number(node)?, *matrix)));
+        let weights = self.weights.iter().map(|(node, weight)| Some((number(node)?, *weight)));
+        Some(Self {
+            pole: number(&self.pole)?,
+            matrix: matrix.collect(),
+            weights: weights.collect::<Option<_>>()?,
+            ..*self
+        })
+    }
+
+    /// Return the rotation that moves a node, if it is a tied node of the surface.
+    fn rotation_of(&self, node: u32) -> Option<Rotation<'_, D>> {
+        self.matrix.get(&node).map(|matrix| Rotation { pole: self.pole, matrix })
+    }
+
+    /// Return nodal forces, given by `force`, as a force at the dofs of the rotation.
+    fn turning(&self, force: impl Fn(u32) -> [f64; D]) -> [f64; D] {
+        let of_node = |(&node, matrix): (&u32, &SMatrix<f64, D, D>)| matrix.tr_mul(&SVector::from(force(node)));
+        self.matrix.iter().map(of_node).sum::<SVector<f64, D>>().into()
+    }
+
+    /// Return the dofs v of the rotation of a rigid displacement. `relative` is the displacement of a node relative to the master.
+    fn dofs(&self, relative: impl Fn(u32) -> [f64; D]) -> [f64; D] {
+        let of_node = |(&node, weight): (&u32, &SMatrix<f64, D, D>)| weight * SVector::from(relative(node));
+        self.weights.iter().map(of_node).sum::<SVector<f64, D>>().into()
+    }
+
+    /// Return the displacement of a node by the rotation with the dofs v.
+    fn displacement(&self, node: u32, v: [f64; D]) -> [f64; D] {
+        self.matrix.get(&node).map_or([0.0; D], |matrix| (matrix * SVector::from(v)).into())
+    }
+
+    /// Return nodal forces with the total `force` that acts at the centre and the `moment` (x, y, z) about the centre. `master` is the
+    /// master of the surface.
+    pub fn forces(&self, master: u32, force: [f64; D], moment: [f64; 3]) -> Vec<(u32, [f64; D])> {
+        let about_master = cross(pad(self.arm), pad(force));
+        let moment: [f64; 3] = std::array::from_fn(|c| moment[c] + about_master[c]);
+        let at_pole = SVector::from_fn(|k, _| dot(&moment, &axis::<D>(k)) / self.length);
+        let couple = |(node, weight): (&u32, &SMatrix<f64, D, D>)| (*node, weight.tr_mul(&at_pole).into());
+        let mut forces: Vec<(u32, [f64; D])> = self.weights.iter().map(couple).collect();
+        // The force of the couple at the master is last, so that without a total force the sum is zero to the last digit.
+        let opposite = forces.iter().fold([0.0; D], |sum, entry| minus(sum, entry.1));
+        forces.extend([(master, opposite), (master, force)]);
+        forces
+    }
+}
+
+/// Return the axis of rotation of a dof of the pole. It is zero for the second one in the plane.
+fn axis<const D: usize>(dof: usize) -> [f64; 3] {
+    let about = if D == 2 { dof + 2 } else { dof };
+    std::array::from_fn(|c| if c == about { 1.0 } else { 0.0 })
+}
+
+/// Return the matrix R of a node at `arm` from the master, where the pole is at the distance `length`.
+fn rotation<const D: usize>(arm: [f64; D], length: f64) -> SMatrix<f64, D, D> {
+    SMatrix::from_fn(|c, dof| cross(axis::<D>(dof), pad(arm))[c] / length)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linalg::dot;
 
     #[test]
     fn forces_do_the_same_work_in_both_coordinates() {

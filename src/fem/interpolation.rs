@@ -107,7 +107,7 @@ fn mean_of_ends<const D: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::sample::block;
+    use crate::fem::space::sample::block;
 
     /// Return the values at all dofs, and those at the dofs of coarse nodes.
     fn both(space: &Space<3>, frame: &Frame<3>, u: impl Fn(&[f64; 3]) -> [f64; 3]) -> (Vec<f64>, Vec<f64>) {

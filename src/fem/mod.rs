@@ -1,54 +1,34 @@
 //! Finite elements on one body: P1 and P2 simplices, linear elasticity, assembly into sparse rows.
 //!
 //! Data flow: [`Mesh`](crate::mesh::Mesh) group -> [`Space`] -> [`assemble`] -> [`ElasticBody`] {K, f, supports}. Afterwards
-//! [`stress`] recovers nodal stresses from displacements. Degrees of freedom are numbered `D * node + component`.
+//! [`displacement`] has the stresses of a displacement. Degrees of freedom are numbered `D * node + component`.
 
 pub mod assemble;
+pub mod displacement;
 pub mod elasticity;
 pub mod element;
-pub mod extent;
-pub mod facets;
-pub mod forces;
-pub mod frame;
-pub mod internal;
+mod facets;
+mod frame;
 pub mod interpolation;
-pub mod lever;
-pub mod material;
-pub mod norms;
-pub mod quadrature;
-pub mod recovery;
+mod recovery;
 pub mod rigid;
-#[cfg(test)]
-pub mod sample;
-pub mod slope;
 pub mod space;
-pub mod strain;
-pub mod stress;
-mod support;
 pub mod surface;
 #[cfg(test)]
 mod tests;
-pub mod turn;
 
 use crate::linalg::dot;
 
 pub use crate::linalg::pad;
-pub use assemble::{NodalBlock, NodeGraph};
-pub use elasticity::Elasticity;
-pub use element::EDGES;
-pub use extent::Extent;
+pub use assemble::{Couplings, ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
+pub use elasticity::{Elasticity, Material};
+pub use element::{EDGES, Parts};
 pub use facets::{Facets, area_vector};
-pub use forces::NodalForces;
-pub use frame::{Frame, place};
+pub use frame::{Frame, Levers, place};
 pub use interpolation::Interpolation;
-pub use lever::Levers;
-pub use material::Material;
-pub use quadrature::Parts;
-pub use recovery::{InterpolationError, Recovery};
-pub use rigid::{FreeMotion, RigidMotion};
-pub use slope::Slope;
-pub use space::Space;
-pub use support::{Couplings, ElasticBody, support};
+pub use recovery::{Errors, Recovery};
+pub use rigid::{Extent, FreeMotion, RigidMotion};
+pub use space::{Slope, Space};
 
 /// Return the Euclidean length of a vector.
 pub fn length<const D: usize>(v: [f64; D]) -> f64 {

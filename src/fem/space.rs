@@ -1,6 +1,7 @@
-//! The finite element space of one body: its nodes and cells, numbered within the body.
+//! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of cells.
 
-use super::{Slope, cross, element, minus, pad};
+use super::element::{self, Rule};
+use super::{cross, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh, Numbering, datum};
@@ -177,25 +178,21 @@ impl<const D: usize> Space<D> {
         if D == 2 { 0.5 * normal[2].abs() } else { dot(&normal, &edge(3)).abs() / 6.0 }
     }
 
-    /// Return the gradient of a displacement `u`, one entry a dof, in a cell with these nodes at the point `at`. The shape functions of
-    /// the cell have the values `phi` and these gradients there.
-    pub fn slope(&self, cell: &[u32], at: &[f64; D], phi: &[f64], gradient: &[[f64; D]], u: &[f64]) -> Slope<D> {
-        let mut h = [[0.0; D]; D];
-        for (&node, gradient) in cell.iter().zip(gradient) {
-            for i in 0..D {
-                for j in 0..D {
-                    h[i][j] += u[D * node as usize + i] * gradient[j];
-                }
-            }
-        }
-        let radial = || cell.iter().zip(phi).map(|(&node, phi)| phi * u[D * node as usize]).sum::<f64>();
-        let hoop = match self.axisymmetric {
-            false => 0.0,
-            // On the axis this is the limit of u_r/r.
-            true if at[0] == 0.0 => h[0][0],
-            true => radial() / at[0],
-        };
-        Slope { h, hoop }
+    /// Return the point with barycentric coordinates `l` in cell `i`, whose nodes have the coordinates `x`. Its `weight` in an integral
+    /// over the body is that of a quadrature point with this `weight`. The result is `None` if the map of the cell is singular or
+    /// inverted there.
+    pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<Point<'a, D>> {
+        let (gradient, measure) = element::gradients(self.order, x, l)?;
+        let phi = element::values(self.order, l);
+        let at = element::interpolate(x, &phi);
+        let weight = weight * measure * self.circle(&at);
+        Some(Point { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })
+    }
+
+    /// Return the points of a quadrature rule in cell `i`; `None` for those where the map of the cell is singular or inverted.
+    pub fn points<'a>(&'a self, i: usize, rule: &'a Rule) -> impl Iterator<Item = Option<Point<'a, D>>> {
+        let x = self.cell_nodes(i);
+        rule.iter().map(move |(l, weight)| self.point(i, &x, l, weight))
     }
 
     /// Return the mean of the corners of cell `i`.
@@ -249,5 +246,171 @@ impl<const D: usize> Space<D> {
         nodes.sort_unstable();
         nodes.dedup();
         nodes
+    }
+}
+
+/// A point of a cell, with the shape functions of the cell there.
+pub struct Point<'a, const D: usize> {
+    space: &'a Space<D>,
+    /// Nodes of the cell.
+    pub cell: &'a [u32],
+    /// Barycentric coordinates of the point.
+    pub l: &'a [f64],
+    /// The place of the point.
+    pub at: [f64; D],
+    /// Values of the shape functions.
+    pub phi: [f64; element::MOST],
+    /// Gradients of the shape functions.
+    pub gradient: [[f64; D]; element::MOST],
+    /// Area (volume) of the affine simplex that has the Jacobian of the cell here.
+    pub measure: f64,
+    /// Weight of the point in an integral over the body.
+    pub weight: f64,
+}
+
+impl<const D: usize> Point<'_, D> {
+    /// Return the gradient here of a displacement `u`, one entry a dof.
+    pub fn slope(&self, u: &[f64]) -> Slope<D> {
+        let mut h = [[0.0; D]; D];
+        for (&node, gradient) in self.cell.iter().zip(&self.gradient) {
+            for i in 0..D {
+                for j in 0..D {
+                    h[i][j] += u[D * node as usize + i] * gradient[j];
+                }
+            }
+        }
+        let radial = || self.cell.iter().zip(&self.phi).map(|(&node, phi)| phi * u[D * node as usize]).sum::<f64>();
+        let hoop = match self.space.axisymmetric {
+            false => 0.0,
+            // On the axis this is the limit of u_r/r.
+            true if self.at[0] == 0.0 => h[0][0],
+            true => radial() / self.at[0],
+        };
+        Slope { h, hoop }
+    }
+
+    /// Return a displacement `u`, one entry a dof, here.
+    pub fn value(&self, u: &[f64]) -> [f64; D] {
+        let at = |c| self.cell.iter().zip(self.phi).map(|(&node, phi)| phi * u[D * node as usize + c]).sum();
+        std::array::from_fn(at)
+    }
+
+    /// Return the force on node `a` of the cell of a stress (xx yy zz xy yz xz) per volume: its product with the gradient of the shape
+    /// function of the node.
+    pub fn force(&self, stress: &[f64; 6], a: usize) -> [f64; D] {
+        let along = |c: usize| (0..D).map(|j| stress[component(c, j)] * self.gradient[a][j]).sum();
+        let mut force = std::array::from_fn(along);
+        force[0] += stress[2] * self.space.hoop(&self.at, self.phi[a]);
+        force
+    }
+}
+
+/// Index pairs of the components xx yy zz xy yz xz of stress and strain, in the order of VTK.
+pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
+
+/// Return the index of the component (i, j) of a symmetric tensor in [`PAIRS`].
+pub fn component(i: usize, j: usize) -> usize {
+    match (i.min(j), i.max(j)) {
+        (i, j) if i == j => i,
+        (0, 1) => 3,
+        (1, _) => 4,
+        _ => 5,
+    }
+}
+
+/// The gradient of a displacement at a point.
+///
+/// In a body of revolution x is the radius r and y runs along the axis. The radial displacement u_r also stretches the circle through
+/// the point, so that the third normal strain is u_r/r.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slope<const D: usize> {
+    /// Derivatives du_i/dx_j.
+    pub h: [[f64; D]; D],
+    /// Strain u_r/r of the circle in a body of revolution, zero in others.
+    pub hoop: f64,
+}
+
+impl<const D: usize> Slope<D> {
+    /// The gradient of a constant displacement.
+    pub const ZERO: Self = Self { h: [[0.0; D]; D], hoop: 0.0 };
+
+    /// Add `factor` times another gradient.
+    pub fn add(&mut self, factor: f64, other: &Self) {
+        for (sum, term) in self.h.iter_mut().flatten().zip(other.h.iter().flatten()) {
+            *sum += factor * term;
+        }
+        self.hoop += factor * other.hoop;
+    }
+
+    /// Return the strain (xx yy zz, and 2 eps of xy yz xz) (3). The strain of the circles is zz.
+    pub fn strain(&self) -> [f64; 6] {
+        let mut strain = strain(&self.h);
+        strain[2] += self.hoop;
+        strain
+    }
+
+    /// Return the sum of the squares of all entries.
+    pub fn square(&self) -> f64 {
+        self.h.as_flattened().iter().map(|h| h * h).sum::<f64>() + self.hoop * self.hoop
+    }
+}
+
+/// Return the strain (xx yy zz, and 2 eps of xy yz xz) of a displacement gradient (3).
+pub fn strain<const D: usize>(h: &[[f64; D]; D]) -> [f64; 6] {
+    PAIRS.map(|(i, j)| match (i < D && j < D, i == j) {
+        (false, _) => 0.0,
+        (_, true) => h[i][i],
+        _ => h[i][j] + h[j][i],
+    })
+}
+
+#[cfg(test)]
+pub(crate) mod sample {
+    use super::*;
+
+    /// Make the space of a cube with `n` cells in each direction, which are divided into simplices that share one diagonal. The
+    /// coordinates are skewed.
+    pub fn block<const D: usize>(n: usize, order: Order) -> Space<D> {
+        let count = 2 * n + 1;
+        let number = |at: [usize; D]| at.iter().rev().fold(0, |sum, &k| sum * count + k) as u32;
+        let place = |mut index: usize| -> [f64; D] {
+            let at: [f64; D] = std::array::from_fn(|_| {
+                let k = index % count;
+                index /= count;
+                k as f64 / (2 * n) as f64
+            });
+            std::array::from_fn(|c| at[c] + 0.2 * at[(c + 1) % D] * usize::from(c + 1 < D) as f64)
+        };
+        let mut connectivity = Vec::new();
+        let permutations: &[&[usize]] = if D == 2 {
+            &[&[0, 1], &[1, 0]]
+        } else {
+            &[&[0, 1, 2], &[1, 2, 0], &[2, 0, 1], &[0, 2, 1], &[2, 1, 0], &[1, 0, 2]]
+        };
+        for cell in 0..n.pow(D as u32) {
+            let corner: [usize; D] = std::array::from_fn(|c| 2 * (cell / n.pow(c as u32) % n));
+            for permutation in permutations {
+                let mut path = vec![corner];
+                for &axis in *permutation {
+                    let mut next = path[path.len() - 1];
+                    next[axis] += 2;
+                    path.push(next);
+                }
+                let even =
+                    permutation.iter().enumerate().map(|(i, p)| permutation[i..].iter().filter(|q| *q < p).count());
+                if even.sum::<usize>() % 2 == 1 {
+                    path.swap(0, 1);
+                }
+                connectivity.extend(path.iter().map(|&at| number(at)));
+                for &(i, j) in &element::EDGES[..D * (D + 1) / 2] {
+                    connectivity.push(number(std::array::from_fn(|c| (path[i][c] + path[j][c]) / 2)));
+                }
+            }
+        }
+        let stride = element::node_count(D + 1, Order::P2);
+        let group = Group { name: "block".into(), dimension: D, stride, connectivity, tags: Vec::new() };
+        let points = (0..count.pow(D as u32)).map(place).collect();
+        let mesh = Mesh::new("block".into(), points, Order::P2, vec![group].into());
+        Space::new(&mesh, &mesh.groups[0], order)
     }
 }

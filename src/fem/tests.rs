@@ -1,6 +1,6 @@
 //! Tests of rigid surfaces that turn: dofs, matrices and forces together.
 
-use super::sample::block;
+use super::space::sample::block;
 use super::{Elasticity, Extent, Frame, Levers, NodeGraph, RigidMotion, Space, assemble, rigid};
 use crate::linalg::dot;
 use crate::problem::{BodySpec, Order, Plane};

@@ -1,6 +1,8 @@
-//! Vectors over all bodies: iterates, corrections, search directions.
+//! Vectors over all bodies (iterates, corrections, search directions), and the functional F1 along a line with an exact line search. F1
+//! is convex.
 
 use super::body::Energy;
+use super::layer::Layer;
 use super::{BodySlot, Model};
 use crate::linalg::{axpy, dot};
 
@@ -127,4 +129,135 @@ pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
             body.add_rows(&model.at_rows(index, force), y);
         }
     }
+}
+
+/// F1(u + t v) as a function of t: linear and quadratic terms of the bodies, and the laws of the layers at every point.
+pub struct Line<'a> {
+    model: &'a Model,
+    /// Compression at u, n.
+    compression: &'a [f64],
+    /// B v, the change of compression with t, n.
+    closing: Vec<f64>,
+    /// (K u - f)'v.
+    slope: f64,
+    /// v'K v.
+    curvature: f64,
+}
+
+/// The error for a line along which F1 decreases without end, because some body is not constrained.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Unbounded;
+
+impl<'a> Line<'a> {
+    /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`. One message.
+    pub fn new(model: &'a mut Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field) -> Self {
+        let kv = apply_stiffness(model, v);
+        let mut sums = [local_dot(r, &v.states), local_dot(&kv, &v.states)];
+        model.exchange.sum(&mut sums);
+        let closing = v.closing();
+        let slope = -sums[0] - dot(&layer.force, &closing);
+        Self { model, compression: &layer.compression, closing, slope, curvature: sums[1] }
+    }
+
+    /// Return v'K v.
+    pub fn curvature(&self) -> f64 {
+        self.curvature
+    }
+
+    /// Return d/dt F1(u + t v).
+    pub fn derivative(&self, t: f64) -> f64 {
+        let mut sum = self.slope + t * self.curvature;
+        for (i, pair) in self.model.pairs.iter().enumerate() {
+            for q in self.model.range(i) {
+                let s = self.closing[q];
+                if s != 0.0 {
+                    let c = self.compression[q] + t * s;
+                    sum += self.model.weight[q] * pair.law.pressure(q - self.model.offset[i], c) * s;
+                }
+            }
+        }
+        // a law that leaves the range of numbers resists with an infinite force
+        if sum.is_nan() { f64::INFINITY } else { sum }
+    }
+
+    /// Return F1(u + t v) - F1(u); infinite beyond the range of numbers.
+    pub fn change(&self, t: f64) -> f64 {
+        let mut sum = t * (self.slope + 0.5 * t * self.curvature);
+        for (i, pair) in self.model.pairs.iter().enumerate() {
+            for q in self.model.range(i) {
+                let energy = |c: f64| pair.law.response(q - self.model.offset[i], c).energy;
+                let c = self.compression[q];
+                sum += self.model.weight[q] * (energy(c + t * self.closing[q]) - energy(c));
+            }
+        }
+        if sum.is_nan() { f64::INFINITY } else { sum }
+    }
+
+    /// Return the minimiser t >= 0 of F1 along the line, or 0 if F1 does not decrease along it. `accuracy` is that of the derivative, relative to the derivative
+    /// at 0.
+    ///
+    /// # Errors
+    /// [`Unbounded`] if F1 still decreases at the longest step.
+    pub fn minimize(&self, accuracy: f64) -> Result<f64, Unbounded> {
+        zero(|t| self.derivative(t), self.derivative(0.0), accuracy)
+    }
+}
+
+/// Step, as a multiple of the first one, beyond which nothing stops a motion. With a law p = c^10, a load of 1e-100 moves a body 1e90 times as far as the
+/// springs of a first step do. Squares of longer steps leave the range of numbers.
+const LONGEST: f64 = 1e150;
+
+/// A point (t, f(t)) of a function f, and the value that the secant rule uses in place of f(t).
+#[derive(Clone, Copy)]
+struct Point {
+    t: f64,
+    value: f64,
+    weight: f64,
+}
+
+impl Point {
+    fn new(t: f64, value: f64) -> Self {
+        Self { t, value, weight: value }
+    }
+}
+
+/// Return the zero t >= 0 of an increasing function with the value `start` at 0, or 0 if `start` is not negative. `accuracy` is relative to `start`.
+///
+/// # Errors
+/// [`Unbounded`] if the function is still negative at the longest step.
+pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64, Unbounded> {
+    if start >= 0.0 {
+        return Ok(0.0);
+    }
+    let target = accuracy * start.abs();
+    let (mut low, mut high) = (Point::new(0.0, start), Point::new(1.0, value(1.0)));
+    while high.value < -target {
+        if high.t > LONGEST {
+            return Err(Unbounded);
+        }
+        low = high;
+        high = Point::new(4.0 * high.t, value(4.0 * high.t));
+    }
+    // Illinois variant of the secant rule, with bisection where a law is too steep for it
+    for _ in 0..200 {
+        if high.value <= target {
+            return Ok(high.t);
+        }
+        let secant = (low.t * high.weight - high.t * low.weight) / (high.weight - low.weight);
+        let middle = 0.5 * (low.t + high.t);
+        let is_steep = !high.value.is_finite() || high.value > 1e3 * low.value.abs();
+        let t = if is_steep || !(secant > low.t && secant < high.t) { middle } else { secant };
+        let next = Point::new(t, value(t));
+        if next.value.abs() <= target || high.t - low.t <= 1e-15 * high.t {
+            return Ok(t);
+        }
+        if next.value < 0.0 {
+            low = next;
+            high.weight *= 0.5;
+        } else {
+            high = next;
+            low.weight *= 0.5;
+        }
+    }
+    Ok(low.t)
 }

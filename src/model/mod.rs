@@ -5,24 +5,26 @@
 //! A body is local if it lives on this rank, wholly or in part.
 
 pub mod body;
-pub mod coarse;
-pub mod distribution;
 pub mod field;
-pub mod joint;
 pub mod layer;
-pub mod line;
 pub mod linear;
-pub mod origin;
 pub mod rigid;
-pub mod surface;
 
-pub use body::{Body, BodyCounts, Energy, Loads, Matrices, Solved};
-pub use distribution::Distribution;
+pub use body::{Body, BodyCounts, Distribution, Energy, Joint, Loads, Matrices, Solved};
 pub use field::Field;
-pub use joint::Joint;
 pub use layer::Layer;
 pub use linear::{LinearStep, Solution};
 pub use rigid::{Motions, Moved};
+// Names of former modules.
+pub use field as line;
+pub use rigid as coarse;
+pub use rigid as origin;
+
+/// Name of a former module.
+pub mod surface {
+    pub use super::layer::{contact_slopes, in_series, meeting_slopes, surface_slopes};
+}
+
 use serde::{Deserialize, Serialize};
 
 use crate::contact::ContactPair;

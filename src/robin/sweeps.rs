@@ -8,10 +8,10 @@ use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
-use crate::model::coarse::{Coarse, Space};
 use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
 use crate::model::linear::{Enough, Failure, LinearStep, Solution, Solved, System, Trial};
 use crate::model::rigid::Motions;
+use crate::model::rigid::{Coarse, Space};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::rc::Rc;
 

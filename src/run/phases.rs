@@ -72,8 +72,8 @@ pub fn build_after(
     }
     collectively(session, options::refuse_log(session))?;
     match scene.dimension.value {
-        2 => build_in::<2>(session, scene, pieces::plane, kept, interrupt, clock),
-        _ => build_in::<3>(session, scene, pieces::space, kept, interrupt, clock),
+        2 => build_in::<2>(session, scene, pieces::in_plane, kept, interrupt, clock),
+        _ => build_in::<3>(session, scene, pieces::in_space, kept, interrupt, clock),
     }
 }
 

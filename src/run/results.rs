@@ -7,7 +7,7 @@ use crate::contact::{ContactPair, moment_in_scene};
 use crate::discretize::{Balance, BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
-use crate::fem::strain::{self, Strained};
+use crate::fem::displacement::{self, Strained};
 use crate::linalg::{around, bounds, dot};
 use crate::model::{Body, BodySlot, Model};
 use crate::output::report::readable;
@@ -140,7 +140,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
         if extremes.is_moved_far() {
             moved.push(report.name.clone());
         }
-        if extremes.strain.most > strain::SMALL {
+        if extremes.strain.most > displacement::SMALL {
             strained.push(strain_in_words(&report.name, &extremes.strain));
         }
     }
@@ -154,7 +154,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
     let strained = (!strained.is_empty()).then(|| {
         format!(
             "strains of more than {} per cent: {}. Linear elasticity is the theory of small ones: look at the moduli, the loads and the units",
-            100.0 * strain::SMALL,
+            100.0 * displacement::SMALL,
             few(strained).join("; ")
         )
     });

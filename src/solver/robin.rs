@@ -3,7 +3,7 @@
 use super::{Change, InnerSolver};
 use crate::error::Result;
 use crate::linalg::Csr;
-use crate::model::coarse::{Coarse, Space};
+use crate::model::rigid::{Coarse, Space};
 use crate::model::{BodyCounts, Model, Solved};
 use crate::petsc::{Rows, Subspace};
 use std::ops::Range;
@@ -210,7 +210,7 @@ impl Coupling {
     }
 }
 
-/// The [coarse space](crate::model::coarse) of rigid motions of all bodies, in the rows of the matrix that this rank owns.
+/// The [coarse space](crate::model::rigid::Coarse) of rigid motions of all bodies, in the rows of the matrix that this rank owns.
 pub struct RigidSpace {
     space: Rc<Space>,
     /// The columns of B that this rank owns; one row a contact point.

@@ -4,7 +4,7 @@ use crate::common::{Run, Scene, root, solve, winkler};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use winkler::contact::Side;
-use winkler::fem::{Elasticity, Frame, Space, stress};
+use winkler::fem::{Elasticity, Frame, Space, displacement};
 use winkler::interrupt::Interrupt;
 use winkler::mesh::load;
 use winkler::problem::order::Order;
@@ -413,7 +413,7 @@ fn stress_along_the_circles() {
         let space = space.revolved();
         assert!(space.nodes.iter().any(|x| x[0] == 0.0), "the shell meets the axis");
         let u: Vec<f64> = space.nodes.iter().flat_map(|x| [a * x[0], b * x[1]]).collect();
-        for (s, x) in stress::nodal(&space, &elasticity, &u).iter().zip(&space.nodes) {
+        for (s, x) in displacement::nodal_stresses(&space, &elasticity, &u).iter().zip(&space.nodes) {
             let exact = [across, along, across, 0.0, 0.0, 0.0];
             assert!((0..6).all(|c| (s[c] - exact[c]).abs() < 1e-9 * young), "{degree:?} at {x:?}: {s:?}");
         }

@@ -6,8 +6,7 @@ use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use winkler::contact::law::{self, OwnLaws};
 use winkler::contact::pieces::{self, Cut, Reach};
 use winkler::contact::{Carriers, ContactPair, Side, assemble};
-use winkler::fem::quadrature::Parts;
-use winkler::fem::{Frame, Space, assemble as fem};
+use winkler::fem::{Frame, Parts, Space, assemble as fem};
 use winkler::interrupt::Interrupt;
 use winkler::mesh::{Mesh, load};
 use winkler::problem::order::Order;
@@ -165,9 +164,9 @@ fn concentric<const D: usize>(name: &str, meshes: &[&str], cut: Cut<D>, exact: f
 fn concentric_surfaces() {
     let pi = std::f64::consts::PI;
     let rings = ["{ni=6, no=8, gap=0.1}", "{ni=12, no=16, gap=0.1}", "{ni=24, no=32, gap=0.1}"];
-    concentric::<2>("rings", &rings, pieces::plane, 0.5 * pi * 1.1, [1.8, 2.7]);
+    concentric::<2>("rings", &rings, pieces::in_plane, 0.5 * pi * 1.1, [1.8, 2.7]);
     let shells = ["{hi=0.4, ho=0.3, gap=0.1}", "{hi=0.2, ho=0.15, gap=0.1}"];
-    concentric::<3>("shells", &shells, pieces::space, 0.5 * pi * 1.1 * 1.1, [1.5, 1.5]);
+    concentric::<3>("shells", &shells, pieces::in_space, 0.5 * pi * 1.1 * 1.1, [1.5, 1.5]);
 }
 
 /// Plane surfaces that do not match: forces of both sides are opposite to rounding and moments to the share of a node
@@ -181,7 +180,7 @@ fn moments_on_plane_surfaces() {
         for bodies in [["lower", "upper"], ["upper", "lower"]] {
             let group = |body: &str| format!("{body}_{}", if body == "lower" { "top" } else { "bottom" });
             let groups = bodies.map(group);
-            let sums = sums(&mesh, [first, second], pieces::space, bodies, groups.each_ref().map(String::as_str));
+            let sums = sums(&mesh, [first, second], pieces::in_space, bodies, groups.each_ref().map(String::as_str));
             assert!((sums.measure - 1.0).abs() < 1e-13, "{}", sums.measure);
             assert!(sums.forces < 1e-14 && sums.moments < 1e-10, "{} {}", sums.forces, sums.moments);
             assert_eq!(sums.gap, [0.0; 2]);
@@ -212,12 +211,12 @@ fn points_of_quadratic_triangles() {
     ] {
         let groups = bodies.map(|body| format!("{body}_face"));
         let groups = groups.each_ref().map(String::as_str);
-        let (pair, spaces) = pair_on(&mesh, [Order::P2; 2], pieces::space, bodies, groups);
+        let (pair, spaces) = pair_on(&mesh, [Order::P2; 2], pieces::in_space, bodies, groups);
         let carriers: Vec<_> = pair.cover.iter().map(|cover| cover.carriers).collect();
         assert!(kinds.iter().all(|kind| carriers.contains(kind)), "{bodies:?}: {carriers:?}");
         assert!(carriers.iter().all(|kind| kinds.contains(kind)), "{bodies:?}: {carriers:?}");
         assert!(pair.weight.iter().all(|&weight| weight > 0.0), "{bodies:?}: {:?}", pair.weight);
-        let sums = sums(&mesh, [Order::P2; 2], pieces::space, bodies, groups);
+        let sums = sums(&mesh, [Order::P2; 2], pieces::in_space, bodies, groups);
         assert!((sums.measure - 0.5 * 0.55).abs() < 1e-13, "{bodies:?}: {}", sums.measure);
         assert!(sums.forces < 1e-14 && sums.moments < 1e-10, "{bodies:?}: {} {}", sums.forces, sums.moments);
         if kinds.len() > 1 {

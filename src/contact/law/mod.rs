@@ -1,7 +1,7 @@
 //! Laws of Winkler layers: pressure against compression.
 //!
 //! The paper writes sigma_n = g(w) with w = -c, where c is the compression. Here the pressure is p(c) = -g(-c). A law is monotone
-//! with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is a new file, a form in
+//! with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is a new type, a form in
 //! [`layer`](crate::problem::layer) and a line in [`make`]. A program that uses this library implements the trait alone:
 //! [`OwnLaws`].
 //!
@@ -11,33 +11,18 @@
 //! graph. These methods handle the open layer and the ends of the range. A law implements the methods with `loaded` in their
 //! names if it has a better way than the common search.
 
-mod asperities;
-mod cubic;
-mod exponential;
-mod gap;
-mod linear;
+mod forms;
 mod make;
-mod own;
-mod power;
-mod quadrature;
-mod root;
-mod scaled;
-mod smoothed;
+mod numeric;
 mod table;
 #[cfg(test)]
 mod tests;
-mod typed;
 
-pub use cubic::Cubic;
-pub use exponential::Exponential;
-pub use linear::Linear;
-pub use make::make;
-pub use own::OwnLaws;
-pub use power::Power;
-pub use scaled::Scaled;
-pub use smoothed::{LawState, resolve};
+pub use forms::{Cubic, Exponential, Linear, Power};
+pub use make::{OwnLaws, Typed, make};
 pub use table::Table;
-pub use typed::Typed;
+
+use std::rc::Rc;
 
 /// The response of a layer at one point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -117,7 +102,7 @@ pub trait LayerLaw: std::fmt::Debug {
 
     /// Return the same as [`LayerLaw::meet`] for finite `s > 0` and `rho > 0`.
     fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        root::meeting(s, rho, [0.0, s], s, |c| self.pressure_and_tangent(point, c))
+        numeric::meeting(s, rho, [0.0, s], s, |c| self.pressure_and_tangent(point, c))
     }
 
     /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a pressure that
@@ -134,7 +119,8 @@ pub trait LayerLaw: std::fmt::Debug {
     fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
         // The unit of length is unknown, so no start is better than another.
         let start = 1.0;
-        root::root(pressure, [0.0, f64::MAX], start, |c| self.pressure_and_tangent(point, c)).unwrap_or(f64::INFINITY)
+        numeric::root(pressure, [0.0, f64::MAX], start, |c| self.pressure_and_tangent(point, c))
+            .unwrap_or(f64::INFINITY)
     }
 
     /// Return Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` p, which need not be a point of the graph.
@@ -168,7 +154,7 @@ pub trait LayerLaw: std::fmt::Debug {
     /// Return the same as [`LayerLaw::duality_gap`] for a finite `c >= 0` and a finite `pressure > 0`.
     fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
         let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
-        gap::by_quadrature(c, pressure, self.compression(point, pressure), law, tangent)
+        numeric::gap_by_quadrature(c, pressure, self.compression(point, pressure), law, tangent)
     }
 }
 
@@ -204,4 +190,109 @@ impl<L: LayerLaw> LayerLaw for PerPoint<L> {
     fn end(&self, point: usize) -> f64 {
         self.0[point].end(0)
     }
+}
+
+/// The law p(s c)/s for a law p and a factor s > 0.
+///
+/// If bodies under s times their loads have displacements that are divided by s, these satisfy the equations of the full loads.
+/// This is then the law of the layer between them.
+#[derive(Debug)]
+pub struct Scaled {
+    /// The law p.
+    pub law: Rc<dyn LayerLaw>,
+    /// The factor s.
+    pub factor: f64,
+}
+
+impl LayerLaw for Scaled {
+    fn compressed(&self, point: usize, c: f64) -> Response {
+        let s = self.factor;
+        let Response { pressure, tangent, energy } = self.law.compressed(point, s * c);
+        Response { pressure: pressure / s, tangent, energy: energy / (s * s) }
+    }
+
+    fn pressure(&self, point: usize, c: f64) -> f64 {
+        self.law.pressure(point, self.factor * c) / self.factor
+    }
+
+    fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
+        let (pressure, tangent) = self.law.pressure_and_tangent(point, self.factor * c);
+        (pressure / self.factor, tangent)
+    }
+
+    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
+        self.law.meet(point, self.factor * s, rho) / self.factor
+    }
+
+    fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
+        self.law.compression(point, self.factor * pressure) / self.factor
+    }
+
+    fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
+        let s = self.factor;
+        self.law.duality_gap(point, s * c, s * pressure) / (s * s)
+    }
+
+    fn end(&self, point: usize) -> f64 {
+        self.law.end(point) / self.factor
+    }
+}
+
+/// A state (c, p) on a law or a smoothed law, with the tangent there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawState {
+    /// Compression c.
+    pub compression: f64,
+    /// Pressure p, force per area.
+    pub pressure: f64,
+    /// Tangent kappa = dp/dc.
+    pub tangent: f64,
+}
+
+/// Return Minty's resolvent: the only state with c + p/rho = `sum` on the law smoothed by `mu`.
+///
+/// `mu` is an energy per area and `rho > 0` a stiffness per area. With `mu` = 0 the result is the state on the law itself.
+///
+/// Let c = phi(p) be the inverse of the law. The smoothed law, as on the central path of an interior-point method, is
+///
+/// ```text
+/// c = phi(p) - mu/p,   p > 0,        kappa = dp/dc = 1 / (phi'(p) + mu/p^2)
+/// ```
+///
+/// It is strictly monotone and has no corner. At every pressure p the gap s = mu/p remains, so that s p = mu, which is the perturbed
+/// complementarity condition.
+///
+/// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A state with the
+/// remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left side increases with y. The root
+/// is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
+pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
+    if mu == 0.0 || !sum.is_finite() {
+        return on_law(law, point, sum, rho);
+    }
+    let value = |gap: f64| {
+        let LawState { pressure, tangent, .. } = on_law(law, point, sum + gap, rho);
+        (gap * pressure, pressure + gap * tangent / (1.0 + tangent / rho))
+    };
+    let diagonal = sum.hypot(2.0 * (mu / rho).sqrt());
+    let rigid = if sum > 0.0 { 2.0 * mu / rho / (sum + diagonal) } else { 0.5 * (diagonal - sum) };
+    // With an infinite rho the gap of a closed point has no lower bound.
+    let start = if rigid > 0.0 { rigid } else { 1.0 };
+    let least = rigid * (1.0 - 4.0 * f64::EPSILON);
+    let (Ok(gap) | Err(gap)) = numeric::root(mu, [least, f64::MAX], start, value);
+    let LawState { compression, tangent, .. } = on_law(law, point, sum + gap, rho);
+    let pressure = mu / gap;
+    LawState { compression: compression - gap, pressure, tangent: (tangent.recip() + gap / pressure).recip() }
+}
+
+/// Return the state on the law itself with c + p/rho = `sum`.
+fn on_law(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64) -> LawState {
+    let compression = law.meet(point, sum, rho);
+    let (pressure, tangent) = match compression > 0.0 {
+        true => law.pressure_and_tangent(point, compression),
+        false => {
+            let Response { pressure, tangent, .. } = law.response(point, compression);
+            (pressure, tangent)
+        }
+    };
+    LawState { compression, pressure, tangent }
 }

@@ -2,7 +2,6 @@ use super::*;
 use crate::error::{Place, Source};
 use crate::expression::{Expression, Scope};
 use std::cell::Cell;
-use std::rc::Rc;
 use std::sync::Arc;
 
 /// Check from far below `scale` to far beyond it that the pressure is the derivative of the energy, the tangent that of the
@@ -24,7 +23,7 @@ fn check(law: &dyn LayerLaw, scale: f64) {
         let bent = (plus.tangent / minus.tangent - 1.0).abs();
         let rounding = 4.0 * f64::EPSILON * here.pressure / (h * here.tangent);
         assert!(rough < 1e-8 + 1e-3 * bent + rounding, "{law:?} at {c}: p' {slope} {here:?}");
-        let work = quadrature::integral(&|c| law.pressure(0, c), from, c);
+        let work = numeric::integral(&|c| law.pressure(0, c), from, c);
         let gained = here.energy - last.energy;
         assert!((gained - work).abs() < 1e-11 * here.energy, "{law:?} at {c}: P gains {gained}, not {work}");
         assert!(here.pressure > last.pressure && here.pressure.is_finite(), "{law:?} is not increasing at {c}");
@@ -126,7 +125,7 @@ fn expressions_that_are_no_laws() {
 }
 
 /// Return laws of every kind, each with a compression where it is curved.
-pub(super) fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
+fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
     let table = [[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]];
     let mut laws: Vec<(Box<dyn LayerLaw>, f64)> = vec![
         (Box::new(Linear { stiffness: 3e7 }), 1e-5),
@@ -299,7 +298,7 @@ fn brute_gap(law: &dyn LayerLaw, c: f64, pressure: f64) -> f64 {
         // The contribution of an open layer is below rounding.
         let to = if to < 1e-6 * f64::from_bits(high) && c < from { c } else { to };
         let noise = 4.0 * f64::EPSILON * pressure * (to - from).abs();
-        sum += quadrature::integral_to(&|c| law.pressure(0, c) - pressure, from, to, 1e-9, noise);
+        sum += numeric::integral_to(&|c| law.pressure(0, c) - pressure, from, to, 1e-9, noise);
         from = to;
     }
     sum
@@ -433,4 +432,60 @@ fn searches_ask_a_law_a_few_times() {
         most(Table::new(&[[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]]), 1e-5),
     ];
     assert!(bent.iter().flatten().all(|&count| count <= 20), "{bent:?}");
+}
+
+/// Return the pressure at which phi(p) - mu/p + p/rho is the sum, by bisection of its logarithm. Here the law is inverted.
+fn bisected(law: &dyn LayerLaw, sum: f64, rho: f64, mu: f64) -> f64 {
+    let excess = |pressure: f64| law.compression(0, pressure) - mu / pressure + pressure / rho - sum;
+    let (mut low, mut high) = (f64::MIN_POSITIVE, 1e300);
+    while high / low > 1.0 + 4.0 * f64::EPSILON {
+        let middle = if high / low > 4.0 { low.sqrt() * high.sqrt() } else { 0.5 * (low + high) };
+        if excess(middle) < 0.0 { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// All laws are checked from open to strongly compressed points, for soft to infinite slopes and for much to hardly any smoothing.
+#[test]
+fn states_are_those_of_the_inverted_law() {
+    for (law, scale) in all_laws() {
+        let level = law.pressure(0, scale);
+        for share in [-1e3, -1.0, -1e-6, 0.0, 1e-6, 0.3, 2.0] {
+            for rho in [1e-3, 1.0, 1e3, f64::INFINITY].map(|times: f64| times * level / scale) {
+                for mu in [1e-12, 1e-4, 1.0, 1e3].map(|times| times * level * scale) {
+                    let sum = share * scale;
+                    let state = resolve(&*law, 0, sum, rho, mu);
+                    let expected = bisected(&*law, sum, rho, mu);
+                    let error = state.pressure / expected - 1.0;
+                    assert!(error.abs() < 1e-7, "{law:?} sum {sum:e} rho {rho:e} mu {mu:e}: {state:?} {expected:e}");
+                    // The compression c is the difference of phi and the gap.
+                    let size = sum.abs().max(mu / state.pressure).max(state.pressure / rho);
+                    let off = state.compression + state.pressure / rho - sum;
+                    assert!(off.abs() <= 1e-12 * size, "{law:?} sum {sum:e} rho {rho:e} mu {mu:e}: {off:e}");
+                    assert!(state.tangent > 0.0 && state.tangent.is_finite(), "{law:?}: {state:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_tangent_is_the_slope_and_no_smoothing_is_the_law() {
+    for (law, scale) in all_laws() {
+        let level = law.pressure(0, scale);
+        let (rho, mu) = (level / scale, 0.1 * level * scale);
+        for share in [-2.0, -0.5, 0.0, 0.4] {
+            let at = |share: f64| resolve(&*law, 0, share * scale, rho, mu);
+            let [low, here, high] = [share - 1e-5, share, share + 1e-5].map(at);
+            let slope = (high.pressure - low.pressure) / (high.compression - low.compression);
+            assert!((here.tangent / slope - 1.0).abs() < 1e-2, "{law:?}: {here:?} {slope}");
+            let exact = resolve(&*law, 0, share * scale, rho, 0.0);
+            assert_eq!(exact.compression, law.meet(0, share * scale, rho));
+            assert_eq!(exact.pressure, law.pressure(0, exact.compression));
+        }
+        for sum in [f64::NEG_INFINITY, f64::INFINITY] {
+            assert_eq!(resolve(&*law, 0, sum, rho, mu).compression, sum);
+        }
+        assert!(resolve(&*law, 0, f64::NAN, rho, mu).pressure.is_nan());
+    }
 }

@@ -1,26 +1,26 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::{AWAY, Common, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
-use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, element, minus, quadrature};
+use super::{AWAY, Common, Facet, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
+use crate::contact::side::Side;
+use crate::fem::{element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
 /// Return the common pieces of two plane curves.
-pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
+pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
     let search = Search::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = quadrature::gauss(if quadratic { 4 } else { 3 });
+    let rule = element::gauss(if quadratic { 4 } else { 3 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
-        let facet = Curve::of(a, i);
+        let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let pieces = search.pieces(a, i, reach, refused, |near, refused| facing(&facet, b, near, reach, refused));
         for (low, high, Piece { index, other, .. }) in nearest(&pieces) {
             let offset = minus(facet.from, other.from);
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
-                let (on_a, normal) = (facet.at(s), facet.normal(s));
+                let (on_a, normal) = (facet.at(&place(s)), facet.normal(&place(s)));
                 let from = plus(on_a, offset);
                 let Ok(Some(t)) = other.hit(from, normal) else {
                     // The normals on both sides of this point hit the facet, so this one is lost.
@@ -34,9 +34,9 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
                 }
                 common.points.push(Shared {
                     facet_a: i,
-                    at_a: [1.0 - s, s],
+                    at_a: place(s),
                     facet_b: *index,
-                    at_b: [1.0 - t, t],
+                    at_b: place(t),
                     weight: weight * (high - low) * length(facet.tangent(s)) * a.space.circle(&plus(on_a, facet.from)),
                     gap,
                 });
@@ -47,10 +47,10 @@ pub fn plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
 }
 
 /// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others are none.
-fn facing(facet: &Curve, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
+fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
     for &index in near {
-        let other = Curve::of(b, index);
+        let other = Facet::of(b, index);
         let directions = [facet.direction, other.direction];
         match Piece::between(facet, other, index) {
             Ok(piece) => pieces.extend(piece.filter(|p| refused.admits(reach, index, p.gap, directions))),
@@ -88,57 +88,15 @@ fn claim(free: &mut Vec<(f64, f64)>, range: (f64, f64)) -> Vec<(f64, f64)> {
     claimed
 }
 
-/// A facet of side a or b as a parametrised curve x(s), s from 0 to 1.
-///
-/// Coordinates are measured from its first end, so that interpolation and subtraction round relative to the size of the facet,
-/// wherever it lies.
-struct Curve {
-    order: Order,
-    /// First end.
-    from: [f64; 2],
-    /// Nodes, measured from the first end.
-    x: Vec<[f64; 2]>,
-    /// Largest distance of a node from the first end.
-    size: f64,
-    normals: [[f64; 2]; 2],
-    /// Outer unit normal in the middle.
-    direction: [f64; 2],
+/// Return the barycentric coordinates of the parameter s, which runs from 0 to 1 along a facet.
+fn place(s: f64) -> [f64; 2] {
+    [1.0 - s, s]
 }
 
-impl Curve {
-    fn of(side: &Side<2>, i: usize) -> Self {
-        let nodes = side.facets.facet(i);
-        let mut x = side.facets.coordinates(i, side.space);
-        let from = x[0];
-        x.iter_mut().for_each(|x| *x = minus(*x, from));
-        Self {
-            order: side.facets.order,
-            from,
-            size: x.iter().map(|&x| length(x)).fold(0.0, f64::max),
-            normals: [side.normals[&nodes[0]], side.normals[&nodes[1]]],
-            direction: unit(area_vector(side.facets.order, &x, &[0.5; 2])),
-            x,
-        }
-    }
-
-    fn at(&self, s: f64) -> [f64; 2] {
-        crate::fem::assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - s, s]))
-    }
-
+impl Facet<2> {
     fn tangent(&self, s: f64) -> [f64; 2] {
-        let d = element::derivatives(self.order, &[1.0 - s, s]);
-        std::array::from_fn(|c| (0..self.x.len()).map(|n| (d[n][1] - d[n][0]) * self.x[n][c]).sum())
-    }
-
-    fn normal(&self, s: f64) -> [f64; 2] {
-        std::array::from_fn(|c| (1.0 - s) * self.normals[0][c] + s * self.normals[1][c])
-    }
-
-    /// Return a bound of the sum of the sizes of the terms that [`Curve::at`] adds.
-    fn terms(&self, s: f64) -> f64 {
-        let reach = 1.0 + 2.0 * s.abs();
-        // The three quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size.
-        self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
+        let [tangent] = self.tangents(&place(s));
+        tangent
     }
 
     /// Return the parameter s at which the line through `x` along `n` meets the curve, cross(x(s) - x, n) = 0; `None` if it does
@@ -148,16 +106,16 @@ impl Curve {
     /// [`Lost`] if the search does not converge.
     fn hit(&self, x: [f64; 2], n: [f64; 2]) -> Result<Option<f64>, Lost> {
         let found = newton(|s| Equation {
-            value: cross(minus(self.at(s), x), n),
+            value: cross(minus(self.at(&place(s)), x), n),
             slope: cross(self.tangent(s), n),
-            terms: (self.terms(s) + length(x)) * length(n),
+            terms: (self.terms(&place(s)) + length(x)) * length(n),
         })?;
         Ok(found.filter(|s| (-ON_FACET..=1.0 + ON_FACET).contains(s)))
     }
 
     /// Return the signed distance of the point at `s` from `x` along `n`.
     fn distance(&self, s: f64, x: [f64; 2], n: [f64; 2]) -> f64 {
-        dot(&minus(self.at(s), x), &n) / length(n)
+        dot(&minus(self.at(&place(s)), x), &n) / length(n)
     }
 
     /// Return the parameter s whose normal n(s) passes through `x`, cross(x - x(s), n(s)) = 0; `None` if there is none.
@@ -167,12 +125,12 @@ impl Curve {
     fn foot(&self, x: [f64; 2]) -> Result<Option<f64>, Lost> {
         let turn = minus(self.normals[1], self.normals[0]);
         newton(|s| {
-            let (t, n) = (self.tangent(s), self.normal(s));
-            let arm = minus(x, self.at(s));
+            let (t, n) = (self.tangent(s), self.normal(&place(s)));
+            let arm = minus(x, self.at(&place(s)));
             Equation {
                 value: cross(arm, n),
                 slope: cross(arm, turn) - cross(t, n),
-                terms: (self.terms(s) + length(x)) * (1.0 + 2.0 * s.abs()),
+                terms: (self.terms(&place(s)) + length(x)) * (1.0 + 2.0 * s.abs()),
             }
         })
     }
@@ -218,7 +176,7 @@ struct Piece {
     range: (f64, f64),
     /// Index of the facet of side b.
     index: usize,
-    other: Curve,
+    other: Facet<2>,
     /// Signed distance in the middle of the piece.
     gap: f64,
 }
@@ -228,7 +186,7 @@ impl Piece {
     ///
     /// # Errors
     /// [`Lost`] if the search for an end of the piece fails.
-    fn between(a: &Curve, b: Curve, index: usize) -> Result<Option<Self>, Lost> {
+    fn between(a: &Facet<2>, b: Facet<2>, index: usize) -> Result<Option<Self>, Lost> {
         if dot(&a.direction, &b.direction) >= 0.0 {
             return Ok(None);
         }
@@ -242,7 +200,7 @@ impl Piece {
         breaks.sort_by(f64::total_cmp);
         let gap_in_middle = |low: f64, high: f64| -> Result<Option<f64>, Lost> {
             let middle = 0.5 * (low + high);
-            let (from, normal) = (minus(a.at(middle), offset), a.normal(middle));
+            let (from, normal) = (minus(a.at(&place(middle)), offset), a.normal(&place(middle)));
             Ok(b.hit(from, normal)?.map(|t| b.distance(t, from, normal)))
         };
         let mut hits: Vec<&[f64]> = Vec::new();

@@ -7,11 +7,9 @@
 //! curved facet of b is split into four at the middle of its edges. All facets of b are split further where corners of some
 //! have no image.
 
-use super::polygon::{self, Polygon};
-use super::{AWAY, Common, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
-use crate::contact::cover::WHOLE;
-use crate::contact::side::{Side, length, unit};
-use crate::fem::{area_vector, assemble, cross, element, minus, quadrature};
+use super::{AWAY, Common, Facet, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared, WHOLE, plus};
+use crate::contact::side::Side;
+use crate::fem::{area_vector, cross, element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
@@ -22,6 +20,9 @@ const TINY: f64 = 1e-11;
 /// b's edge, which bows by an eighth of the angle that the normals turn along it: a tenth if they turn by a radian a facet.
 const ON_FACET: f64 = 0.1;
 
+/// Middle of a facet.
+const MIDDLE: [f64; 3] = [1.0 - 1.0 / 3.0 - 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
+
 /// Numbers of parts into which the edges of facets of side b are split. They are tried one after the other, until a facet of side a is
 /// covered or each corner of the parts lies on one of its normals.
 ///
@@ -30,11 +31,11 @@ const ON_FACET: f64 = 0.1;
 const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 /// Return the common pieces of two surfaces in space.
-pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
+pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
     let search = Search::new(b);
-    let facets_b: Vec<Facet> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
+    let facets_b: Vec<Facet<3>> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = quadrature::simplex(3, if quadratic { 5 } else { 2 });
+    let rule = element::rule(3, if quadratic { 5 } else { 2 });
     let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
@@ -44,23 +45,22 @@ pub fn space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
         for Piece { polygon, index, .. } in pieces {
             let other = &facets_b[index];
             let offset = minus(facet.from, other.from);
-            for triangle in polygon::fan(&polygon) {
-                let share = 2.0 * polygon::area(&triangle);
+            for triangle in fan(&polygon) {
+                let share = 2.0 * area(&triangle);
                 for (l, weight) in rule.iter() {
-                    let [u, v] = [0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum());
-                    let normal = facet.normal(u, v);
-                    let Ok(Some((at_b, t))) = other.hit(plus(facet.at(u, v), offset), normal) else {
+                    let at_a = place([0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum()));
+                    let normal = facet.normal(&at_a);
+                    let Ok(Some((at_b, t))) = other.hit(plus(facet.at(&at_a), offset), normal) else {
                         // The point lies under the image of this very facet, so it is lost.
                         refused.lost += 1;
                         continue;
                     };
-                    let weight = weight * share * length(facet.area(u, v));
+                    let weight = weight * share * length(area_vector(facet.order, &facet.x, &at_a));
                     let gap = t * length(normal);
                     if !reach.holds(gap) {
                         refused.far.insert(index);
                         continue;
                     }
-                    let at_a = [1.0 - u - v, u, v];
                     common.points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
                 }
             }
@@ -74,7 +74,7 @@ fn without_overlaps(pieces: Vec<Piece>) -> Vec<Piece> {
     let mut free: Vec<Piece> = Vec::new();
     for Piece { polygon, index, gap } in pieces {
         let parts = free.iter().fold(vec![polygon], |parts, nearer| {
-            parts.into_iter().flat_map(|part| polygon::difference(part, &nearer.polygon, 0.5 * TINY)).collect()
+            parts.into_iter().flat_map(|part| difference(part, &nearer.polygon, 0.5 * TINY)).collect()
         });
         free.extend(parts.into_iter().map(|polygon| Piece { polygon, index, gap }));
     }
@@ -82,7 +82,7 @@ fn without_overlaps(pieces: Vec<Piece>) -> Vec<Piece> {
 }
 
 /// Return the pieces of a facet of side a that face these facets of side b, without what nearer ones cover. Note in `refused` why others are none.
-fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
+fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for parts in PARTS {
         let before = refused.clone();
@@ -100,7 +100,7 @@ fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &m
         }
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
         pieces = without_overlaps(found);
-        let covered: f64 = pieces.iter().map(|piece| polygon::area(&piece.polygon)).sum();
+        let covered: f64 = pieces.iter().map(|piece| area(&piece.polygon)).sum();
         if without_image == 0 || covered >= 0.5 * WHOLE || parts == PARTS[PARTS.len() - 1] {
             break;
         }
@@ -109,66 +109,14 @@ fn facing(facet: &Facet, b: &[Facet], near: &[usize], reach: &Reach, refused: &m
     pieces
 }
 
-/// A facet as a parametrised surface x(u, v), u, v >= 0, u + v <= 1, with the barycentric coordinates 1 - u - v, u, v.
-///
-/// Coordinates are measured from its first corner, so that interpolation and subtraction round relative to the size of the facet.
-/// This holds also if the two bodies of a pair lie far from the others of the scene.
-struct Facet {
-    order: Order,
-    /// First corner.
-    from: [f64; 3],
-    /// Nodes, measured from the first corner.
-    x: Vec<[f64; 3]>,
-    /// Largest distance of a node from the first corner.
-    size: f64,
-    normals: [[f64; 3]; 3],
-    /// Outer unit normal in the middle.
-    direction: [f64; 3],
-    straight: bool,
+/// Return the barycentric coordinates of the parameters u, v >= 0, u + v <= 1, of a facet.
+fn place([u, v]: [f64; 2]) -> [f64; 3] {
+    [1.0 - u - v, u, v]
 }
 
-impl Facet {
-    fn of(side: &Side<3>, i: usize) -> Self {
-        let nodes = side.facets.facet(i);
-        let mut x = side.facets.coordinates(i, side.space);
-        let from = x[0];
-        x.iter_mut().for_each(|x| *x = minus(*x, from));
-        Self {
-            order: side.facets.order,
-            from,
-            straight: assemble::is_straight(&x, 3),
-            size: x.iter().map(|&x| length(x)).fold(0.0, f64::max),
-            direction: unit(area_vector(side.facets.order, &x, &[1.0 / 3.0; 3])),
-            normals: [0, 1, 2].map(|k| side.normals[&nodes[k]]),
-            x,
-        }
-    }
-
-    fn at(&self, u: f64, v: f64) -> [f64; 3] {
-        assemble::interpolate(&self.x, &element::values(self.order, &[1.0 - u - v, u, v]))
-    }
-
-    /// Return a bound of the sum of the sizes of the terms that [`Facet::at`] adds.
-    fn terms(&self, u: f64, v: f64) -> f64 {
-        let reach = 1.0 + 2.0 * (u.abs() + v.abs());
-        // The six quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size.
-        self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
-    }
-
-    /// Return the outer normal times the area per area of the parameters.
-    fn area(&self, u: f64, v: f64) -> [f64; 3] {
-        area_vector(self.order, &self.x, &[1.0 - u - v, u, v])
-    }
-
-    fn normal(&self, u: f64, v: f64) -> [f64; 3] {
-        let [n, m, o] = self.normals;
-        std::array::from_fn(|c| (1.0 - u - v) * n[c] + u * m[c] + v * o[c])
-    }
-
-    /// Return dx/du and dx/dv.
-    fn tangents(&self, u: f64, v: f64) -> [[f64; 3]; 2] {
-        let d = element::derivatives(self.order, &[1.0 - u - v, u, v]);
-        [1, 2].map(|k| std::array::from_fn(|c| (0..self.x.len()).map(|n| (d[n][k] - d[n][0]) * self.x[n][c]).sum()))
+impl Facet<3> {
+    fn is_straight(&self) -> bool {
+        element::is_straight(&self.x, 3)
     }
 
     /// Return where the line x + t n meets the surface, as barycentric coordinates and t; `None` if it does not meet it.
@@ -176,18 +124,18 @@ impl Facet {
     /// # Errors
     /// [`Lost`] if the search does not converge.
     fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Result<Option<([f64; 3], f64)>, Lost> {
-        let middle = self.at(1.0 / 3.0, 1.0 / 3.0);
+        let middle = self.at(&MIDDLE);
         let found = newton(dot(&minus(middle, x), &n) / dot(&n, &n), |[u, v, t]| {
-            let on_facet = self.at(u, v);
-            let [along_u, along_v] = self.tangents(u, v);
+            let l = place([u, v]);
+            let (on_facet, [along_u, along_v]) = (self.at(&l), self.tangents(&l));
             System {
                 value: std::array::from_fn(|c| on_facet[c] - x[c] - t * n[c]),
                 columns: [along_u, along_v, n.map(|n| -n)],
-                terms: self.terms(u, v) + length(x) + t.abs() * length(n),
+                terms: self.terms(&l) + length(x) + t.abs() * length(n),
             }
         })?;
         let Some([u, v, t]) = found else { return Ok(None) };
-        let at = [1.0 - u - v, u, v];
+        let at = place([u, v]);
         Ok(at.iter().all(|l| (-ON_FACET..=1.0 + ON_FACET).contains(l)).then_some((at, t)))
     }
 
@@ -198,15 +146,15 @@ impl Facet {
     fn foot(&self, x: [f64; 3]) -> Result<Option<[f64; 2]>, Lost> {
         let [n, m, o] = self.normals;
         let turns = [minus(m, n), minus(o, n)];
-        let third = 1.0 / 3.0;
-        let (middle, normal) = (self.at(third, third), self.normal(third, third));
+        let (middle, normal) = (self.at(&MIDDLE), self.normal(&MIDDLE));
         let found = newton(dot(&minus(x, middle), &normal) / dot(&normal, &normal), |[u, v, t]| {
-            let (on_facet, n, tangents) = (self.at(u, v), self.normal(u, v), self.tangents(u, v));
+            let l = place([u, v]);
+            let (on_facet, n, tangents) = (self.at(&l), self.normal(&l), self.tangents::<2>(&l));
             let column = |k: usize| std::array::from_fn(|c| tangents[k][c] + t * turns[k][c]);
             System {
                 value: std::array::from_fn(|c| on_facet[c] + t * n[c] - x[c]),
                 columns: [column(0), column(1), n],
-                terms: self.terms(u, v) + length(x) + t.abs() * (1.0 + 2.0 * (u.abs() + v.abs())),
+                terms: self.terms(&l) + length(x) + t.abs() * (1.0 + 2.0 * (u.abs() + v.abs())),
             }
         })?;
         Ok(found.map(|[u, v, _]| [u, v]))
@@ -270,18 +218,19 @@ struct Clipped {
 
 impl Clipped {
     /// Clip one facet of b, whose edges are split into so many `parts`, or twice as many where it is curved.
-    fn between(a: &Facet, b: &Facet, index: usize, parts: usize) -> Self {
+    fn between(a: &Facet<3>, b: &Facet<3>, index: usize, parts: usize) -> Self {
         let mut clipped = Self::default();
         if dot(&a.direction, &b.direction) >= 0.0 {
             return clipped;
         }
         let is_same_normal = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;
-        let is_flat = b.order == Order::P1 || (a.straight && b.straight && a.normals.iter().all(is_same_normal));
+        let is_flat =
+            b.order == Order::P1 || (a.is_straight() && b.is_straight() && a.normals.iter().all(is_same_normal));
         let parts = if is_flat { parts } else { 2 * parts };
         let offset = minus(b.from, a.from);
         let foot = |[i, j]: [usize; 2]| {
-            let [u, v] = [i, j].map(|k| k as f64 / parts as f64);
-            a.foot(plus(b.at(u, v), offset)).map(|foot| foot.map(snap))
+            let at = place([i, j].map(|k| k as f64 / parts as f64));
+            a.foot(plus(b.at(&at), offset)).map(|foot| foot.map(snap))
         };
         let rows = (0..=parts).map(|j| (0..=parts - j).map(|i| foot([i, j])).collect::<Vec<_>>());
         let feet: Vec<Vec<Foot>> = rows.collect();
@@ -308,19 +257,19 @@ impl Piece {
     ///
     /// # Errors
     /// [`Lost`] if the search for the distance does not converge.
-    fn under(a: &Facet, b: &Facet, index: usize, [p, q, r]: [[f64; 2]; 3]) -> Result<Option<Self>, Lost> {
+    fn under(a: &Facet<3>, b: &Facet<3>, index: usize, [p, q, r]: [[f64; 2]; 3]) -> Result<Option<Self>, Lost> {
         // Side b looks the other way, so its corners are counterclockwise in reverse.
         let image = [p, r, q];
-        if polygon::area(&image) <= 0.0 {
+        if area(&image) <= 0.0 {
             return Ok(None);
         }
-        let polygon = polygon::intersection(&image, &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
-        if polygon::area(&polygon) <= 0.5 * TINY {
+        let polygon = intersection(&image, &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+        if area(&polygon) <= 0.5 * TINY {
             return Ok(None);
         }
-        let [u, v] = polygon::middle(&polygon);
-        let normal = a.normal(u, v);
-        let hit = b.hit(plus(a.at(u, v), minus(a.from, b.from)), normal)?;
+        let middle = place(middle(&polygon));
+        let normal = a.normal(&middle);
+        let hit = b.hit(plus(a.at(&middle), minus(a.from, b.from)), normal)?;
         Ok(hit.map(|(_, t)| Self { polygon, index, gap: t * length(normal) }))
     }
 }
@@ -352,5 +301,98 @@ fn snap([u, v]: [f64; 2]) -> [f64; 2] {
         [u.round(), v.round()]
     } else {
         [u, 1.0 - u]
+    }
+}
+
+/// A convex polygon with counterclockwise corners.
+type Polygon = Vec<[f64; 2]>;
+
+/// Return twice the area of a triangle, which is positive if the corners are counterclockwise.
+fn turn(p: [f64; 2], q: [f64; 2], r: [f64; 2]) -> f64 {
+    (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
+}
+
+/// Return the area, which is positive if the corners are counterclockwise.
+fn area(polygon: &[[f64; 2]]) -> f64 {
+    fan(polygon).map(|[p, q, r]| 0.5 * turn(p, q, r)).sum()
+}
+
+/// Return the triangles of a polygon that meet in its first corner.
+fn fan(polygon: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 3]> + '_ {
+    (2..polygon.len()).map(|i| [polygon[0], polygon[i - 1], polygon[i]])
+}
+
+/// Return the mean of the corners.
+fn middle(polygon: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|c| polygon.iter().map(|p| p[c]).sum::<f64>() / polygon.len() as f64)
+}
+
+/// Return the part of a polygon to the left of the line from `p` to `q`.
+fn left_of(polygon: &[[f64; 2]], p: [f64; 2], q: [f64; 2]) -> Polygon {
+    let mut part = Polygon::with_capacity(polygon.len() + 1);
+    for (i, &to) in polygon.iter().enumerate() {
+        let from = polygon[(i + polygon.len() - 1) % polygon.len()];
+        let (before, after) = (turn(p, q, from), turn(p, q, to));
+        if before * after < 0.0 {
+            let s = before / (before - after);
+            part.push([0, 1].map(|c| from[c] + s * (to[c] - from[c])));
+        }
+        if after >= 0.0 {
+            part.push(to);
+        }
+    }
+    part
+}
+
+fn edges(polygon: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
+    (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
+}
+
+/// Return the intersection of two convex polygons.
+fn intersection(polygon: &[[f64; 2]], other: &[[f64; 2]]) -> Polygon {
+    edges(other).fold(polygon.to_vec(), |part, (p, q)| left_of(&part, p, q))
+}
+
+/// Return the part of a convex polygon outside another, as convex polygons. Parts of an area up to `tiny` are dropped. If the
+/// intersection is no larger than that, the result is the whole polygon.
+fn difference(polygon: Polygon, other: &[[f64; 2]], tiny: f64) -> Vec<Polygon> {
+    if area(&intersection(&polygon, other)) <= tiny {
+        return vec![polygon];
+    }
+    let mut inside = polygon;
+    let mut outside = Vec::new();
+    for (p, q) in edges(other) {
+        let part = left_of(&inside, q, p);
+        if area(&part) > tiny {
+            outside.push(part);
+        }
+        inside = left_of(&inside, p, q);
+    }
+    outside
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+    #[test]
+    fn a_corner_is_cut_off_a_square() {
+        let triangle = [[0.5, 0.5], [2.0, 0.5], [0.5, 2.0]];
+        let common = intersection(&triangle, &SQUARE);
+        assert!((area(&common) - 0.25).abs() < 1e-15, "{common:?}");
+        let rest = difference(SQUARE.to_vec(), &triangle, 1e-12);
+        assert!((rest.iter().map(|part| area(part)).sum::<f64>() - 0.75).abs() < 1e-15, "{rest:?}");
+        assert!(rest.iter().all(|part| area(&intersection(part, &triangle)) < 1e-15));
+    }
+
+    #[test]
+    fn polygons_that_only_touch_share_nothing() {
+        let beside = SQUARE.map(|p| [p[0] + 1.0, p[1]]);
+        assert!(area(&intersection(&beside, &SQUARE)) == 0.0);
+        assert_eq!(difference(beside.to_vec(), &SQUARE, 1e-12), [beside.to_vec()]);
+        assert!(difference(SQUARE.to_vec(), &SQUARE, 1e-12).is_empty());
+        assert_eq!(middle(&SQUARE), [0.5, 0.5]);
     }
 }

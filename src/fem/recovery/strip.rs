@@ -4,12 +4,12 @@
 //! coordinates l_i. It is the surface of second degree through the vertices of the facet that is nearest to the vertices of the
 //! facets around it. Facets that meet at a corner have no influence on each other.
 
-use super::{Law, Recovery};
-use crate::fem::{EDGES, Facets, Space, area_vector, assemble, element, quadrature};
+use super::Recovery;
+use crate::fem::space::component;
+use crate::fem::{EDGES, Facets, Space, area_vector, element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::{Matrix3, Vector3};
-use std::collections::HashMap;
 
 /// Cosine of the angle, 40 degrees, at which facets meet in a corner. Gmsh uses the same angle where it makes surfaces of
 /// triangles (its tutorial t13). A circle of nine edges is still smooth.
@@ -32,7 +32,7 @@ impl<const D: usize> Strip<D> {
     fn of(space: &Space<D>) -> Self {
         let places: Vec<(usize, usize)> = space.lone_facets().collect();
         let all = space.facets_of(places.iter().copied());
-        let straight = |i: &usize| assemble::is_straight(&all.coordinates(*i, space), D);
+        let straight = |i: &usize| element::is_straight(&all.coordinates(*i, space), D);
         // Quadratic facets represent the boundary of the mesh. If one is curved, the straight ones are exact, too.
         let is_known = space.order == Order::P2 && !(0..all.count()).all(|i| straight(&i));
         let inside = |i: usize| all.facet(i)[..D].iter().all(|&node| space.on_axis(node));
@@ -43,10 +43,6 @@ impl<const D: usize> Strip<D> {
         let cells = places.iter().zip(&keep).filter(|(_, is_kept)| **is_kept).map(|((cell, _), _)| *cell).collect();
         Self { facets: all.only(&keep), cells, rise: rises.into_iter().flatten().collect() }
     }
-
-    fn is_empty(&self) -> bool {
-        self.rise.is_empty()
-    }
 }
 
 /// Neighbouring facets.
@@ -54,23 +50,20 @@ struct Around<'a, const D: usize> {
     space: &'a Space<D>,
     facets: &'a Facets<D>,
     normal: Vec<[f64; D]>,
-    /// Facet that continues smoothly beyond the edge (in the plane: node) opposite to each vertex.
-    beside: Vec<[Option<usize>; D]>,
+    /// Facets beside each one that continue it smoothly beyond an edge (in the plane: an end).
+    beside: Vec<Vec<usize>>,
 }
 
 impl<'a, const D: usize> Around<'a, D> {
     fn new(space: &'a Space<D>, facets: &'a Facets<D>) -> Self {
         let normal: Vec<[f64; D]> = facets.normals(space).into_iter().step_by(D).collect();
-        let mut first: HashMap<[u32; D], (usize, usize)> = HashMap::new();
-        let mut beside = vec![[None; D]; facets.count()];
-        for i in 0..facets.count() {
-            let nodes = &facets.facet(i)[..D];
-            for opposite in 0..D {
-                let mut key: [u32; D] = std::array::from_fn(|k| if k == opposite { u32::MAX } else { nodes[k] });
-                key.sort_unstable();
-                let Some((other, at)) = first.insert(key, (i, opposite)) else { continue };
-                if dot(&normal[i], &normal[other]) >= CORNER {
-                    (beside[i][opposite], beside[other][at]) = (Some(other), Some(i));
+        let mut beside = vec![Vec::new(); facets.count()];
+        for around in facets.by_edge().into_values() {
+            for pair in around.windows(2) {
+                let (i, j) = (pair[0], pair[1]);
+                if dot(&normal[i], &normal[j]) >= CORNER {
+                    beside[i].push(j);
+                    beside[j].push(i);
                 }
             }
         }
@@ -86,7 +79,7 @@ impl<'a, const D: usize> Around<'a, D> {
         let own = self.vertices(i);
         let (mut found, mut nodes, mut next) = (vec![i], Vec::<u32>::new(), 0);
         while next < found.len() {
-            for other in self.beside[found[next]].into_iter().flatten() {
+            for &other in &self.beside[found[next]] {
                 if !found.contains(&other) && self.vertices(other).iter().any(|node| own.contains(node)) {
                     found.push(other);
                     nodes.extend(self.vertices(other).iter().filter(|node| !own.contains(node)));
@@ -117,16 +110,16 @@ impl<'a, const D: usize> Around<'a, D> {
         let x = self.facets.coordinates(i, self.space);
         let (normal, dual) = (&self.normal[i], dual(&x));
         let centre: [f64; D] = std::array::from_fn(|c| x[..D].iter().map(|x| x[c]).sum::<f64>() / D as f64);
-        let size = (0..D).map(|k| distance(&x[k], &centre)).fold(0.0, f64::max);
+        let size = (0..D).map(|k| length(minus(x[k], centre))).fold(0.0, f64::max);
         let (mut gram, mut right, mut heights) = (Matrix3::zeros(), Vector3::zeros(), Vec::new());
         for at in self.ring(i) {
-            let from: [f64; D] = std::array::from_fn(|c| at[c] - x[0][c]);
+            let from = minus(at, x[0]);
             let height = dot(normal, &from) / size;
             let mut l = [0.0; D];
             (1..D).for_each(|k| l[k] = dot(&dual[k], &from));
             l[0] = 1.0 - l[1..].iter().sum::<f64>();
             let row = products(&l);
-            let near = (size / distance(&at, &centre)).powi(2);
+            let near = (size / length(minus(at, centre))).powi(2);
             gram += near.powi(3) * row * row.transpose();
             right += near.powi(3) * height * row;
             heights.push((near, row, height));
@@ -151,66 +144,39 @@ impl<'a, const D: usize> Around<'a, D> {
 
 impl<const D: usize> Recovery<'_, D> {
     /// Add the residual of the strip between straight facets and the curved boundary to `residual`, one entry per dof. It is
-    /// `-int delta (sigma - sigma_nn) : grad v` along the facets for every shape function v, with the recovered stress sigma.
+    /// `-int delta (sigma - sigma_nn) : grad v` along the facets for every shape function v, with the recovered stress sigma. Return the
+    /// energy `int |delta| sigma : eps` of the strip along the facets of each cell.
     ///
     /// The strip is a part of the body that cells do not cover, and it carries sigma. The pressure -sigma_nn acts on the curve
     /// and not on the facet; the difference of its work is that of div v in the strip. Other loads on the boundary, and body
-    /// forces, change less.
-    pub fn add_strip(&self, law: Law<D>, residual: &mut [f64]) {
-        let strip = Strip::of(self.space);
-        if strip.is_empty() {
-            return;
-        }
-        let (rule, order) = (quadrature::simplex(D, 5), self.space.order);
-        let place = [[0, 3, 5], [3, 1, 4], [5, 4, 2]];
+    /// forces, change less. The energy changes the work of the loads to first order, as does the squared energy error of a cell, so that
+    /// both have the same share in the error of displacements.
+    pub(super) fn add_strip(&self, residual: &mut [f64]) -> Vec<f64> {
+        let (strip, space) = (Strip::of(self.space), self.space);
+        let (rule, mut energies) = (element::rule(D, 5), vec![0.0; space.cell_count()]);
         for (i, rise) in strip.rise.iter().enumerate() {
-            let (nodes, x) = (strip.facets.facet(i), strip.facets.coordinates(i, self.space));
+            let (nodes, x, cell) = (strip.facets.facet(i), strip.facets.coordinates(i, space), strip.cells[i]);
             let area = area_vector(Order::P1, &x[..D], &[1.0 / D as f64; D]);
-            let size = dot(&area, &area).sqrt();
+            let size = length(area);
             let (normal, dual) = (area.map(|a| a / size), dual(&x));
             for (l, weight) in rule.iter() {
-                let (phi, slopes) = (element::values(order, l), element::derivatives(order, l));
-                let at = assemble::interpolate(&x, &phi);
-                let mut slope = super::Slope::ZERO;
-                l.iter().zip(nodes).for_each(|(l, &node)| slope.add(*l, &self.recovered(node, &at)));
-                let stress = law(strip.cells[i], at, &slope.strain());
-                let of = |c: usize, j: usize| stress[place[c][j]];
+                let (phi, slopes) = (element::values(space.order, l), element::derivatives(space.order, l));
+                let at = element::interpolate(&x, &phi);
+                let strain = self.recovered_slope(nodes, l, &at).strain();
+                let stress = self.stress(cell, at, &strain);
+                let (weight, height) = (weight * size * space.circle(&at), rise.dot(&products(l)));
+                energies[cell] += weight * height.abs() * dot(&stress, &strain);
+                let of = |c: usize, j: usize| stress[component(c, j)];
                 let pressing: f64 = (0..D).map(|c| (0..D).map(|j| normal[c] * of(c, j) * normal[j]).sum::<f64>()).sum();
-                let weight = weight * size * self.space.circle(&at) * rise.dot(&products(l));
                 for (a, &node) in nodes.iter().enumerate() {
                     let along = |j: usize| (1..D).map(|k| (slopes[a][k] - slopes[a][0]) * dual[k][j]).sum::<f64>();
                     for c in 0..D {
                         let work: f64 =
                             (0..D).map(|j| (of(c, j) - if c == j { pressing } else { 0.0 }) * along(j)).sum();
-                        residual[D * node as usize + c] -= weight * work;
+                        residual[D * node as usize + c] -= weight * height * work;
                     }
-                    residual[D * node as usize] -= weight * (stress[2] - pressing) * self.space.hoop(&at, phi[a]);
+                    residual[D * node as usize] -= weight * height * (stress[2] - pressing) * space.hoop(&at, phi[a]);
                 }
-            }
-        }
-    }
-}
-
-impl<const D: usize> Recovery<'_, D> {
-    /// Return the energy `int |delta| sigma : eps` of the strip along the facets of each cell, with the recovered stress and strain.
-    ///
-    /// It changes the work of the loads to first order, as does the squared energy error of a cell, so that both have the same share in
-    /// the error of displacements.
-    pub fn strip_energies(&self, law: Law<D>) -> Vec<f64> {
-        let mut energies = vec![0.0; self.space.cell_count()];
-        let (strip, rule) = (Strip::of(self.space), quadrature::simplex(D, 5));
-        for (i, rise) in strip.rise.iter().enumerate() {
-            let (nodes, x) = (strip.facets.facet(i), strip.facets.coordinates(i, self.space));
-            let area = area_vector(Order::P1, &x[..D], &[1.0 / D as f64; D]);
-            for (l, weight) in rule.iter() {
-                let at = assemble::interpolate(&x, &element::values(self.space.order, l));
-                let mut slope = super::Slope::ZERO;
-                l.iter().zip(nodes).for_each(|(l, &node)| slope.add(*l, &self.recovered(node, &at)));
-                let strain = slope.strain();
-                let density: f64 = law(strip.cells[i], at, &strain).iter().zip(strain).map(|(s, e)| s * e).sum();
-                let height = rise.dot(&products(l)).abs();
-                energies[strip.cells[i]] +=
-                    weight * dot(&area, &area).sqrt() * self.space.circle(&at) * height * density;
             }
         }
         energies
@@ -226,15 +192,14 @@ fn products(l: &[f64]) -> Vector3<f64> {
 /// Return the gradients of the barycentric coordinates in the plane of a facet with these corners. That of the first is not
 /// computed.
 fn dual<const D: usize>(x: &[[f64; D]]) -> [[f64; D]; D] {
-    let arm = |k: usize| -> [f64; D] { std::array::from_fn(|c| x[k][c] - x[0][c]) };
     let mut dual = [[0.0; D]; D];
-    let a = arm(1);
+    let a = minus(x[1], x[0]);
     if D == 2 {
         let square = dot(&a, &a);
         dual[1] = a.map(|a| a / square);
         return dual;
     }
-    let b = arm(2);
+    let b = minus(x[2], x[0]);
     let (aa, ab, bb) = (dot(&a, &a), dot(&a, &b), dot(&b, &b));
     let determinant = aa * bb - ab * ab;
     dual[1] = std::array::from_fn(|c| (bb * a[c] - ab * b[c]) / determinant);
@@ -242,14 +207,10 @@ fn dual<const D: usize>(x: &[[f64; D]]) -> [[f64; D]; D] {
     dual
 }
 
-fn distance<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::sample::block;
+    use crate::fem::space::sample::block;
 
     /// Return the coordinates of a point in the cube of `sample::block` without its skew.
     fn straight<const D: usize>(x: &[f64; D]) -> [f64; D] {
@@ -289,7 +250,7 @@ mod tests {
         for (i, rise) in strip.rise.iter().enumerate() {
             let x = strip.facets.coordinates(i, &space);
             let l = [1.0 / D as f64; D];
-            let mean = |x: &[[f64; D]]| -> [f64; D] { assemble::interpolate(x, &element::values(Order::P1, &l)) };
+            let mean = |x: &[[f64; D]]| -> [f64; D] { element::interpolate(x, &element::values(Order::P1, &l)) };
             let (chord, curve) = (mean(&x[..D]), bent(mean(&x[..D].iter().map(|x| flat(*x)).collect::<Vec<_>>())));
             let area = area_vector(Order::P1, &x[..D], &l);
             let height: f64 = (0..D).map(|c| area[c] * (curve[c] - chord[c])).sum::<f64>() / dot(&area, &area).sqrt();
@@ -311,14 +272,14 @@ mod tests {
     /// Check planes, a roof of planes, and quadratic facets that are curved like the boundary.
     fn nothing_is_missed<const D: usize>() {
         let mut roof = block::<D>(4, Order::P1);
-        assert!(Strip::of(&roof).is_empty());
+        assert!(Strip::of(&roof).rise.is_empty());
         // The planes meet at 33 degrees, which is less than a corner.
         roof.nodes.iter_mut().for_each(|x| x[D - 1] += 0.3 * (straight(x)[0] - 0.5).abs());
         let strip = Strip::of(&roof);
-        assert!(strip.is_empty(), "{D}: {} of {} facets", strip.rise.len(), roof.boundary().count());
+        assert!(strip.rise.is_empty(), "{D}: {} of {} facets", strip.rise.len(), roof.boundary().count());
         let mut curved = block::<D>(4, Order::P2);
         curved.nodes.iter_mut().for_each(|x| *x = bent(*x));
-        assert!(Strip::of(&curved).is_empty());
+        assert!(Strip::of(&curved).rise.is_empty());
     }
 
     #[test]

@@ -1,0 +1,348 @@
+//! What follows from the displacement of a body: stresses, strains, internal forces and energies, and its error against a known one.
+
+use super::elasticity::{Elasticity, Material};
+use super::space::{Point, Slope, Space};
+use super::{assemble, element};
+use crate::linalg::dot;
+use crate::problem::order::Order;
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+/// Return the stress (xx yy zz xy yz xz) at every node: the mean of the stresses that the cells around the node have there, weighted by
+/// their measures. In bodies of revolution zz is the stress along the circles.
+///
+/// `u` has one entry a dof. Where the elasticity has no value at a node, as on the axis of cylindrical axes, that of an integration
+/// point of the cell is used.
+pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
+    let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });
+    let inside = element::values(space.order, &rule.points[0]);
+    let mut sum = vec![[0.0; 6]; space.nodes.len()];
+    let mut volume = vec![0.0; space.nodes.len()];
+    for index in 0..space.cell_count() {
+        let x = space.cell_nodes(index);
+        for (place, &node) in space.cell(index).iter().enumerate() {
+            let l = &element::place(D + 1, place)[..=D];
+            let Some(point) = space.point(index, &x, l, 1.0) else { continue };
+            let material = elasticity
+                .at(index, space.in_scene(point.at))
+                .or_else(|_| elasticity.at(index, space.in_scene(element::interpolate(&x, &inside))));
+            // Assembly has evaluated this integration point, so it has a value.
+            let Ok(material) = material else { continue };
+            let stress = material.stress(&point.slope(u).strain());
+            volume[node as usize] += point.measure;
+            for (sum, stress) in sum[node as usize].iter_mut().zip(stress) {
+                *sum += point.measure * stress;
+            }
+        }
+    }
+    for (sum, volume) in sum.iter_mut().zip(volume) {
+        sum.iter_mut().for_each(|s| *s /= volume);
+    }
+    sum
+}
+
+/// Return the principal stresses of (xx yy zz xy yz xz), the largest first (tension is positive); NaN if the stress is not finite.
+pub fn principal(s: &[f64; 6]) -> [f64; 3] {
+    if s.iter().any(|s| !s.is_finite()) {
+        return [f64::NAN; 3];
+    }
+    let [xx, yy, zz, xy, yz, xz] = *s;
+    let values = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz).symmetric_eigenvalues();
+    let mut sorted = [values[0], values[1], values[2]];
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    sorted
+}
+
+/// Return the von Mises stress of (xx yy zz xy yz xz).
+pub fn von_mises(s: &[f64; 6]) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = *s;
+    let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
+    (0.5 * normal + 3.0 * (xy * xy + yz * yz + xz * xz)).sqrt()
+}
+
+/// Largest strain that counts as small. The strain e of linear theory differs there by 1.5 per cent from Green's strain e + e^2/2 and
+/// from the logarithmic strain e - e^2/2. This is no more than the uncertainty of moduli.
+pub const SMALL: f64 = 0.03;
+
+/// The largest strain in some cells of a body.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Strained {
+    /// Largest principal strain in absolute value, at the centres of cells.
+    pub most: f64,
+    /// Centre of the cell with this strain (x, y, z) in the scene.
+    pub at: [f64; 3],
+    /// Measure (area or volume) of the cells with more than [`SMALL`], and of all cells.
+    pub measure: [f64; 2],
+}
+
+impl Strained {
+    /// The value for no cells.
+    pub const NONE: Self = Self { most: 0.0, at: [0.0; 3], measure: [0.0; 2] };
+
+    /// Return the largest strain in the cells of both values.
+    pub fn with(self, other: Self) -> Self {
+        let larger = if other.most > self.most { other } else { self };
+        Self { measure: std::array::from_fn(|k| self.measure[k] + other.measure[k]), ..larger }
+    }
+}
+
+/// Return the largest strain at the centres of some cells of a space for the displacement `u`, one entry a dof.
+///
+/// At its centre a linear element has its mean strain. The value at a singular corner is therefore that of a cell and is not
+/// extrapolated to the corner. The norm of a strain is no less than its largest principal strain, so that few cells need the latter.
+pub fn largest_strain<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usize>, u: &[f64]) -> Strained {
+    let centre = [1.0 / (D + 1) as f64; 4];
+    let mut found = Strained::NONE;
+    for index in cells {
+        let Some(point) = space.point(index, &space.cell_nodes(index), &centre[..=D], 1.0) else { continue };
+        let strain = point.slope(u).strain();
+        found.measure[1] += point.weight;
+        if norm(&strain) <= found.most.min(SMALL) {
+            continue;
+        }
+        let principal = largest_principal(&strain);
+        found.measure[0] += if principal > SMALL { point.weight } else { 0.0 };
+        if principal > found.most {
+            (found.most, found.at) = (principal, space.in_scene(point.at));
+        }
+    }
+    found
+}
+
+/// Return the root of the sum of the squares of the tensor's nine components. `strain` holds twice each shear strain, which occurs two
+/// times in the tensor.
+fn norm(strain: &[f64; 6]) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = *strain;
+    (xx * xx + yy * yy + zz * zz + 0.5 * (xy * xy + yz * yz + xz * xz)).sqrt()
+}
+
+/// Return the largest principal strain in absolute value.
+fn largest_principal(strain: &[f64; 6]) -> f64 {
+    let [xx, yy, zz, xy, yz, xz] = *strain;
+    let [first, _, last] = principal(&[xx, yy, zz, 0.5 * xy, 0.5 * yz, 0.5 * xz]);
+    first.abs().max(last.abs())
+}
+
+/// The norms of a displacement of one body.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Norms {
+    /// L2 norm: root of the integral of u.u.
+    pub l2: f64,
+    /// H1 seminorm: root of the integral of grad u : grad u, plus (u_r/r)^2 in bodies of revolution.
+    pub h1: f64,
+    /// Energy norm: root of the integral of eps(u) : C eps(u), which is twice the strain energy.
+    pub energy: f64,
+}
+
+/// A known displacement u at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exact<const D: usize> {
+    /// Components u_i.
+    pub value: [f64; D],
+    /// Derivatives du_i/dx_j.
+    pub gradient: [[f64; D]; D],
+}
+
+/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five.
+///
+/// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u. Points without
+/// elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not finite.
+pub fn norms_of_error<const D: usize>(
+    space: &Space<D>,
+    cells: impl Iterator<Item = usize>,
+    elasticity: &Elasticity,
+    u: &[f64],
+    exact: &dyn Fn([f64; D]) -> Exact<D>,
+) -> [Norms; 2] {
+    let rule = element::rule(D + 1, 5);
+    let mut squares = [Norms::default(); 2];
+    for index in cells {
+        for point in space.points(index, &rule).flatten() {
+            let known = exact(point.at);
+            let value = point.value(u);
+            let exact_slope = Slope { h: known.gradient, hoop: space.hoop(&point.at, known.value[0]) };
+            let mut difference = point.slope(u);
+            difference.add(-1.0, &exact_slope);
+            let error = std::array::from_fn(|i| value[i] - known.value[i]);
+            let material = elasticity.at(index, space.in_scene(point.at)).ok();
+            for (sum, (value, slope)) in squares.iter_mut().zip([(error, difference), (known.value, exact_slope)]) {
+                let strain = slope.strain();
+                let stress = material.map_or([0.0; 6], |material| material.stress(&strain));
+                sum.l2 += point.weight * value.iter().map(|v| v * v).sum::<f64>();
+                sum.h1 += point.weight * slope.square();
+                sum.energy += point.weight * dot(&stress, &strain);
+            }
+        }
+    }
+    squares.map(|sum| Norms { l2: sum.l2.sqrt(), h1: sum.h1.sqrt(), energy: sum.energy.sqrt() })
+}
+
+/// The internal forces of the cells of a body on its nodes, and the scales that these forces are compared with.
+///
+/// They check the results of solvers that use assembled matrices. Therefore they share with assembly only the integration points and
+/// Hooke's law.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Internal {
+    /// K u, one entry a dof.
+    pub force: Vec<f64>,
+    /// Bound of the rounding errors in `force`, one entry a node.
+    pub rounding: Vec<f64>,
+    /// Bound of the diagonal entries of K, one entry a node.
+    pub diagonal: Vec<f64>,
+    /// Integral of the norm of Hooke's law, shared among the nodes of each cell, one entry a node.
+    pub bulk: Vec<f64>,
+}
+
+/// Visit the integration points of some cells, which are those of [`assemble::stiffness`]. A cell that cannot be integrated is skipped,
+/// since assembly has already failed on it.
+fn visit<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+    mut each: impl FnMut(&Point<D>, &Material),
+) {
+    let rules = assemble::Rules::new::<D>(space.order);
+    for index in cells {
+        let _ = assemble::visit(space, elasticity, &rules, index, &mut each);
+    }
+}
+
+/// Return the internal forces of some cells for a displacement `u`, one entry a dof. They are complete at nodes all of whose cells are
+/// visited.
+///
+/// A force is a sum over stresses, each stress is a sum over strains, and each strain is a sum over displacements. A sum of n terms has a
+/// rounding error of at most n eps times the sum of their sizes. The bound is therefore eps times the lengths of all three sums times
+/// the sizes.
+pub fn internal_forces<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+    u: &[f64],
+) -> Internal {
+    let count = space.nodes.len();
+    let zero = || vec![0.0; count];
+    let mut sums = Internal { force: vec![0.0; D * count], rounding: zero(), diagonal: zero(), bulk: zero() };
+    let mut terms = zero();
+    visit(space, elasticity, cells, |point, material| {
+        point.cell.iter().for_each(|&node| terms[node as usize] += 1.0);
+        sums.add(space, point, material, u);
+    });
+    // A strain has D * stride terms, a stress has six, and a force has D for each integration point.
+    let inner = (D * space.stride + 6 + D) as f64;
+    sums.rounding.iter_mut().zip(terms).for_each(|(rounding, terms)| *rounding *= f64::EPSILON * (inner + terms));
+    sums
+}
+
+impl Internal {
+    /// Add the forces and bounds of an integration point; `rounding` is still without the factor of eps and the lengths of sums.
+    fn add<const D: usize>(&mut self, space: &Space<D>, point: &Point<D>, material: &Material, u: &[f64]) {
+        let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
+        let stress = material.stress(&point.slope(u).strain());
+        let stiffness = point.weight * material.norm();
+        let slope = |a: usize| size(&point.gradient[a]) + space.hoop(&point.at, point.phi[a]).abs();
+        let size_of_strain = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
+        let strains: f64 = point.cell.iter().enumerate().map(size_of_strain).sum();
+        for (a, &node) in point.cell.iter().enumerate() {
+            let node = node as usize;
+            let force = point.force(&stress, a);
+            (0..D).for_each(|c| self.force[D * node + c] += point.weight * force[c]);
+            self.rounding[node] += stiffness * slope(a) * strains;
+            self.diagonal[node] += stiffness * slope(a).powi(2);
+            self.bulk[node] += stiffness / space.stride as f64;
+        }
+    }
+}
+
+/// Return the products v_i'K v_j of n displacements, with one entry a dof each, over some cells: an n x n matrix by rows.
+pub fn energy_products<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cells: impl Iterator<Item = usize>,
+    fields: &[Vec<f64>],
+) -> Vec<f64> {
+    let n = fields.len();
+    let mut products = vec![0.0; n * n];
+    visit(space, elasticity, cells, |point, material| {
+        let strains: Vec<[f64; 6]> = fields.iter().map(|u| point.slope(u).strain()).collect();
+        for (i, strain) in strains.iter().enumerate() {
+            let stress = material.stress(strain);
+            (0..n).for_each(|j| products[n * i + j] += point.weight * dot(&stress, &strains[j]));
+        }
+    });
+    products
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::space::sample::block;
+    use crate::fem::{Frame, NodeGraph};
+    use crate::problem::{BodySpec, Plane};
+
+    #[test]
+    fn invariants_of_a_stress() {
+        // The principal stresses are 7, 2, -3 along the rows of Q = I - 2 v v'/(v'v) with v = (1, 1, 1).
+        let q = |i: usize, j: usize| f64::from(i == j) - 2.0 / 3.0;
+        let values = [7.0, 2.0, -3.0];
+        let s = |i: usize, j: usize| (0..3).map(|k| q(i, k) * values[k] * q(j, k)).sum::<f64>();
+        let stress = [s(0, 0), s(1, 1), s(2, 2), s(0, 1), s(1, 2), s(0, 2)];
+        let found = principal(&stress);
+        assert!((0..3).all(|k| (found[k] - values[k]).abs() < 1e-14), "{found:?}");
+        // The expected value is sqrt(((7-2)^2 + (2+3)^2 + (7+3)^2) / 2).
+        assert!((von_mises(&stress) - 75f64.sqrt()).abs() < 1e-13);
+        assert!(principal(&[f64::NAN; 6])[0].is_nan());
+    }
+
+    /// A shear of 0.08 in the upper half of a cube has principal strains of 0.04 and -0.04, whatever the elements.
+    #[test]
+    fn half_a_cube_is_sheared() {
+        for order in [Order::P1, Order::P2] {
+            let space = block::<3>(2, order);
+            let u: Vec<f64> = space.nodes.iter().flat_map(|x| [0.08 * (x[2] - 0.5).max(0.0), 0.0, 0.0]).collect();
+            let found = largest_strain(&space, 0..space.cell_count(), &u);
+            assert!((found.most - 0.04).abs() < 1e-12 && found.at[2] > 0.5, "{found:?}");
+            assert!((found.measure[0] / found.measure[1] - 0.5).abs() < 1e-12, "{found:?}");
+            let lower = |cell: &usize| space.cell_nodes(*cell)[..4].iter().all(|x| x[2] < 0.6);
+            let still = largest_strain(&space, (0..space.cell_count()).filter(lower), &u);
+            assert_eq!((still.most, still.measure[0]), (0.0, 0.0));
+            let both = still.with(found);
+            assert_eq!((both.most, both.measure[0]), (found.most, found.measure[0]));
+        }
+    }
+
+    /// Check that the assembled matrix gives the same forces, and that its entries lie below the bounds.
+    fn same_as_matrix<const D: usize>(order: Order, plane: Plane) {
+        let mut space = block::<D>(2, order);
+        space.axisymmetric = plane == Plane::Axisymmetric;
+        space.nodes.iter_mut().for_each(|x| x[0] += 1.0);
+        let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
+        let elasticity = Elasticity::new(&[&spec], Vec::new(), D, plane).expect("a material");
+        let graph = NodeGraph::new(&space, &[], &Frame::default());
+        let matrix = assemble::stiffness(&space, &graph, &Frame::default(), &elasticity).expect("a matrix");
+        let u: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.7).sin()).collect();
+        let v: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.3).cos()).collect();
+        let mut expected = vec![0.0; u.len()];
+        matrix.multiply(&u, &mut expected);
+        let found = internal_forces(&space, &elasticity, 0..space.cell_count(), &u);
+        for (i, (force, expected)) in found.force.iter().zip(&expected).enumerate() {
+            assert!((force - expected).abs() <= 2.0 * found.rounding[i / D], "{i}: {force} {expected}");
+            assert!(matrix.diagonal(i) <= found.diagonal[i / D] && found.rounding[i / D] < 1e-8);
+        }
+        let fields = [u, v];
+        let products = energy_products(&space, &elasticity, 0..space.cell_count(), &fields);
+        for (j, field) in fields.iter().enumerate() {
+            assert!((products[j] - dot(&expected, field)).abs() < 1e-12 * products[0]);
+        }
+        assert!((products[1] - products[2]).abs() < 1e-12 * products[0]);
+    }
+
+    #[test]
+    fn internal_forces_are_those_of_the_matrix() {
+        for order in [Order::P1, Order::P2] {
+            for plane in [Plane::Strain, Plane::Stress, Plane::Axisymmetric] {
+                same_as_matrix::<2>(order, plane);
+            }
+            same_as_matrix::<3>(order, Plane::Strain);
+        }
+    }
+}
