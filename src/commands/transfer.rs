@@ -90,7 +90,7 @@ impl EstimatedSolution {
     ///
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
     /// both errors are too small, and e is multiplied by the ratio. The error of the displacements then becomes the geometric mean of this and of
-    /// the [`extrapolated`] error. Pairs that are found automatically may differ between meshes; then nothing is compared.
+    /// the extrapolated error. Pairs that are found automatically may differ between meshes; then nothing is compared.
     pub fn correct(&self, tables: &[ContactTable], estimate: &mut Estimate) {
         if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
             return;
