@@ -85,7 +85,7 @@ pub fn estimate(
     let LocalErrors { cells, mut loads, layers, sides, mean_error, .. } = local;
     to_dofs(meshes, model, &mut loads);
 
-    let (field, closing, nodal) = nodal_errors(model, step, layer, &loads, &mean_error)?;
+    let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
     let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] - held.energy + layer.work;
@@ -128,23 +128,31 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
     Ok(all)
 }
 
-/// Solve for the errors of nodal values: the response of bodies and layers to what the elements cannot represent. Return the error of the
-/// displacements, that of the compression at each contact point, n, and the squared energy norm of both. `loads` has one entry a dof of each
-/// local body, and `mean_error` is that of [`LocalErrors`], n.
+/// The errors of nodal values: the response of bodies and layers to what the elements cannot represent.
+struct NodalErrors {
+    /// Error of the displacements.
+    field: Field,
+    /// Error of the compression at each contact point, n.
+    closing: Vec<f64>,
+    /// Squared energy norm of the error.
+    energy: f64,
+}
+
+/// Solve for the errors of nodal values. `loads` has one entry a dof of each local body, and `mean_error` is that of [`LocalErrors`], n.
 fn nodal_errors(
     model: &mut Model,
     step: &mut dyn LinearStep,
     layer: &Layer,
     loads: &[Vec<f64>],
     mean_error: &[f64],
-) -> Result<(Field, Vec<f64>, f64)> {
+) -> Result<NodalErrors> {
     let response = respond(model, step, layer, loads, tolerance(model, layer, mean_error))?;
     let (field, mut energy) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
     let closing: Vec<f64> = field.closing().iter().zip(mean_error).map(|(w, mean)| w + mean).collect();
     for (q, mean) in mean_error.iter().enumerate() {
         energy += model.weight[q] * layer.tangent[q] * mean * (2.0 * closing[q] - mean);
     }
-    Ok((field, closing, energy))
+    Ok(NodalErrors { field, closing, energy })
 }
 
 /// Return the relative energy norm of an error from its squared energy norm. `reference` is the energy of bodies and layers, without the energy `held` of

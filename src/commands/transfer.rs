@@ -184,19 +184,17 @@ impl Norms {
 /// Scattered points whose values are brought to other points by linear functions fitted to the nearest ones.
 pub struct Planes {
     tree: Tree,
-    /// Weight of the slopes in the fit, which holds them near zero; the relative weights of the points are one at least.
+    /// Weight of the slopes in the fit, which holds them near zero. The weights of the points are one at least.
     slopes: f64,
-    /// Whether misfits are weighted by the inverse distance instead of its square.
-    is_even: bool,
 }
 
 impl Planes {
     /// Points that a linear function is fitted to: twice the four that determine one in space.
     const NEAREST: usize = 8;
 
-    /// Return planes that follow the values as they are.
+    /// Return planes that follow the values as they are. Points of a plane determine no slope across it: this weight alone makes it zero.
     pub fn exact(points: &[[f64; 3]]) -> Self {
-        Self { tree: tree(points), slopes: 0.0, is_even: true }
+        Self { tree: tree(points), slopes: 1e-6 }
     }
 
     /// Return planes that lean towards the values of the nearest points.
@@ -204,33 +202,29 @@ impl Planes {
     /// Points of a surface hardly differ across it, so that the data determine no slope there. Along the surface the squares of the data's
     /// weights are some hundred times that of the slopes.
     fn damped(points: &[[f64; 3]]) -> Self {
-        Self { tree: tree(points), slopes: 0.1, is_even: false }
+        Self { tree: tree(points), slopes: 0.1 }
     }
 
-    /// Return the weights of the values of the nearest points in the fitted value at a point. The fit minimises the sum of squared weighted
-    /// misfits.
+    /// Return the weights of the values of the nearest points in the fitted value at a point.
+    ///
+    /// The fit minimises the sum of squared misfits, each weighted by the inverse distance to the fourth.
     pub fn weights(&self, at: &[f64; 3]) -> Weights {
         let nearest: Vec<_> = self.tree.nearest_neighbor_iter_with_distance_2(*at).take(Self::NEAREST).collect();
         let far = nearest.last().map_or(0.0, |(_, squared)| squared.sqrt());
         if let Some((same, _)) = nearest.first().filter(|(_, squared)| squared.sqrt() <= 1e-9 * far) {
             return vec![(same.data, 1.0)];
         }
-        let weight = |squared: f64| if self.is_even { far / squared.sqrt() } else { far * far / squared };
-        let along = |step: f64, squared: f64| if self.is_even { step / squared.sqrt() } else { far * step / squared };
         // a row for each point, then one for each slope
         let count = nearest.len();
         let rows = DMatrix::from_fn(count + 3, 4, |i, k| match nearest.get(i) {
-            Some((_, squared)) if k == 0 => weight(*squared),
-            Some((near, squared)) => along(near.geom()[k - 1] - at[k - 1], *squared),
+            Some((_, squared)) if k == 0 => far * far / squared,
+            Some((near, squared)) => far * (near.geom()[k - 1] - at[k - 1]) / squared,
             None if i + 1 == count + k => self.slopes,
             None => 0.0,
         });
-        let fit = rows.svd(true, true);
-        // a slope that the data do not determine is left out where nothing holds it
-        let cut = if self.slopes > 0.0 { f64::EPSILON } else { 1e-9 * fit.singular_values.max() };
-        let Ok(inverse) = fit.pseudo_inverse(cut) else { return vec![(nearest[0].0.data, 1.0)] };
+        let Ok(inverse) = rows.pseudo_inverse(f64::EPSILON) else { return vec![(nearest[0].0.data, 1.0)] };
         let nearest = nearest.iter().enumerate();
-        nearest.map(|(i, (near, squared))| (near.data, inverse[(0, i)] * weight(*squared))).collect()
+        nearest.map(|(i, (near, squared))| (near.data, inverse[(0, i)] * far * far / squared)).collect()
     }
 }
 

@@ -11,7 +11,6 @@ pub mod pieces;
 mod review;
 mod side;
 
-pub use crate::fem::{pad, unit};
 pub use basis::Carriers;
 pub use fine::{Fine, FinePoints};
 pub use law::{LayerLaw, Response};

@@ -2,9 +2,9 @@
 
 use super::roster::{find_group, load_dimensions};
 use super::supports::unit;
-use crate::contact::{add, pad};
+use crate::contact::add;
 use crate::error::Result;
-use crate::fem::{Facets, NodalForces, Parts, Space, assemble, place, surface};
+use crate::fem::{Facets, NodalForces, Parts, Space, assemble, pad, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};

@@ -4,9 +4,9 @@
 use super::part::Part;
 use super::roster::{pattern, tie};
 use crate::contact::pieces::{Cut, Reach, Search};
-use crate::contact::{Faces, Side, unit};
+use crate::contact::{Faces, Side};
 use crate::error::{Error, Place, Result, few};
-use crate::fem::Facets;
+use crate::fem::{Facets, unit};
 use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,7 @@ use super::supports::{Constraints, unit};
 use super::unassembled::{Gauged, NO_WORK, Supported, Unassembled, Unconstrained};
 use crate::contact::{self, ContactPair};
 use crate::exchange::Plain;
-use crate::fem::{NodalBlock, NodalForces, NodeGraph, Space, place};
+use crate::fem::{self, NodalBlock, NodalForces, NodeGraph, Space, place};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Checked;
 use crate::model::Segment;
@@ -220,10 +220,10 @@ impl<const D: usize> Unassembled<'_, D> {
             let [work, largest] = self.nodal_load.works(|_| unit(c));
             *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
         }
-        part.rigid_forces().for_each(|(_, force)| contact::add(&mut load, contact::pad(force)));
+        part.rigid_forces().for_each(|(_, force)| contact::add(&mut load, fem::pad(force)));
         BodyInfo {
             name: spec.name.value.clone(),
-            datum: contact::pad(part.space.datum),
+            datum: fem::pad(part.space.datum),
             nodes: part.space.nodes.len(),
             points: Vec::new(),
             cells: part.facts.cells,

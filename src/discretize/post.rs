@@ -4,11 +4,11 @@
 use super::approach::Outer;
 use super::roster::point;
 use super::supports::Constraints;
-use crate::contact::{add, pad};
+use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::fem::displacement::{self, Internal, Strained};
-use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble};
+use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble, pad};
 use crate::linalg::{Csr, dot};
 use crate::output::{BodyField, CellKind};
 use std::rc::Rc;

@@ -15,22 +15,12 @@ pub use field::Field;
 pub use layer::Layer;
 pub use linear::{LinearStep, Solution};
 pub use rigid::{Motions, Moved};
-// Names of former modules.
-pub use field as line;
-pub use rigid as coarse;
-pub use rigid as origin;
-
-/// Name of a former module.
-pub mod surface {
-    pub use super::layer::{contact_slopes, in_series, meeting_slopes, surface_slopes};
-}
-
-use serde::{Deserialize, Serialize};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::exchange::Exchange;
 use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;

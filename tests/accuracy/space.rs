@@ -117,7 +117,7 @@ fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: 
             for (dof, entry) in pair.rows[side].row(q) {
                 let mut f = [0.0; 3];
                 f[dof % D] = entry * pair.weight[q];
-                let x = winkler::contact::pad(space.nodes[dof / D]);
+                let x = winkler::fem::pad(space.nodes[dof / D]);
                 for c in 0..3 {
                     force[c] += f[c];
                     moment[c] += x[(c + 1) % 3] * f[(c + 2) % 3] - x[(c + 2) % 3] * f[(c + 1) % 3];
