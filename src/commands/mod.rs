@@ -1,4 +1,4 @@
-//! The commands, one file each: [`solve`], [`check`], [`sweep`], [`bench`](mod@bench), [`mesh`], [`new`](mod@new). This file has what
+//! The commands, one file each: `solve`, `check`, `sweep`, `bench`, `mesh`, `new`. This file has what
 //! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
 mod adapt;

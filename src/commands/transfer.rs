@@ -1,4 +1,5 @@
-//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and a check of the error estimates of both.
+//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, extrapolated and checked
+//! by the earlier one. Values are brought from the points of one mesh to those of another by planes.
 
 use crate::contact::ContactPair;
 use crate::discretize::Discrete;
@@ -88,9 +89,11 @@ impl EstimatedSolution {
 
     /// Correct the estimate of the next mesh, whose solution is `tables`, by the difference of both solutions.
     ///
+    /// The error of the displacements becomes the geometric mean of the estimate and of the extrapolated error.
+    ///
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
-    /// both errors are too small, and e is multiplied by the ratio. The error of the displacements then becomes the geometric mean of this and of
-    /// the extrapolated error. Pairs that are found automatically may differ between meshes; then nothing is compared.
+    /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
+    /// nothing is compared.
     pub fn correct(&self, tables: &[ContactTable], estimate: &mut Estimate) {
         if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
             return;
@@ -99,10 +102,10 @@ impl EstimatedSolution {
         for (i, error) in estimate.pressure.iter_mut().enumerate() {
             *error *= excess(&norms.pressure[i], *error, self.pressure[i]);
         }
-        estimate.displacement *= excess(&norms.displacement, estimate.displacement, self.displacement);
         if let Some(extrapolated) = extrapolated(&norms.displacement, self.energy, estimate.squared_energy()) {
             estimate.displacement = (estimate.displacement * extrapolated).sqrt();
         }
+        estimate.displacement *= excess(&norms.displacement, estimate.displacement, self.displacement);
     }
 }
 
@@ -258,15 +261,26 @@ mod tests {
         assert!((extrapolated(&norms, 4.0, 1.0).expect("a smaller error") - SAFETY * 0.1).abs() < 1e-15);
         assert_eq!(extrapolated(&norms, 1.0, 1.0), None);
         let tables = || vec![table(5, 1.0)];
-        let earlier = Estimate { displacement: 0.02, bodies: vec![3.0], layers: vec![1.0], ..Estimate::default() };
-        let earlier = EstimatedSolution::new(&Estimate { pressure: vec![0.1], ..earlier }, tables());
-        let later = Estimate { displacement: 0.09, bodies: vec![0.5], layers: vec![0.5], ..Estimate::default() };
-        let mut later = Estimate { pressure: vec![0.1], ..later };
-        earlier.correct(&[table(5, 1.1)], &mut later);
-        // The solutions differ by a tenth of the earlier one, which both errors explain.
-        let expected = (0.09 * SAFETY * 0.1 / 1.1 / 3.0f64).sqrt();
-        assert!((later.displacement - expected).abs() < 1e-12, "{} {expected}", later.displacement);
-        assert_eq!(later.pressure, [0.1]);
+        // The displacement of the later mesh after a correction by an earlier one with this error. The solutions differ by 0.1/1.1 of the later one.
+        let corrected = |of_earlier: f64| {
+            let estimate = |displacement: f64, bodies: f64| Estimate {
+                displacement,
+                bodies: vec![bodies],
+                layers: vec![0.5],
+                pressure: vec![0.1],
+                ..Estimate::default()
+            };
+            let earlier = EstimatedSolution::new(&estimate(of_earlier, 3.5), tables());
+            let mut later = estimate(0.09, 0.5);
+            earlier.correct(&[table(5, 1.1)], &mut later);
+            assert_eq!(later.pressure, [0.1]);
+            later.displacement
+        };
+        let mean = (0.09 * SAFETY * 0.1 / 1.1 / 3.0f64).sqrt();
+        assert!((corrected(0.06) - mean).abs() < 1e-12, "{} {mean}", corrected(0.06));
+        // An error of 0.02 and the mean do not explain the difference.
+        let raised = mean * 0.1 / (mean * 1.1 + 0.02);
+        assert!((corrected(0.02) - raised).abs() < 1e-12 && raised > mean, "{} {raised}", corrected(0.02));
     }
 
     /// A grid of n x n points on the unit square, with pressures and displacements that are linear functions, times a factor.

@@ -136,7 +136,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// singular one. The quadrature of linear elements is too coarse for the energy of their interpolant.
     ///
     /// The load of the interpolation error does the work eta^2 on the discrete displacement, except where the solution is singular. The
-    /// missing work is done by a multiple, at most one, of [`Recovery::softening`].
+    /// missing work is done by a multiple, at most one, of `Recovery::softening`.
     pub fn errors(&self) -> Errors {
         let of_solution = self.energy_errors();
         let (of_interpolant, mut load) = self.interpolation_error();

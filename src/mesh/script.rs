@@ -1,9 +1,9 @@
 //! The facts about a `.geo` script that matter before Gmsh runs it: which files and other inputs it reads, and which numbers can be set
-//! from outside. Scripts that follow a field of sizes are made here, too.
+//! from outside.
 //!
 //! This is a search through its text, not an interpreter: a file whose name the script computes is not seen. The values of environment
 //! variables belong to the key of its mesh in the cache. Other inputs besides files are unknown before Gmsh runs, so a mesh that depends
-//! on them cannot be cached.
+//! on them cannot be cached. Scripts that follow a field of sizes are made here, too.
 
 use super::cache::write;
 use super::trust::{self, READ, Token, runs, tokens};

@@ -1,7 +1,7 @@
 //! The free rigid motions E of all bodies together, as they close the contact points: B E. They are also a coarse space of the linear
 //! system, and the origin of displacements.
 //!
-//! Motions are numbered consecutively, body by body. Since K E = 0, all that is computed here are sums over contact points. Combinations that no contact
+//! Motions are numbered consecutively, body by body. Since K E = 0, E'(K + B'DB) z takes only sums over contact points. Combinations that no contact
 //! resists are the kernel of [`Motions::springs`], up to [`TOLERANCE`].
 
 use super::{BodySlot, Exchange, Field, Model, Motion, Segment};

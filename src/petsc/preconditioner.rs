@@ -179,7 +179,7 @@ impl Ksp {
 
     /// Solve exactly in the outermost subspace before the iteration: set `x` to Q b and replace `rest` = b by b - A x.
     ///
-    /// All residuals of conjugate gradients from there have Q r = 0. So an application needs no solve before M, which saves half of the work in
+    /// All residuals of conjugate gradients from there have Q r = 0 up to rounding. So an application needs no solve before M, which saves half of the work in
     /// the space, until the returned guard is dropped. Return `None` without a subspace, or for another method than `cg`.
     pub(super) fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Option<Started<'_>>> {
         let Some(outermost) = self.wrappers.last().filter(|_| self.ksp_type() == "cg") else { return Ok(None) };

@@ -62,7 +62,7 @@ pub(super) struct Wrapper {
 struct Context {
     inner: Inner,
     subspace: Box<dyn Subspace>,
-    /// Whether all residuals have Q r = 0, because the solve was started in the space.
+    /// Whether all residuals have Q r = 0 up to rounding, because the solve was started in the space.
     is_started: Cell<bool>,
     /// The first failure. PETSc itself passes on an error number only.
     failure: RefCell<Option<Error>>,
@@ -117,7 +117,7 @@ impl Wrapper {
         self.context().inner.pc
     }
 
-    /// Set x = Q b and `rest` = b - A x, and take all residuals to have Q r = 0 until the guard is dropped.
+    /// Set x = Q b and `rest` = b - A x, and take all residuals to have Q r = 0 up to rounding until the guard is dropped.
     pub fn start(&self, rest: &mut Vec<f64>, x: &mut [f64]) -> Result<Started<'_>> {
         let context = self.context();
         x.fill(0.0);

@@ -1,6 +1,6 @@
 //! What inner solvers cost: the choice between a factorisation and multigrid for bodies in space.
 //!
-//! The dense operations of a factorisation are counted before it is made ([`factorisation`]). All other work is
+//! The dense operations of a factorisation are counted before it is made (`factorisation`). All other work is
 //! proportional to the entries of K. It is expressed in products of K with a vector, whose speed is that of the machine's memory ([`products`]).
 //! docs/solvers.md compares both ways and the choice on thirty scenes, which are called the table below.
 

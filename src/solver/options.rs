@@ -248,7 +248,7 @@ pub fn pairs(words: &[String]) -> Result<Vec<(&str, Option<&str>)>> {
 /// Check that an option chooses a solver or sets a parameter of one, and can do nothing else: then a scene may have it.
 ///
 /// PETSc's options also write files, remove folders, call a shell, load libraries and read more options. A scene may come from anybody, so it
-/// may only have options of the lists in [`names`](super::names). An option that PETSc adds later is not among them.
+/// may only have options of the lists in [`names`]. An option that PETSc adds later is not among them.
 ///
 /// # Errors
 /// Any other option, and a value that such an option does not take.

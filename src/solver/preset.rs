@@ -82,7 +82,7 @@ impl Size {
 }
 
 /// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
-/// lack of memory speaks against it. In space [`cost`](super::cost) decides.
+/// lack of memory speaks against it. In space [`cost`] decides.
 ///
 /// ```
 /// use winkler::{problem::solver::Preset, solver::preset::{Size, in_plane}};

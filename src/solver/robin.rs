@@ -1,4 +1,5 @@
-//! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
+//! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver, and the coarse space of the
+//! rigid motions of all bodies around it.
 
 use super::{Change, InnerSolver};
 use crate::error::Result;

@@ -13,7 +13,7 @@ use std::rc::Rc;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
 ///
-/// A state is (v, a) for the displacement v + R a ([`Split`]).
+/// A state is (v, a) for the displacement v + R a (`Split`).
 pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,

@@ -1,4 +1,4 @@
-//! Cases with known answers, through the whole program; docs/verification.md names their sources.
+//! Cases with known answers, through the whole program; docs/cases.md names their sources.
 
 use crate::common::{Run, Scene, case, distance, solve, text_of};
 
