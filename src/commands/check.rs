@@ -3,8 +3,7 @@
 use super::{SceneArgs, clock_with_phases, load};
 use crate::contact::{ContactPair, Left};
 use crate::data::{Data, Detrend, Fill, Roughness, Trend};
-use crate::discretize::BodyInfo;
-use crate::discretize::{Resolution, resolution};
+use crate::discretize::{BodyInfo, Resolution, resolution};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, say, sci, warning_lines};

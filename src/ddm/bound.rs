@@ -18,8 +18,7 @@ use super::stop::Status;
 use crate::contact::LayerLaw;
 use crate::linalg::dot;
 use crate::model::Model;
-use crate::model::layer::Layer;
-use crate::model::layer::{in_series, meeting_slopes, surface_slopes};
+use crate::model::layer::{Layer, in_series, meeting_slopes, surface_slopes};
 use crate::model::linear::Solution;
 use crate::model::rigid::PART;
 

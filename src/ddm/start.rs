@@ -21,8 +21,7 @@
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{self, Unbounded};
-use crate::model::layer::Layer;
-use crate::model::layer::{contact_slopes, in_series, surface_slopes};
+use crate::model::layer::{Layer, contact_slopes, in_series, surface_slopes};
 use crate::model::rigid::{Motions, Moved, PART};
 use nalgebra::DVector;
 

@@ -154,11 +154,15 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
                 )));
             }
         }
-        let lists = regions.into_iter().zip(fix).zip(load.into_iter().zip(spring));
-        for (name, ((regions, fix), (load, spring))) in names.iter().zip(lists) {
+        let first = bodies.len();
+        bodies.extend(names.iter().zip(regions).map(|(name, regions)| {
             let name = Located::new((*name).to_owned(), table.name.place.clone());
-            bodies.push(BodySpec { name, regions, fix, load, spring, ..table.clone() });
-        }
+            BodySpec { name, regions, ..table.clone() }
+        }));
+        let new = &mut bodies[first..];
+        new.iter_mut().zip(fix).for_each(|(body, fix)| body.fix = fix);
+        new.iter_mut().zip(load).for_each(|(body, load)| body.load = load);
+        new.iter_mut().zip(spring).for_each(|(body, spring)| body.spring = spring);
     }
     Ok(bodies)
 }

@@ -3,7 +3,7 @@
 
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::expression::Field;
-use crate::fem::element;
+use crate::fem::{element, length, minus};
 use crate::output::fields::{CellKind, Grid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
@@ -229,18 +229,14 @@ impl Facet<'_> {
 
     /// Return the mean length of the sides. In the plane it is the length of the facet.
     fn side(&self, corners: usize) -> f64 {
-        (0..corners).map(|k| distance(self.nodes[k], self.nodes[(k + 1) % corners])).sum::<f64>() / corners as f64
+        (0..corners).map(|k| length(minus(self.nodes[k], self.nodes[(k + 1) % corners]))).sum::<f64>() / corners as f64
     }
 
     /// Return the length or area of the facet with straight sides.
     fn measure(&self, corners: usize) -> f64 {
-        let [a, b, c] = [0, 1, 2].map(|k| distance(self.nodes[k % corners], self.nodes[(k + 1) % corners]));
+        let [a, b, c] = [0, 1, 2].map(|k| length(minus(self.nodes[k % corners], self.nodes[(k + 1) % corners])));
         let half = 0.5 * (a + b + c);
         // This is Heron's formula.
         if corners == 2 { a } else { (half * (half - a) * (half - b) * (half - c)).max(0.0).sqrt() }
     }
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|c| (b[c] - a[c]).powi(2)).sum::<f64>().sqrt()
 }

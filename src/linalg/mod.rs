@@ -25,6 +25,12 @@ pub fn bounds<const K: usize>(points: impl IntoIterator<Item = [f64; K]>) -> [[f
     points.into_iter().fold([[f64::INFINITY; K], [f64::NEG_INFINITY; K]], |all, x| around(all, [x; 2]))
 }
 
+/// Return the diagonal of the box around points.
+pub fn diagonal(points: &[[f64; 3]]) -> f64 {
+    let [low, high] = bounds(points.iter().copied());
+    (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt()
+}
+
 /// Return the bounding box of two boxes; either may be that of no points.
 pub fn around<const K: usize>(a: [[f64; K]; 2], b: [[f64; K]; 2]) -> [[f64; K]; 2] {
     [std::array::from_fn(|c| a[0][c].min(b[0][c])), std::array::from_fn(|c| a[1][c].max(b[1][c]))]

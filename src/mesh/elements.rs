@@ -37,8 +37,7 @@ pub fn read<const D: usize>(
     let (mut orders, mut in_parts, mut known) = (Orders::default(), 0, HashMap::new());
     let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
-        let head = Head::read(cursor)?;
-        let Head { position, dimension, tag, kind, count } = head;
+        let Head { position, dimension, tag, kind, count } = Head::read(cursor)?;
         seen = seen.saturating_add(count);
         let Some(members) = physical.members(dimension, tag) else {
             let message = format!("elements of {} {tag}, which $Entities does not list", thing(dimension));

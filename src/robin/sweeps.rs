@@ -10,8 +10,7 @@ use crate::linalg::{axpy, dot};
 use crate::model::Model;
 use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
 use crate::model::linear::{Enough, Failure, LinearStep, Solution, Solved, System, Trial};
-use crate::model::rigid::Motions;
-use crate::model::rigid::{Coarse, Space};
+use crate::model::rigid::{Coarse, Motions, Space};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::rc::Rc;
 

@@ -10,8 +10,7 @@
 //! where kappa are the tangent stiffnesses of the layers. The trial displacements v come from no solver: one is what the force on
 //! each node alone would cause, others are what forces on hats of coarser and coarser grids would cause (docs/theory.md).
 
-use super::stages::Done;
-use super::stages::{All, Look, Recovered};
+use super::stages::{All, Done, Look, Recovered};
 use crate::ddm::{Inaccuracy, Row, Status, Whose, resisting};
 use crate::discretize::Unbalanced;
 use crate::exchange::all_gather;

@@ -9,7 +9,7 @@ use crate::contact::{Chords, ContactPair, End, Left, LostPieces};
 use crate::discretize::{Balanced, ContactInfo, Discrete, point};
 use crate::error::few;
 use crate::estimate::{Cause, Estimate};
-use crate::linalg::bounds;
+use crate::linalg::diagonal;
 use crate::model::{Mechanism, Model};
 use crate::output::sci;
 use crate::petsc::{Schur, Session, has_metis};
@@ -246,7 +246,7 @@ pub fn swapped_table(built: &Built, i: usize) -> Option<String> {
     let stiffness = pair.bodies.map(|body| built.discrete.bodies[body].stiffness).into_iter().fold(0.0, f64::max);
     let distance = |other: f64| (other / stiffness).ln().abs();
     let load = coupling(built, i).pressure;
-    let fits = if load > 0.0 { load <= p } else { c <= extent(&pair.position) };
+    let fits = if load > 0.0 { load <= p } else { c <= diagonal(&pair.position) };
     if stiffness == 0.0 || fits || distance(c / p) >= distance(p / c) {
         return None;
     }
@@ -261,12 +261,6 @@ pub fn swapped_table(built: &Built, i: usize) -> Option<String> {
         sci(p / c, 2),
         sci(stiffness, 2)
     ))
-}
-
-/// Return the diagonal of the box around all points.
-fn extent(points: &[[f64; 3]]) -> f64 {
-    let [low, high] = bounds(points.iter().copied());
-    (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt()
 }
 
 /// Return the warning for pair `i`, if its layer is compressed beyond the end of its law, at the solution or in a load step. There the

@@ -9,8 +9,7 @@ use winkler::model::field::{apply_stiffness, local_dot, residual};
 use winkler::model::{Field, Model};
 use winkler::petsc::Session;
 use winkler::run;
-use winkler::run::stages::Begin;
-use winkler::run::stages::Clock;
+use winkler::run::stages::{Begin, Clock};
 use winkler::scene;
 
 /// Every law, stiff and soft beside blocks of 2.1e5 of height 1 under pressures of 10.

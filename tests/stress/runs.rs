@@ -9,8 +9,7 @@ use winkler::error::Result;
 use winkler::interrupt::Interrupt;
 use winkler::petsc::Session;
 use winkler::run;
-use winkler::run::stages::Begin;
-use winkler::run::stages::Clock;
+use winkler::run::stages::{Begin, Clock};
 use winkler::run::{report, results};
 use winkler::scene;
 

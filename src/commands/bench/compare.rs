@@ -1,7 +1,6 @@
 //! The error of a contact pressure, against a table or against the closed form of the scene.
 
-use super::plan::Plan;
-use super::plan::usage;
+use super::plan::{Plan, usage};
 use crate::commands::transfer::{Planes, mean};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;

@@ -1,7 +1,6 @@
 //! One run as a process of its own: its messages, its time and its memory.
 
-use super::plan::Case;
-use super::plan::{Request, usage};
+use super::plan::{Case, Request, usage};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};

@@ -7,7 +7,7 @@ use super::table::{Table, asperities};
 use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::{Expression, Field};
-use crate::linalg::portable::pow;
+use crate::linalg::{diagonal, portable::pow};
 use crate::problem::Own;
 use crate::problem::layer::{LawForm, LawKind, LayerSpec, Parameter};
 use std::rc::Rc;
@@ -77,11 +77,7 @@ fn checked(parameter: &Parameter, field: &Field, x: [f64; 3]) -> Result<f64> {
 
 /// Return the diagonal of the box around all points. No layer is compressed by more.
 fn extent(position: &[[f64; 3]]) -> f64 {
-    let spread = |c: usize| {
-        let values = position.iter().map(|x| x[c]);
-        values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
-    };
-    let size = (0..3).map(|c| spread(c).powi(2)).sum::<f64>().sqrt();
+    let size = diagonal(position);
     if size > 0.0 { size } else { 1.0 }
 }
 
