@@ -85,7 +85,7 @@ impl Size {
 /// lack of memory speaks against it. In space [`cost`] decides.
 ///
 /// ```
-/// use winkler::{problem::solver::Preset, solver::preset::{Size, in_plane}};
+/// use winkler::{problem::Preset, solver::preset::{Size, in_plane}};
 /// let size = Size { dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
 /// assert_eq!(in_plane(&size).0, Preset::Condensed);
 /// // a sheet whose dofs are mostly on the contact gains nothing by condensation
