@@ -156,14 +156,12 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// Return the squared energy norm of the recovered minus the discrete stress on each cell.
     fn energy_errors(&self) -> Vec<f64> {
         let rule = element::rule(D + 1, 5);
-        let is_linear = self.space.order == Order::P1 && !self.space.axisymmetric;
+        if self.space.order == Order::P1 && !self.space.axisymmetric {
+            return (0..self.space.cell_count()).map(|index| self.energy_error_of_linear(index, &rule)).collect();
+        }
         let of_cell = |index: usize| {
-            let corners = is_linear.then(|| self.slopes_at_corners(self.space.cell(index)));
             let of_point = |point: Point<D>| {
-                let mut difference = match &corners {
-                    Some(corners) => between_corners(corners, point.l),
-                    None => self.recovered_slope(point.cell, point.l, &point.at),
-                };
+                let mut difference = self.recovered_slope(point.cell, point.l, &point.at);
                 difference.add(-1.0, &point.slope(self.displacement));
                 let strain = difference.strain();
                 point.weight * dot(&self.stress(index, point.at, &strain), &strain)
@@ -171,6 +169,45 @@ impl<'a, const D: usize> Recovery<'a, D> {
             self.space.points(index, &rule).flatten().map(of_point).sum()
         };
         (0..self.space.cell_count()).map(of_cell).collect()
+    }
+
+    /// Return the squared energy error of a linear cell. Its map and its discrete strain are constant, so that both are computed once.
+    fn energy_error_of_linear(&self, index: usize, rule: &element::Rule) -> f64 {
+        let Some(first) = self.space.points(index, rule).flatten().next() else { return 0.0 };
+        let errors = self.strain_errors(first.cell, &first.slope(self.displacement));
+        let x = self.space.cell_nodes(index);
+        let mut sum = 0.0;
+        for (l, weight) in rule.iter() {
+            let products = (0..=D).flat_map(|k| (k..=D).map(move |m| l[k] * l[m]));
+            let mut strain = [0.0; 6];
+            for (product, error) in products.zip(&errors) {
+                (0..6).for_each(|i| strain[i] += product * error[i]);
+            }
+            let at = element::interpolate(&x, l);
+            sum += weight * first.measure * dot(&self.stress(index, at, &strain), &strain);
+        }
+        sum
+    }
+
+    /// Return the strain of the recovered minus the discrete displacement in a linear cell, as coefficients of the products l_k l_m with k <= m.
+    /// The gradient of a parabola is linear, the blending weights are linear in linear elements, and all products sum to one.
+    fn strain_errors(&self, cell: &[u32], discrete: &Slope<D>) -> Vec<[f64; 6]> {
+        let error = |k: usize, m: usize| {
+            let mut slope = Slope { h: self.jet(cell[k], &self.space.nodes[cell[m] as usize]).1, hoop: 0.0 };
+            slope.add(-1.0, discrete);
+            slope
+        };
+        let mut errors = Vec::new();
+        for k in 0..=D {
+            for m in k..=D {
+                let mut slope = error(k, m);
+                if m > k {
+                    slope.add(1.0, &error(m, k));
+                }
+                errors.push(slope.strain());
+            }
+        }
+        errors
     }
 
     /// Return the gradient of the recovered displacement at a point with barycentric coordinates `l` of a cell or facet with these nodes.
@@ -181,12 +218,6 @@ impl<'a, const D: usize> Recovery<'a, D> {
             sum.add(*l, &Slope { h, hoop: self.space.hoop(at, value[0]) });
         }
         sum
-    }
-
-    /// Return the gradient of the polynomial of each vertex of a linear cell at each vertex.
-    fn slopes_at_corners(&self, cell: &[u32]) -> Vec<Vec<Slope<D>>> {
-        let at = |node: u32, at: u32| Slope { h: self.jet(node, &self.space.nodes[at as usize]).1, hoop: 0.0 };
-        cell.iter().map(|&node| cell.iter().map(|&corner| at(node, corner)).collect()).collect()
     }
 
     /// Return the error b of the nodal interpolant at barycentric point `l` of a simplex with these nodes, which is a cell or a
@@ -270,15 +301,6 @@ impl<'a, const D: usize> Recovery<'a, D> {
         }
         load
     }
-}
-
-/// Return the gradient of the blend at barycentric point `l` of a linear cell, from those at its corners: parabolas have linear gradients.
-fn between_corners<const D: usize>(corners: &[Vec<Slope<D>>], l: &[f64]) -> Slope<D> {
-    let mut sum = Slope::ZERO;
-    for (of_vertex, l_k) in corners.iter().zip(l) {
-        of_vertex.iter().zip(l).for_each(|(slope, l_m)| sum.add(l_k * l_m, slope));
-    }
-    sum
 }
 
 /// Add `weight sigma : grad v` at a point for the shape functions v of its cell to `sum`, one entry per dof.
