@@ -116,6 +116,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     }
 
     /// Return the value and the gradient of the polynomial of a vertex at a point.
+    #[inline]
     fn jet(&self, vertex: u32, at: &[f64; D]) -> ([f64; D], [[f64; D]; D]) {
         match &self.patches[vertex as usize] {
             Some(patch) => patch.jet(&self.monomials[0], at),

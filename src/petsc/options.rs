@@ -1,4 +1,4 @@
-//! PETSc's table of options, of which a process has one, and the words that begin options of PETSc.
+//! The table of PETSc's options, which all solvers of a process share, and the words with which PETSc's options begin.
 
 use super::library::{self, flag, is_set, petsc, string, text};
 use super::{Session, ffi};

@@ -183,9 +183,8 @@ impl Ritz {
             sums[row * (row + 1) / 2 + column]
         };
         let closing: Vec<Vec<f64>> = self.fields.iter().map(Field::closing).collect();
-        let springs = |weight: &[f64], v: &[f64], w: &[f64]| -> f64 {
-            weight.iter().zip(v).zip(w).map(|((weight, v), w)| weight * v * w).sum()
-        };
+        let springs =
+            |weight: &[f64], v: &[f64], w: &[f64]| -> f64 { (0..weight.len()).map(|i| weight[i] * v[i] * w[i]).sum() };
         let traces = |i: usize, j: usize| springs(weight, &self.fields[i].trace, &self.fields[j].trace);
         let gram = DMatrix::from_fn(n, n, |i, j| stiffness(i, j) + traces(i, j));
         let form = DMatrix::from_fn(n, n, |i, j| stiffness(i, j) + springs(spring, &closing[i], &closing[j]));

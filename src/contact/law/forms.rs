@@ -180,7 +180,8 @@ pub struct Exponential {
     at_end: Response,
 }
 
-/// Ratio c/c0 beyond which the law is a straight line.
+/// Ratio c/c0 beyond which the law is a straight line. The pressure is exp(60) = 1e26 times p0 there: no solution gets so far, and the squares of such
+/// pressures are finite.
 const LINE: f64 = 60.0;
 
 impl Exponential {

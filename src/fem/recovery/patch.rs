@@ -104,6 +104,7 @@ impl<const D: usize> Patch<D> {
     }
 
     /// Return the value and the gradient u_c,j at a point.
+    #[inline]
     pub fn jet(&self, monomials: &Monomials, x: &[f64; D]) -> ([f64; D], [[f64; D]; D]) {
         let local: [f64; D] = std::array::from_fn(|i| (x[i] - self.centre[i]) / self.size);
         let (mut values, mut slopes) = ([0.0; MOST], [[0.0; D]; MOST]);
@@ -116,9 +117,10 @@ impl<const D: usize> Patch<D> {
             slopes[k][i] += values[of];
             for c in 0..D {
                 value[c] += term[c] * values[k];
-                (0..D).for_each(|j| gradient[c][j] += term[c] * slopes[k][j] / self.size);
+                (0..D).for_each(|j| gradient[c][j] += term[c] * slopes[k][j]);
             }
         }
+        gradient.as_flattened_mut().iter_mut().for_each(|slope| *slope /= self.size);
         (value, gradient)
     }
 }
