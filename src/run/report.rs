@@ -2,11 +2,11 @@
 
 use super::stages::{All, Built, Clock, Done, Look};
 use super::verdict::{self, forecast, message, status_name};
-use super::{recorder, results, warnings};
+use super::{results, warnings};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Reached, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
-use crate::error::{Kind, few};
+use crate::error::few;
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
@@ -16,15 +16,6 @@ use crate::output::{
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
-
-/// Return the exit code of a run.
-pub fn exit_code(done: &Done) -> i32 {
-    match done.outcome.status {
-        Status::Converged | Status::RoundoffLimited if verdict::step_warnings(&done.steps).is_empty() => 0,
-        Status::Paused { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
-        _ => 1,
-    }
-}
 
 /// Return the report of a run. Collective.
 pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
