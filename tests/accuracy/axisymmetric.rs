@@ -75,10 +75,10 @@ impl Tube {
             let errors =
                 [4, 8, 16].map(|n| self.errors(&[&format!("mesh.set.n={n}"), &format!("body.0.order={degree}")]));
             let orders = [0, 1].map(|norm| order(&errors.map(|error| error[norm])));
-            let told = format!("{what} P{degree}: orders {orders:.2?}, {errors:?}");
-            println!("{told}");
+            let label = format!("{what} P{degree}: orders {orders:.2?}, {errors:?}");
+            println!("{label}");
             let least = f64::from(degree) - 0.1;
-            assert!(orders[0] > least + 0.95 && orders[1] > least && errors[2][1] < last, "{told}");
+            assert!(orders[0] > least + 0.95 && orders[1] > least && errors[2][1] < last, "{label}");
         }
     }
 }
@@ -251,10 +251,10 @@ fn a_shell_under_pressure() {
             ["error_l2", "error_h1"].map(|norm| run.number(&format!("bodies/0/{norm}")))
         });
         let orders = [0, 1].map(|norm| order(&errors.map(|error| error[norm])));
-        let told = format!("shell P{degree}: orders {orders:.2?}, {errors:?}");
-        println!("{told}");
+        let label = format!("shell P{degree}: orders {orders:.2?}, {errors:?}");
+        println!("{label}");
         let least = f64::from(degree) - 0.1;
-        assert!(orders[0] > least + 0.95 && orders[1] > least, "{told}");
+        assert!(orders[0] > least + 0.95 && orders[1] > least, "{label}");
     }
 }
 

@@ -82,11 +82,11 @@ fn oblique_fibres_in_space() {
     assert!(near(run.number("F1"), energy, 1e-9), "{} {energy}", run.number("F1"));
 }
 
-/// A uniaxial state told one per cent too large is wrong by 0.01/1.01 in every norm, and its stresses are known.
+/// A uniaxial state given one per cent too large is wrong by 0.01/1.01 in every norm, and its stresses are known.
 #[test]
 fn known_displacements_and_stresses() {
-    let told: Vec<String> = ["0.3*x", "0.3*y", "-z"].iter().map(|u| format!("\"1.01*10/2.1e5*({u})\"")).collect();
-    let sets = [format!("body.0.exact=[{}]", told.join(", "))];
+    let given: Vec<String> = ["0.3*x", "0.3*y", "-z"].iter().map(|u| format!("\"1.01*10/2.1e5*({u})\"")).collect();
+    let sets = [format!("body.0.exact=[{}]", given.join(", "))];
     let run = solve_set(case("patch-3d"), &sets).converged();
     for norm in ["error_l2", "error_h1", "error_energy"] {
         let error = run.number(&format!("bodies/0/{norm}"));
@@ -185,9 +185,9 @@ fn regions() {
     let (scene, _script) = layered("[[body.region]]\non = \"core\"\nyoung = 7e4\npoisson = 0\n");
     let run = solve(&scene, &[]).converged();
     // cells that another rank has read have the constants of their region, too
-    let dealt_out = solve_on(3, &scene, &["--method", "newton", "--set", "solver=mumps"]).converged();
+    let distributed = solve_on(3, &scene, &["--method", "newton", "--set", "solver=mumps"]).converged();
     let shortening = 10.0 * (0.5 / 2.1e5 + 0.5 / 7e4);
-    for table in [run.contact(), dealt_out.contact()] {
+    for table in [run.contact(), distributed.contact()] {
         assert!(table["u_n_lower"].iter().all(|u| near(*u, -shortening, 1e-9)), "{:?}", &table["u_n_lower"]);
     }
     assert_eq!(run.report.pointer("/settings/body/0/region/0/on").and_then(|on| on.as_str()), Some("core"));
@@ -269,7 +269,7 @@ fn nearly_incompressible() {
     assert!(silent.is_empty(), "{silent}");
 }
 
-/// Strains of more than 3 per cent are told of, with the bodies and the place. Under q = 10 a block in plane strain, free sideways, has
+/// Strains of more than 3 per cent are reported, with the bodies and the place. Under q = 10 a block in plane strain, free sideways, has
 /// strains -q (1 - nu^2)/E and q nu (1 + nu)/E.
 #[test]
 fn strains_that_are_not_small() {
@@ -286,6 +286,6 @@ fn strains_that_are_not_small() {
     assert!((soft.number("bodies/1/max_strain") / 9.1e-4 - 1.0).abs() < 1e-8, "{}", soft.said());
     assert!((0.0..1.0).contains(&soft.number("bodies/0/max_strain_at/1")), "{}", soft.said());
     // 9.1/E on both sides of 0.03
-    let told = |young| run(young).warnings().contains("strains of more");
-    assert_eq!([told(300.0), told(310.0)], [true, false]);
+    let warns = |young| run(young).warnings().contains("strains of more");
+    assert_eq!([warns(300.0), warns(310.0)], [true, false]);
 }

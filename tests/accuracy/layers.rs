@@ -93,8 +93,8 @@ fn coating() {
     assert!(table["compression"].iter().all(|&c| c < 2e-4));
 }
 
-/// A table, or an expression with an end, that the layer leaves is told of with what it is compressed to and where it ends; with load steps that
-/// of the step which goes farthest.
+/// A table, or an expression with an end, that the layer leaves is reported with the compression and the end of the law; with load steps for
+/// the step which goes farthest.
 #[test]
 fn laws_that_a_run_leaves() {
     let left = |layer: &str, steps: &str| {

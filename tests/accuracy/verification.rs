@@ -38,10 +38,10 @@ fn patch_of(name: &str, shortening: f64, axis: usize, meshes: &[(usize, usize)],
             let run = solve_with(case(name), &args);
             let table = run.contact();
             for q in 0..table.rows() {
-                let told = format!("{name} {lower}:{upper} P{p} P{r} point {q}: {}", table["pressure"][q]);
-                assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-10, "{told}");
-                assert!((table["compression"][q] / closing - 1.0).abs() < 1e-10, "{told}");
-                assert!((table["u_n_lower"][q] / -shortening - 1.0).abs() < 1e-9, "{told}");
+                let label = format!("{name} {lower}:{upper} P{p} P{r} point {q}: {}", table["pressure"][q]);
+                assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-10, "{label}");
+                assert!((table["compression"][q] / closing - 1.0).abs() < 1e-10, "{label}");
+                assert!((table["u_n_lower"][q] / -shortening - 1.0).abs() < 1e-9, "{label}");
             }
             // the lower face carries the load: forces on both sides are opposite to rounding
             let force = |side: usize| run.number(&format!("pairs/0/force/{side}/{axis}"));
@@ -110,9 +110,9 @@ fn wavy() {
             // a longer wave has a smaller amplitude beside q
             let coarser = (length * length) as f64 / 4.0;
             let found = (order(&sizes, &of_wave), order(&sizes, &at_points));
-            let told =
+            let label =
                 format!("L {length}, stiffness {stiffness}, P{degree}: orders {found:?}, {of_wave:?}, {at_points:?}");
-            assert!(found.0 > amplitude && found.1 > nodal && at_points[2] < last * coarser, "{told}");
+            assert!(found.0 > amplitude && found.1 > nodal && at_points[2] < last * coarser, "{label}");
         }
     }
 }

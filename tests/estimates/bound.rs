@@ -97,7 +97,7 @@ struct Step {
     #[allow(dead_code)] // for messages
     number: usize,
     is_bound: bool,
-    told: f64,
+    reported: f64,
     /// sqrt(2 (F1(u) - F1(u*))).
     truth: f64,
     /// |u - u*|_K, which is less.
@@ -122,9 +122,9 @@ fn steps(session: &Session, case: &str, more: &[&str], law: Option<&str>) -> Vec
         let image = apply_stiffness(&mut model, &difference);
         let bodies = local_dot(&image, &difference.states).max(0.0);
         let between = layers(&model, &compression, &model.compression(&outcome.iterate.trace));
-        let [told, truth, distance] =
+        let [reported, truth, distance] =
             [row.error * scale, (bodies + 2.0 * between).sqrt(), bodies.sqrt()].map(|error| error / norm);
-        all.push(Step { number, is_bound: row.is_bound, told, truth, distance });
+        all.push(Step { number, is_bound: row.is_bound, reported, truth, distance });
     }
     all
 }
@@ -153,10 +153,10 @@ fn compare(session: &Session) {
         for (case, more) in all {
             for step in steps(session, case, more, law) {
                 // one without a number says nothing: pressures beyond the range of numbers
-                if step.is_bound && step.truth > ROUNDING && step.told.is_finite() {
-                    let ratio = step.told / step.truth;
+                if step.is_bound && step.truth > ROUNDING && step.reported.is_finite() {
+                    let ratio = step.reported / step.truth;
                     assert!((1.0 - 1e-3..MOST_ABOVE).contains(&ratio), "{case} {law:?}: {ratio} in {step:?}");
-                    assert!(step.told >= step.distance, "{case} {law:?}: {step:?}");
+                    assert!(step.reported >= step.distance, "{case} {law:?}: {step:?}");
                     known += 1;
                 }
             }

@@ -121,8 +121,8 @@ fn steep_facets_are_told() {
     let run = solve(&scene, &["--set", "output.vtu=true"]).converged();
     let steep = run.count("pairs/0/facets_steep");
     assert!(steep >= 2 && run.count("pairs/0/facets_uncovered") + 1 >= steep, "{steep}");
-    let told = " of `upper_face` stand at more than 60 degrees to the other side (key `angle`)";
-    assert!(run.warnings().contains(told), "{}", run.warnings());
+    let expected = " of `upper_face` stand at more than 60 degrees to the other side (key `angle`)";
+    assert!(run.warnings().contains(expected), "{}", run.warnings());
     let surface = Vtk::import(run.folder.join("contact-upper-lower.vtu")).expect("a surface");
     let DataSet::UnstructuredGrid { pieces, .. } = surface.data else { panic!("no grid") };
     let [Piece::Inline(piece)] = &pieces[..] else { panic!("no piece") };

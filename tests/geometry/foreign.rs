@@ -53,21 +53,21 @@ fn patch() -> std::path::PathBuf {
 #[test]
 fn meshes_of_other_formats_give_the_same_answer() {
     let whole = solved("a.msh", &made(&patch(), &["-3", "-format", "msh41"], "a.msh"), "\"a.msh\"", &NAMED).converged();
-    let same = |run: &Run, told: &str| {
+    let same = |run: &Run, label: &str| {
         // coordinates in eight characters have six digits
-        let size = if told == "bdf" { 1e-5 } else { 1e-9 };
-        assert_eq!(run.count("dofs"), whole.count("dofs"), "{told}");
+        let size = if label == "bdf" { 1e-5 } else { 1e-9 };
+        assert_eq!(run.count("dofs"), whole.count("dofs"), "{label}");
         assert!(
             (run.number("pairs/0/peak_pressure") / whole.number("pairs/0/peak_pressure") - 1.0).abs() < size,
-            "{told}"
+            "{label}"
         );
         let sorted = |run: &Run| {
             let mut all = run.contact()["pressure"].to_vec();
             all.sort_by(f64::total_cmp);
             all
         };
-        assert!(distance(&sorted(run), &sorted(&whole)) < size, "{told}");
-        assert!(run.warnings().is_empty(), "{told}: {}", run.warnings());
+        assert!(distance(&sorted(run), &sorted(&whole)) < size, "{label}");
+        assert!(run.warnings().is_empty(), "{label}: {}", run.warnings());
     };
     for (format, names) in
         [("msh22", &NAMED), ("unv", &NAMED), ("bdf", &NUMBERED), ("mesh", &NUMBERED), ("msh1", &NUMBERED)]

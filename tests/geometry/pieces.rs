@@ -1,4 +1,4 @@
-//! Bodies that are dealt out: each rank recovers and writes its part, and all parts together are the body of one rank.
+//! Distributed bodies: each rank recovers and writes its part, and all parts together are the body of one rank.
 
 use crate::common::{Run, case, solve, solve_on};
 use std::collections::{BTreeMap, BTreeSet};

@@ -28,7 +28,7 @@ fn scene(name: &str) -> String {
     case(name).display().to_string()
 }
 
-/// The wavy gap has its pressure in closed form once the scene is told: errors fall with the mesh, whatever the solver; and
+/// The wavy gap has its pressure in closed form once the scene has it: errors fall with the mesh, whatever the solver; and
 /// counts and errors do not depend on the solver.
 #[test]
 fn errors_fall_with_the_mesh_and_rows_are_whole() {
@@ -177,7 +177,7 @@ fn rows_name_what_ran() {
     }
 }
 
-/// Elements of another order are other meshes of the same scene, and the runs are told apart by what differs: two keys with one last word have
+/// Elements of another order are other meshes of the same scene, and the labels of runs have what differs: two keys with one last word have
 /// whole names.
 #[test]
 fn orders_are_an_axis_and_lines_name_what_differs() {

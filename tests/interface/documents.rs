@@ -183,7 +183,7 @@ fn the_job_scripts_work() {
     }
 }
 
-/// A command that fails is told of, with its place.
+/// A command that fails is reported with its place.
 #[test]
 fn a_wrong_command_fails() {
     let typed = |text: &str| Typed { line: 3, text: text.to_owned() };

@@ -389,7 +389,7 @@ fn a_table_on_a_full_disk_is_a_warning_and_nothing_is_lost() {
     assert_eq!(stderr.lines().filter(warns).count(), 1, "{stderr}");
     assert!(stderr.contains("sweep.csv lacks rows") && stderr.contains("cannot write"), "{stderr}");
     let reports: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
-    assert_eq!(reports.as_array().map(Vec::len), Some(60), "all runs are told");
+    assert_eq!(reports.as_array().map(Vec::len), Some(60), "all runs are reported");
     let table = fs::read_to_string(out.join("sweep.csv")).expect("a table");
     let widths: Vec<usize> = table.lines().map(|line| line.split(',').count()).collect();
     assert!(table.ends_with('\n') && widths.len() > 5 && widths.iter().all(|width| *width == widths[0]), "{table}");

@@ -98,10 +98,10 @@ fn options_of_all_bodies_together() {
 }
 
 #[test]
-fn preonly_factors_anew_although_told_to_reuse() {
-    let (fresh, told) = (tight("--set solver=mumps"), tight("-ksp_reuse_preconditioner"));
-    assert_eq!(fresh.count("iterations"), told.count("iterations"));
-    assert_eq!(fresh.history()["residual"], told.history()["residual"]);
+fn preonly_factors_anew_although_reuse_is_requested() {
+    let (fresh, reused) = (tight("--set solver=mumps"), tight("-ksp_reuse_preconditioner"));
+    assert_eq!(fresh.count("iterations"), reused.count("iterations"));
+    assert_eq!(fresh.history()["residual"], reused.history()["residual"]);
 }
 
 /// With CG a stale preconditioner is the user's good right: then nothing is factored again, and the counter says so.
@@ -286,9 +286,9 @@ fn options_that_look_change_nothing() {
             assert_eq!(of(&run), of(&plain), "{method} {options}");
             for name in options.split_whitespace().filter(|word| word.starts_with("-ksp") || word.starts_with("-upper"))
             {
-                let told = format!("{name} ");
+                let option = format!("{name} ");
                 assert!(
-                    run.warnings().contains(told.trim()) && run.warnings().contains("nothing to show"),
+                    run.warnings().contains(option.trim()) && run.warnings().contains("nothing to show"),
                     "{}",
                     run.warnings()
                 );
@@ -376,10 +376,10 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
     // another smoother, whose bounds hold for one matrix: it is set up for each contact set, where one rank keeps its own
     let one = inner(&run(""));
     for ranks in [3, 5] {
-        let dealt = run_on(ranks, "");
-        assert!(distance(&dealt.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{ranks} ranks");
-        assert!(inner(&dealt) < 2 * one, "{ranks} ranks: {} and {one}", inner(&dealt));
-        assert_eq!(dealt.solvers(), ["cg + mg by hypre"; 2]);
+        let distributed = run_on(ranks, "");
+        assert!(distance(&distributed.contact()["pressure"], &plain.contact()["pressure"]) < 1e-7, "{ranks} ranks");
+        assert!(inner(&distributed) < 2 * one, "{ranks} ranks: {} and {one}", inner(&distributed));
+        assert_eq!(distributed.solvers(), ["cg + mg by hypre"; 2]);
     }
     let typed = run("-newton_pc_hypre_boomeramg_strong_threshold 0.5");
     assert!(typed.solvers().iter().all(|name| *name == "cg + hypre"), "{:?}", typed.solvers());

@@ -152,7 +152,7 @@ fn ranks_that_read_other_scenes_data_or_tables_are_refused() {
     refused(&solve(&wrong), 3, &["did you mean `pressure`?"]);
 }
 
-/// Every rank says what it was told before it goes its way, also one that would end at once.
+/// Every rank compares its command line with those of the others before it does anything, also one that would end at once.
 #[test]
 fn ranks_with_other_words_are_refused() {
     let scene = case("groove").display().to_string();

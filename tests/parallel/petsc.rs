@@ -189,8 +189,8 @@ fn options_come_from_line_file_and_environment() {
 }
 
 #[test]
-fn a_missing_options_file_is_told_in_petscs_words() {
-    expect_success(alone("petsc::a_missing_options_file_is_told_in_petscs_words", 0, &[], || {
+fn a_missing_options_file_is_reported_in_petscs_words() {
+    expect_success(alone("petsc::a_missing_options_file_is_reported_in_petscs_words", 0, &[], || {
         let error = Session::start(&words("-options_file nosuch.opt")).err().expect("no such file");
         // the sentence around the name differs between versions
         assert!(error.render(false).contains("nosuch.opt"), "{error}");

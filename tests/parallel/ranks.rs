@@ -1,4 +1,4 @@
-//! Newton's method is the same on any number of ranks: dofs are dealt out, or every rank solves for the contacts of condensed bodies.
+//! Newton's method is the same on any number of ranks: dofs are distributed, or every rank solves for the contacts of condensed bodies.
 
 use crate::common::{Run, Scene, apart, case, solve, solve_on, text_of, winkler_on};
 use std::fs;
@@ -121,7 +121,7 @@ fn multigrid() {
 
 /// The matrix of all bodies has its rows on all ranks, and is not solved by each for itself.
 #[test]
-fn rows_are_dealt_out() {
+fn rows_are_distributed() {
     for solver in ["hypre", "mumps"] {
         let solver = format!("solver={solver}");
         let args = ["--method", "newton", "--set", "mesh.set.n=4", "--set", &solver, "-newton_ksp_view"];
@@ -151,7 +151,7 @@ fn warnings_are_those_of_one_rank() {
 /// A product with the matrix takes each rank as many operations, although rows of quadratic elements are longer, and those at the contact: PETSc
 /// prints the ratio of the most to the least with one decimal.
 #[test]
-fn operations_are_dealt_out() {
+fn operations_are_distributed() {
     let sets = ["solver=hypre", "body.0.order=1"];
     let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
     for ranks in [2, 3] {
@@ -350,10 +350,10 @@ fn same_sweeps(ranks: &[usize], scene: &str, words: &[&str], to: f64) {
     }
 }
 
-/// One large body beside a small one, more ranks than bodies, one body too many, free bodies and quadratic elements, by each method: sweeps deal
-/// bodies out, and find what one rank finds.
+/// One large body beside a small one, more ranks than bodies, one body too many, free bodies and quadratic elements, by each method: sweeps
+/// distribute bodies, and find what one rank finds.
 #[test]
-fn bodies_of_sweeps_are_dealt_out() {
+fn bodies_of_sweeps_are_distributed() {
     let cubes = |words: &[&'static str]| [&["--set", "mesh.set={nl=10,nu=5}"], &CUBES[2..], words].concat();
     let newton = ["--method", "newton-robin", "--set", "solver=hypre"];
     same_sweeps(&[2, 5], "patch-3d", &cubes(&newton), 1e-8);
@@ -375,7 +375,7 @@ fn bodies_of_sweeps_are_dealt_out() {
 
 /// The matrix of a large body has its rows on all ranks; the small one stays whole, and so does a large one whose solver is one of a rank.
 #[test]
-fn large_bodies_are_dealt_out_and_small_ones_are_whole() {
+fn large_bodies_are_distributed_and_small_ones_are_whole() {
     let args = ["--method", "ncg", "--set", "solver=hypre", "-ksp_view"];
     let run = swept(2, "patch-3d", &[&CUBES[..], &args].concat());
     let view = ["KSP Object: (lower_) 2 MPI processes", "type: mpiaij", "rows=6591, cols=6591"];
@@ -388,10 +388,10 @@ fn large_bodies_are_dealt_out_and_small_ones_are_whole() {
     assert_eq!([run.count("bodies/0/rank"), run.count("bodies/1/rank")], [0, 1]);
 }
 
-/// A sweep has one message. A body that is dealt out adds two if contact alone holds it, for the balance of its residual and of its correction
+/// A sweep has one message. A distributed body adds two if contact alone holds it, for the balance of its residual and of its correction
 /// on rigid motions, and none if supports do.
 #[test]
-fn messages_of_dealt_out_bodies() {
+fn messages_of_distributed_bodies() {
     let upper = ["--set", "mesh.set={nl=6,nu=12}", CUBES[2], CUBES[3]];
     for (ranks, sets, each) in [(2, &CUBES, 1), (8, &CUBES, 1), (2, &upper, 3)] {
         let of = |limit: usize| {
@@ -405,7 +405,7 @@ fn messages_of_dealt_out_bodies() {
     }
 }
 
-/// Bodies that never touch need one solve each, dealt out or not, which ranks agree on by a message.
+/// Bodies that never touch need one solve each, distributed or not, which ranks agree on by a message.
 #[test]
 fn solves_that_are_known_are_skipped_on_all_ranks() {
     let args = ["--set", "mesh.set.n=40", "--set", "solver=mumps", "--set", "contact.0.gap=1"];

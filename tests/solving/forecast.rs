@@ -71,8 +71,8 @@ fn methods_with_an_estimate_stop_by_balance() {
 
 const LAYER: &str = "{power={B=2.5e-5,a=0.5}}";
 
-/// A run that ends at its limit says how many iterations are missing: compared with those that really are. What is told of an
-/// exact line search is its worst case: how much better it does depends on the start.
+/// A run that ends at its limit says how many iterations are missing: compared with those that really are. The forecast of an
+/// exact line search is that of its worst case: how much better the search is depends on the start.
 #[test]
 fn the_forecast_is_what_comes() {
     for (method, limit, [less, more]) in [
@@ -86,12 +86,12 @@ fn the_forecast_is_what_comes() {
         let all = run(LAYER, &format!("{{{method}, stop={{residual=1e-8}}}}")).converged();
         let cut = run(LAYER, &format!("{{{method}, stop={{residual=1e-8, iterations={limit}}}}}"));
         assert_eq!(cut.text("status"), "iteration-limit");
-        let (told, came) = (cut.count("forecast/iterations"), all.count("iterations") - limit);
-        let share = (told as f64 - came as f64) / came as f64;
+        let (reported, came) = (cut.count("forecast/iterations"), all.count("iterations") - limit);
+        let share = (reported as f64 - came as f64) / came as f64;
         let one = 1.0 / came as f64;
         let within = -less - one <= share && share <= more + one;
-        assert!(within, "{method}: {told} told, {came} came");
-        let line = format!("about {told} more at this rate");
+        assert!(within, "{method}: {reported} reported, {came} came");
+        let line = format!("about {reported} more at this rate");
         assert!(cut.text("message").contains(&line), "{}", cut.text("message"));
         assert_eq!(all.count("forecast/iterations"), 0);
     }
@@ -99,7 +99,7 @@ fn the_forecast_is_what_comes() {
 
 /// The factor of a fixed gamma and the best such gamma are those that runs show.
 #[test]
-fn a_fixed_gamma_is_told_the_best_one() {
+fn a_fixed_gamma_is_reported_with_the_best_one() {
     let last_factor = |run: &Run| {
         let residual = run.history()["residual"].to_vec();
         residual[residual.len() - 1] / residual[residual.len() - 2]
@@ -109,7 +109,7 @@ fn a_fixed_gamma_is_told_the_best_one() {
     assert!((slow.number("forecast/factor") - last_factor(&slow)).abs() < 1e-3);
     let (gamma, factor) = (slow.number("forecast/best_gamma"), slow.number("forecast/best_factor"));
     let best = run(LAYER, &format!("{{gamma={gamma}, start={{normal=1e-4}}}}")).converged();
-    assert!((last_factor(&best) - factor).abs() < 0.01, "{factor} told, {} came", last_factor(&best));
+    assert!((last_factor(&best) - factor).abs() < 0.01, "{factor} reported, {} came", last_factor(&best));
     for other in [gamma - 0.1, gamma + 0.1] {
         let other = run(LAYER, &format!("{{gamma={other}, start={{normal=1e-4}}, stop={{iterations=500}}}}"));
         assert!(other.code == 1 || last_factor(&other) > last_factor(&best) + 0.01, "{}", last_factor(&other));
@@ -155,8 +155,8 @@ fn the_interval_of_one_mode() {
             format!("psi = \"full\"\ngamma = {gamma}\ninterval = true\nstop = {{ residual = 1e-6, iterations = 900 }}");
         one_mode(PRESSED, "linear = { stiffness = 300 }", &method)
     };
-    let told = run(0.6).converged();
-    let interval = |key: &str| told.number(&format!("gamma_interval/{key}"));
+    let reported = run(0.6).converged();
+    let interval = |key: &str| reported.number(&format!("gamma_interval/{key}"));
     for (key, expected) in
         [("lower", 0.25), ("upper", 1.75), ("theorem", 0.5 / 1.75f64.powi(2)), ("descent", 2.0 / 1.75)]
     {
@@ -190,9 +190,9 @@ fn the_interval_of_a_layer_that_stiffens() {
     let [now, most] = [x, low].map(|x| 2.0 * x / 1e-3);
     let (lower, upper) = (100.0 / (100.0 + now), (100.0 + 2.0 * most) / (100.0 + now));
     assert!(most > 1.1 * now, "{now} to {most}");
-    let told = |key: &str| run.number(&format!("gamma_interval/{key}"));
-    assert!((told("upper") / upper - 1.0).abs() < 1e-6, "{} instead of {upper}", told("upper"));
-    assert!((told("lower") / lower - 1.0).abs() < 1e-6, "{} instead of {lower}", told("lower"));
+    let reported = |key: &str| run.number(&format!("gamma_interval/{key}"));
+    assert!((reported("upper") / upper - 1.0).abs() < 1e-6, "{} instead of {upper}", reported("upper"));
+    assert!((reported("lower") / lower - 1.0).abs() < 1e-6, "{} instead of {lower}", reported("lower"));
 }
 
 /// Inside the interval F1 falls in every step, with forms that stay and with those of the paper.
@@ -203,9 +203,9 @@ fn inside_the_interval_the_energy_falls() {
             let method = format!("method={{robin={robin}, start={{normal=1e-4}}, {rest}}}");
             solve(case("groove"), &["--set", "mesh.set.n=8", "--set", &method])
         };
-        let told = with("interval=true, stop={residual=1e-8}").converged();
-        let descent = told.number("gamma_interval/descent");
-        assert!(told.number("gamma_interval/theorem") < descent && descent < 2.0);
+        let reported = with("interval=true, stop={residual=1e-8}").converged();
+        let descent = reported.number("gamma_interval/descent");
+        assert!(reported.number("gamma_interval/theorem") < descent && descent < 2.0);
         let run = with(&format!("gamma={}, stop={{residual=1e-8, iterations=100}}", 0.99 * descent));
         assert!(descends(&run) && run.number("residual") < 0.5 * run.history()["residual"][0], "{robin}");
     }

@@ -35,8 +35,8 @@ fn steps(folder: &Path) -> Table {
     Table::read(&numbers)
 }
 
-fn near(ours: f64, theirs: f64, size: f64, told: &str) {
-    assert!((ours - theirs).abs() <= size, "{told}: {ours} {theirs}");
+fn near(ours: f64, theirs: f64, size: f64, label: &str) {
+    assert!((ours - theirs).abs() <= size, "{label}: {ours} {theirs}");
 }
 
 /// Every step of a path is the run with its loads, whatever came before: elastic layers have no memory.
@@ -54,24 +54,24 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
             let fix = format!("body.0.fix.1.y={}", 1e-3 * lift);
             let sets = ["--method", method, "--set", &load, "--set", &fix, "--set", "method.steps=1"];
             let alone = solve(groove(""), &sets).converged();
-            let told = format!("{method}, step {step}");
+            let label = format!("{method}, step {step}");
             let of = |name: &str| table[&format!("{name} lower-upper")][step];
             for (name, size) in sizes {
                 let path = if name == "force_y" { "pairs/0/force/0/1" } else { &format!("pairs/0/{name}") };
-                near(of(name), alone.number(path), size, &format!("{told}, {name}"));
+                near(of(name), alone.number(path), size, &format!("{label}, {name}"));
             }
-            near(of("approach"), alone.number("pairs/0/approach"), 1e-10, &told);
+            near(of("approach"), alone.number("pairs/0/approach"), 1e-10, &label);
             for (column, path) in [
                 ("reaction_x lower:lower_axis", "bodies/0/balance/supports/0/force/0"),
                 ("reaction_y lower:lower_face", "bodies/0/balance/supports/1/force/1"),
                 ("reaction_x upper:upper_axis", "bodies/1/balance/supports/0/force/0"),
             ] {
-                near(table[column][step], alone.number(path), 4e-5, &format!("{told}, {column}"));
+                near(table[column][step], alone.number(path), 4e-5, &format!("{label}, {column}"));
             }
             if step == 6 {
                 assert!(distance(&run.contact()["pressure"], &alone.contact()["pressure"]) < 1e-7);
                 assert!(distance(&run.contact()["u_n_upper"], &alone.contact()["u_n_upper"]) < 1e-7);
-                near(run.number("F1") / alone.number("F1"), 1.0, 1e-7, &told);
+                near(run.number("F1") / alone.number("F1"), 1.0, 1e-7, &label);
             }
         }
         let rows = run.history();

@@ -98,7 +98,7 @@ fn the_busiest_pairs_have_files() {
     let (width, pi) = (0.25 * SIDE as f64, std::f64::consts::PI);
     let expected = 0.5 * (width + (pi * width).sin() / pi) + 0.018 * width * 0.125 * (SIDE - 1) as f64;
     assert!((carried / expected - 1.0).abs() < 1e-6, "{carried} {expected}");
-    // what was left out is told, with the way to it
+    // what was left out is reported, with the way to it
     let left = pairs.len() - LISTED;
     assert!(run.text("left_out").starts_with(&format!("{left} of {} pairs", pairs.len())), "{}", run.said());
     assert!(run.stdout.contains("--set output.pairs=all") && run.stdout.lines().count() < LISTED + 8, "{}", run.stdout);

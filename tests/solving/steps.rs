@@ -20,12 +20,12 @@ fn result(run: &Run) -> (f64, f64, usize) {
     (run.number("pairs/0/force/0/1"), run.number("pairs/0/peak_pressure"), closed)
 }
 
-fn assert_same(ours: (f64, f64, usize), theirs: (f64, f64, usize), told: &str) {
+fn assert_same(ours: (f64, f64, usize), theirs: (f64, f64, usize), label: &str) {
     assert!(
         (ours.0 / theirs.0 - 1.0).abs() < 1e-6 && (ours.1 / theirs.1 - 1.0).abs() < 1e-6,
-        "{told}: {ours:?} {theirs:?}"
+        "{label}: {ours:?} {theirs:?}"
     );
-    assert_eq!(ours.2, theirs.2, "{told}");
+    assert_eq!(ours.2, theirs.2, "{label}");
 }
 
 /// A gap that closes under loads, a body that contact alone holds: every step is the run with that share of the load.
@@ -114,7 +114,7 @@ fn steps_assemble_and_factor_nothing() {
     assert_eq!(again.count("steps/1/iterations"), 0);
 }
 
-/// A step that is not solved is told of, and the next one goes on from where it ended.
+/// A step that is not solved is reported, and the next one goes on from where it ended.
 #[test]
 fn a_step_that_is_not_solved() {
     let method = |steps: &str| format!("{{gamma=0.6, {steps} stop={{residual=1e-8, iterations=70}}}}");

@@ -301,7 +301,7 @@ fn memory_ends_with_a_message() {
     environment(&mut command);
     command.arg("check").arg(&scene).args(["--set", "mesh.set={nl=24,nu=24}"]);
     assert!(output(command, Duration::from_secs(60)).0.success());
-    let mut told = 0;
+    let mut reports = 0;
     for megabytes in (60..400).step_by(20) {
         let mut command = Command::new("sh");
         environment(&mut command);
@@ -311,13 +311,13 @@ fn memory_ends_with_a_message() {
         let (status, _, said) = output(command, Duration::from_secs(60));
         if said.contains("out of memory") {
             assert!(status.code() == Some(5) && said.matches("error:").count() == 1, "{megabytes}: {said}");
-            told += 1;
-        } else if told > 0 {
+            reports += 1;
+        } else if reports > 0 {
             assert!(status.success(), "{megabytes}: {said}");
             break;
         }
     }
-    assert!(told > 0);
+    assert!(reports > 0);
 }
 
 /// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper

@@ -114,15 +114,15 @@ impl Problem {
     }
 
     /// Asserts the orders of its errors.
-    fn converges(&self, told: &str, order: usize, sizes: [usize; 3], least: [f64; 2], last: f64) {
-        check_orders(told, &Scene::new(self.scene(order)), order, sizes, least, last);
+    fn converges(&self, label: &str, order: usize, sizes: [usize; 3], least: [f64; 2], last: f64) {
+        check_orders(label, &Scene::new(self.scene(order)), order, sizes, least, last);
     }
 }
 
 /// Asserts that the relative errors (L2, H1) of the worse body fall with at least these orders, by a fit over all meshes, and
 /// that the last one in H1 is below a bound.
 fn check_orders(
-    told: &str,
+    label: &str,
     scene: &impl AsRef<std::path::Path>,
     order: usize,
     sizes: [usize; 3],
@@ -139,9 +139,9 @@ fn check_orders(
         })
     });
     let orders = [0, 1].map(|norm| slope(sizes.map(|n| -(n as f64).ln()), errors.map(|error| error[norm].ln())));
-    let told = format!("{told} P{order}: orders {orders:.2?}, {errors:?}");
-    println!("{told}");
-    assert!(orders[0] > least[0] && orders[1] > least[1] && errors[2][1] < last, "{told}");
+    let label = format!("{label} P{order}: orders {orders:.2?}, {errors:?}");
+    println!("{label}");
+    assert!(orders[0] > least[0] && orders[1] > least[1] && errors[2][1] < last, "{label}");
 }
 
 /// Slope of the straight line nearest to some points.
