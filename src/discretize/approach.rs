@@ -4,7 +4,7 @@ use super::roster::{find_group, load_dimensions};
 use super::supports::unit;
 use crate::contact::add;
 use crate::error::Result;
-use crate::fem::{Facets, NodalForces, Parts, Space, assemble, pad, place, surface};
+use crate::fem::{Facets, NodalForces, Parts, Space, assemble, length, pad, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
@@ -182,6 +182,6 @@ fn normal<const D: usize>(space: &Space<D>, group: &crate::mesh::Group) -> Optio
 }
 
 fn normalized(v: [f64; 3]) -> Option<[f64; 3]> {
-    let size = dot(&v, &v).sqrt();
+    let size = length(v);
     (size > 0.0).then(|| v.map(|v| v / size))
 }
