@@ -4,6 +4,7 @@
 //! start programs, and the current folder may belong to anybody. So its files are skipped unless `-options_file` names them. The check is
 //! needed because PETSc follows files that name each other until its stack overflows, and waits for ever at a pipe.
 
+use super::library::NO_FILES;
 use crate::error::{Error, Kind, Result};
 use std::collections::BTreeSet;
 use std::fs::File;
@@ -34,7 +35,7 @@ impl Files {
     /// # Errors
     /// When one is not a regular text file, is too large, or leads back to itself.
     pub fn check(words: &[String]) -> Result<Self> {
-        let skips = is_on(words, "-skip_petscrc");
+        let skips = skips_files(words);
         let home =
             std::env::var_os("HOME").filter(|home| !home.is_empty()).map(|home| Path::new(&home).join(".petscrc"));
         let home = home.filter(|path| !skips && path.is_file() && File::open(path).is_ok());
@@ -53,9 +54,9 @@ impl Files {
     }
 }
 
-/// Return whether a switch of the command line is on. The last occurrence counts.
-fn is_on(words: &[String], name: &str) -> bool {
-    let Some(at) = words.iter().rposition(|word| word.eq_ignore_ascii_case(name)) else { return false };
+/// Return whether the command line keeps PETSc from looking for files of options. The last occurrence of the switch counts.
+fn skips_files(words: &[String]) -> bool {
+    let Some(at) = words.iter().rposition(|word| word.eq_ignore_ascii_case(NO_FILES)) else { return false };
     let value = words.get(at + 1).map(|value| value.to_lowercase()).unwrap_or_default();
     !["0", "no", "off", "false"].contains(&value.as_str())
 }
@@ -233,7 +234,7 @@ mod tests {
 
     #[test]
     fn the_last_switch_counts() {
-        let of = |text: &str| is_on(&text.split(' ').map(str::to_owned).collect::<Vec<_>>(), "-skip_petscrc");
+        let of = |text: &str| skips_files(&text.split(' ').map(str::to_owned).collect::<Vec<_>>());
         assert!(of("-skip_petscrc") && of("-a -Skip_PetscRC 1") && of("-skip_petscrc no -skip_petscrc -x"));
         assert!(!of("-a") && !of("-skip_petscrc -skip_petscrc False"));
     }

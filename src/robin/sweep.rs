@@ -261,7 +261,7 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
                 Zone::None => false,
                 Zone::Full => true,
                 Zone::Active => layer.tangent[q] > 0.0,
-                Zone::Subset(holds) => holds.is_true_at("psi", contact.position[point], k)?,
+                Zone::Subset(holds) => holds.is_true_at(contact.position[point], k)?,
             };
             if inside {
                 // a smoothed law has a tangent where the law itself has none
