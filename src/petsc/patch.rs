@@ -28,7 +28,7 @@ struct Patch {
     over_touched: Vector,
     /// PETSc's header of a vector over P.
     over_inside: Vector,
-    factor: Factor,
+    factor: PatchFactor,
 }
 
 impl Ksp {
@@ -87,7 +87,7 @@ impl Patch {
         touched.retain(|i| owned.contains(i));
         let mut inside: Vec<usize> = dofs.iter().copied().filter(|i| owned.contains(i)).collect();
         let inside_set = Indices::new(scope.comm(session), &inside)?;
-        let Some(factor) = Factor::new(matrix, &dofs, &inside_set, inside.len())? else { return Ok(None) };
+        let Some(factor) = PatchFactor::new(matrix, &dofs, &inside_set, inside.len())? else { return Ok(None) };
         let (over_touched, over_inside) = (header(&touched)?, header(&inside)?);
         let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &inside_set)?;
         inside.iter_mut().chain(&mut touched).for_each(|i| *i -= owned.start);
@@ -129,18 +129,18 @@ impl Drop for Patch {
 /// take the same time: 45 s for `flange` with n = 2 under a layer of 1e8, compiled without optimisation. But each solve by MUMPS takes many messages, so
 /// that it takes 1.7 times as long on a machine with ten processes a core.
 #[allow(clippy::large_enum_variant)]
-pub(super) enum Factor {
+enum PatchFactor {
     /// Two halves, each eliminated by one process.
     Halves(Substructures),
     /// One factorisation by MUMPS on all processes.
     Parallel(Ksp),
 }
 
-impl Factor {
+impl PatchFactor {
     /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
     ///
     /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order. `owned` are the `count` dofs that this process owns.
-    pub fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
+    fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
         let (session, scope) = (matrix.session(), matrix.scope());
         // a half is to be no larger than what a process has of the matrix anyway
         if dofs.len() * scope.processes(session) <= 2 * matrix.total() {
@@ -160,7 +160,7 @@ impl Factor {
     }
 
     /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
-    pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
+    fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
         match self {
             Self::Halves(halves) => halves.solve(b, x),
             Self::Parallel(solver) => solver.solve(b, x).map(|_| ()),
