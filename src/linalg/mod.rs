@@ -42,18 +42,18 @@ pub fn pad<const K: usize>(v: [f64; K]) -> [f64; 3] {
 }
 
 /// Return the Euclidean length of a vector.
-pub fn length<const D: usize>(v: [f64; D]) -> f64 {
+pub fn length<const K: usize>(v: [f64; K]) -> f64 {
     dot(&v, &v).sqrt()
 }
 
 /// Return the vector scaled to length one.
-pub fn unit<const D: usize>(v: [f64; D]) -> [f64; D] {
+pub fn unit<const K: usize>(v: [f64; K]) -> [f64; K] {
     let norm = length(v);
     v.map(|v| v / norm)
 }
 
 /// Return the difference of two vectors.
-pub fn minus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
+pub fn minus<const K: usize>(a: [f64; K], b: [f64; K]) -> [f64; K] {
     std::array::from_fn(|c| a[c] - b[c])
 }
 
