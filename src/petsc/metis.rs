@@ -1,4 +1,4 @@
-//! Nested dissection and partition of graphs by METIS.
+//! Nested dissection of graphs by METIS.
 //!
 //! The library is opened when it is first needed: the file that has METIS for PETSc, or else one of METIS' usual names. Its integers have 32 or 64
 //! bits, which it shows itself. Libraries of SCOTCH have some functions of the same names, with other arguments in older versions.
@@ -15,23 +15,6 @@ const LIBRARIES: [Option<&str>; 3] = [option_env!("WINKLER_METIS_LIBRARY"), Some
 
 /// The arguments of METIS_NodeND, with its integers.
 type NodeNd<T> = unsafe extern "C" fn(*mut T, *mut T, *mut T, *mut T, *mut T, *mut T, *mut T) -> c_int;
-
-/// The arguments of METIS_PartGraphRecursive, with its integers. Floating-point numbers are always left out.
-type PartGraph<T> = unsafe extern "C" fn(
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut c_void,
-    *mut c_void,
-    *mut T,
-    *mut T,
-    *mut T,
-) -> c_int;
 
 /// METIS with the width of its integers.
 struct Metis {
@@ -89,25 +72,6 @@ impl Metis {
         let code = unsafe { node_nd(&mut count, i, j, none, none, order.as_mut_ptr(), position.as_mut_ptr()) };
         Ok((code, narrow(position)))
     }
-
-    /// Return the result of METIS_PartGraphRecursive and the part of each node.
-    fn part_graph<T: Integer>(&self, graph: Graph, parts: i32) -> Result<(c_int, Vec<i32>)> {
-        // SAFETY: METIS 5 has these arguments, and the caller chose the width.
-        let part_graph = unsafe { self.function::<PartGraph<T>>(c"METIS_PartGraphRecursive") }?;
-        let nodes = graph.ptr.len() - 1;
-        let (mut count, mut ptr, mut col) =
-            (T::from(fit("METIS", "nodes", nodes)?), array(graph.ptr), array(graph.col));
-        let (mut constraints, mut parts) = (T::from(1), T::from(parts));
-        let (mut cut, mut part) = (T::from(0), vec![T::from(-1); nodes]);
-        let (i, j, none, nothing) = (ptr.as_mut_ptr(), col.as_mut_ptr(), null_mut(), null_mut());
-        let (parts, cut, to) = (&raw mut parts, &raw mut cut, part.as_mut_ptr());
-        // SAFETY: it reads the graph, writes one number for each node to the last array and one number to the last but one; null means a
-        // default.
-        let code = unsafe {
-            part_graph(&mut count, &mut constraints, i, j, none, none, none, parts, nothing, nothing, none, cut, to)
-        };
-        Ok((code, narrow(part)))
-    }
 }
 
 /// An integer of METIS (idx_t).
@@ -120,7 +84,7 @@ fn array<T: Integer>(values: Vec<i32>) -> Vec<T> {
     values.into_iter().map(T::from).collect()
 }
 
-/// Convert a result of METIS, whose numbers are nodes or parts; others become -1.
+/// Convert a result of METIS, whose numbers are nodes; others become -1.
 fn narrow<T: Integer>(values: Vec<T>) -> Vec<i32> {
     values.into_iter().map(|value| value.try_into().unwrap_or(-1)).collect()
 }
@@ -163,29 +127,9 @@ pub fn nested_dissection(graph: Graph) -> Result<Vec<i32>> {
     Ok(position)
 }
 
-/// Return the part of each node of a graph. The `parts` parts have about the same size and few edges between them.
-///
-/// # Errors
-/// When METIS is not there ([`has_metis`]), or does not return parts.
-pub fn partition(graph: Graph, parts: i32) -> Result<Vec<i32>> {
-    let nodes = graph.ptr.len() - 1;
-    if graph.col.is_empty() {
-        return Ok((0..nodes).map(|node| (node * parts as usize / nodes) as i32).collect());
-    }
-    let metis = metis().ok_or_else(missing)?;
-    let (code, part) =
-        if metis.is_wide { metis.part_graph::<i64>(graph, parts) } else { metis.part_graph::<i32>(graph, parts) }?;
-    if code != 1 || part.iter().any(|part| !(0..parts).contains(part)) {
-        return Err(Error::new(Kind::Solver, "METIS returned no parts")
-            .because(format!("METIS_PartGraphRecursive returned {code}"))
-            .help("take another solver: --set solver=mumps"));
-    }
-    Ok(part)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Graph, nested_dissection, partition};
+    use super::{Graph, nested_dissection};
 
     /// The separator in the middle of a chain of nodes comes last.
     #[test]
@@ -203,11 +147,5 @@ mod tests {
         let last = position.iter().position(|&at| at == 400).expect("a permutation");
         assert!((100..300).contains(&last), "{last}");
         assert_eq!(nested_dissection(without_edges()).expect("no edges"), [0, 1]);
-        // two ends and a middle of the same length
-        let thirds = partition(chain(), 3).expect("METIS");
-        let changes = thirds.windows(2).filter(|pair| pair[0] != pair[1]).count();
-        let most = (0..3).map(|part| thirds.iter().filter(|of| **of == part).count()).max();
-        assert!(changes == 2 && most < Some(140), "{changes} {most:?}");
-        assert_eq!(partition(without_edges(), 2).expect("no edges"), [0, 1]);
     }
 }

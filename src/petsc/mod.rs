@@ -40,7 +40,6 @@ mod printed;
 mod requirements;
 mod session;
 mod subspace;
-mod substructures;
 mod until;
 mod vector;
 
