@@ -34,25 +34,7 @@ pub trait GammaRule {
 /// Rules that a Rust program adds, by name. Each function makes the rule of a run.
 pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 
-/// gamma^k = gamma, as in the paper.
-#[derive(Debug, Clone, Copy)]
-pub struct Stationary(pub f64);
-
-impl GammaRule for Stationary {
-    fn gamma(&mut self, _here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
-        Ok(self.0)
-    }
-
-    fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
-        Some(relaxed_factor(self.0, spectrum))
-    }
-
-    fn is_fixed(&self) -> bool {
-        true
-    }
-}
-
-/// gamma^k from a list; the last value stays.
+/// gamma^k from a list; the last value stays. With one value it is gamma^k = gamma, as in the paper.
 #[derive(Debug, Clone)]
 pub struct Schedule(pub Vec<f64>);
 

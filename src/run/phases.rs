@@ -6,7 +6,7 @@ use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
 use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Relaxed, Schedule, Spectral, Stationary};
+use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Relaxed, Schedule, Spectral};
 use crate::ddm::robin::{Acceleration, Anderson, Conjugate};
 use crate::ddm::{self, Method, Outcome, Start, Status, first_springs};
 use crate::discretize::{self, Verified, point};
@@ -437,7 +437,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut Start) -> Resul
 
 fn rule(scene: &Scene) -> Result<Box<dyn GammaRule>> {
     Ok(match &scene.method.gamma {
-        Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),
+        Gamma::Stationary(gamma) => Box::new(Schedule(vec![*gamma])),
         Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
         Gamma::LineSearch => Box::new(LineSearch),
         Gamma::Aitken => Box::new(Aitken::default()),
