@@ -206,7 +206,7 @@ fn known_correction(model: &Model, index: usize, r: &[f64], last: &Sweep, factor
         model.exchange.sum(&mut sums);
     }
     (sums[0] <= 1e-12 * sums[1]).then(|| {
-        let mut z = vec![0.0; body.len()];
+        let mut z = vec![0.0; body.state_len()];
         axpy(factor, &last.correction.states[index], &mut z);
         z
     })
