@@ -6,7 +6,7 @@
 use super::library::fit;
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
-use std::ffi::{CStr, c_int, c_void};
+use std::ffi::{c_int, c_void};
 use std::ptr::null_mut;
 use std::sync::OnceLock;
 
@@ -49,28 +49,22 @@ impl Metis {
         Some(Self { library, is_wide: options[39] == -1 })
     }
 
-    /// Return a function by its name.
-    ///
-    /// # Safety
-    /// `T` is the type of the function of this name, with integers of the right width.
-    unsafe fn function<T: Copy>(&self, name: &CStr) -> Result<T> {
-        // SAFETY: the caller's promise.
-        let function = unsafe { self.library.get::<T>(name.to_bytes_with_nul()) };
-        function.map(|function| *function).map_err(|cause| missing().because(cause.to_string()))
-    }
-
     /// Return the result of METIS_NodeND and the position of each node in the order of elimination.
     fn node_nd<T: Integer>(&self, graph: Graph) -> Result<(c_int, Vec<i32>)> {
-        // SAFETY: METIS 5 has these arguments, and the caller chose the width.
-        let node_nd = unsafe { self.function::<NodeNd<T>>(c"METIS_NodeND") }?;
+        // SAFETY: METIS 5 has this function with these arguments, and the caller chose the width.
+        let found = unsafe { self.library.get::<NodeNd<T>>(b"METIS_NodeND\0") };
+        let node_nd = found.map_err(|cause| missing().because(cause.to_string()))?;
         let nodes = graph.ptr.len() - 1;
-        let (mut count, mut ptr, mut col) =
-            (T::from(fit("METIS", "nodes", nodes)?), array(graph.ptr), array(graph.col));
+        // arrays of integers with 32 bits are not copied
+        let array = |values: Vec<i32>| values.into_iter().map(T::from).collect::<Vec<_>>();
+        let mut count = T::from(fit("METIS", "nodes", nodes)?);
+        let (mut ptr, mut col) = (array(graph.ptr), array(graph.col));
         let (mut order, mut position) = (vec![T::from(-1); nodes], vec![T::from(-1); nodes]);
         let (i, j, none) = (ptr.as_mut_ptr(), col.as_mut_ptr(), null_mut());
         // SAFETY: it reads the graph and writes one number for each node to each of the last two arrays.
         let code = unsafe { node_nd(&mut count, i, j, none, none, order.as_mut_ptr(), position.as_mut_ptr()) };
-        Ok((code, narrow(position)))
+        // a number that is no node becomes -1
+        Ok((code, position.into_iter().map(|at| at.try_into().unwrap_or(-1)).collect()))
     }
 }
 
@@ -78,16 +72,6 @@ impl Metis {
 trait Integer: Copy + From<i32> + TryInto<i32> {}
 impl Integer for i32 {}
 impl Integer for i64 {}
-
-/// Convert an array to METIS' integers. Where these have 32 bits, it is not copied.
-fn array<T: Integer>(values: Vec<i32>) -> Vec<T> {
-    values.into_iter().map(T::from).collect()
-}
-
-/// Convert a result of METIS, whose numbers are nodes; others become -1.
-fn narrow<T: Integer>(values: Vec<T>) -> Vec<i32> {
-    values.into_iter().map(|value| value.try_into().unwrap_or(-1)).collect()
-}
 
 /// A symmetric graph: the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself.
 pub struct Graph {
