@@ -48,11 +48,8 @@ const FUNCTIONS: &[&str] = &[
     "MatCreate",
     "MatCreateMPIAIJWithSplitArrays",
     "MatCreateSeqAIJWithArrays",
-    "MatCreateSubMatrices",
     "MatCreateSubMatrix",
     "MatDestroy",
-    "MatDestroySubMatrices",
-    "MatGetRow",
     "MatIncreaseOverlap",
     "MatMPIAIJGetSeqAIJ",
     "MatMPIAIJSetPreallocationCSR",
@@ -62,7 +59,6 @@ const FUNCTIONS: &[&str] = &[
     "MatMumpsSetIcntl",
     "MatNullSpaceCreate",
     "MatNullSpaceDestroy",
-    "MatRestoreRow",
     "MatSeqAIJGetArray",
     "MatSeqAIJRestoreArray",
     "MatSeqAIJSetPreallocationCSR",
@@ -136,10 +132,6 @@ const FUNCTIONS: &[&str] = &[
     "VecResetArray",
     "VecRestoreArray",
     "VecRestoreArrayRead",
-    "VecScatterBegin",
-    "VecScatterCreate",
-    "VecScatterDestroy",
-    "VecScatterEnd",
     "VecSetBlockSize",
 ];
 
@@ -350,7 +342,7 @@ fn declare(folders: &[PathBuf], mpi: &build_probe_mpi::Library) {
         // the type of communicators in the whole crate is that of the `mpi` crate
         .blocklist_type("(MPI_Comm|ompi_communicator_t)")
         .raw_line("use mpi::ffi::MPI_Comm;")
-        .allowlist_type("(InsertMode|KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool|ScatterMode)")
+        .allowlist_type("(KSPConvergedReason|MatOption|MatReuse|PetscCopyMode|PCFailedReason|PetscErrorType|PetscBool)")
         .allowlist_var(VERSIONS.join("|"))
         .dynamic_library_name("Library")
         .dynamic_link_require_all(true);

@@ -176,7 +176,7 @@ impl Field {
         }
     }
 
-    /// Return the value at a point in iteration `k`.
+    /// Return the value at a point in iteration `k`. Messages call it psi.
     pub fn eval_at(&self, x: [f64; 3], k: usize) -> f64 {
         match self {
             Field::Constant(value) => *value,
@@ -199,13 +199,13 @@ impl Field {
         if value.is_finite() { Ok(value) } else { Err(self.refuse(what, &x, value)) }
     }
 
-    /// Return whether it is true, which is a number > 0, at a point in iteration `k`. `what` is its name in a message ("psi").
+    /// Return whether it is true, which is a number > 0, at a point in iteration `k`. Messages call it psi.
     ///
     /// # Errors
     /// A point where it is not defined.
-    pub fn is_true_at(&self, what: &str, x: [f64; 3], k: usize) -> Result<bool> {
+    pub fn is_true_at(&self, x: [f64; 3], k: usize) -> Result<bool> {
         let value = self.eval_at(x, k);
-        if value.is_nan() { Err(self.refuse(what, &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
+        if value.is_nan() { Err(self.refuse("psi", &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
     }
 
     /// Return the data that it uses.

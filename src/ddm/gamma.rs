@@ -41,7 +41,7 @@ pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 /// A name that no rule of the program has.
 pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
     Ok(match gamma {
-        Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),
+        Gamma::Stationary(gamma) => Box::new(Schedule(vec![*gamma])),
         Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
         Gamma::LineSearch => Box::new(LineSearch),
         Gamma::Aitken => Box::new(Aitken::default()),
@@ -51,25 +51,7 @@ pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
     })
 }
 
-/// gamma^k = gamma, as in the paper.
-#[derive(Debug, Clone, Copy)]
-pub struct Stationary(pub f64);
-
-impl GammaRule for Stationary {
-    fn gamma(&mut self, _here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
-        Ok(self.0)
-    }
-
-    fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
-        Some(relaxed_factor(self.0, spectrum))
-    }
-
-    fn is_fixed(&self) -> bool {
-        true
-    }
-}
-
-/// gamma^k from a list; the last value stays.
+/// gamma^k from a list; the last value stays. With one value it is gamma^k = gamma, as in the paper.
 #[derive(Debug, Clone)]
 pub struct Schedule(pub Vec<f64>);
 

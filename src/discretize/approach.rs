@@ -1,10 +1,10 @@
 //! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
 
 use super::roster::{find_group, load_dimensions};
-use super::supports::unit;
+use super::supports::axis_vector;
 use crate::contact::add;
 use crate::error::Result;
-use crate::fem::{Facets, NodalForces, Parts, Space, assemble, pad, place, surface};
+use crate::fem::{Facets, NodalForces, Parts, Space, assemble, length, pad, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
@@ -99,14 +99,14 @@ impl Outer {
         }
         for fix in &spec.fix {
             let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
-            let components = (0..D).filter(|&c| fix.value[c].is_some()).map(unit);
+            let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axis_vector);
             let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
             outer.held.push(Place::new(space, group, components.chain(normal).collect()));
         }
         for spring in &spec.spring {
             let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
             let directions = match &spring.kind {
-                SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(unit).collect(),
+                SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axis_vector).collect(),
                 SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
             };
             outer.held.push(Place::new(space, group, directions));
@@ -159,12 +159,12 @@ fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &
 
 /// Return the integrals of the shape functions over a surface.
 fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
-    first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| unit(0)))
+    first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| axis_vector(0)))
 }
 
 /// Return the integrals of the shape functions over the body.
 fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
-    first_components(&assemble::body_force(space, Parts::Whole, &|_| unit(0)))
+    first_components(&assemble::body_force(space, Parts::Whole, &|_| axis_vector(0)))
 }
 
 fn first_components<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {
@@ -182,6 +182,6 @@ fn normal<const D: usize>(space: &Space<D>, group: &crate::mesh::Group) -> Optio
 }
 
 fn normalized(v: [f64; 3]) -> Option<[f64; 3]> {
-    let size = dot(&v, &v).sqrt();
+    let size = length(v);
     (size > 0.0).then(|| v.map(|v| v / size))
 }

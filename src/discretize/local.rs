@@ -3,7 +3,7 @@
 use super::distribute::{Partition, Share};
 use super::part::BodyFacts;
 use super::post::Post;
-use super::supports::{Constraints, unit};
+use super::supports::{Constraints, axis_vector};
 use super::unassembled::{Gauged, NO_WORK, Supported, Unassembled, Unconstrained};
 use crate::contact::{self, ContactPair};
 use crate::exchange::Plain;
@@ -217,7 +217,7 @@ impl<const D: usize> Unassembled<'_, D> {
         // Loads that balance, as a pressure in a closed ring does, leave rounding, which counts as zero.
         let mut load = self.nodal_load.sum();
         for (c, sum) in load.iter_mut().enumerate().take(D) {
-            let [work, largest] = self.nodal_load.works(|_| unit(c));
+            let [work, largest] = self.nodal_load.works(|_| axis_vector(c));
             *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
         }
         part.rigid_forces().for_each(|(_, force)| contact::add(&mut load, fem::pad(force)));

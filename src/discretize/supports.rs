@@ -60,7 +60,8 @@ impl<const D: usize> Constraints<D> {
                 return Err(not_on_body(&fix.on, &spec.name.value));
             }
             let components = fix.value[..D].iter().enumerate();
-            let mut held_here: Vec<_> = components.filter_map(|(c, field)| Some((unit(c), field.as_ref()?))).collect();
+            let mut held_here: Vec<_> =
+                components.filter_map(|(c, field)| Some((axis_vector(c), field.as_ref()?))).collect();
             if let Some(field) = &fix.normal {
                 held_here.push((plane(space, group, &fix.on.value, &fix.on.place)?, field));
             }
@@ -100,7 +101,7 @@ impl<const D: usize> Constraints<D> {
     /// Return the conditions of symmetry. In a body of revolution, nodes on the axis and rigid surfaces have no radial
     /// displacement.
     fn symmetry(&self, space: &Space<D>) -> BTreeMap<u32, Vec<Condition<D>>> {
-        let radial = Condition { direction: unit(0), value: 0.0, support: None };
+        let radial = Condition { direction: axis_vector(0), value: 0.0, support: None };
         let on_axis = (0..space.nodes.len() as u32).filter(|&node| space.on_axis(node));
         let masters = self.rigid.iter().flat_map(|(_, nodes)| nodes.first().copied());
         let held = on_axis.chain(masters).filter(|_| space.axisymmetric);
@@ -181,7 +182,7 @@ impl<const D: usize> Constraints<D> {
                 let axis = rest.map(|r| r / size);
                 // A coordinate axis stays exact to the last digit.
                 let along = (0..D).find(|&c| axis[c].abs() > 1.0 - 1e-14);
-                basis.push(along.map_or((axis, value / size), |c| (unit(c), value / size * axis[c].signum())));
+                basis.push(along.map_or((axis, value / size), |c| (axis_vector(c), value / size * axis[c].signum())));
                 kept.push((condition.direction, condition.support));
                 continue;
             }
@@ -195,7 +196,7 @@ impl<const D: usize> Constraints<D> {
         if turned {
             let mut axes: Vec<[f64; D]> = basis.iter().map(|(axis, _)| *axis).collect();
             for c in 0..D {
-                let rest = axes.iter().fold(unit(c), |rest: [f64; D], axis| {
+                let rest = axes.iter().fold(axis_vector(c), |rest: [f64; D], axis| {
                     let share = dot(&rest, axis);
                     std::array::from_fn(|i| rest[i] - share * axis[i])
                 });
@@ -285,7 +286,7 @@ impl<const D: usize> Constraints<D> {
 }
 
 /// Return the unit vector along an axis.
-pub fn unit<const D: usize>(component: usize) -> [f64; D] {
+pub fn axis_vector<const D: usize>(component: usize) -> [f64; D] {
     std::array::from_fn(|c| if c == component { 1.0 } else { 0.0 })
 }
 
@@ -384,7 +385,7 @@ pub fn spring_blocks<const D: usize>(
 pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts) -> [f64; 3] {
     let sum =
         |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
-    let area = sum(&|_| unit(0))[0];
+    let area = sum(&|_| axis_vector(0))[0];
     sum(&|x| x).map(|sum| sum / area)
 }
 
@@ -419,7 +420,7 @@ pub fn moment_load<const D: usize>(
     // In the plane bodies turn about z alone. The other axes keep a one on the diagonal.
     let mut inertia = Matrix3::identity();
     for axis in if D == 2 { 2..3 } else { 0..3 } {
-        inertia.set_column(axis, &moment_of(&turn(unit(axis))));
+        inertia.set_column(axis, &moment_of(&turn(axis_vector(axis))));
     }
     let theta = inertia.lu().solve(&Vector3::from(moment)).unwrap_or(Vector3::repeat(f64::NAN));
     turn(theta.into())

@@ -141,7 +141,7 @@ fn variables_take_their_own_values() {
     assert_eq!(expression.eval(&[3.0, 5.0]), 305.0);
     let zone = "x > 1 && k < 5";
     let field = Field::parse(zone, &place(zone), 2, true, &Library::new()).unwrap();
-    assert_eq!([4, 5].map(|k| field.is_true_at("psi", [2.0, 0.0, 0.0], k).unwrap()), [true, false]);
+    assert_eq!([4, 5].map(|k| field.is_true_at([2.0, 0.0, 0.0], k).unwrap()), [true, false]);
 }
 
 #[test]
@@ -207,9 +207,9 @@ fn a_value_that_is_not_finite_is_refused_with_its_point() {
     assert_eq!(error.message(), "gap is not a finite number at x = 0.5, y = 2");
     let zone = "log(x) < z*k";
     let field = Field::parse(zone, &place(zone), 3, true, &Library::new()).unwrap();
-    assert!(field.is_true_at("psi", [1.0, 9.0, 2.0], 1).unwrap());
-    assert!(!field.is_true_at("psi", [1.0, 9.0, 2.0], 0).unwrap());
-    let error = field.is_true_at("psi", [-1.0, 9.0, 2.0], 3).expect_err("NaN");
+    assert!(field.is_true_at([1.0, 9.0, 2.0], 1).unwrap());
+    assert!(!field.is_true_at([1.0, 9.0, 2.0], 0).unwrap());
+    let error = field.is_true_at([-1.0, 9.0, 2.0], 3).expect_err("NaN");
     assert_eq!(error.message(), "psi is not a finite number at x = -1, y = 9, z = 2, k = 3");
 }
 

@@ -41,6 +41,27 @@ pub fn pad<const K: usize>(v: [f64; K]) -> [f64; 3] {
     std::array::from_fn(|c| if c < K { v[c] } else { 0.0 })
 }
 
+/// Return the Euclidean length of a vector.
+pub fn length<const K: usize>(v: [f64; K]) -> f64 {
+    dot(&v, &v).sqrt()
+}
+
+/// Return the vector scaled to length one.
+pub fn unit<const K: usize>(v: [f64; K]) -> [f64; K] {
+    let norm = length(v);
+    v.map(|v| v / norm)
+}
+
+/// Return the difference of two vectors.
+pub fn minus<const K: usize>(a: [f64; K], b: [f64; K]) -> [f64; K] {
+    std::array::from_fn(|c| a[c] - b[c])
+}
+
+/// Return the vector product.
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| a[(c + 1) % 3] * b[(c + 2) % 3] - a[(c + 2) % 3] * b[(c + 1) % 3])
+}
+
 /// A sparse matrix in compressed rows: row `i` has the columns `col[ptr[i]..ptr[i+1]]`, sorted.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Csr {

@@ -22,10 +22,10 @@ pub fn file_name(made_from: impl Serialize, path: &Path) -> String {
     format!("{stem}-{:.32}.msh", digest(&("winkler mesh 4", made_from)))
 }
 
-/// Return the path of the mesh that a Gmsh makes in a folder, under a name of [`file_name`]. `identity` distinguishes this Gmsh from others.
-pub fn made_by(folder: &Path, name: &str, identity: &str) -> PathBuf {
+/// Return the name of the mesh that a Gmsh makes under a name of [`file_name`]. `identity` distinguishes this Gmsh from others.
+pub fn made_by(name: &str, identity: &str) -> String {
     // A prefix of 64 bits distinguishes more than all versions of Gmsh.
-    folder.join(format!("{}{:.16}.msh", start(name), digest(&identity)))
+    format!("{}{:.16}.msh", start(name), digest(&identity))
 }
 
 /// Return the paths of the meshes in a folder that any Gmsh made under a name of [`file_name`], newest first.
@@ -155,12 +155,12 @@ impl Workshop {
         }
     }
 
-    /// Move a finished file into the cache, over an older one, and return its path there. `name` gives this path for the cache's folder.
+    /// Move a finished file into the cache under a name, over an older one, and return its path there.
     ///
     /// # Errors
     /// The file system refuses.
-    pub fn publish(&self, file: &Path, name: impl FnOnce(&Path) -> PathBuf) -> Result<PathBuf> {
-        let to = name(&self.cache);
+    pub fn publish(&self, file: &Path, name: &str) -> Result<PathBuf> {
+        let to = self.cache.join(name);
         let owned = |data: Metadata| Permissions::from_mode(data.permissions().mode() & !WRITABLE_BY_ALL);
         let ours = std::fs::metadata(file).and_then(|data| std::fs::set_permissions(file, owned(data)));
         ours.and_then(|()| std::fs::rename(file, &to)).map_err(|cause| Error::file(&to, "create", &cause))?;
@@ -264,7 +264,7 @@ mod tests {
         let workshop = Workshop::open(&[blocked.clone(), good.clone()]).unwrap();
         let file = workshop.path().join("a");
         std::fs::write(&file, "a").unwrap();
-        assert_eq!(workshop.publish(&file, |cache| cache.join("b.msh")).unwrap(), good.join("b.msh"));
+        assert_eq!(workshop.publish(&file, "b.msh").unwrap(), good.join("b.msh"));
         let blamed = |error: Error| workshop.blame(error).message().to_owned();
         assert_eq!(blamed(Error::new(Kind::Mesh, "no mesh")), "no mesh");
         let left = std::fs::read_dir(workshop.path()).unwrap().map(|entry| entry.unwrap().file_name());

@@ -429,19 +429,4 @@ mod tests {
         let found = nodes("1 1 1 1\n1 1 1 1\n1\n4 5 6 0.25\n").unwrap();
         assert_eq!(found.points, [[4.0, 5.0, 6.0]]);
     }
-
-    #[test]
-    fn errors_name_the_line() {
-        for (text, expected) in [
-            ("1 2 1 2\n2 1 0 2\n5\n5\n0 0 0\n1 0 0\n", "a.msh:6: node tag 5 stands twice"),
-            ("1 1 1 1\n2 1 0 1\n5\n0 nan 0\n", "a.msh:4: a coordinate is NaN"),
-            ("1 1 1 1\n2 1 0 1\n5\n0 0\n", "a.msh:4: this line has too few entries"),
-            ("1 1 1 1\n2 1 0 1\n5\n0 0 0 0\n", "a.msh:4: this line has more entries than expected"),
-            ("1 2 1 1\n2 1 0 1\n5\n0 0 0\n", "$Nodes announces 2 nodes and holds 1"),
-            ("1 1 1 1\n2 1 0 999999999999\n5\n0 0 0\n", "a.msh:2: the file is too short for a count of 999999999999"),
-        ] {
-            let error = nodes(text).err().unwrap().to_string();
-            assert!(error.contains(expected), "{error}");
-        }
-    }
 }

@@ -131,9 +131,7 @@ fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
 fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
     let abaqus::Converted { mesh: bytes, notes } = abaqus::convert(path, bytes, D)?;
     let name = file_name(("input file", digest_of_bytes(&bytes)), path);
-    let make = |_: &Path, made: &Path| write(made, &bytes);
-    let place = |cache: &Path| cache.join(&name);
-    let loaded = made_anew((path, &name), None, &folders(), make, place)?;
+    let loaded = made_anew((path, &name), None, &folders(), |_, made| write(made, &bytes))?;
     Ok(Loaded { origin: Origin::File, notes, ..loaded })
 }
 
@@ -184,7 +182,7 @@ fn kept<const D: usize>(
 ) -> Result<Loaded<D>> {
     let gmsh = Gmsh::find();
     let candidates = |folder: &PathBuf| match &gmsh {
-        Some(gmsh) => vec![cache::made_by(folder, name, &gmsh.identity())],
+        Some(gmsh) => vec![folder.join(cache::made_by(name, &gmsh.identity()))],
         None => cache::made_by_any(folder, name),
     };
     // A file of the cache that cannot be read or is damaged counts as absent.
@@ -194,19 +192,17 @@ fn kept<const D: usize>(
         }
     }
     let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
-    let place = |cache: &Path| cache::made_by(cache, name, &gmsh.identity());
-    let loaded = made_anew((path, name), order, folders, |work, made| make(&gmsh, work, made), place)?;
+    let name = cache::made_by(name, &gmsh.identity());
+    let loaded = made_anew((path, &name), order, folders, |work, made| make(&gmsh, work, made))?;
     Ok(Loaded { unkept, ..loaded })
 }
 
-/// Make the mesh `name` and put it into the cache, at the `place` in its folder. `make` gets a folder to work in and the path of the
-/// file that it must write there.
+/// Make the mesh `name` and put it into the cache. `make` gets a folder to work in and the path of the file that it must write there.
 fn made_anew<const D: usize>(
     (path, name): (&Path, &str),
     order: Option<Order>,
     folders: &[PathBuf],
     make: impl FnOnce(&Path, &Path) -> Result<()>,
-    place: impl FnOnce(&Path) -> PathBuf,
 ) -> Result<Loaded<D>> {
     let workshop = Workshop::open(folders)?;
     let made = workshop.path().join(name);
@@ -214,7 +210,7 @@ fn made_anew<const D: usize>(
     let mesh = make(workshop.path(), &made).and_then(|()| read_made(path, order, open()?));
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
-    let file = workshop.publish(&made, place)?;
+    let file = workshop.publish(&made, name)?;
     Ok(Loaded::new(mesh, Origin::Gmsh, file, digest))
 }
 
@@ -324,7 +320,7 @@ pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
     let name = final_name(purpose);
     let made = workshop.path().join(&name);
     write(&made, sizes)?;
-    workshop.publish(&made, |cache| cache.join(&name)).map(|_| ())
+    workshop.publish(&made, &name).map(|_| ())
 }
 
 /// Return the final sizes of an earlier adaptation for the same `purpose`.

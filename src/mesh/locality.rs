@@ -70,9 +70,13 @@ pub fn bisect<const D: usize>(points: &[[f64; D]], weight: &[u32], parts: usize)
         let axis = longest(own.iter().map(|&point| points[point as usize]));
         let total: u64 = own.iter().map(|&point| u64::from(weight[point as usize])).sum();
         let share = total * (parts.len() / 2) as u64 / parts.len() as u64;
-        let along = |a: &u32, b: &u32| compare(axis, (&points[*a as usize], *a), (&points[*b as usize], *b));
-        let below = split(&mut own, share, &|point| u64::from(weight[point as usize]), &along);
-        let above = own.split_off(below);
+        own.sort_unstable_by(|&a, &b| compare(axis, (&points[a as usize], a), (&points[b as usize], b)));
+        let mut below = 0;
+        let is_above = |point: &u32| {
+            below += u64::from(weight[*point as usize]);
+            below > share
+        };
+        let above = own.split_off(own.iter().position(is_above).unwrap_or(own.len()));
         pieces.push((own, parts.start..middle));
         pieces.push((above, middle..parts.end));
     }
@@ -83,26 +87,6 @@ pub fn bisect<const D: usize>(points: &[[f64; D]], weight: &[u32], parts: usize)
 fn longest<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> usize {
     let [low, high] = bounds(points.map(pad));
     (0..D).rev().max_by(|&a, &b| (high[a] - low[a]).total_cmp(&(high[b] - low[b]))).unwrap_or(0)
-}
-
-/// Move the first points of an order to the front, as many as together weigh no more than `share`, and return their number. The
-/// time is linear, since each step halves the range in which the last of these points may be.
-fn split(points: &mut [u32], share: u64, weight: &dyn Fn(u32) -> u64, order: &dyn Fn(&u32, &u32) -> Ordering) -> usize {
-    let (mut open, mut before) = (0..points.len(), 0);
-    while !open.is_empty() {
-        let middle = open.start + open.len() / 2;
-        points[open.clone()].select_nth_unstable_by(middle - open.start, order);
-        let below = before + points[open.start..middle].iter().map(|&point| weight(point)).sum::<u64>();
-        let with_middle = below + weight(points[middle]);
-        if below > share {
-            open.end = middle;
-        } else if with_middle > share {
-            return middle;
-        } else {
-            (open.start, before) = (middle + 1, with_middle);
-        }
-    }
-    open.start
 }
 
 /// Compare two points, given with their numbers, along an axis. Points with equal coordinates are compared along the other

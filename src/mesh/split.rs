@@ -118,7 +118,6 @@ impl Middles<'_> {
 mod tests {
     use super::*;
     use crate::mesh::simplex::{HEXAHEDRON, PRISM, PYRAMID, measure};
-    use nalgebra::{Matrix3, Vector3};
     use std::collections::BTreeMap;
 
     /// Corners of the unit cube in Gmsh's order.
@@ -207,56 +206,6 @@ mod tests {
         let all = CUBE.into_iter().chain(HEXAHEDRON.edges.iter().map(middle));
         order.iter().zip(all).for_each(|(&at, x)| points[at as usize] = map(x));
         points
-    }
-
-    /// Return the volume of quadratic tetrahedra by Keast's rule, which is exact for their Jacobians of degree 3. Each is
-    /// positive once its vertices are in order.
-    fn volume(simplices: &[u32], points: &[[f64; 3]]) -> f64 {
-        let mut sum = 0.0;
-        for simplex in simplices.chunks_exact(10) {
-            let mut own = 0.0;
-            for k in 0..5 {
-                let (l, weight) = match k {
-                    4 => ([0.25; 4], -0.8),
-                    _ => (std::array::from_fn(|i| if i == k { 0.5 } else { 1.0 / 6.0 }), 0.45),
-                };
-                // The derivatives along the barycentric coordinates.
-                let mut along = [Vector3::zeros(); 4];
-                for (along, (node, l)) in along.iter_mut().zip(simplex.iter().zip(&l)) {
-                    *along += Vector3::from(points[*node as usize]) * (4.0 * l - 1.0);
-                }
-                for ([a, b], node) in EDGES.iter().zip(&simplex[4..]) {
-                    let x = Vector3::from(points[*node as usize]) * 4.0;
-                    along[*a] += x * l[*b];
-                    along[*b] += x * l[*a];
-                }
-                let jacobian = Matrix3::from_columns(&[along[1] - along[0], along[2] - along[0], along[3] - along[0]]);
-                own += weight * jacobian.determinant() / 6.0;
-            }
-            sum += own.abs();
-        }
-        sum
-    }
-
-    /// A piece of a spherical shell: all of its six faces are curved or on planes through the axis. The map of the cell has an
-    /// error of fourth order, and so have the simplices, whatever the numbers of the nodes.
-    #[test]
-    fn curved_hexahedra_keep_their_volume() {
-        let error = |angle: f64, turn: u32| {
-            let order: Vec<u32> = (0..20).map(|k| (7 * k + turn) % 20).collect();
-            let mut points = placed(&order, |[a, b, c]| {
-                let (r, longitude, latitude) = (1.0 + 0.5 * angle * a, angle * b, angle * c);
-                [longitude.cos() * latitude.cos(), longitude.sin() * latitude.cos(), latitude.sin()].map(|x| r * x)
-            });
-            let mut middles = Middles { points: &mut points, known: &mut HashMap::new() };
-            let simplices = middles.simplices(hexahedron(), &order);
-            let exact = angle * angle.sin() * ((1.0 + 0.5 * angle).powi(3) - 1.0) / 3.0;
-            (volume(&simplices, &points) / exact - 1.0).abs()
-        };
-        for turn in 0..8 {
-            let [coarse, fine] = [0.4, 0.2].map(|angle| error(angle, turn));
-            assert!(fine < 1e-4 && fine < coarse / 10.0, "{turn}: {coarse} {fine}");
-        }
     }
 
     /// Cells of all kinds use the same node on a common face, which a full kind has among its own.

@@ -1,4 +1,4 @@
-//! Tests on meshes that the real Gmsh makes: of scripts here and in `meshes/`, of damaged files, and of the way through the cache.
+//! Tests on meshes that the real Gmsh makes: of scripts, of damaged files, and of the way through the cache.
 
 mod mutations;
 
@@ -181,147 +181,8 @@ fn inverted_cells_are_turned_and_order_two_with_them() {
     }
 }
 
-fn case(script: &str, set: &[(&str, f64)]) -> Mesh<2> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("meshes").join(script);
-    let set: Vec<(String, f64)> = set.iter().map(|(name, value)| (name.to_string(), *value)).collect();
-    meshed(&file, &set, Order::P1, &[folder.path().to_owned()]).unwrap().mesh
-}
-
-/// Accuracy with which Gmsh places the nodes of a transfinite line.
-const PLACES: f64 = 1e-10;
-
-/// Return the vertices of the triangles of a group on a fine grid, sorted. They are reflected about y = `reflect`, if it is
-/// given.
-fn triangles(mesh: &Mesh<2>, group: &str, reflect: Option<f64>) -> Vec<[[i64; 2]; 3]> {
-    let place = |point: &u32| {
-        let [x, y] = mesh.points[*point as usize];
-        let y = reflect.map_or(y, |middle| 2.0 * middle - y);
-        [x, y].map(|coordinate| (coordinate * 1e6).round() as i64)
-    };
-    let mut all: Vec<[[i64; 2]; 3]> = mesh
-        .group(group)
-        .unwrap()
-        .simplices()
-        .map(|simplex| {
-            let mut vertices = [place(&simplex[0]), place(&simplex[1]), place(&simplex[2])];
-            vertices.sort();
-            vertices
-        })
-        .collect();
-    all.sort();
-    all
-}
-
-/// Assert that the upper body mirrors the lower one, and that they share no point.
-fn assert_mirrored(mesh: &Mesh<2>, middle: f64) {
-    let lower = mesh.group("lower").unwrap();
-    let upper = mesh.group("upper").unwrap();
-    assert!(triangles(mesh, "lower", None) == triangles(mesh, "upper", Some(middle)));
-    assert!(triangles(mesh, "lower", None) != triangles(mesh, "upper", None));
-    assert!(!lower.connectivity.iter().any(|point| upper.connectivity.contains(point)));
-}
-
-fn count(mesh: &Mesh<2>, group: &str) -> usize {
-    mesh.group(group).unwrap().len()
-}
-
-fn area(mesh: &Mesh<2>, group: &str) -> f64 {
-    0.5 * extent(mesh, mesh.group(group).unwrap())
-}
-
-#[test]
-fn the_groove_has_the_papers_triangles() {
-    let mesh = case("groove/groove.geo", &[]);
-    assert_eq!([count(&mesh, "lower"), count(&mesh, "upper")], [8192, 8192]);
-    let mesh = case("groove/groove.geo", &[("n", 8.0)]);
-    assert_eq!(count(&mesh, "lower"), 2 * 4 * 8 * 8);
-    assert_eq!([count(&mesh, "lower_top"), count(&mesh, "upper_bottom"), count(&mesh, "upper_axis")], [32, 32, 8]);
-    assert!((area(&mesh, "lower") - 4.0).abs() < PLACES && (area(&mesh, "upper") - 4.0).abs() < PLACES);
-    assert_mirrored(&mesh, 1.0);
-    let at = |group: &str, k: usize, value: f64| {
-        let points = &mesh.group(group).unwrap().connectivity;
-        assert!(points.iter().all(|point| (mesh.points[*point as usize][k] - value).abs() < PLACES), "{group}");
-    };
-    at("lower_top", 1, 1.0);
-    at("upper_bottom", 1, 1.0);
-    at("lower_face", 1, 0.0);
-    at("upper_face", 1, 2.0);
-    for body in ["lower", "upper"] {
-        at(&format!("{body}_axis"), 0, 4.0);
-        at(&format!("{body}_end"), 0, 0.0);
-    }
-}
-
-#[test]
-fn the_patch_takes_any_two_meshes() {
-    let mesh = case("patch/patch.geo", &[("nl", 2.0), ("nu", 3.0)]);
-    assert_eq!([count(&mesh, "lower"), count(&mesh, "upper")], [8, 18]);
-    assert_eq!([count(&mesh, "lower_top"), count(&mesh, "upper_bottom")], [2, 3]);
-    let pin = |name: &str| mesh.points[mesh.group(name).unwrap().connectivity[0] as usize];
-    assert_eq!([pin("lower_pin"), pin("upper_pin")], [[0.0, 0.0], [0.0, 2.0]]);
-    assert_mirrored(&case("patch/patch.geo", &[]), 1.0);
-}
-
-#[test]
-fn waves_of_any_length_keep_their_triangles_in_shape() {
-    for (length, rows) in [(2.0, 8), (8.0, 2)] {
-        let mesh = case("wavy/wavy.geo", &[("L", length), ("n", 8.0)]);
-        assert_eq!([count(&mesh, "lower_top"), count(&mesh, "lower_sides")], [8, 2 * rows]);
-        assert!((area(&mesh, "upper") - 0.5 * length).abs() < PLACES);
-        assert_mirrored(&mesh, 1.0);
-    }
-}
-
-#[test]
-fn half_planes_are_fine_at_the_groove_and_coarse_far_away() {
-    let mesh = case("half-planes/half-planes.geo", &[("n", 16.0)]);
-    assert!((area(&mesh, "lower") - 256.0).abs() < 1e-8);
-    assert_mirrored(&mesh, 16.0);
-    // These are the distance from the axis and the length of each edge of the contact surface.
-    let edges: Vec<(f64, f64)> = mesh
-        .group("lower_top")
-        .unwrap()
-        .simplices()
-        .map(|edge| {
-            let [a, b] = [edge[0], edge[1]].map(|point| mesh.points[point as usize][0]);
-            (16.0 - a.max(b), (a - b).abs())
-        })
-        .collect();
-    assert!(edges.iter().filter(|(from, _)| *from < 1.99).all(|(_, length)| (length - 1.0 / 16.0).abs() < PLACES));
-    let longest = edges.iter().map(|(_, length)| *length).fold(0.0, f64::max);
-    assert!((0.9..1.1).contains(&longest), "{longest}");
-    // The edge of the groove, where the pressure has a kink, is a node.
-    assert!(edges.iter().any(|(from, _)| (from - 1.0).abs() < PLACES));
-}
-
 fn message(bytes: &[u8]) -> String {
     parse::<2>(bytes).map(|_| ()).expect_err("this mesh is bad").to_string()
-}
-
-/// No byte makes the reader panic or allocate without end. Whatever it accepts satisfies the invariants of a mesh.
-#[test]
-fn damaged_files_are_meshes_or_errors() {
-    for form in [&[][..], &["-bin"], &["-order", "2", "-bin"]] {
-        let good = gmsh(SQUARE, &[&["-2", "-setnumber", "n", "1"], form].concat());
-        for end in 0..good.len() {
-            let read = parse::<2>(&good[..end]);
-            // Only the end of line after the last section may be missing.
-            assert!(read.is_err() || end + 1 == good.len(), "{end} of {}", good.len());
-        }
-        for position in 0..good.len() {
-            for value in [0, 0xff, b'\n', b'9', b'-', good[position] ^ 0x80, good[position] ^ 1] {
-                let mut bad = good.clone();
-                bad[position] = value;
-                let Ok(mesh) = parse::<2>(&bad) else { continue };
-                assert!(mesh.points.iter().flatten().all(|coordinate| coordinate.is_finite()));
-                for group in mesh.groups.iter() {
-                    assert!(!group.is_empty() && extent(&mesh, group) > 0.0);
-                    assert!(group.connectivity.iter().all(|point| (*point as usize) < mesh.points.len()));
-                }
-            }
-        }
-    }
 }
 
 #[test]
@@ -370,6 +231,8 @@ fn small_mistakes_in_text_are_refused_at_their_line() {
         ("2 1 2 1\n", "2 7 2 1\n", "a.msh:28: elements of surface 7, which $Entities does not list"),
         ("2 1 2 1\n", "2 1 2 987654321\n", "a.msh:28: the file is too short for a count of 987654321"),
         ("2 2 1 2\n", "2 3 1 2\n", "a.msh:25: $Elements announces 3 elements and holds 2"),
+        ("1\n2\n3\n", "1\n2\n2\n", "a.msh:22: node tag 2 stands twice"),
+        ("1 3 1 3\n", "1 4 1 3\n", "$Nodes announces 4 nodes and holds 3"),
         ("$EndElements\n", "", "`$EndElements` should stand here"),
         ("$EndNodes\n", "$EndNodes\n$Nodes\n", "the section $Nodes stands twice"),
         ("\"body\"", "\"\"", "a.msh:7: physical surface 1 has an empty name"),

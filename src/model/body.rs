@@ -86,13 +86,8 @@ pub struct Matrices<'a> {
 
 impl Matrices<'_> {
     /// Return the length of a state.
-    pub fn len(&self) -> usize {
+    pub fn state_len(&self) -> usize {
         self.stiffness.rows() + self.motions.len()
-    }
-
-    /// Return whether states are empty, which they never are.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
@@ -111,16 +106,11 @@ pub struct Loads {
 
 /// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
-/// A state is a vector of `len()` numbers whose meaning is the body's own: all dofs, or only the retained ones.
+/// A state is a vector of `state_len()` numbers whose meaning is the body's own: all dofs, or only the retained ones.
 /// Solves may be inexact, but [`Body::residual`] is exact.
 pub trait Body {
     /// Return the length of a state.
-    fn len(&self) -> usize;
-
-    /// Return whether states are empty, which they never are.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
+    fn state_len(&self) -> usize;
 
     /// Return the undeformed state: zero on free dofs, prescribed values on supports.
     fn rest(&self) -> Vec<f64>;

@@ -24,7 +24,7 @@ impl Field {
 
     /// Return the field without displacement of any body.
     pub fn zero(model: &Model) -> Field {
-        let state = |slot: &BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.len())];
+        let state = |slot: &BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.state_len())];
         Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
     }
 

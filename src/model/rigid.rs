@@ -263,7 +263,7 @@ impl Space {
             for (motion, Motion { trace, .. }) in numbers.zip(&slot.motions) {
                 let amounts = fit(matrices.traces, trace);
                 columns.push(match offset {
-                    None => Column { motion, vector: body, first: local.len() - amounts.len(), values: amounts },
+                    None => Column { motion, vector: body, first: local.state_len() - amounts.len(), values: amounts },
                     Some(offset) => {
                         let mut values = vec![0.0; offset[body + 1] - offset[body]];
                         amounts.iter().zip(matrices.motions).for_each(|(a, shape)| axpy(*a, shape, &mut values));

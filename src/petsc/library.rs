@@ -26,7 +26,7 @@ use std::sync::OnceLock;
 const NO_SIGNALS: &str = "-no_signal_handler";
 
 /// Option that keeps PETSc from looking for files of options. It gets the file of the home folder by name instead.
-const NO_FILES: &str = "-skip_petscrc";
+pub(super) const NO_FILES: &str = "-skip_petscrc";
 
 thread_local! {
     /// Whether PETSc runs. It belongs to the thread of the session.

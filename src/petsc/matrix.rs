@@ -1,7 +1,7 @@
 //! Sparse matrices (MATAIJ), the rows that they are made of, and their index sets (IS) and submatrices.
 
 use super::library::{fit, flag, petsc};
-use super::vector::{Vector, check_length, slice};
+use super::vector::{Vector, check_length};
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
@@ -542,43 +542,12 @@ impl Indices {
         unsafe { petsc!(MatCreateSubMatrix(matrix.raw(), self.0, columns.0, reuse, &mut part)) }?;
         Ok(part)
     }
-
-    /// Fetch the submatrix of these rows and the given `columns`, which other processes may own, and hand it to `read`.
-    ///
-    /// Each process has its own index sets. Rows and columns of the submatrix are numbered by their positions in the sets. Collective.
-    pub(super) fn fetch(
-        &self,
-        matrix: &Matrix,
-        columns: &Indices,
-        read: impl FnOnce(ffi::Mat) -> Result<()>,
-    ) -> Result<()> {
-        let (reuse, mut parts) = (ffi::MatReuse_MAT_INITIAL_MATRIX, null_mut());
-        // SAFETY: one matrix, of this process, which lives until `read` is done.
-        unsafe {
-            petsc!(MatCreateSubMatrices(matrix.raw(), 1, &self.0, &columns.0, reuse, &mut parts))?;
-            let done = read(*parts);
-            petsc!(MatDestroySubMatrices(1, &mut parts))?;
-            done
-        }
-    }
 }
 
 impl Drop for Indices {
     fn drop(&mut self) {
         // SAFETY: the one reference of this type.
         let _ = unsafe { petsc!(ISDestroy(&mut self.0)) };
-    }
-}
-
-/// Return what `read` makes of the row with the global number `i`, which this process owns: of its global columns and its values.
-pub(super) fn row<T>(matrix: ffi::Mat, i: usize, read: impl FnOnce(&[Int], &[f64]) -> T) -> Result<T> {
-    let (i, mut count, mut columns, mut values) = (i as Int, 0, null(), null());
-    // SAFETY: the row, of as many columns as values, is read before it is given back.
-    unsafe {
-        petsc!(MatGetRow(matrix, i, &mut count, &mut columns, &mut values))?;
-        let made = read(slice(columns, count as usize), slice(values, count as usize));
-        petsc!(MatRestoreRow(matrix, i, &mut count, &mut columns, &mut values))?;
-        Ok(made)
     }
 }
 

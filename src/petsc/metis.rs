@@ -1,4 +1,4 @@
-//! Nested dissection and partition of graphs by METIS.
+//! Nested dissection of graphs by METIS.
 //!
 //! The library is opened when it is first needed: the file that has METIS for PETSc, or else one of METIS' usual names. Its integers have 32 or 64
 //! bits, which it shows itself. Libraries of SCOTCH have some functions of the same names, with other arguments in older versions.
@@ -6,7 +6,7 @@
 use super::library::fit;
 use crate::error::{Error, Kind, Result};
 use libloading::Library;
-use std::ffi::{CStr, c_int, c_void};
+use std::ffi::{c_int, c_void};
 use std::ptr::null_mut;
 use std::sync::OnceLock;
 
@@ -15,23 +15,6 @@ const LIBRARIES: [Option<&str>; 3] = [option_env!("WINKLER_METIS_LIBRARY"), Some
 
 /// The arguments of METIS_NodeND, with its integers.
 type NodeNd<T> = unsafe extern "C" fn(*mut T, *mut T, *mut T, *mut T, *mut T, *mut T, *mut T) -> c_int;
-
-/// The arguments of METIS_PartGraphRecursive, with its integers. Floating-point numbers are always left out.
-type PartGraph<T> = unsafe extern "C" fn(
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut T,
-    *mut c_void,
-    *mut c_void,
-    *mut T,
-    *mut T,
-    *mut T,
-) -> c_int;
 
 /// METIS with the width of its integers.
 struct Metis {
@@ -66,47 +49,22 @@ impl Metis {
         Some(Self { library, is_wide: options[39] == -1 })
     }
 
-    /// Return a function by its name.
-    ///
-    /// # Safety
-    /// `T` is the type of the function of this name, with integers of the right width.
-    unsafe fn function<T: Copy>(&self, name: &CStr) -> Result<T> {
-        // SAFETY: the caller's promise.
-        let function = unsafe { self.library.get::<T>(name.to_bytes_with_nul()) };
-        function.map(|function| *function).map_err(|cause| missing().because(cause.to_string()))
-    }
-
     /// Return the result of METIS_NodeND and the position of each node in the order of elimination.
     fn node_nd<T: Integer>(&self, graph: Graph) -> Result<(c_int, Vec<i32>)> {
-        // SAFETY: METIS 5 has these arguments, and the caller chose the width.
-        let node_nd = unsafe { self.function::<NodeNd<T>>(c"METIS_NodeND") }?;
+        // SAFETY: METIS 5 has this function with these arguments, and the caller chose the width.
+        let found = unsafe { self.library.get::<NodeNd<T>>(b"METIS_NodeND\0") };
+        let node_nd = found.map_err(|cause| missing().because(cause.to_string()))?;
         let nodes = graph.ptr.len() - 1;
-        let (mut count, mut ptr, mut col) =
-            (T::from(fit("METIS", "nodes", nodes)?), array(graph.ptr), array(graph.col));
+        // arrays of integers with 32 bits are not copied
+        let array = |values: Vec<i32>| values.into_iter().map(T::from).collect::<Vec<_>>();
+        let mut count = T::from(fit("METIS", "nodes", nodes)?);
+        let (mut ptr, mut col) = (array(graph.ptr), array(graph.col));
         let (mut order, mut position) = (vec![T::from(-1); nodes], vec![T::from(-1); nodes]);
         let (i, j, none) = (ptr.as_mut_ptr(), col.as_mut_ptr(), null_mut());
         // SAFETY: it reads the graph and writes one number for each node to each of the last two arrays.
         let code = unsafe { node_nd(&mut count, i, j, none, none, order.as_mut_ptr(), position.as_mut_ptr()) };
-        Ok((code, narrow(position)))
-    }
-
-    /// Return the result of METIS_PartGraphRecursive and the part of each node.
-    fn part_graph<T: Integer>(&self, graph: Graph, parts: i32) -> Result<(c_int, Vec<i32>)> {
-        // SAFETY: METIS 5 has these arguments, and the caller chose the width.
-        let part_graph = unsafe { self.function::<PartGraph<T>>(c"METIS_PartGraphRecursive") }?;
-        let nodes = graph.ptr.len() - 1;
-        let (mut count, mut ptr, mut col) =
-            (T::from(fit("METIS", "nodes", nodes)?), array(graph.ptr), array(graph.col));
-        let (mut constraints, mut parts) = (T::from(1), T::from(parts));
-        let (mut cut, mut part) = (T::from(0), vec![T::from(-1); nodes]);
-        let (i, j, none, nothing) = (ptr.as_mut_ptr(), col.as_mut_ptr(), null_mut(), null_mut());
-        let (parts, cut, to) = (&raw mut parts, &raw mut cut, part.as_mut_ptr());
-        // SAFETY: it reads the graph, writes one number for each node to the last array and one number to the last but one; null means a
-        // default.
-        let code = unsafe {
-            part_graph(&mut count, &mut constraints, i, j, none, none, none, parts, nothing, nothing, none, cut, to)
-        };
-        Ok((code, narrow(part)))
+        // a number that is no node becomes -1
+        Ok((code, position.into_iter().map(|at| at.try_into().unwrap_or(-1)).collect()))
     }
 }
 
@@ -114,16 +72,6 @@ impl Metis {
 trait Integer: Copy + From<i32> + TryInto<i32> {}
 impl Integer for i32 {}
 impl Integer for i64 {}
-
-/// Convert an array to METIS' integers. Where these have 32 bits, it is not copied.
-fn array<T: Integer>(values: Vec<i32>) -> Vec<T> {
-    values.into_iter().map(T::from).collect()
-}
-
-/// Convert a result of METIS, whose numbers are nodes or parts; others become -1.
-fn narrow<T: Integer>(values: Vec<T>) -> Vec<i32> {
-    values.into_iter().map(|value| value.try_into().unwrap_or(-1)).collect()
-}
 
 /// A symmetric graph: the neighbours of node `i` are `col[ptr[i]..ptr[i + 1]]`, without `i` itself.
 pub struct Graph {
@@ -163,29 +111,9 @@ pub fn nested_dissection(graph: Graph) -> Result<Vec<i32>> {
     Ok(position)
 }
 
-/// Return the part of each node of a graph. The `parts` parts have about the same size and few edges between them.
-///
-/// # Errors
-/// When METIS is not there ([`has_metis`]), or does not return parts.
-pub fn partition(graph: Graph, parts: i32) -> Result<Vec<i32>> {
-    let nodes = graph.ptr.len() - 1;
-    if graph.col.is_empty() {
-        return Ok((0..nodes).map(|node| (node * parts as usize / nodes) as i32).collect());
-    }
-    let metis = metis().ok_or_else(missing)?;
-    let (code, part) =
-        if metis.is_wide { metis.part_graph::<i64>(graph, parts) } else { metis.part_graph::<i32>(graph, parts) }?;
-    if code != 1 || part.iter().any(|part| !(0..parts).contains(part)) {
-        return Err(Error::new(Kind::Solver, "METIS returned no parts")
-            .because(format!("METIS_PartGraphRecursive returned {code}"))
-            .help("take another solver: --set solver=mumps"));
-    }
-    Ok(part)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Graph, nested_dissection, partition};
+    use super::{Graph, nested_dissection};
 
     /// The separator in the middle of a chain of nodes comes last.
     #[test]
@@ -203,11 +131,5 @@ mod tests {
         let last = position.iter().position(|&at| at == 400).expect("a permutation");
         assert!((100..300).contains(&last), "{last}");
         assert_eq!(nested_dissection(without_edges()).expect("no edges"), [0, 1]);
-        // two ends and a middle of the same length
-        let thirds = partition(chain(), 3).expect("METIS");
-        let changes = thirds.windows(2).filter(|pair| pair[0] != pair[1]).count();
-        let most = (0..3).map(|part| thirds.iter().filter(|of| **of == part).count()).max();
-        assert!(changes == 2 && most < Some(140), "{changes} {most:?}");
-        assert_eq!(partition(without_edges(), 2).expect("no edges"), [0, 1]);
     }
 }

@@ -155,11 +155,6 @@ impl Schur {
         self.mumps.head.infog[15].max(0) as usize
     }
 
-    /// Return whether the last factorisation met a zero pivot.
-    pub(super) fn is_singular(&self) -> bool {
-        self.mumps.head.infog[0] == -10
-    }
-
     /// Eliminate the interior. The functions below need that.
     ///
     /// # Errors

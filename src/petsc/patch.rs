@@ -11,7 +11,6 @@
 use super::library::{flag, petsc};
 use super::matrix::Indices;
 use super::subspace::Subspace;
-use super::substructures::Substructures;
 use super::vector::Vector;
 use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
@@ -28,7 +27,8 @@ struct Patch {
     over_touched: Vector,
     /// PETSc's header of a vector over P.
     over_inside: Vector,
-    factor: Factor,
+    /// MUMPS with the factor of P'AP.
+    factor: Ksp,
 }
 
 impl Ksp {
@@ -87,7 +87,10 @@ impl Patch {
         touched.retain(|i| owned.contains(i));
         let mut inside: Vec<usize> = dofs.iter().copied().filter(|i| owned.contains(i)).collect();
         let inside_set = Indices::new(scope.comm(session), &inside)?;
-        let Some(factor) = Factor::new(matrix, &dofs, &inside_set, inside.len())? else { return Ok(None) };
+        let factor = factor(matrix, &inside_set, inside.len())?;
+        if factor.failure().is_some() {
+            return Ok(None);
+        }
         let (over_touched, over_inside) = (header(&touched)?, header(&inside)?);
         let columns = Indices::new(scope.comm(session), &touched)?.submatrix(matrix, &inside_set)?;
         inside.iter_mut().chain(&mut touched).for_each(|i| *i -= owned.start);
@@ -100,6 +103,20 @@ fn of_whole_nodes(mut dofs: Vec<usize>, block_size: usize) -> Vec<usize> {
     dofs.iter_mut().for_each(|dof| *dof /= block_size);
     dofs.dedup();
     dofs.into_iter().flat_map(|node| node * block_size..(node + 1) * block_size).collect()
+}
+
+/// Factor P'AP, where `inside` are the `count` dofs P that this process owns. Collective.
+fn factor(matrix: &Matrix, inside: &Indices, count: usize) -> Result<Ksp> {
+    let mut block = inside.submatrix(matrix, inside)?;
+    // SAFETY: a matrix of rows and columns of one that is positive definite.
+    unsafe {
+        petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, flag(true)))?;
+        petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, flag(true)))?;
+    }
+    let solver = Ksp::factored(matrix.session(), matrix.scope(), block, count);
+    // SAFETY: our reference; the solver has its own.
+    unsafe { petsc!(MatDestroy(&mut block)) }?;
+    solver
 }
 
 impl Subspace for Patch {
@@ -120,50 +137,5 @@ impl Drop for Patch {
     fn drop(&mut self) {
         // SAFETY: the one reference of this type.
         let _ = unsafe { petsc!(MatDestroy(&mut self.columns)) };
-    }
-}
-
-/// The factor of P'AP, where P are some dofs of a matrix A. A run has one or two of them.
-///
-/// MUMPS on all processes is for a P'AP of which a half would be more than a process has of the matrix anyway. On a quiet machine with two processes both
-/// take the same time: 45 s for `flange` with n = 2 under a layer of 1e8, compiled without optimisation. But each solve by MUMPS takes many messages, so
-/// that it takes 1.7 times as long on a machine with ten processes a core.
-#[allow(clippy::large_enum_variant)]
-pub(super) enum Factor {
-    /// Two halves, each eliminated by one process.
-    Halves(Substructures),
-    /// One factorisation by MUMPS on all processes.
-    Parallel(Ksp),
-}
-
-impl Factor {
-    /// Factor P'AP. Collective. Return `None` if it is not positive definite to rounding.
-    ///
-    /// `dofs` are all dofs P, the same on all processes: whole nodes in increasing order. `owned` are the `count` dofs that this process owns.
-    pub fn new(matrix: &Matrix, dofs: &[usize], owned: &Indices, count: usize) -> Result<Option<Self>> {
-        let (session, scope) = (matrix.session(), matrix.scope());
-        // a half is to be no larger than what a process has of the matrix anyway
-        if dofs.len() * scope.processes(session) <= 2 * matrix.total() {
-            return Ok(Substructures::new(matrix, dofs)?.map(Self::Halves));
-        }
-        let mut block = owned.submatrix(matrix, owned)?;
-        // SAFETY: a matrix of rows and columns of one that is positive definite.
-        unsafe {
-            petsc!(MatSetOption(block, ffi::MatOption_MAT_SYMMETRIC, flag(true)))?;
-            petsc!(MatSetOption(block, ffi::MatOption_MAT_SPD, flag(true)))?;
-        }
-        let solver = Ksp::factored(session, scope, block, count);
-        // SAFETY: our reference; the solver has its own.
-        unsafe { petsc!(MatDestroy(&mut block)) }?;
-        let solver = solver?;
-        Ok(solver.failure().is_none().then_some(Self::Parallel(solver)))
-    }
-
-    /// Compute x = (P'AP)^-1 b; the slices have one entry for each dof P that this process owns. Collective.
-    pub fn solve(&self, b: &[f64], x: &mut [f64]) -> Result<()> {
-        match self {
-            Self::Halves(halves) => halves.solve(b, x),
-            Self::Parallel(solver) => solver.solve(b, x).map(|_| ()),
-        }
     }
 }

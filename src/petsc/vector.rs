@@ -157,9 +157,4 @@ impl Scope {
             session.world().all_reduce_into(&mine[..], values, SystemOperation::sum());
         }
     }
-
-    /// Return the number of processes.
-    pub(super) fn processes(self, session: &Session) -> usize {
-        if self == Scope::World { session.size() } else { 1 }
-    }
 }

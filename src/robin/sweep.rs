@@ -206,7 +206,7 @@ fn known_correction(model: &Model, index: usize, r: &[f64], last: &Sweep, factor
         model.exchange.sum(&mut sums);
     }
     (sums[0] <= 1e-12 * sums[1]).then(|| {
-        let mut z = vec![0.0; body.len()];
+        let mut z = vec![0.0; body.state_len()];
         axpy(factor, &last.correction.states[index], &mut z);
         z
     })
@@ -261,7 +261,7 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
                 Zone::None => false,
                 Zone::Full => true,
                 Zone::Active => layer.tangent[q] > 0.0,
-                Zone::Subset(holds) => holds.is_true_at("psi", contact.position[point], k)?,
+                Zone::Subset(holds) => holds.is_true_at(contact.position[point], k)?,
             };
             if inside {
                 // a smoothed law has a tangent where the law itself has none

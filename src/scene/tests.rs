@@ -115,7 +115,7 @@ fn overrides_replace_and_add() {
     assert_eq!(scene.contacts[0].gap.eval([2.0, 0.0, 0.0]), 2e-4);
     assert_eq!(scene.contacts[0].reference.as_ref().unwrap().eval([3.0, 0.0, 0.0]), -2.0);
     let Zone::Subset(zone) = &scene.method.psi else { panic!() };
-    assert_eq!([4, 5].map(|k| zone.is_true_at("psi", [2.0, 0.0, 0.0], k).unwrap()), [true, false]);
+    assert_eq!([4, 5].map(|k| zone.is_true_at([2.0, 0.0, 0.0], k).unwrap()), [true, false]);
     assert_eq!(scene.method.stop.residual, Some(1e-6));
     assert_eq!(scene.method.stop.increment, Some(1e-3));
     let MeshSource::Geo { set, .. } = &scene.mesh else { panic!() };

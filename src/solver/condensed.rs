@@ -126,12 +126,12 @@ fn on_retained(retained: &Retained, motion: FreeMotion) -> FreeMotion {
 }
 
 impl Body for CondensedBody {
-    fn len(&self) -> usize {
+    fn state_len(&self) -> usize {
         self.retained.dofs.len() + self.free.len()
     }
 
     fn rest(&self) -> Vec<f64> {
-        vec![0.0; self.len()]
+        vec![0.0; self.state_len()]
     }
 
     fn trace(&self, u: &[f64], t: &mut [f64]) {

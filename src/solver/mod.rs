@@ -6,6 +6,7 @@
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
 
+mod coarse;
 mod condensed;
 pub mod cost;
 mod dense;
@@ -17,11 +18,12 @@ pub mod preset;
 mod robin;
 mod sparse;
 
+pub use coarse::RigidSpace;
 pub use condensed::{CondensedBody, Retained};
 pub use dense::Dense;
 pub use krylov::Krylov;
 pub use monolithic::{Monolithic, Union};
-pub use robin::{RigidSpace, RobinMatrix};
+pub use robin::RobinMatrix;
 pub use sparse::SparseBody;
 
 use crate::error::Result;

@@ -55,7 +55,7 @@ impl<S> Joined<S> {
         let state = |(slot, part): (&BodySlot, Range<usize>)| {
             let Some(body) = &slot.local else { return Vec::new() };
             let mut state = x[part].to_vec();
-            state.resize(body.len(), 0.0);
+            state.resize(body.state_len(), 0.0);
             body.separate(&mut state);
             state
         };
@@ -289,7 +289,7 @@ impl<'a> Layout<'a> {
         let distributions: Vec<_> = model.bodies.iter().map(distribution).collect();
         let mut offset = vec![0];
         for part in parts {
-            offset.push(offset[offset.len() - 1] + part.len());
+            offset.push(offset[offset.len() - 1] + part.state_len());
         }
         let shared = distributions.iter().copied().flatten().next();
         let total = shared.map_or(offset[parts.len()], |shared| shared.total);
@@ -355,7 +355,7 @@ impl<'a> Layout<'a> {
                 let known = own.range(i).map(|k| (shift + own.col[k], own.values[k]));
                 push_merged(&mut stiffness, known, coupled.remove(&(begin + i)).as_deref().unwrap_or_default());
             }
-            for i in begin + own.rows()..begin + part.len() {
+            for i in begin + own.rows()..begin + part.state_len() {
                 // a rigid motion that no contact row sees has only its diagonal
                 let columns = coupled.remove(&i).unwrap_or_else(|| vec![i as i32]);
                 push_merged(&mut stiffness, std::iter::empty(), &columns);

@@ -191,14 +191,22 @@ pub(super) fn bare<'a>(option: &'a str, bodies: &[&str]) -> impl Iterator<Item =
 
 /// Return whether a name is among those that are `known`, or a control of MUMPS. It may begin with the prefix of a nested solver.
 pub(super) fn is_known(name: &str, known: &[&str]) -> bool {
+    known.iter().any(|known| is_nested(name, known)) || leaves(name).any(|leaf| control_of_mumps(leaf).is_some())
+}
+
+/// Return whether a name is `known`, perhaps behind the prefix of a nested solver.
+pub(super) fn is_nested(name: &str, known: &str) -> bool {
+    leaves(name).any(|leaf| leaf.eq_ignore_ascii_case(known))
+}
+
+/// Return what stands in a name behind each prefix that a nested solver may have, the empty one included.
+fn leaves(name: &str) -> impl Iterator<Item = &str> {
     let is_number = |word: &str| word.bytes().all(|byte| byte.is_ascii_digit());
-    let is_nest = |nest: &str| {
+    let is_nest = move |nest: &str| {
         // the word for a field is free, as x in fieldsplit_x_ksp_type
         nest.starts_with("fieldsplit") || nest.split('_').all(|word| is_number(word) || NESTS.contains(&word))
     };
-    let is_leaf =
-        |leaf: &str| known.iter().any(|known| known.eq_ignore_ascii_case(leaf)) || control_of_mumps(leaf).is_some();
-    ends(name).any(|(nest, leaf)| is_nest(nest) && is_leaf(leaf))
+    ends(name).filter(move |(nest, _)| is_nest(nest)).map(|(_, leaf)| leaf)
 }
 
 /// Return the name that is meant, if a name, its last part, or the name of a body before it is mistyped.

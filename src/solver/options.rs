@@ -427,7 +427,8 @@ fn left(session: &Session, bodies: &[&str], solvers: &[Chosen]) -> Result<Vec<St
     };
     let is_read = |option: &String| {
         // a solve reads this one
-        let is_late = !solvers.is_empty() && nest_of(&option[1..], "ksp_converged_reason").is_some();
+        let is_late =
+            !solvers.is_empty() && bare(option, bodies).any(|name| names::is_nested(name, "ksp_converged_reason"));
         // an option has no effect if every solver has an own one of this name; this is no mistake
         let is_replaced =
             [bodies, &prefixes].iter().any(|all| !all.is_empty() && all.iter().all(|prefix| own(prefix, option)));

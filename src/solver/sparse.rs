@@ -143,12 +143,12 @@ fn matrix_rows<'a>(rows: &'a Csr, distribution: &'a Option<Rc<Distribution>>) ->
 }
 
 impl<S: InnerSolver> Body for SparseBody<S> {
-    fn len(&self) -> usize {
+    fn state_len(&self) -> usize {
         self.dofs() + self.split.count()
     }
 
     fn rest(&self) -> Vec<f64> {
-        let mut u = vec![0.0; self.len()];
+        let mut u = vec![0.0; self.state_len()];
         for &(dof, value) in &self.body.prescribed {
             u[dof] = value;
         }

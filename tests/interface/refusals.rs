@@ -353,6 +353,10 @@ fn petsc_options() {
     typed(&["-ksp_tpye", "cg"], &["-ksp_tpye", "did you mean -ksp_type?"]);
     typed(&["-uper_ksp_type", "cg"], &["-uper_ksp_type", "did you mean -upper_ksp_type?"]);
     typed(&["-upper_ksp_tpye", "cg"], &["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]);
+    for end in ["ksp_converged_reason", "ksp_view"] {
+        let (wrong, right) = (format!("-uper_{end}"), format!("did you mean -upper_{end}?"));
+        typed(&["-ksp_type", "cg", &wrong], &[&wrong, &right]);
+    }
     typed(&["-ksp_type", "cg", "-pc_hypre_tpe", "euclid"], &["-pc_hypre_tpe", "did you mean -pc_hypre_type?"]);
     typed(&["-ksp_type", "nonsense"], &["nonsense", "KSP"]);
     typed(&["-pc_type", "nonsense"], &["nonsense", "PC"]);

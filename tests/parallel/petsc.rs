@@ -429,8 +429,7 @@ fn sheet(side: usize, dofs: std::ops::Range<usize>) -> (Vec<Int>, Vec<Int>, Vec<
     (row_ptr, columns, values)
 }
 
-/// Dofs are solved exactly with the same iterations, however many processes have their rows: in two halves, and by MUMPS on all where halves
-/// would be more than a process has. The second of three has no rows.
+/// Dofs are solved exactly with the same iterations, however many processes have their rows. The second of three has no rows.
 #[test]
 fn processes_share_an_exact_solve() {
     let inside = || -> Result<()> {

@@ -2,7 +2,7 @@
 
 use super::faces::{Cells, Face, NONE};
 use crate::error::Result;
-use crate::linalg::{self, Joined};
+use crate::linalg::{self, Joined, cross, dot, length, minus};
 use robust::Coord3D;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -285,7 +285,7 @@ fn line(from: Point, a: Point, b: Point) -> i32 {
 
 /// Return the crossing of a triangle whose normal points out of the body. At its edges return `None`.
 fn triangle(from: Point, x: [Point; 3]) -> Option<i32> {
-    let x = x.map(|x| -> Point { std::array::from_fn(|c| x[c] - from[c]) });
+    let x = x.map(|x| minus(x, from));
     // These are twice the areas in the plane across the line.
     let areas = [[1, 2], [2, 0], [0, 1]].map(|[i, j]| x[i][1] * x[j][2] - x[i][2] * x[j][1]);
     let size = x.iter().flat_map(|x| &x[1..]).fold(0.0, |max: f64, x| max.max(x.abs()));
@@ -297,31 +297,18 @@ fn triangle(from: Point, x: [Point; 3]) -> Option<i32> {
     if sides.contains(&0) {
         return None;
     }
-    let across: [Point; 2] = [1, 2].map(|i| std::array::from_fn(|c| x[i][c] - x[0][c]));
-    let normal = cross(across[0], across[1]);
+    let normal = cross(minus(x[1], x[0]), minus(x[2], x[0]));
     // The line meets the plane of the triangle ahead of the point if this x is positive.
-    let ahead = (0..3).map(|c| normal[c] * x[0][c]).sum::<f64>() / normal[0] > 0.0;
+    let ahead = dot(&normal, &x[0]) / normal[0] > 0.0;
     Some(if ahead { sides[0] } else { 0 })
 }
 
 /// A point (x, y, z).
 type Point = [f64; 3];
 
-fn minus(a: Point, b: Point) -> Point {
-    std::array::from_fn(|c| a[c] - b[c])
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: Point, b: Point) -> Point {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// Return the distance of two points.
 fn apart(a: Point, b: Point) -> f64 {
-    dot(minus(a, b), minus(a, b)).sqrt()
+    length(minus(a, b))
 }
 
 fn between(a: Point, b: Point, t: f64) -> Point {
@@ -331,7 +318,7 @@ fn between(a: Point, b: Point, t: f64) -> Point {
 /// Return the distance of a point from a segment.
 fn from_segment(x: Point, [a, b]: [Point; 2]) -> f64 {
     let edge = minus(b, a);
-    let t = (dot(minus(x, a), edge) / dot(edge, edge)).clamp(0.0, 1.0);
+    let t = (dot(&minus(x, a), &edge) / dot(&edge, &edge)).clamp(0.0, 1.0);
     apart(x, between(a, b, t))
 }
 
@@ -344,9 +331,9 @@ fn segments([a, b]: [Point; 2], [c, d]: [Point; 2], within: f64) -> bool {
     }
     // The least distance is that of an end, or that of the lines if both feet lie inside the segments.
     let (u, v, w) = (minus(b, a), minus(d, c), minus(a, c));
-    let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+    let (uu, uv, vv) = (dot(&u, &u), dot(&u, &v), dot(&v, &v));
     let det = uu * vv - uv * uv;
-    let (s, t) = ((uv * dot(v, w) - vv * dot(u, w)) / det, (uu * dot(v, w) - uv * dot(u, w)) / det);
+    let (s, t) = ((uv * dot(&v, &w) - vv * dot(&u, &w)) / det, (uu * dot(&v, &w) - uv * dot(&u, &w)) / det);
     let inside = |t: f64| (0.0..=1.0).contains(&t);
     inside(s) && inside(t) && apart(between(a, b, s), between(c, d, t)) <= within
 }
@@ -354,9 +341,9 @@ fn segments([a, b]: [Point; 2], [c, d]: [Point; 2], within: f64) -> bool {
 /// Return the distance of a point from a triangle.
 fn from_triangle(x: Point, [a, b, c]: [Point; 3]) -> f64 {
     let normal = cross(minus(b, a), minus(c, a));
-    let inner = |p: Point, q: Point| dot(cross(minus(q, p), minus(x, p)), normal) >= 0.0;
+    let inner = |p: Point, q: Point| dot(&cross(minus(q, p), minus(x, p)), &normal) >= 0.0;
     if inner(a, b) && inner(b, c) && inner(c, a) {
-        return dot(minus(x, a), normal).abs() / dot(normal, normal).sqrt();
+        return dot(&minus(x, a), &normal).abs() / length(normal);
     }
     from_segment(x, [a, b]).min(from_segment(x, [b, c])).min(from_segment(x, [c, a]))
 }
@@ -382,8 +369,8 @@ fn pierces([p, q]: [Point; 2], [a, b, c]: [Point; 3]) -> bool {
 /// Return whether the distance of a segment and a triangle is at most `within`.
 fn segment_triangle([p, q]: [Point; 2], [a, b, c]: [Point; 3], within: f64) -> bool {
     let normal = cross(minus(b, a), minus(c, a));
-    let size = dot(normal, normal).sqrt();
-    let [from, to] = [p, q].map(|x| dot(minus(x, a), normal));
+    let size = length(normal);
+    let [from, to] = [p, q].map(|x| dot(&minus(x, a), &normal));
     if from.min(to) > within * size || from.max(to) < -within * size {
         return false;
     }
@@ -397,12 +384,12 @@ fn segment_triangle([p, q]: [Point; 2], [a, b, c]: [Point; 3], within: f64) -> b
 fn same_side([a, b]: [Point; 2], c: Point, d: Point, angle: f64) -> bool {
     let edge = minus(b, a);
     let across = |x: Point| {
-        let t = dot(minus(x, a), edge) / dot(edge, edge);
+        let t = dot(&minus(x, a), &edge) / dot(&edge, &edge);
         minus(x, between(a, b, t))
     };
     let (c, d) = (across(c), across(d));
     let sine = cross(c, d);
-    dot(c, d) > 0.0 && dot(sine, sine) <= angle * angle * dot(c, c) * dot(d, d)
+    dot(&c, &d) > 0.0 && dot(&sine, &sine) <= angle * angle * dot(&c, &c) * dot(&d, &d)
 }
 
 #[cfg(test)]

@@ -21,11 +21,7 @@ fn with_group<const D: usize>(mesh: Mesh<D>, name: &str, dimension: usize, conne
 
 fn check<const D: usize>(mesh: &Mesh<D>, groups: &[(&str, Duty)]) -> Result<Checked, String> {
     let asked = Asked { name: "body", order: mesh.order, groups: groups.to_vec() };
-    all(mesh, &[asked], false).map(|mut found| found.remove(0))
-}
-
-fn all<const D: usize>(mesh: &Mesh<D>, asked: &[Asked], shared: bool) -> Result<Vec<Checked>, String> {
-    mesh.check(asked, &[], shared).map_err(|error| error.to_string())
+    mesh.check(&[asked], &[], false).map(|mut found| found.remove(0)).map_err(|error| error.to_string())
 }
 
 fn refused<const D: usize>(mesh: &Mesh<D>, words: &[&str]) {
@@ -92,42 +88,6 @@ fn good_meshes_are_counted() {
         let found = found.unwrap();
         assert_eq!([found.inner, found.outer, found.parts.count], counts);
     }
-}
-
-/// A bar of many cubes with a group at its end is valid, until another cube lies across it.
-#[test]
-fn a_bar_is_looked_at_as_a_whole() {
-    let count = 20;
-    let corners = |i: u32| (0..4).map(move |k| [i, k & 1, k >> 1].map(f64::from));
-    let mut points: Vec<[f64; 3]> = (0..=count).flat_map(corners).collect();
-    let of_bar = |i: u32| cube([0.0; 3], 0).1.into_iter().map(move |k| 4 * (i + (k & 1)) + (k >> 1));
-    let mut cells: Vec<u32> = (0..count).flat_map(of_bar).collect();
-    let end =
-        Group { name: "end".into(), dimension: 2, stride: 3, connectivity: vec![0, 1, 3, 0, 3, 2], tags: Vec::new() };
-    let with_end = |points: Vec<[f64; 3]>, cells: &[u32]| {
-        let mut bar = mesh(points, cells);
-        bar.groups = [bar.groups.to_vec(), vec![end.clone()]].concat().into();
-        bar
-    };
-    let bar = with_end(points.clone(), &cells);
-    for bar in [bar.clone(), quadratic(&bar)] {
-        let found = check(&bar, &[("end", Duty::Acts)]).unwrap();
-        assert_eq!([found.inner, found.outer, found.parts.count, found.points.len()], [158, 164, 1, bar.points.len()]);
-    }
-    // The added cube has its own nodes and crosses a side of the bar in its middle.
-    let (more, others) = cube([10.3, 0.4, 0.5], points.len() as u32);
-    points.extend(more);
-    cells.extend(others);
-    refused(&with_end(points, &cells), &["crosses itself", "elements "]);
-}
-
-#[test]
-fn parts_that_lie_apart_are_found() {
-    let ((mut points, mut cells), (more, others)) = (cube([0.0; 3], 0), cube([1.5, 0.0, 0.0], 8));
-    points.extend(more);
-    cells.extend(others);
-    let parts = check(&mesh(points, &cells), &[]).unwrap().parts;
-    assert_eq!((parts.count, parts.of_node), (2, [[0; 8], [1; 8]].concat()));
 }
 
 #[test]
@@ -311,16 +271,4 @@ fn groups_lie_on_their_bodies() {
     let space = |edge: [u32; 2]| with_group(mesh(points.clone(), &cells), "edge", 1, edge.to_vec());
     assert!(check(&space([0, 1]), &[("edge", Duty::Holds)]).is_ok());
     assert!(check(&space([1, 2]), &[("edge", Duty::Holds)]).is_err());
-}
-
-#[test]
-fn bodies_have_nodes_of_their_own() {
-    let (points, cells) = squares();
-    let left = mesh(points, &cells[..6]);
-    let two = with_group(left, "other", 2, cells[6..].to_vec());
-    let asked = |name| Asked { name, order: Order::P1, groups: Vec::new() };
-    let check = |shared| all(&two, &[asked("body"), asked("other")], shared);
-    assert!(check(true).is_ok());
-    let message = check(false).unwrap_err();
-    assert!(message.contains("body `other`: it shares a node with body `body` at (1, 0)"), "{message}");
 }
