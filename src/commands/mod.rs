@@ -5,6 +5,7 @@ mod adapt;
 pub(crate) mod bench;
 pub(crate) mod check;
 pub mod checkpoint;
+mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;
 pub(crate) mod solve;

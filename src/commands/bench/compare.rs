@@ -1,7 +1,7 @@
 //! The error of a contact pressure, against a table or against the closed form of the scene.
 
 use super::plan::{Plan, usage};
-use crate::commands::transfer::{Planes, mean};
+use crate::commands::interpolate::{EXACT, Scattered, Squares, mean};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::scene::Scene;
@@ -116,13 +116,13 @@ pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points])
         let known: Vec<f64> = match dimension {
             2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
             _ => {
-                let planes = Planes::exact(&other.at);
-                own.at.iter().map(|x| mean(&planes.weights(x), &other.pressure)).collect()
+                let scattered = Scattered::new(&other.at);
+                own.at.iter().map(|x| mean(&scattered.plane(x, EXACT), &other.pressure)).collect()
             }
         };
-        squares.add(own, &known);
+        add(&mut squares, own, &known);
     }
-    squares.relative()
+    relative(&squares)
 }
 
 /// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without one, or with several pairs.
@@ -132,30 +132,18 @@ pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
     let field = contact.reference.as_ref()?;
     let known: Vec<f64> = own.at.iter().map(|&x| field.eval(x)).collect();
     let mut squares = Squares::default();
-    squares.add(own, &known);
-    squares.relative()
+    add(&mut squares, own, &known);
+    relative(&squares)
 }
 
-/// Squares of pressures, integrated over contact surfaces.
-#[derive(Default)]
-struct Squares {
-    error: f64,
-    reference: f64,
+/// Add the squares of the pressures of a run and of the known pressures (n) at its points.
+fn add(squares: &mut Squares, run: &Points, known: &[f64]) {
+    (0..known.len()).for_each(|q| squares.add(run.weight[q], known[q], run.pressure[q]));
 }
 
-impl Squares {
-    /// Add the pressures of a run at points with known pressures (n).
-    fn add(&mut self, run: &Points, known: &[f64]) {
-        for q in 0..known.len() {
-            self.error += run.weight[q] * (run.pressure[q] - known[q]).powi(2);
-            self.reference += run.weight[q] * known[q].powi(2);
-        }
-    }
-
-    /// Return the relative error; `None` if it is not finite.
-    fn relative(&self) -> Option<f64> {
-        Some((self.error / self.reference).sqrt()).filter(|relative| relative.is_finite())
-    }
+/// Return the relative error of a run; `None` if it is not finite.
+fn relative(squares: &Squares) -> Option<f64> {
+    Some((squares.difference / squares.old).sqrt()).filter(|relative| relative.is_finite())
 }
 
 /// Return the pressure at the point of a curve that is nearest to `x`, linear between the points of the table.
