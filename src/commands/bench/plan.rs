@@ -1,7 +1,7 @@
 //! The command line of `winkler bench`, and the plan that it asks for: all combinations of scenes, keys, orders, methods, solvers and ranks.
 
+use crate::commands::axes::{Axis, Choice, combinations, named};
 use crate::commands::case_of;
-use crate::commands::sweep::{Axis, Choice, combinations, named};
 use crate::error::{Error, Kind, Result};
 use crate::problem::{Order, Preset};
 use crate::scene::Scene;
