@@ -1,5 +1,6 @@
 //! Values at scattered points: brought to other points, and compared with the values there.
 
+use crate::linalg::range;
 use nalgebra::DMatrix;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -70,8 +71,7 @@ pub fn mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
 
 /// Return the fitted value, clamped to the range of the values that it is fitted to: where all points lie to one side, a plane may lead anywhere.
 pub fn clamped_mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
-    let values = || weights.iter().map(|(near, _)| column[*near]);
-    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
+    let [least, most] = range(weights.iter().map(|(near, _)| column[*near]));
     mean(weights, column).clamp(least, most)
 }
 
