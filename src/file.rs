@@ -182,18 +182,4 @@ mod tests {
         assert_eq!(bytes_on_line("MemFree: 1 kB", "MemAvailable"), None);
         assert!(bytes_in_proc("/proc/meminfo", "MemAvailable").is_some_and(|bytes| bytes > 1_000_000));
     }
-
-    #[test]
-    fn only_regular_files_are_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("text");
-        std::fs::write(&path, "text").unwrap();
-        assert_eq!(read(&path).unwrap(), b"text");
-        let refused = |path: &Path| read(path).unwrap_err().message().to_owned();
-        assert!(refused(folder.path()).ends_with("is a folder, not a file"));
-        assert_eq!(refused(Path::new("/dev/zero")), "/dev/zero is a device, not a file");
-        let _socket = std::os::unix::net::UnixListener::bind(folder.path().join("socket")).unwrap();
-        assert!(refused(&folder.path().join("socket")).contains("is a socket"));
-        assert!(refused(&folder.path().join("none")).starts_with("cannot read"));
-    }
 }

@@ -571,18 +571,6 @@ mod tests {
     }
 
     #[test]
-    fn one_holds_at_a_time_and_names_itself() {
-        let folder = tempfile::tempdir().unwrap();
-        let lock = Lock::take(folder.path()).unwrap();
-        let error = Lock::take(folder.path()).unwrap_err();
-        assert!(error.message().contains(&format!("process {} is writing", std::process::id())), "{error}");
-        assert_eq!(error.kind(), Kind::File);
-        drop(lock);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-        drop(Lock::take(folder.path()).unwrap());
-    }
-
-    #[test]
     fn what_a_killed_process_left_stops_nobody() {
         let folder = tempfile::tempdir().unwrap();
         for text in ["", "1 elsewhere\n", "4194305 here\n", "no holder"] {

@@ -5,6 +5,7 @@
 //! their checksums.
 
 use crate::error::{Error, Kind, Result};
+use crate::fem::length;
 use crate::linalg::bounds;
 use crate::output::{Checksums, folder};
 use base64::Engine;
@@ -149,7 +150,7 @@ impl Part {
 
     /// Return the length of the displacement at each point.
     pub fn travel(&self) -> Vec<f64> {
-        self.displacement.iter().map(|u| u.iter().map(|u| u * u).sum::<f64>().sqrt()).collect()
+        self.displacement.iter().map(|&u| length(u)).collect()
     }
 }
 
