@@ -54,7 +54,7 @@ pub use crate::scene::Scene;
 
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
-use crate::run::{self, All, Begin, Clock, Done, report, results};
+use crate::run::{self, All, Begin, Clock, Done, report, results, verdict};
 use std::rc::Rc;
 
 /// The solution of a scene.
@@ -101,7 +101,7 @@ impl Solution {
 
     /// Return whether the tolerance is reached, or the accuracy that double precision allows.
     pub fn is_converged(&self) -> bool {
-        report::exit_code(&self.done) == 0
+        verdict::exit_code(&self.done) == 0
     }
 
     /// Return the contents of `report.json`: counters, forces, approaches, largest stresses, times, warnings and settings.

@@ -52,7 +52,7 @@ Examples:
   winkler solve scene.toml --vtu --report --set mesh.set.n=64
   winkler solve scene.toml --method robin --set method.gamma=line-search -v
   winkler solve scene.toml -ksp_type cg -pc_type gamg -ksp_converged_reason
-  mpiexec -n 4 winkler solve scene.toml -q";
+  mpiexec -n 2 winkler solve scene.toml -q";
 
 const CHECK: &str = "Examples:
   winkler check scene.toml
@@ -91,7 +91,7 @@ enum Command {
         /// Folder of results
         #[arg(value_name = "DIR")]
         folder: PathBuf,
-        /// What to draw: stress, displacement, pressure, convergence, or area (in contact, over the force at load steps)
+        /// What to draw: stress, displacement, pressure, convergence, or over load steps area (in contact over force) or force (over approach)
         #[arg(value_name = "WHAT")]
         what: String,
         /// File to write, .svg [default: WHAT.svg in the folder]

@@ -14,7 +14,7 @@ use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, Ro
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::run::recorder::{is_snapshot, signal};
-use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results};
+use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results, verdict};
 use std::path::{Path, PathBuf};
 
 /// The command line of `winkler solve`.
@@ -212,7 +212,7 @@ impl Solver<'_> {
             false => written,
         };
         drop(line);
-        let code = if plan.limit.is_some() { 1 } else { report::exit_code(&done) };
+        let code = if plan.limit.is_some() { 1 } else { verdict::exit_code(&done) };
         if first {
             if self.has_checkpoint && code == 0 {
                 // nothing is left to go on with; it is no failure if the file is gone already

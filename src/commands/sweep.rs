@@ -12,7 +12,7 @@ use crate::output::tables::{contact_column, vector_columns, vector_fields};
 use crate::output::{Folder, LISTED, Report, RowFile, busiest, say, sci, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::run::{self, Begin, Built, Clock, Done, Prepared, Requests, report, results};
+use crate::run::{self, Begin, Built, Clock, Done, Prepared, Requests, report, results, verdict};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
@@ -69,7 +69,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
         let done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
         clock.total();
         let report = report::report(session, &done, &results::recover(&done), &clock);
-        exit = exit.max(report::exit_code(&done));
+        exit = exit.max(verdict::exit_code(&done));
         if session.rank() == 0 {
             sweep.write_row(case, &done, &report)?;
             sweep.collect(case, &done, report);
@@ -151,7 +151,7 @@ impl Sweep<'_> {
         }
         self.bar.inc(1);
         // with `-q` only runs that are not solved are printed
-        if self.terminal.is_loud() || (!self.terminal.json && report::exit_code(done) != 0) {
+        if self.terminal.is_loud() || (!self.terminal.json && verdict::exit_code(done) != 0) {
             let (label, status, iterations) = (&case.label, &report.status, report.iterations);
             let residual = sci(report.residual.unwrap_or(f64::NAN), 2);
             self.bar

@@ -5,6 +5,7 @@ use crate::error::Result;
 use crate::linalg::dot;
 use crate::model::field::{Line, Unbounded};
 use crate::problem::Own;
+use crate::problem::method::Gamma;
 use crate::robin::Ritz;
 use std::collections::VecDeque;
 
@@ -33,6 +34,22 @@ pub trait GammaRule {
 
 /// Rules that a Rust program adds, by name. Each function makes the rule of a run.
 pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
+
+/// Make the rule that a scene names. `own` are the rules that the program brings.
+///
+/// # Errors
+/// A name that no rule of the program has.
+pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
+    Ok(match gamma {
+        Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),
+        Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
+        Gamma::LineSearch => Box::new(LineSearch),
+        Gamma::Aitken => Box::new(Aitken::default()),
+        Gamma::BarzilaiBorwein => Box::new(BarzilaiBorwein::default()),
+        Gamma::Spectral => Box::new(Spectral::default()),
+        Gamma::Own(name) => own.get("rule for gamma", name)?(),
+    })
+}
 
 /// gamma^k = gamma, as in the paper.
 #[derive(Debug, Clone, Copy)]

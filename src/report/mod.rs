@@ -169,10 +169,9 @@ impl Results {
         Some(Plot { title: String::new(), x: Axis::linear(force), y: Axis::linear(size), series })
     }
 
-    /// Return the plot of the contact force over the approach in the same way; none for more than [`LISTED`] pairs.
+    /// Return the plot of the contact force over the approach in the same way.
     fn approach(&self) -> Option<Plot> {
-        let curves =
-            self.curves(|pair| (number(&pair["approach"]), force(pair))).filter(|curves| curves.len() <= LISTED)?;
+        let curves = self.curves(|pair| (number(&pair["approach"]), force(pair)))?;
         let curves = curves.iter().map(|(name, points)| (name.as_str(), points.clone()));
         Some(Plot::approach("", force_labels(self.units.as_ref()), curves))
     }
@@ -288,7 +287,8 @@ impl Results {
             view,
             pressures => self.pressures(false)?,
             convergence,
-            approach => self.approach().map(|plot| svg(&plot)).transpose()?,
+            // the page has no room for the legend of more curves
+            approach => self.approach().filter(|plot| plot.series.len() <= LISTED).map(|plot| svg(&plot)).transpose()?,
             phases => phases.into_iter().filter(timed).chain(["total"]).collect::<Vec<_>>(),
             command => self.command(),
             settings => serde_json::to_string_pretty(&report["settings"]).unwrap_or_default(),
@@ -300,10 +300,9 @@ impl Results {
     }
 }
 
-const WHAT: [&str; 5] = ["stress", "displacement", "pressure", "convergence", "area"];
+const WHAT: [&str; 6] = ["stress", "displacement", "pressure", "convergence", "area", "force"];
 
-/// Draw one of the pictures `stress`, `displacement`, `pressure`, `convergence` and `area` from a folder of results, and return the
-/// paths of the files.
+/// Draw one of the pictures [`WHAT`] from a folder of results, and return the paths of the files.
 ///
 /// The file is `out`, or an SVG file of the picture's name in the folder. Each pair has a picture of its own, numbered from the
 /// second one on.
@@ -351,8 +350,8 @@ fn drawn(results: &Results, folder: &Path, what: &str) -> Result<Vec<String>> {
     let pictures: Vec<String> = match what {
         "pressure" => results.pressures(true)?.into_iter().map(|picture| picture.svg).collect(),
         "convergence" => results.convergence()?.map(|plot| svg(&plot)).transpose()?.into_iter().collect(),
-        "area" => {
-            let Some(plot) = results.area() else {
+        "area" | "force" => {
+            let Some(plot) = (if what == "area" { results.area() } else { results.approach() }) else {
                 return Err(lacks("no load steps", "give the scene `method.steps`, or a history of its loads"));
             };
             vec![svg(&plot)?]

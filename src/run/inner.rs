@@ -81,6 +81,11 @@ impl<'a> Inner<'a> {
 
     /// Return the reason for the solvers in words. Each kind of solver is named once, with the reason of its largest body.
     pub fn reason(&self) -> String {
+        let is_typed = self.plans.iter().any(|plan| plan.chosen.asks_for_ksp());
+        if self.method == MethodName::Auto && self.may_join() && self.linear == Linear::Sweeps && is_typed {
+            return "as typed for each body, so that linear steps are sweeps; `--method newton` joins the bodies in one matrix"
+                .to_owned();
+        }
         let mut kinds: Vec<Vec<&Plan>> = Vec::new();
         for plan in &self.plans {
             match kinds.iter_mut().find(|kind| kind[0].preset == plan.preset) {

@@ -6,7 +6,7 @@ use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
 use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::gamma::{Aitken, BarzilaiBorwein, GammaRule, LineSearch, Relaxed, Schedule, Spectral, Stationary};
+use crate::ddm::gamma::{self, Relaxed};
 use crate::ddm::robin::{Acceleration, Anderson, Conjugate};
 use crate::ddm::{self, Method, Outcome, Start, Status, first_springs};
 use crate::discretize::{self, Verified, point};
@@ -20,7 +20,7 @@ use crate::model::{BodySlot, LinearStep};
 use crate::parallel::{Ranks, collectively, differences};
 use crate::petsc::{Session, keep_apart, keep_at_hand};
 use crate::problem::Order;
-use crate::problem::method::{Gamma, Linear, MethodName, MethodSpec};
+use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
 use crate::setting::remove;
@@ -386,7 +386,7 @@ fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Metho
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
             return linear_step(session, built, start).map(Method::Newton);
         }
-        MethodName::Robin => Box::new(Relaxed::new(rule(&scene)?)),
+        MethodName::Robin => Box::new(Relaxed::new(gamma::rule(&scene.method.gamma, &scene.rules)?)),
         MethodName::Ncg => Box::new(Conjugate::default()),
         MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
     };
@@ -427,16 +427,4 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut Start) -> Resul
         step.set_up(&springs)?;
     }
     Ok(step)
-}
-
-fn rule(scene: &Scene) -> Result<Box<dyn GammaRule>> {
-    Ok(match &scene.method.gamma {
-        Gamma::Stationary(gamma) => Box::new(Stationary(*gamma)),
-        Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
-        Gamma::LineSearch => Box::new(LineSearch),
-        Gamma::Aitken => Box::new(Aitken::default()),
-        Gamma::BarzilaiBorwein => Box::new(BarzilaiBorwein::default()),
-        Gamma::Spectral => Box::new(Spectral::default()),
-        Gamma::Own(name) => scene.rules.get("rule for gamma", name)?(),
-    })
 }

@@ -2,30 +2,20 @@
 
 use super::stages::{All, Built, Clock, Done, Look};
 use super::verdict::{self, forecast, message, status_name};
-use super::{recorder, results, warnings};
+use super::{results, warnings};
 use crate::contact::{ContactPair, Left};
 use crate::ddm::{Outcome, Reached, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
-use crate::error::{Kind, few};
+use crate::error::few;
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LISTED, LookReport, PairReport,
-    Report, sci,
+    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LookReport, PairReport, Report,
+    sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-
-/// Return the exit code of a run.
-pub fn exit_code(done: &Done) -> i32 {
-    match done.outcome.status {
-        Status::Converged | Status::RoundoffLimited if verdict::step_warnings(&done.steps).is_empty() => 0,
-        Status::Paused { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
-        _ => 1,
-    }
-}
 
 /// Return the report of a run. Collective.
 pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
@@ -225,20 +215,20 @@ pub struct Shared {
     pub solvers: Vec<String>,
 }
 
-/// Return the inner solvers of the bodies in words: one name if all are the same, and numbers of bodies per solver if there are many
-/// bodies.
+/// Return the inner solvers of the bodies in words: each solver once, with the number of its bodies if it has several but not all.
 pub fn solvers_in_words(solvers: &[String]) -> String {
-    match solvers {
-        [first, rest @ ..] if rest.iter().all(|other| other == first) => first.clone(),
-        all if all.len() <= LISTED => all.join(", "),
-        all => {
-            let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-            all.iter().for_each(|solver| *counts.entry(solver).or_default() += 1);
-            let mut kinds: Vec<(&str, usize)> = counts.into_iter().collect();
-            kinds.sort_by_key(|kind| std::cmp::Reverse(kind.1));
-            few(kinds.iter().map(|(solver, count)| format!("{count} bodies {solver}"))).join(", ")
+    let mut kinds: Vec<(&str, usize)> = Vec::new();
+    for solver in solvers {
+        match kinds.iter_mut().find(|(kind, _)| kind == solver) {
+            Some((_, count)) => *count += 1,
+            None => kinds.push((solver, 1)),
         }
     }
+    let in_words = |&(solver, count): &(&str, usize)| match count {
+        count if count == 1 || count == solvers.len() => solver.to_owned(),
+        count => format!("{count} bodies {solver}"),
+    };
+    few(kinds.iter().map(in_words)).join(", ")
 }
 
 impl Shared {

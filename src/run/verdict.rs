@@ -1,9 +1,11 @@
-//! The end of a run in words: the name of its status, and a message with the cause and with advice.
+//! The end of a run: the name of its status, its exit code, and a message with the cause and with advice.
 
 use super::in_words;
 use super::recorder;
+use super::stages::Done;
 use crate::ddm::robin::{best_factor, best_gamma};
 use crate::ddm::{Inaccuracy, Outcome, Status, Whose};
+use crate::error::Kind;
 use crate::model::{Mechanism, Model, Moved};
 use crate::output::{ForecastReport, StepReport, sci};
 
@@ -22,6 +24,15 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::Inaccurate(_) => "inaccurate",
         Status::Paused { asked } if recorder::signal(*asked).is_some() => "interrupted",
         Status::Paused { .. } => "running",
+    }
+}
+
+/// Return the exit code of a run.
+pub fn exit_code(done: &Done) -> i32 {
+    match done.outcome.status {
+        Status::Converged | Status::RoundoffLimited if step_warnings(&done.steps).is_empty() => 0,
+        Status::Paused { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
+        _ => 1,
     }
 }
 

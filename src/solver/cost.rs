@@ -88,12 +88,19 @@ pub struct Cost {
     pub bytes: f64,
 }
 
+/// Seconds below which the times that a run measures are two to five times as long or as short as the model of cubes says (`cubes`, `shells`,
+/// `sphere-layer`): calls and set-ups take most of them, which the model leaves out.
+const BRIEF: f64 = 0.5;
+
 impl Cost {
-    /// Return the cost as text.
+    /// Return the cost as text. The estimate of a time below [`BRIEF`] is not worth a number.
     pub fn words(&self) -> String {
         let megabytes = self.bytes / 1e6;
         let digits = |value: f64| if value < 10.0 { format!("{value:.1}") } else { format!("{value:.0}") };
-        format!("{} s and {} MB", digits(self.seconds), digits(megabytes))
+        match self.seconds {
+            seconds if seconds < BRIEF => format!("less than {BRIEF} s and {} MB", digits(megabytes)),
+            seconds => format!("some {} s and {} MB", digits(seconds), digits(megabytes)),
+        }
     }
 
     fn and(self, other: Cost) -> Cost {

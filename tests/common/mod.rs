@@ -28,6 +28,8 @@ pub fn example(name: &str, args: &[&str]) -> String {
     let cargo = |words: &[&str]| {
         let mut command = Command::new(env!("CARGO"));
         command.args(words).args(["--locked", "--quiet", "--example", name]).current_dir(root());
+        // `scripts/timed` sets it for the test program; cargo would build all crates anew for it
+        command.env_remove("RUSTC_BOOTSTRAP");
         if !cfg!(debug_assertions) {
             command.arg("--release");
         }

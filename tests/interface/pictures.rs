@@ -225,6 +225,9 @@ fn contact_over_force() {
         let drawn = fs::read_to_string(run.folder.join("area.svg")).expect("a picture");
         assert_eq!(drawn.matches("<polygon").count(), 3, "{name}");
         assert!(drawn.contains("contact force") && drawn.contains(&column.replace("contact_", "")), "{name}");
+        assert_eq!(winkler(&["plot", folder, "force"]).code, 0);
+        let drawn = fs::read_to_string(run.folder.join("force.svg")).expect("a picture");
+        assert!(drawn.contains("contact force") && drawn.contains("approach"), "{name}");
     }
     let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
     refused(&winkler(&["plot", run.folder.to_str().expect("a name"), "area"]), 6, &["no load steps", "method.steps"]);

@@ -1,8 +1,60 @@
 //! Laws of a known form: linear, cubic, power and exponential.
 
 use super::numeric::{exp_less_line, gap_by_quadrature, meeting};
-use super::{LayerLaw, Response};
+use super::{LayerLaw, PerPoint, Response};
+use crate::error::{Error, Kind, Result, shown};
+use crate::expression::Field;
 use crate::linalg::portable::{cbrt, exp, expm1, log, log1p, pow};
+use crate::problem::layer::{LawForm, LawKind, Parameter};
+use std::rc::Rc;
+
+/// Make the law of a form with these values of its parameters, for the contact points `position`.
+///
+/// # Errors
+/// A parameter that is not finite or out of its range at a point.
+pub fn make(form: &LawForm, values: &[Field], position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
+    match form.kind {
+        LawKind::Linear => formed(form, values, position, |v| Linear { stiffness: v[0] }),
+        LawKind::Power => formed(form, values, position, |v| Power::new(v[0], v[1])),
+        LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
+        LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
+    }
+}
+
+/// Make a law of a known form: one for all points, or one a point where a parameter varies.
+///
+/// # Errors
+/// A parameter that is not finite or out of its range at a point.
+fn formed<L: LayerLaw + 'static>(
+    form: &LawForm,
+    values: &[Field],
+    position: &[[f64; 3]],
+    new: fn(&[f64]) -> L,
+) -> Result<Rc<dyn LayerLaw>> {
+    let at = |&x: &[f64; 3]| -> Result<L> {
+        let parameters = form.parameters.iter().zip(values).map(|(parameter, field)| checked(parameter, field, x));
+        Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
+    };
+    match values.iter().all(Field::is_constant) {
+        true => Ok(Rc::new(at(&[0.0; 3])?)),
+        false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
+    }
+}
+
+/// Return the value of a parameter at a point.
+///
+/// # Errors
+/// A value that is not finite or out of its range.
+fn checked(parameter: &Parameter, field: &Field, x: [f64; 3]) -> Result<f64> {
+    let value = field.eval_finite(parameter.what, x)?;
+    let Some(breach) = parameter.bounds.breach(value) else { return Ok(value) };
+    let message = format!("{} is {} at ({}, {}, {})", parameter.what, shown(value), x[0], x[1], x[2]);
+    let error = Error::new(Kind::Scene, message);
+    Err(match field.place() {
+        Some(place) => error.at(place).label(breach),
+        None => error.help(breach),
+    })
+}
 
 /// The law p(c) = stiffness * c.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,15 +1,15 @@
 //! The law that a scene asks for, at the points of a pair: laws of a known form, expressions, and the check of laws that a Rust program
 //! supplies.
 
-use super::forms::{Cubic, Exponential, Linear, Power};
+use super::forms;
 use super::numeric::{integral, meeting, root};
 use super::table::{Table, asperities};
 use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
-use crate::expression::{Expression, Field};
+use crate::expression::Expression;
 use crate::linalg::{diagonal, portable::pow};
 use crate::problem::Own;
-use crate::problem::layer::{LawForm, LawKind, LayerSpec, Parameter};
+use crate::problem::layer::LayerSpec;
 use std::rc::Rc;
 
 /// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.
@@ -20,12 +20,7 @@ use std::rc::Rc;
 /// Parameters out of their range at a point, and expressions or the program's own laws that are not the law of a layer.
 pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match spec {
-        LayerSpec::Form { form, values } => match form.kind {
-            LawKind::Linear => formed(form, values, position, |v| Linear { stiffness: v[0] }),
-            LawKind::Power => formed(form, values, position, |v| Power::new(v[0], v[1])),
-            LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
-            LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
-        },
+        LayerSpec::Form { form, values } => forms::make(form, values, position),
         LayerSpec::Asperities(spec) => Ok(Rc::new(asperities(spec))),
         LayerSpec::Own(name) => own(laws, name, position, extent(position)),
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
@@ -38,41 +33,6 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
             }
         }
     }
-}
-
-/// Make a law of a known form: one for all points, or one a point where a parameter varies.
-///
-/// # Errors
-/// A parameter that is not finite or out of its range at a point.
-fn formed<L: LayerLaw + 'static>(
-    form: &LawForm,
-    values: &[Field],
-    position: &[[f64; 3]],
-    new: fn(&[f64]) -> L,
-) -> Result<Rc<dyn LayerLaw>> {
-    let at = |&x: &[f64; 3]| -> Result<L> {
-        let parameters = form.parameters.iter().zip(values).map(|(parameter, field)| checked(parameter, field, x));
-        Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
-    };
-    match values.iter().all(Field::is_constant) {
-        true => Ok(Rc::new(at(&[0.0; 3])?)),
-        false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
-    }
-}
-
-/// Return the value of a parameter at a point.
-///
-/// # Errors
-/// A value that is not finite or out of its range.
-fn checked(parameter: &Parameter, field: &Field, x: [f64; 3]) -> Result<f64> {
-    let value = field.eval_finite(parameter.what, x)?;
-    let Some(breach) = parameter.bounds.breach(value) else { return Ok(value) };
-    let message = format!("{} is {} at ({}, {}, {})", parameter.what, shown(value), x[0], x[1], x[2]);
-    let error = Error::new(Kind::Scene, message);
-    Err(match field.place() {
-        Some(place) => error.at(place).label(breach),
-        None => error.help(breach),
-    })
 }
 
 /// Return the diagonal of the box around all points. No layer is compressed by more.
@@ -322,6 +282,7 @@ fn check(law: &dyn LayerLaw, size: f64) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact::law::forms::{Cubic, Exponential, Power};
 
     #[test]
     fn the_extent_is_a_diagonal() {
