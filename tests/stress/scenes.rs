@@ -362,7 +362,7 @@ impl Blocks {
 
     fn in_ring(&self, block: usize) -> Holds {
         let mut holds = Holds::default();
-        let (is_lower, is_left) = (block < 2, block % 2 == 0);
+        let (is_lower, is_left) = (block < 2, block.is_multiple_of(2));
         let pressure = format!("pressure = {:e}", self.signed_load());
         if self.are_held() {
             holds.fix.push(on(block, "pin", "x = 0, y = 0"));

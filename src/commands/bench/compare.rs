@@ -109,20 +109,18 @@ pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points])
     if run.len() != reference.len() {
         return None;
     }
-    let mut squares = Squares::default();
-    for own in run {
+    let known = |own: &Points| -> Option<Vec<f64>> {
         // tables of the same pair, or the only two
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
-        let known: Vec<f64> = match dimension {
+        Some(match dimension {
             2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
             _ => {
                 let scattered = Scattered::new(&other.at);
                 own.at.iter().map(|x| mean(&scattered.plane(x, EXACT), &other.pressure)).collect()
             }
-        };
-        add(&mut squares, own, &known);
-    }
-    relative(&squares)
+        })
+    };
+    relative(run, &run.iter().map(known).collect::<Option<Vec<_>>>()?)
 }
 
 /// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without one, or with several pairs.
@@ -131,18 +129,15 @@ pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
     let ([contact], [own]) = (&scene.contacts[..], run) else { return None };
     let field = contact.reference.as_ref()?;
     let known: Vec<f64> = own.at.iter().map(|&x| field.eval(x)).collect();
+    relative(run, &[known])
+}
+
+/// Return the relative error of a run against the known pressures at its points, n for each pair; `None` if it is not finite.
+fn relative(run: &[Points], known: &[Vec<f64>]) -> Option<f64> {
     let mut squares = Squares::default();
-    add(&mut squares, own, &known);
-    relative(&squares)
-}
-
-/// Add the squares of the pressures of a run and of the known pressures (n) at its points.
-fn add(squares: &mut Squares, run: &Points, known: &[f64]) {
-    (0..known.len()).for_each(|q| squares.add(run.weight[q], known[q], run.pressure[q]));
-}
-
-/// Return the relative error of a run; `None` if it is not finite.
-fn relative(squares: &Squares) -> Option<f64> {
+    for (run, known) in run.iter().zip(known) {
+        (0..known.len()).for_each(|q| squares.add(run.weight[q], known[q], run.pressure[q]));
+    }
     Some((squares.difference / squares.old).sqrt()).filter(|relative| relative.is_finite())
 }
 

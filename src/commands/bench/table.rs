@@ -158,9 +158,12 @@ fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
 /// Columns of texts and of the number of runs, after the key.
 const TEXTS: [&str; 4] = ["runs", "status", "message", "method"];
 
+/// A function that returns a number of the runs of a case, if they have it.
+type Number = fn(&Runs) -> Option<f64>;
+
 /// Columns with a number, after the texts. Times are medians over the runs; counters are those of one run, and all runs have the same. The
 /// numbers that need the whole table, or tables of contact, are set later.
-const NUMBERS: [(&str, fn(&Runs) -> Option<f64>); 25] = [
+const NUMBERS: [(&str, Number); 25] = [
     ("dofs", |runs| runs.shown.number("/dofs")),
     ("points", |runs| Some(runs.pairs()?.map(|pair| of(pair, "points")).sum())),
     ("theta", |runs| Some(runs.pairs()?.map(coupling).fold(0.0, f64::max))),
@@ -372,8 +375,11 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
     }
 }
 
+/// A function that returns a number as a text.
+type Format = fn(f64) -> String;
+
 /// Columns with a number: heading, name in the rows, format.
-const SHOWN: [(&str, &str, fn(f64) -> String); 8] = [
+const SHOWN: [(&str, &str, Format); 8] = [
     ("dofs", "dofs", |value| format!("{value:.0}")),
     ("iterations", "iterations", |value| format!("{value:.0}")),
     ("sweeps", "sweeps", |value| format!("{value:.0}")),
