@@ -72,7 +72,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = LocalErrors::of_bodies(meshes, &recovered);
+    let mut local = LocalErrors::of_bodies(meshes, &recovered, &work_on_missed(meshes, model, layer, &recovered));
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, pair);
     }
@@ -188,15 +188,15 @@ struct LocalErrors {
 }
 
 impl LocalErrors {
-    /// Return the errors of the bodies, without those of the layers.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies) -> Self {
+    /// Return the errors of the bodies, without those of the layers. `work_on_missed` has an entry for each body.
+    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, strips, loads) = (none(), none(), none());
         let mut local = Self { cells, strips, loads, layers: Vec::new(), sides: Vec::new(), mean_error: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
-                let Errors { cells, strips, mut load } = recovered.errors();
+                let Errors { cells, strips, mut load } = recovered.errors(work_on_missed[body]);
                 load.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
                 (local.cells[body], local.strips[body], local.loads[body]) = (cells, strips, load);
             }
@@ -248,6 +248,22 @@ impl LocalErrors {
         self.layers.push(of_layer.energy);
         self.mean_error.extend(mean_error);
     }
+}
+
+/// Return the work of the pressures of all contacts on the interpolation error of each body that this rank owns.
+fn work_on_missed(meshes: &dyn Meshes, model: &Model, layer: &Layer, recovered: &RecoveredBodies) -> Vec<f64> {
+    let mut work = vec![0.0; recovered.len()];
+    for (index, pair) in model.pairs.iter().enumerate() {
+        let (points, pressure) = (meshes.points(index), &layer.pressure[model.range(index)]);
+        let at = |g: usize| points.interpolation.row(g).map(|(q, share)| share * pressure[q]).sum::<f64>().max(0.0);
+        let force: Vec<f64> = points.each.iter().enumerate().map(|(g, point)| -point.weight * at(g)).collect();
+        for (side, &body) in pair.bodies.iter().enumerate() {
+            if let Some(recovered) = &recovered[body] {
+                work[body] += recovered.work_on_missed(index, side, &force);
+            }
+        }
+    }
+    work
 }
 
 /// Turn loads at the nodes of each body into those at its dofs, on all ranks that have a part of the body. Collective.

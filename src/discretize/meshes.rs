@@ -54,7 +54,10 @@ pub struct Cells {
 /// A displacement of a body with the fields recovered from it.
 pub trait Recovered {
     /// Return the errors of the body, see [`Recovery::errors`].
-    fn errors(&self) -> Errors;
+    fn errors(&self, work_on_missed: f64) -> Errors;
+
+    /// Return the work `sum force_g n.b` of forces at the integration points of a side of a pair on the interpolation error b.
+    fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64;
 
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
@@ -181,8 +184,14 @@ impl<const D: usize> OnBody<'_, D> {
 }
 
 impl<const D: usize> Recovered for OnBody<'_, D> {
-    fn errors(&self) -> Errors {
-        self.recovery.errors()
+    fn errors(&self, work_on_missed: f64) -> Errors {
+        self.recovery.errors(work_on_missed)
+    }
+
+    fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64 {
+        let mut work = 0.0;
+        self.visit(pair, side, |g, normal, nodes, l| work += force[g] * dot(&normal, &self.recovery.missed(nodes, l)));
+        work
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
