@@ -77,6 +77,24 @@ struct Tally {
     seconds: f64,
 }
 
+/// An answer that is listed.
+struct Failure {
+    index: usize,
+    /// What is wrong, in a line.
+    line: String,
+    /// The scene in a line.
+    scene: String,
+}
+
+/// What came of all scenes so far.
+struct Results<'a> {
+    arguments: &'a Arguments,
+    tallies: HashMap<&'a str, Tally>,
+    failures: Vec<Failure>,
+    /// Whether no method was wrong, and the default method did not fail.
+    sound: bool,
+}
+
 /// Newton steps beyond which a scene is listed.
 const MANY: usize = 15;
 
@@ -92,72 +110,21 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<bool> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    refuse_unknown(&arguments.methods)?;
     let scratch = tempfile::tempdir().map_err(|cause| Error::file(&std::env::temp_dir(), "write", &cause))?;
     let folder = arguments.keep.as_deref().unwrap_or(scratch.path());
     std::fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create", &cause))?;
-    for name in &arguments.methods {
-        let gamma = name.parse::<f64>().is_ok_and(|gamma| gamma > 0.0);
-        if !gamma && !NAMES.contains(&name.as_str()) {
-            let help = format!("it is a number or one of {}", NAMES.join(", "));
-            return Err(Error::new(Kind::Usage, format!("unknown method `{name}`")).help(help));
-        }
-    }
     let session = Session::start(&[])?;
     let indices = match arguments.only {
         Some(index) => index..index + 1,
         None => arguments.first..arguments.first + arguments.scenes,
     };
-    let mut tallies: HashMap<&str, Tally> = HashMap::new();
-    let mut failures = Vec::new();
-    let mut sound = true;
+    let mut results = Results { arguments, tallies: HashMap::new(), failures: Vec::new(), sound: true };
     for index in indices {
-        let draw = match (arguments.wide, arguments.slender) {
-            (true, _) => wide::scene,
-            (_, true) => slender::scene,
-            _ => scenes::scene,
-        };
-        let case = draw(arguments.seed, index, root);
-        let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
-        let text = format!("# {}\n{}", case.line, case.text);
-        std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause))?;
-        if arguments.keep.is_some() {
-            println!("{}", path.display());
-        }
+        let (case, path) = write(arguments, folder, index)?;
         let (reference, answers) = solve_all(&session, arguments, &case, &path)?;
         for (name, answer) in arguments.methods.iter().zip(&answers) {
-            let verdict = runs::judge(&case, &reference, answer);
-            let solvable = case.expect == Expect::Solution && verdict != Verdict::Named;
-            tallies.entry(name).or_default().take(answer, &verdict, solvable);
-            let wrong = matches!(verdict, Verdict::Wrong(_));
-            sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
-            if arguments.only.is_some() {
-                println!(
-                    "{name}: {verdict:?}: {} iterations, {} sweeps; {}\n  {}",
-                    answer.iterations,
-                    answer.sweeps,
-                    answer.message,
-                    answer.history.join(" ")
-                );
-            }
-            let many = matches!(name.as_str(), "auto" | "newton" | "newton-robin") && answer.iterations > MANY;
-            let roundoff = answer.status == "roundoff-limited";
-            if wrong || verdict == Verdict::Failed || many || roundoff {
-                let why = match &verdict {
-                    Verdict::Wrong(why) => format!("WRONG ({why})"),
-                    Verdict::Right if many => format!("{} STEPS", answer.iterations),
-                    Verdict::Failed if solvable => format!("FAILED ({})", answer.status),
-                    Verdict::Failed => format!("NOT NAMED ({})", answer.status),
-                    _ => answer.status.clone(),
-                };
-                let (peak, off) = (runs::peak(&reference) / case.pressure, runs::difference(&case, &reference, answer));
-                let line = format!(
-                    "{index} {name}: {why}, peak {peak:.1e}, pressure {off:.1e} off, residual {:.1e}, {} sweeps: {}",
-                    answer.residual, answer.sweeps, answer.message
-                );
-                eprintln!("{line}");
-                failures.push((index, name.clone(), line, case.line.clone()));
-            }
+            results.take(&case, &reference, name, answer);
         }
         if !reference.claims && case.expect == Expect::Solution && !reference.status.starts_with("un") {
             eprintln!("{index} reference: {} residual {:.1e}", reference.message, reference.residual);
@@ -166,8 +133,33 @@ fn run(arguments: &Arguments) -> Result<bool> {
             eprintln!("{} scenes done", index + 1);
         }
     }
-    print(arguments, &tallies, &failures);
-    Ok(sound)
+    results.print();
+    Ok(results.sound)
+}
+
+fn refuse_unknown(methods: &[String]) -> Result<()> {
+    let is_known =
+        |name: &&String| NAMES.contains(&name.as_str()) || name.parse::<f64>().is_ok_and(|gamma| gamma > 0.0);
+    let Some(name) = methods.iter().find(|name| !is_known(name)) else { return Ok(()) };
+    let help = format!("it is a number or one of {}", NAMES.join(", "));
+    Err(Error::new(Kind::Usage, format!("unknown method `{name}`")).help(help))
+}
+
+/// Draws a scene and writes its file.
+fn write(arguments: &Arguments, folder: &Path, index: usize) -> Result<(Case, PathBuf)> {
+    let draw = match (arguments.wide, arguments.slender) {
+        (true, _) => wide::scene,
+        (_, true) => slender::scene,
+        _ => scenes::scene,
+    };
+    let case = draw(arguments.seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+    let path = folder.join(format!("scene-{}-{index}.toml", arguments.seed));
+    let text = format!("# {}\n{}", case.line, case.text);
+    std::fs::write(&path, text).map_err(|cause| Error::file(&path, "write", &cause))?;
+    if arguments.keep.is_some() {
+        println!("{}", path.display());
+    }
+    Ok((case, path))
 }
 
 /// The reference, then every method. Without a reference that claims to be one, the best answer is.
@@ -207,46 +199,86 @@ impl Tally {
     }
 }
 
-fn print(arguments: &Arguments, tallies: &HashMap<&str, Tally>, failures: &[(usize, String, String, String)]) {
-    println!(
-        "| method | solved | rightly named | wrong | failed | roundoff claimed | steps: 50 %, 90 %, 99 %, worst, sum | sweeps: median, worst | factorizations | seconds |"
-    );
-    println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
-    for name in &arguments.methods {
-        let Some(tally) = tallies.get(name.as_str()) else { continue };
-        let (steps, sweeps) = (Sorted::new(&tally.iterations), Sorted::new(&tally.sweeps));
-        println!(
-            "| {name} | {} of {} | {} of {} | {} | {} | {} | {}, {}, {}, {}, {} | {}, {} | {} | {:.0} |",
-            tally.right,
-            tally.solvable,
-            tally.named,
-            tally.unsolvable,
-            tally.wrong,
-            tally.failed,
-            tally.roundoff,
-            steps.share(0.5),
-            steps.share(0.9),
-            steps.share(0.99),
-            steps.share(1.0),
-            tally.iterations.iter().sum::<usize>(),
-            sweeps.share(0.5),
-            sweeps.share(1.0),
-            Sorted::new(&tally.factorizations).share(0.5),
-            tally.seconds
-        );
-    }
-    let mut last = usize::MAX;
-    for (index, _, line, scene) in failures {
-        if *index != last {
-            let family = match (arguments.wide, arguments.slender) {
-                (true, _) => " --wide",
-                (_, true) => " --slender",
-                _ => "",
-            };
-            println!("\n`scripts/stress{family} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
-            last = *index;
+impl<'a> Results<'a> {
+    /// Counts the answer of a method, and lists it if it is not as it should be.
+    fn take(&mut self, case: &Case, reference: &Answer, name: &'a str, answer: &Answer) {
+        let verdict = runs::judge(case, reference, answer);
+        let solvable = case.expect == Expect::Solution && verdict != Verdict::Named;
+        self.tallies.entry(name).or_default().take(answer, &verdict, solvable);
+        let wrong = matches!(verdict, Verdict::Wrong(_));
+        self.sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
+        if self.arguments.only.is_some() {
+            println!(
+                "{name}: {verdict:?}: {} iterations, {} sweeps; {}\n  {}",
+                answer.iterations,
+                answer.sweeps,
+                answer.message,
+                answer.history.join(" ")
+            );
         }
-        println!("- {line}");
+        let many = matches!(name, "auto" | "newton" | "newton-robin") && answer.iterations > MANY;
+        let roundoff = answer.status == "roundoff-limited";
+        if !(wrong || verdict == Verdict::Failed || many || roundoff) {
+            return;
+        }
+        let why = match &verdict {
+            Verdict::Wrong(why) => format!("WRONG ({why})"),
+            Verdict::Right if many => format!("{} STEPS", answer.iterations),
+            Verdict::Failed if solvable => format!("FAILED ({})", answer.status),
+            Verdict::Failed => format!("NOT NAMED ({})", answer.status),
+            _ => answer.status.clone(),
+        };
+        let (peak, off) = (runs::peak(reference) / case.pressure, runs::difference(case, reference, answer));
+        let line = format!(
+            "{} {name}: {why}, peak {peak:.1e}, pressure {off:.1e} off, residual {:.1e}, {} sweeps: {}",
+            case.index, answer.residual, answer.sweeps, answer.message
+        );
+        eprintln!("{line}");
+        self.failures.push(Failure { index: case.index, line, scene: case.line.clone() });
+    }
+
+    fn print(&self) {
+        let Self { arguments, tallies, failures, .. } = self;
+        println!(
+            "| method | solved | rightly named | wrong | failed | roundoff claimed | steps: 50 %, 90 %, 99 %, worst, sum | sweeps: median, worst | factorizations | seconds |"
+        );
+        println!("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |");
+        for name in &arguments.methods {
+            let Some(tally) = tallies.get(name.as_str()) else { continue };
+            let (steps, sweeps) = (Sorted::new(&tally.iterations), Sorted::new(&tally.sweeps));
+            println!(
+                "| {name} | {} of {} | {} of {} | {} | {} | {} | {}, {}, {}, {}, {} | {}, {} | {} | {:.0} |",
+                tally.right,
+                tally.solvable,
+                tally.named,
+                tally.unsolvable,
+                tally.wrong,
+                tally.failed,
+                tally.roundoff,
+                steps.share(0.5),
+                steps.share(0.9),
+                steps.share(0.99),
+                steps.share(1.0),
+                tally.iterations.iter().sum::<usize>(),
+                sweeps.share(0.5),
+                sweeps.share(1.0),
+                Sorted::new(&tally.factorizations).share(0.5),
+                tally.seconds
+            );
+        }
+        let mut last = usize::MAX;
+        for Failure { index, line, scene } in failures {
+            if *index != last {
+                let family = match (arguments.wide, arguments.slender) {
+                    (true, _) => " --wide",
+                    (_, true) => " --slender",
+                    _ => "",
+                };
+                println!("\n`scripts/stress{family} --seed {} --only {index} --keep`: {scene}\n", arguments.seed);
+                last = *index;
+            }
+            println!("- {line}");
+        }
     }
 }
 

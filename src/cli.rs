@@ -253,12 +253,12 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
     let ended = match command {
         Command::Solving(_) => unreachable!("these commands have a session"),
         Command::New { folder, space, axisymmetric } => {
-            let kind = match (space, axisymmetric) {
-                (true, _) => new::Example::Space,
-                (_, true) => new::Example::Revolution,
-                _ => new::Example::Plane,
+            let example = match (space, axisymmetric) {
+                (true, _) => new::SPACE,
+                (_, true) => new::REVOLUTION,
+                _ => new::PLANE,
             };
-            new::new(&folder, kind)
+            new::new(&folder, example)
         }
         Command::Schema => say(format_args!("{:#}", crate::scene::schema())).map(|()| 0),
         Command::Completions { shell } => {

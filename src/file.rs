@@ -3,7 +3,7 @@
 use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
-use std::fs::File;
+use std::fs::{File, FileType};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
@@ -24,15 +24,22 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
 pub fn open(path: &Path) -> Result<File> {
     let failed = |cause| Error::file(path, "read", &cause);
     let kind = std::fs::metadata(path).map_err(failed)?.file_type();
-    let other = match () {
-        _ if kind.is_file() => return File::open(path).map_err(failed),
+    if kind.is_file() {
+        return File::open(path).map_err(failed);
+    }
+    Err(Error::new(Kind::File, format!("{} is {}, not a file", path.display(), kind_of(kind)))
+        .help("name a regular file; what a pipe gives can be saved as one"))
+}
+
+/// Return the kind of a directory entry in words.
+pub fn kind_of(kind: FileType) -> &'static str {
+    match () {
+        _ if kind.is_file() => "a file, not a folder",
         _ if kind.is_dir() => "a folder",
         _ if kind.is_fifo() => "a pipe",
         _ if kind.is_socket() => "a socket",
         _ => "a device",
-    };
-    Err(Error::new(Kind::File, format!("{} is {other}, not a file", path.display()))
-        .help("name a regular file; what a pipe gives can be saved as one"))
+    }
 }
 
 /// Return the bytes of a text with the line ends of Unix, if it has those of old Macs, carriage returns alone. Other texts are unchanged, so that
@@ -122,6 +129,13 @@ pub fn digest_of_bytes(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
+/// Return the SHA-256 of a file, which is read in blocks, in hexadecimal digits.
+pub fn digest_of_file(path: &Path) -> io::Result<String> {
+    let mut source = Digested::new(File::open(path)?);
+    io::copy(&mut source, &mut io::sink())?;
+    Ok(source.digest())
+}
+
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -167,19 +181,5 @@ mod tests {
         assert_eq!(bytes_on_line(text, "MemAvailable"), Some(20_480_000));
         assert_eq!(bytes_on_line("MemFree: 1 kB", "MemAvailable"), None);
         assert!(bytes_in_proc("/proc/meminfo", "MemAvailable").is_some_and(|bytes| bytes > 1_000_000));
-    }
-
-    #[test]
-    fn only_regular_files_are_read() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("text");
-        std::fs::write(&path, "text").unwrap();
-        assert_eq!(read(&path).unwrap(), b"text");
-        let refused = |path: &Path| read(path).unwrap_err().message().to_owned();
-        assert!(refused(folder.path()).ends_with("is a folder, not a file"));
-        assert_eq!(refused(Path::new("/dev/zero")), "/dev/zero is a device, not a file");
-        let _socket = std::os::unix::net::UnixListener::bind(folder.path().join("socket")).unwrap();
-        assert!(refused(&folder.path().join("socket")).contains("is a socket"));
-        assert!(refused(&folder.path().join("none")).starts_with("cannot read"));
     }
 }

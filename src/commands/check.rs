@@ -6,6 +6,7 @@ use crate::data::{Data, Detrend, Fill, Roughness, Trend};
 use crate::discretize::{BodyInfo, Resolution, resolution};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
+use crate::linalg::range;
 use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, say, sci, warning_lines};
 use crate::petsc::Session;
 use crate::problem::{AsperitySpec, ContactSpec, Depths, LayerSpec, label, name_of};
@@ -79,7 +80,7 @@ fn to_json(built: &Built, settings: Value, headline: Value) -> Value {
 
 fn pair_to_json(built: &Built, i: usize) -> Value {
     let pair = &built.discrete.model.pairs[i];
-    let (low, high) = gap_range(&pair.gap);
+    let [low, high] = range(pair.gap.iter().copied());
     let coupling = results::coupling(built, i);
     let sweeps = coupling.sweeps.iter().filter(|_| coupling.pressure > 0.0);
     json!({
@@ -99,10 +100,6 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "expected_sweeps": sweeps.map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
         "surface": surface_to_json(built, i),
     })
-}
-
-fn gap_range(gap: &[f64]) -> (f64, f64) {
-    (gap.iter().copied().fold(f64::INFINITY, f64::min), gap.iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// Print the problem: every body and every pair, or sums where there are too many of them.
@@ -175,7 +172,7 @@ fn all_bodies(built: &Built) -> Vec<String> {
 fn each_pair(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
-        let (low, high) = gap_range(&pair.gap);
+        let [low, high] = range(pair.gap.iter().copied());
         lines.push(format!(
             "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
             pair.surfaces[0],
@@ -222,8 +219,7 @@ fn expected(coupling: &Coupling) -> String {
 /// Return sums over the pairs, and the number of sweeps to expect from the pair with the largest theta.
 fn all_pairs(built: &Built) -> Vec<String> {
     let pairs = &built.discrete.model.pairs;
-    let gaps = pairs.iter().map(|pair| gap_range(&pair.gap));
-    let (low, high) = gaps.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), (c, d)| (a.min(c), b.max(d)));
+    let [low, high] = range(pairs.iter().flat_map(|pair| pair.gap.iter().copied()));
     let mut lines = vec![format!(
         "  {} contacts: {} points, {} {:.6}, gap {} to {}; --json has every one",
         pairs.len(),

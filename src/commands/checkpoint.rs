@@ -11,6 +11,7 @@ use crate::model::{BodySlot, Distribution, Field, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
 use crate::run::stages::{Begin, Built, Done};
 use crate::scene::Scene;
+use crate::setting::remove;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -175,9 +176,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
 pub fn settings_digest(scene: &Scene) -> String {
     let mut problem = scene.problem();
     problem["method"]["stop"] = Value::Null;
-    if let Some(mesh) = problem["mesh"].as_object_mut() {
-        ["timeout", "memory"].iter().for_each(|key| drop(mesh.remove(*key)));
-    }
+    remove(&mut problem, "/mesh", &["timeout", "memory"]);
     digest(&problem.to_string())
 }
 

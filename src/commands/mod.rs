@@ -2,9 +2,11 @@
 //! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
 mod adapt;
+mod axes;
 pub(crate) mod bench;
 pub(crate) mod check;
 pub mod checkpoint;
+mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;
 pub(crate) mod solve;

@@ -6,39 +6,26 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::Path;
 
-/// An example to begin from.
-#[derive(Debug, Clone, Copy)]
-pub enum Example {
-    /// Two blocks in the plane.
-    Plane,
-    /// Two blocks in space.
-    Space,
-    /// Two cylinders as bodies of revolution.
-    Revolution,
-}
+/// A scene to begin from, and its script.
+pub type Example = [&'static str; 2];
 
-impl Example {
-    /// Return the scene and its script.
-    fn texts(self) -> [&'static str; 2] {
-        match self {
-            Self::Plane => [include_str!("new/plane.toml"), include_str!("new/plane.geo")],
-            Self::Space => [include_str!("new/space.toml"), include_str!("new/space.geo")],
-            Self::Revolution => [include_str!("new/revolution.toml"), include_str!("new/revolution.geo")],
-        }
-    }
-}
+/// Two blocks in the plane.
+pub const PLANE: Example = [include_str!("new/plane.toml"), include_str!("new/plane.geo")];
+/// Two blocks in space.
+pub const SPACE: Example = [include_str!("new/space.toml"), include_str!("new/space.geo")];
+/// Two cylinders as bodies of revolution.
+pub const REVOLUTION: Example = [include_str!("new/revolution.toml"), include_str!("new/revolution.geo")];
 
 /// Write a scene and its script into `folder`, whose last word names the scene, and return the exit code. Existing files are not replaced.
 ///
 /// # Errors
 /// A folder without a name or with one that is no file name, files that exist or cannot be written.
-pub fn new(folder: &Path, example: Example) -> Result<i32> {
+pub fn new(folder: &Path, [scene, script]: Example) -> Result<i32> {
     let name = folder.file_name().and_then(|name| name.to_str()).filter(|name| !name.contains(['"', '\\']));
     let Some(name) = name else {
         let message = format!("`{}` does not end with a name for a scene", folder.display());
         return Err(Error::new(Kind::Usage, message).help("for example `winkler new blocks`"));
     };
-    let [scene, script] = example.texts();
     let files = [("scene.toml".to_owned(), scene), (format!("{name}.geo"), script)];
     make_folder(folder)?;
     if let Some((file, _)) = files.iter().find(|(file, _)| folder.join(file).symlink_metadata().is_ok()) {

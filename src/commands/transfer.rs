@@ -1,13 +1,11 @@
 //! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, extrapolated and checked
-//! by the earlier one. Values are brought from the points of one mesh to those of another by planes.
+//! by the earlier one.
 
+use super::interpolate::{DAMPED, Norms, Scattered, Squares, Weights, clamped_mean, mean};
 use crate::contact::ContactPair;
 use crate::discretize::Discrete;
 use crate::estimate::{Estimate, SAFETY};
 use crate::output::ContactTable;
-use nalgebra::DMatrix;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
 /// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for each pair.
 pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
@@ -36,32 +34,12 @@ pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
     pressure
 }
 
-/// Points of a table by their index, each with the weight that its value has in an interpolated value.
-pub type Weights = Vec<(usize, f64)>;
-
-/// The points of a table in a search tree, each with its index.
-type Tree = RTree<GeomWithData<[f64; 3], usize>>;
-
-fn tree(points: &[[f64; 3]]) -> Tree {
-    RTree::bulk_load(points.iter().enumerate().map(|(q, &x)| GeomWithData::new(x, q)).collect())
-}
-
 /// Return for each point of a pair the weights of the nearest points of a table.
 fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<Item = Weights> + 'a {
-    let tree = tree(&table.points);
+    let scattered = Scattered::new(&table.points);
     // the neighbours on a curve, or around a point of a surface
     let count = if pair.along_curve { 2 } else { 4 };
-    pair.position.iter().map(move |&x| inverse_distances(&tree, x, count))
-}
-
-/// Return the `count` points nearest to `x`. Their weights are inverse distances, scaled to the sum one.
-fn inverse_distances(tree: &Tree, x: [f64; 3], count: usize) -> Weights {
-    let nearest = tree.nearest_neighbor_iter_with_distance_2(x).take(count);
-    let mut weights: Weights =
-        nearest.map(|(near, squared)| (near.data, 1.0 / squared.sqrt().max(f64::MIN_POSITIVE))).collect();
-    let sum: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
-    weights
+    pair.position.iter().map(move |x| scattered.inverse_distances(x, count))
 }
 
 /// The estimated errors of a solution on one mesh, to be compared with those on the next mesh.
@@ -140,107 +118,24 @@ struct SolutionNorms {
     displacement: Norms,
 }
 
-/// Norms over the contact surfaces: roots of weighted sums of squares.
-#[derive(Debug, Default, Clone, Copy)]
-struct Norms {
-    /// Norm of the difference of both solutions.
-    difference: f64,
-    /// Norm of the solution on the earlier mesh.
-    old: f64,
-    /// Norm of the solution on the later mesh.
-    new: f64,
-}
-
 /// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
 ///
 /// The values of `new` are brought to these points by planes through the nearest points: they bend by less than what the old mesh leaves out.
 fn norms(old: &[ContactTable], new: &[ContactTable]) -> SolutionNorms {
-    let (mut pressure, mut displacement) = (Vec::new(), Norms::default());
+    let (mut pressure, mut displacement) = (Vec::new(), Squares::default());
     for (old, new) in old.iter().zip(new) {
-        let planes = Planes::damped(&new.points);
-        let mut of_pair = Norms::default();
+        let scattered = Scattered::new(&new.points);
+        let mut of_pair = Squares::default();
         for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
-            let weights = planes.weights(point);
+            let weights = scattered.plane(point, DAMPED);
             of_pair.add(*area, old.pressure[q], clamped_mean(&weights, &new.pressure));
             for (new, old) in new.displacement.iter().zip(&old.displacement) {
                 displacement.add(*area, old[q], clamped_mean(&weights, new));
             }
         }
-        pressure.push(of_pair.roots());
+        pressure.push(of_pair.norms());
     }
-    SolutionNorms { pressure, displacement: displacement.roots() }
-}
-
-impl Norms {
-    /// Add the squares of two values at a point that stands for an area (a length in the plane).
-    fn add(&mut self, area: f64, old: f64, new: f64) {
-        self.difference += area * (new - old).powi(2);
-        self.old += area * old * old;
-        self.new += area * new * new;
-    }
-
-    fn roots(self) -> Self {
-        Self { difference: self.difference.sqrt(), old: self.old.sqrt(), new: self.new.sqrt() }
-    }
-}
-
-/// Scattered points whose values are brought to other points by linear functions fitted to the nearest ones.
-pub struct Planes {
-    tree: Tree,
-    /// Weight of the slopes in the fit, which holds them near zero. The weights of the points are one at least.
-    slopes: f64,
-}
-
-impl Planes {
-    /// Points that a linear function is fitted to: twice the four that determine one in space.
-    const NEAREST: usize = 8;
-
-    /// Return planes that follow the values as they are. Points of a plane determine no slope across it: this weight alone makes it zero.
-    pub fn exact(points: &[[f64; 3]]) -> Self {
-        Self { tree: tree(points), slopes: 1e-6 }
-    }
-
-    /// Return planes that lean towards the values of the nearest points.
-    ///
-    /// Points of a surface hardly differ across it, so that the data determine no slope there. Along the surface the squares of the data's
-    /// weights are some hundred times that of the slopes.
-    fn damped(points: &[[f64; 3]]) -> Self {
-        Self { tree: tree(points), slopes: 0.1 }
-    }
-
-    /// Return the weights of the values of the nearest points in the fitted value at a point.
-    ///
-    /// The fit minimises the sum of squared misfits, each weighted by the inverse distance to the fourth.
-    pub fn weights(&self, at: &[f64; 3]) -> Weights {
-        let nearest: Vec<_> = self.tree.nearest_neighbor_iter_with_distance_2(*at).take(Self::NEAREST).collect();
-        let far = nearest.last().map_or(0.0, |(_, squared)| squared.sqrt());
-        if let Some((same, _)) = nearest.first().filter(|(_, squared)| squared.sqrt() <= 1e-9 * far) {
-            return vec![(same.data, 1.0)];
-        }
-        // a row for each point, then one for each slope
-        let count = nearest.len();
-        let rows = DMatrix::from_fn(count + 3, 4, |i, k| match nearest.get(i) {
-            Some((_, squared)) if k == 0 => far * far / squared,
-            Some((near, squared)) => far * (near.geom()[k - 1] - at[k - 1]) / squared,
-            None if i + 1 == count + k => self.slopes,
-            None => 0.0,
-        });
-        let Ok(inverse) = rows.pseudo_inverse(f64::EPSILON) else { return vec![(nearest[0].0.data, 1.0)] };
-        let nearest = nearest.iter().enumerate();
-        nearest.map(|(i, (near, squared))| (near.data, inverse[(0, i)] * far * far / squared)).collect()
-    }
-}
-
-/// Return the fitted value, clamped to the range of the values that it is fitted to: where all points lie to one side, a plane may lead anywhere.
-fn clamped_mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
-    let values = || weights.iter().map(|(near, _)| column[*near]);
-    let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
-    mean(weights, column).clamp(least, most)
-}
-
-/// Return the sum of values with their weights.
-pub fn mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
-    weights.iter().map(|(near, weight)| weight * column[*near]).sum()
+    SolutionNorms { pressure, displacement: displacement.norms() }
 }
 
 #[cfg(test)]

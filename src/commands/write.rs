@@ -7,6 +7,7 @@ use crate::discretize::BodyInfo;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
+use crate::fem::length;
 use crate::linalg::bounds;
 use crate::output::fields::{Entry, Tags, write_pvd};
 use crate::output::folder::STEPS;
@@ -387,7 +388,7 @@ fn write_approach(done: &Done, shown: &[usize], folder: &Folder) -> Result<()> {
 fn approach(steps: &[StepReport], i: usize) -> Vec<(f64, f64)> {
     let of_step = |step: &StepReport| {
         let pair = &step.pairs[i];
-        (pair.approach.unwrap_or(f64::NAN), pair.force.iter().map(|f| f * f).sum::<f64>().sqrt())
+        (pair.approach.unwrap_or(f64::NAN), length(pair.force))
     };
     steps.iter().map(of_step).collect()
 }

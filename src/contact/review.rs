@@ -5,7 +5,7 @@ use super::pair::ContactPair;
 use super::pieces::Common;
 use super::side::Side;
 use crate::fem::{element, minus};
-use crate::linalg::dot;
+use crate::linalg::{dot, range};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashSet};
 
@@ -37,8 +37,7 @@ impl Chords {
     /// Surfaces that touch at a point or along a line overlap as well where their facets do not match, within one facet from there. They are no
     /// fit: on more than half of a fit what facets add is the whole distance, 2 s at most, as that of two facets.
     pub fn of<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>, pair: &ContactPair) -> Option<Self> {
-        let least = pair.gap.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = pair.gap.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let [least, most] = range(pair.gap.iter().copied());
         let deepest = -least;
         if deepest <= 0.0 || most - least <= UNIFORM * deepest {
             return None;

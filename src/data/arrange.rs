@@ -5,7 +5,7 @@ use super::grid::{Axis, Grid};
 use super::rule::{DataSpec, Detrend, Fill, Frame, Interpolation, Outside, Rows};
 use super::scattered::{Knots, Scattered};
 use crate::error::{Result, shown};
-use crate::linalg::bounds;
+use crate::linalg::{bounds, range};
 use nalgebra::{DMatrix, DVector};
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -140,10 +140,7 @@ fn surface(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
     }
     only_linear(spec)?;
     points.retain(|point| !point[2].is_nan());
-    let range = [0, 1].map(|d| {
-        let along = || points.iter().map(|point| point[d]);
-        [along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max)]
-    });
+    let range = [0, 1].map(|d| range(points.iter().map(|point| point[d])));
     match Scattered::new(&points) {
         Some(scattered) => Ok(Shape::Scattered(scattered, range)),
         None => Err(spec.refuse("has points on one line alone", "a surface needs three points that make a triangle")),
@@ -293,11 +290,6 @@ fn suspect<I: Iterator<Item = f64>>(heights: impl Fn() -> I) -> Option<Suspect> 
         let far = if count == 1 { SPIKE * (largest - least) } else { largest - least };
         (distance > far && has_levels(others())).then_some(Suspect { value, count, others: [least, largest] })
     })
-}
-
-/// Return the least and the largest number.
-fn range(numbers: impl Iterator<Item = f64>) -> [f64; 2] {
-    numbers.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], number| [low.min(number), high.max(number)])
 }
 
 /// Return whether there are at least [`LEVELS`] different heights.

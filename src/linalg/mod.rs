@@ -36,6 +36,13 @@ pub fn around<const K: usize>(a: [[f64; K]; 2], b: [[f64; K]; 2]) -> [[f64; K]; 
     [std::array::from_fn(|c| a[0][c].min(b[0][c])), std::array::from_fn(|c| a[1][c].max(b[1][c]))]
 }
 
+/// Return the least and the largest of some numbers; without any the least one is infinite.
+pub fn range(numbers: impl IntoIterator<Item = f64>) -> [f64; 2] {
+    numbers
+        .into_iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], number| [low.min(number), high.max(number)])
+}
+
 /// Return a vector of 2 or 3 components as one of 3.
 pub fn pad<const K: usize>(v: [f64; K]) -> [f64; 3] {
     std::array::from_fn(|c| if c < K { v[c] } else { 0.0 })

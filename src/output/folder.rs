@@ -3,13 +3,13 @@
 //! checksums (`SHA256SUMS`) shows which files were damaged later.
 
 use crate::error::{Error, Kind, Result};
+use crate::file::{digest_of_bytes as sum, digest_of_file, kind_of};
 use serde_json::Value;
-use sha2::{Digest, Sha256};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::{self, File, FileType, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Read, Seek, Write};
-use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
+use std::os::unix::fs::{MetadataExt, OpenOptionsExt};
 use std::path::{Component, Path, PathBuf};
 
 /// A folder for the results of one run.
@@ -134,17 +134,6 @@ fn refuse_foreign(path: &Path, user: u32) -> Result<()> {
                 .help("name a folder of your own with `-o FOLDER`, or let its owner share it: chmod g+w"))
         }
         _ => Ok(()),
-    }
-}
-
-/// Return the kind of a directory entry in words.
-fn kind_of(kind: FileType) -> &'static str {
-    match () {
-        _ if kind.is_file() => "a file, not a folder",
-        _ if kind.is_dir() => "a folder",
-        _ if kind.is_fifo() => "a pipe",
-        _ if kind.is_socket() => "a socket",
-        _ => "a device",
     }
 }
 
@@ -476,7 +465,7 @@ impl Checksums {
             let path = folder.path().join(name);
             // A missing file could not be written, which is reported elsewhere. A pipe would block its reader.
             if fs::symlink_metadata(&path).is_ok_and(|data| data.is_file()) {
-                let sum = sum_of_file(&path).map_err(|cause| Error::file(&path, "read", &cause))?;
+                let sum = digest_of_file(&path).map_err(|cause| Error::file(&path, "read", &cause))?;
                 text += &format!("{sum}  {name}\n");
             }
         }
@@ -515,27 +504,6 @@ fn damaged(path: &Path) -> Error {
     Error::new(Kind::File, format!("{} is damaged", path.display()))
         .because(format!("it is not what the run wrote, by the sums in {SUMS}"))
         .help("solve the scene again, with --vtu for pictures of bodies; `sha256sum -c` lists all files that have changed")
-}
-
-/// Return a finished checksum in hexadecimal digits.
-fn digits(sum: Sha256) -> String {
-    sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-/// Return the checksum of bytes in memory.
-fn sum(bytes: &[u8]) -> String {
-    digits(Sha256::new().chain_update(bytes))
-}
-
-/// Return the checksum of a file, which is read in blocks.
-fn sum_of_file(path: &Path) -> io::Result<String> {
-    let (mut file, mut sum, mut block) = (File::open(path)?, Sha256::new(), vec![0; 1 << 16]);
-    loop {
-        match file.read(&mut block)? {
-            0 => return Ok(digits(sum)),
-            length => sum.update(&block[..length]),
-        }
-    }
 }
 
 #[cfg(test)]
@@ -600,18 +568,6 @@ mod tests {
         assert_eq!(safe_name("..\\x"), "_.._x");
         assert_eq!(safe_name(""), "_");
         assert_eq!(safe_name("größe-1"), "größe-1");
-    }
-
-    #[test]
-    fn one_holds_at_a_time_and_names_itself() {
-        let folder = tempfile::tempdir().unwrap();
-        let lock = Lock::take(folder.path()).unwrap();
-        let error = Lock::take(folder.path()).unwrap_err();
-        assert!(error.message().contains(&format!("process {} is writing", std::process::id())), "{error}");
-        assert_eq!(error.kind(), Kind::File);
-        drop(lock);
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-        drop(Lock::take(folder.path()).unwrap());
     }
 
     #[test]

@@ -5,12 +5,13 @@
 //! their checksums.
 
 use crate::error::{Error, Kind, Result};
+use crate::fem::length;
 use crate::linalg::bounds;
 use crate::output::{Checksums, folder};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use flate2::read::ZlibDecoder;
-use quick_xml::events::{BytesStart, Event};
+use serde::Deserialize;
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -107,23 +108,18 @@ impl Part {
                 .because(cause)
                 .help("solve the scene again with --vtu")
         };
-        let content = |file: &str| read_vtu(&files.read(file)?).map_err(|cause| refuse(file, cause));
+        let open = |file: &str| document(&files.read(file)?).map_err(|cause| refuse(file, cause));
         let mut points = Points::default();
-        let mut add = |file: &str, pieces: Vec<Piece>| {
-            pieces.into_iter().try_for_each(|piece| points.add(piece, value)).map_err(|cause| refuse(file, cause))
-        };
-        match content(file)? {
-            Content::Pieces(pieces) => add(file, pieces)?,
-            Content::Sources(parts) => {
-                for part in parts {
-                    // the parts are in the same folder
-                    let part = Path::new(&part).file_name().unwrap_or_default().to_string_lossy();
-                    let Content::Pieces(pieces) = content(&part)? else {
-                        return Err(refuse(&part, "it has no piece".to_owned()));
-                    };
-                    add(&part, pieces)?;
-                }
-            }
+        let mut add =
+            |file: &str, document: &Document| points.add(document, value).map_err(|cause| refuse(file, cause));
+        let whole = open(file)?;
+        for Source { file } in &whole.joined.pieces {
+            // the parts are in the same folder
+            let part = Path::new(file).file_name().unwrap_or_default().to_string_lossy();
+            add(&part, &open(&part)?)?;
+        }
+        if whole.joined.pieces.is_empty() {
+            add(file, &whole)?;
         }
         Ok(points.part(name))
     }
@@ -154,7 +150,7 @@ impl Part {
 
     /// Return the length of the displacement at each point.
     pub fn travel(&self) -> Vec<f64> {
-        self.displacement.iter().map(|u| u.iter().map(|u| u * u).sum::<f64>().sqrt()).collect()
+        self.displacement.iter().map(|&u| length(u)).collect()
     }
 }
 
@@ -173,11 +169,21 @@ struct Points {
 }
 
 impl Points {
+    /// Add the pieces of a file, with the array `name` at their points.
+    fn add(&mut self, document: &Document, name: &str) -> Parsed<()> {
+        let encoding = document.encoding()?;
+        match &document.grid.pieces[..] {
+            [] => Err("it has no piece of an unstructured grid".to_owned()),
+            pieces => pieces.iter().try_for_each(|piece| self.add_piece(piece, encoding, name)),
+        }
+    }
+
     /// Add the piece of a rank. A point with the coordinates of one in an earlier piece is the same point.
-    fn add(&mut self, mut piece: Piece, name: &str) -> std::result::Result<(), String> {
-        let points = piece.points;
+    fn add_piece(&mut self, piece: &Piece, encoding: Encoding, name: &str) -> Parsed<()> {
+        let points = piece.coordinates(encoding)?;
+        let mut arrays = piece.at_points(encoding)?;
         let mut array = |name: &str, components: usize| {
-            piece.at_points.remove(name).filter(|values| values.len() == components * points.len())
+            arrays.remove(name).filter(|values| values.len() == components * points.len())
         };
         let value = array(name, 1).ok_or_else(|| format!("it has no array `{name}` with a number at each point"))?;
         let displacement = match array("displacement", 3) {
@@ -202,7 +208,7 @@ impl Points {
             }
         }
         self.numbers.extend(points.iter().map(bits).zip(number.iter().copied()));
-        let cells = piece.cells.into_iter();
+        let cells = piece.cells(encoding)?.into_iter();
         self.cells.extend(cells.map(|(kind, nodes)| (kind, nodes.into_iter().map(|node| number[node]).collect())));
         Ok(())
     }
@@ -273,24 +279,70 @@ pub fn magnification(parts: &[Part]) -> f64 {
 /// A value, or a description of what is wrong with the file.
 type Parsed<T> = std::result::Result<T, String>;
 
-type Attributes = HashMap<String, String>;
-
-/// The content of a file: a grid, or the names of the files with its parts.
-enum Content {
-    /// Pieces in the file itself.
-    Pieces(Vec<Piece>),
-    /// Names of the files that a `.pvtu` joins, in the same folder.
-    Sources(Vec<String>),
+/// A file as its elements and their attributes.
+#[derive(Deserialize)]
+struct Document {
+    /// Type of the sizes in front of arrays. A `.pvtu` has no arrays.
+    #[serde(rename = "@header_type", default)]
+    size_type: String,
+    #[serde(rename = "@compressor", default)]
+    compressor: String,
+    #[serde(rename = "@byte_order", default)]
+    byte_order: String,
+    #[serde(rename = "UnstructuredGrid", default)]
+    grid: Pieces<Piece>,
+    #[serde(rename = "PUnstructuredGrid", default)]
+    joined: Pieces<Source>,
 }
 
-/// Points and cells with values at the points.
-#[derive(Default)]
+#[derive(Deserialize)]
+struct Pieces<T> {
+    #[serde(rename = "Piece", default = "Vec::new")]
+    pieces: Vec<T>,
+}
+
+impl<T> Default for Pieces<T> {
+    fn default() -> Self {
+        Self { pieces: Vec::new() }
+    }
+}
+
+#[derive(Deserialize)]
+struct Source {
+    #[serde(rename = "@Source")]
+    file: String,
+}
+
+#[derive(Deserialize)]
 struct Piece {
-    points: Vec<[f64; 3]>,
-    /// Type number in VTK and point numbers of each cell.
-    cells: Vec<(u8, Vec<usize>)>,
-    /// Arrays at the points by name; all components of a point stand together.
-    at_points: HashMap<String, Vec<f64>>,
+    #[serde(rename = "@NumberOfPoints")]
+    points: usize,
+    #[serde(rename = "@NumberOfCells")]
+    cells: usize,
+    #[serde(rename = "Points", default)]
+    coordinates: Arrays,
+    #[serde(rename = "Cells", default)]
+    lists: Arrays,
+    #[serde(rename = "PointData", default)]
+    at_points: Arrays,
+}
+
+#[derive(Default, Deserialize)]
+struct Arrays {
+    #[serde(rename = "DataArray", default)]
+    arrays: Vec<Array>,
+}
+
+#[derive(Deserialize)]
+struct Array {
+    #[serde(rename = "@Name", default)]
+    name: String,
+    #[serde(rename = "@type", default)]
+    kind: String,
+    #[serde(rename = "@format", default)]
+    format: String,
+    #[serde(rename = "$text", default)]
+    data: String,
 }
 
 /// The encoding of the arrays of a file.
@@ -300,163 +352,116 @@ struct Encoding {
     is_compressed: bool,
 }
 
-#[derive(Default)]
-struct OpenPiece {
-    /// Numbers of points and cells.
-    counts: [usize; 2],
-    coordinates: Vec<f64>,
-    at_points: HashMap<String, Vec<f64>>,
-    /// Connectivity, offsets and types of the cells.
-    lists: HashMap<String, Vec<u64>>,
-}
-
 /// Read a `.vtu` or `.pvtu` file.
-fn read_vtu(bytes: &[u8]) -> Parsed<Content> {
+fn document(bytes: &[u8]) -> Parsed<Document> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is no text")?;
-    let mut reader = quick_xml::Reader::from_str(text);
-    let mut document = Document::default();
-    loop {
-        match reader.read_event().map_err(|cause| cause.to_string())? {
-            Event::Eof if document.has_ended => return document.content(),
-            Event::Eof => return Err("it ends too early".to_owned()),
-            Event::Start(tag) => document.start(&tag)?,
-            Event::Empty(tag) if name_of(&tag) == "Piece" => {
-                document.sources.extend(attributes(&tag)?.remove("Source"));
-            }
-            Event::Text(data) => document.text(&data)?,
-            Event::End(tag) => document.end(tag.name().as_ref())?,
-            _ => {}
-        }
-    }
-}
-
-/// The part of a file that has been read so far.
-#[derive(Default)]
-struct Document {
-    encoding: Option<Encoding>,
-    /// Names of the elements around the current position.
-    elements: Vec<String>,
-    piece: Option<OpenPiece>,
-    /// Attributes of the current array, until its data is read.
-    array: Option<Attributes>,
-    pieces: Vec<Piece>,
-    sources: Vec<String>,
-    has_ended: bool,
+    quick_xml::de::from_str(text).map_err(|cause| cause.to_string())
 }
 
 impl Document {
-    fn start(&mut self, tag: &BytesStart) -> Parsed<()> {
-        let (name, attributes) = (name_of(tag), attributes(tag)?);
-        match name.as_str() {
-            "VTKFile" => self.encoding = Some(encoding_of(&attributes)?),
-            "Piece" => {
-                let count = |key: &str| {
-                    let number = attributes.get(key).and_then(|text| text.parse().ok());
-                    number.ok_or_else(|| format!("a piece has no `{key}`"))
-                };
-                let counts = [count("NumberOfPoints")?, count("NumberOfCells")?];
-                self.piece = Some(OpenPiece { counts, ..OpenPiece::default() });
-            }
-            "DataArray" => self.array = Some(attributes),
-            _ => {}
+    fn encoding(&self) -> Parsed<Encoding> {
+        if !matches!(self.size_type.as_str(), "UInt64" | "") {
+            return Err(format!("sizes are of the type `{}`", self.size_type));
         }
-        self.elements.push(name);
-        Ok(())
-    }
-
-    /// Process text, which may be the data of an array. The section is the element around that.
-    fn text(&mut self, data: &[u8]) -> Parsed<()> {
-        let (Some(piece), Some(attributes), Some(encoding)) = (&mut self.piece, self.array.take(), self.encoding)
-        else {
-            return Ok(());
+        let is_compressed = match self.compressor.as_str() {
+            "" => false,
+            "vtkZLibDataCompressor" => true,
+            other => return Err(format!("it is compressed by `{other}`, which is not read")),
         };
-        let name = attributes.get("Name").cloned().unwrap_or_default();
-        let wrong = |what: String| format!("array `{name}`: {what}");
-        match self.elements.iter().rev().nth(1).map_or("", String::as_str) {
-            "Points" => piece.coordinates = reals(&attributes, data, encoding).map_err(wrong)?,
-            "Cells" => drop(piece.lists.insert(name.clone(), wholes(&attributes, data, encoding).map_err(wrong)?)),
-            "PointData" => {
-                drop(piece.at_points.insert(name.clone(), reals(&attributes, data, encoding).map_err(wrong)?));
+        let is_big = match self.byte_order.as_str() {
+            "LittleEndian" => false,
+            "BigEndian" => true,
+            other => return Err(format!("its order of bytes is `{other}`")),
+        };
+        Ok(Encoding { is_big, is_compressed })
+    }
+}
+
+impl Piece {
+    /// Return the points, as many as the piece says.
+    fn coordinates(&self, encoding: Encoding) -> Parsed<Vec<[f64; 3]>> {
+        let all = self.coordinates.arrays.first().map_or(Ok(Vec::new()), |array| array.reals(encoding))?;
+        if Some(all.len()) != self.points.checked_mul(3) {
+            return Err(format!("it has not the {} points that it says", self.points));
+        }
+        match all.iter().all(|x| x.is_finite()) {
+            true => Ok(all.as_chunks().0.to_vec()),
+            false => Err("a coordinate is not finite".to_owned()),
+        }
+    }
+
+    /// Return the values of all arrays at the points, by name; all components of a point stand together.
+    fn at_points(&self, encoding: Encoding) -> Parsed<HashMap<&str, Vec<f64>>> {
+        let (mut found, count) = (HashMap::new(), self.points);
+        for array in &self.at_points.arrays {
+            let (name, values) = (array.name.as_str(), array.reals(encoding)?);
+            if count == 0 || !values.len().is_multiple_of(count) || values.is_empty() {
+                return Err(format!("array `{name}` has {} values for {count} points", values.len()));
             }
-            _ => {}
+            if values.iter().any(|value| value.is_infinite()) {
+                return Err(format!("array `{name}` has a value that is not finite"));
+            }
+            found.insert(name, values);
         }
-        Ok(())
+        Ok(found)
     }
 
-    fn end(&mut self, name: &[u8]) -> Parsed<()> {
-        self.elements.pop();
-        match name {
-            b"Piece" => self.pieces.push(self.piece.take().ok_or("a piece ends that has not begun")?.close()?),
-            b"DataArray" => self.array = None,
-            b"VTKFile" => self.has_ended = true,
-            _ => {}
+    /// Return the cells, as many as the piece says.
+    fn cells(&self, encoding: Encoding) -> Parsed<Vec<Cell>> {
+        let list = |name: &str| {
+            let array = self.lists.arrays.iter().find(|array| array.name == name);
+            array.ok_or_else(|| format!("it has no {name} of cells"))?.wholes(encoding)
+        };
+        let (nodes, ends, kinds) = (list("connectivity")?, list("offsets")?, list("types")?);
+        let count = self.cells;
+        if ends.len() != count || kinds.len() != count || ends.last().copied().unwrap_or(0) != nodes.len() as u64 {
+            return Err(format!("it has not the {count} cells that it says"));
         }
-        Ok(())
+        let (mut start, mut cells) = (0, Vec::new());
+        for (&kind, &end) in kinds.iter().zip(&ends) {
+            let nodes = nodes.get(start..end as usize).ok_or("a cell ends before it begins")?;
+            let is_point = |&node: &usize| node < self.points;
+            let cell: Option<Vec<usize>> =
+                nodes.iter().map(|&node| usize::try_from(node).ok().filter(is_point)).collect();
+            cells.push((kind as u8, cell.ok_or("a cell has a point that is not there")?));
+            start = end as usize;
+        }
+        Ok(cells)
     }
+}
 
-    fn content(self) -> Parsed<Content> {
-        match (self.pieces.is_empty(), self.sources.is_empty()) {
-            (false, true) => Ok(Content::Pieces(self.pieces)),
-            (true, false) => Ok(Content::Sources(self.sources)),
-            _ => Err("it has no piece of an unstructured grid".to_owned()),
+impl Array {
+    /// Return the numbers of an array of floating-point numbers.
+    fn reals(&self, encoding: Encoding) -> Parsed<Vec<f64>> {
+        let numbers = |size: usize| self.numbers(size, encoding);
+        match self.kind.as_str() {
+            "Float64" => Ok(numbers(8)?.into_iter().map(f64::from_bits).collect()),
+            "Float32" => Ok(numbers(4)?.into_iter().map(|bits| f64::from(f32::from_bits(bits as u32))).collect()),
+            other => Err(self.wrong(format!("its numbers are of the type `{other}`"))),
         }
     }
-}
 
-fn name_of(tag: &BytesStart) -> String {
-    String::from_utf8_lossy(tag.name().as_ref()).into_owned()
-}
-
-fn attributes(tag: &BytesStart) -> Parsed<Attributes> {
-    let attribute = |one: std::result::Result<quick_xml::events::attributes::Attribute, _>| {
-        let one = one.map_err(|cause: quick_xml::events::attributes::AttrError| cause.to_string())?;
-        let value = one.unescape_value().map_err(|cause| cause.to_string())?.into_owned();
-        Ok((String::from_utf8_lossy(one.key.as_ref()).into_owned(), value))
-    };
-    tag.attributes().map(attribute).collect()
-}
-
-/// Return the value of an attribute, empty without one.
-fn text<'a>(attributes: &'a Attributes, key: &str) -> &'a str {
-    attributes.get(key).map_or("", String::as_str)
-}
-
-/// Return the encoding from the attributes of the root element. Sizes have eight bytes, but in a `.pvtu`, which has no arrays.
-fn encoding_of(attributes: &Attributes) -> Parsed<Encoding> {
-    if !matches!(text(attributes, "header_type"), "UInt64" | "") {
-        return Err(format!("sizes are of the type `{}`", text(attributes, "header_type")));
-    }
-    let is_compressed = match text(attributes, "compressor") {
-        "" => false,
-        "vtkZLibDataCompressor" => true,
-        other => return Err(format!("it is compressed by `{other}`, which is not read")),
-    };
-    let is_big = match text(attributes, "byte_order") {
-        "LittleEndian" => false,
-        "BigEndian" => true,
-        other => return Err(format!("its order of bytes is `{other}`")),
-    };
-    Ok(Encoding { is_big, is_compressed })
-}
-
-fn reals(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<f64>> {
-    let bytes = bytes(attributes, data, encoding)?;
-    match text(attributes, "type") {
-        "Float64" => Ok(split(&bytes, 8, encoding)?.into_iter().map(f64::from_bits).collect()),
-        "Float32" => {
-            let single = |bits| f64::from(f32::from_bits(bits as u32));
-            Ok(split(&bytes, 4, encoding)?.into_iter().map(single).collect())
+    /// Return the numbers of an array of whole numbers.
+    fn wholes(&self, encoding: Encoding) -> Parsed<Vec<u64>> {
+        match self.kind.as_str() {
+            "UInt8" => self.numbers(1, encoding),
+            "UInt64" => self.numbers(SIZE, encoding),
+            other => Err(self.wrong(format!("its numbers are of the type `{other}`"))),
         }
-        other => Err(format!("its numbers are of the type `{other}`")),
     }
-}
 
-fn wholes(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<u64>> {
-    let bytes = bytes(attributes, data, encoding)?;
-    match text(attributes, "type") {
-        "UInt8" => split(&bytes, 1, encoding),
-        "UInt64" => split(&bytes, SIZE, encoding),
-        other => Err(format!("its numbers are of the type `{other}`")),
+    /// Return the bits of all numbers, which have `size` bytes each.
+    fn numbers(&self, size: usize, encoding: Encoding) -> Parsed<Vec<u64>> {
+        if self.format != "binary" {
+            return Err(self.wrong(format!("its format is `{}`, not `binary`", self.format)));
+        }
+        let bytes = bytes(self.data.trim_ascii().as_bytes(), encoding);
+        bytes.and_then(|bytes| split(&bytes, size, encoding)).map_err(|what| self.wrong(what))
+    }
+
+    /// Say which array is wrong.
+    fn wrong(&self, what: String) -> String {
+        format!("array `{}`: {what}", self.name)
     }
 }
 
@@ -476,11 +481,7 @@ fn split(bytes: &[u8], size: usize, encoding: Encoding) -> Parsed<Vec<u64>> {
 const SIZE: usize = 8;
 
 /// Decode the bytes of an array, which follow their sizes.
-fn bytes(attributes: &Attributes, data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
-    if text(attributes, "format") != "binary" {
-        return Err(format!("its format is `{}`, not `binary`", text(attributes, "format")));
-    }
-    let data = data.trim_ascii();
+fn bytes(data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
     let decode = |text: &[u8]| STANDARD.decode(text).map_err(|cause| format!("no base64: {cause}"));
     let short = || "it is shorter than it says".to_owned();
     if !encoding.is_compressed {
@@ -524,39 +525,4 @@ fn inflate(packed: &[u8], lengths: &[u64], block: u64, last: u64) -> Parsed<Vec<
         rest = after;
     }
     if rest.is_empty() { Ok(all) } else { Err("it is longer than it says".to_owned()) }
-}
-
-impl OpenPiece {
-    /// Return the piece, if all its counts agree.
-    fn close(mut self) -> Parsed<Piece> {
-        let [count, cells] = self.counts;
-        for (name, values) in &self.at_points {
-            if count == 0 || !values.len().is_multiple_of(count) || values.is_empty() {
-                return Err(format!("array `{name}` has {} values for {count} points", values.len()));
-            }
-            if values.iter().any(|value| value.is_infinite()) {
-                return Err(format!("array `{name}` has a value that is not finite"));
-            }
-        }
-        if Some(self.coordinates.len()) != count.checked_mul(3) {
-            return Err(format!("it has not the {count} points that it says"));
-        }
-        if !self.coordinates.iter().all(|x| x.is_finite()) {
-            return Err("a coordinate is not finite".to_owned());
-        }
-        let mut list = |name: &str| self.lists.remove(name).ok_or_else(|| format!("it has no {name} of cells"));
-        let (nodes, ends, kinds) = (list("connectivity")?, list("offsets")?, list("types")?);
-        if ends.len() != cells || kinds.len() != cells || ends.last().copied().unwrap_or(0) != nodes.len() as u64 {
-            return Err(format!("it has not the {cells} cells that it says"));
-        }
-        let (mut start, mut all) = (0, Vec::new());
-        for (&kind, &end) in kinds.iter().zip(&ends) {
-            let nodes = nodes.get(start..end as usize).ok_or("a cell ends before it begins")?;
-            let cell: Option<Vec<usize>> =
-                nodes.iter().map(|&node| usize::try_from(node).ok().filter(|&node| node < count)).collect();
-            all.push((kind as u8, cell.ok_or("a cell has a point that is not there")?));
-            start = end as usize;
-        }
-        Ok(Piece { points: self.coordinates.as_chunks().0.to_vec(), cells: all, at_points: self.at_points })
-    }
 }

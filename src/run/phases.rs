@@ -23,8 +23,9 @@ use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
+use crate::setting::remove;
 use crate::solver::{Dense, Krylov, Monolithic, Union, options};
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -310,41 +311,34 @@ fn serves(last: &Built, scene: &Scene) -> bool {
 /// Return the settings of a scene on which bodies can depend, changed by `edit`.
 fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
     let mut settings = scene.settings();
-    if let Value::Object(map) = &mut settings {
-        ["title", "units", "method", "output"].iter().for_each(|key| drop(map.remove(*key)));
-    }
+    remove(&mut settings, "", &["title", "units", "method", "output"]);
     edit(&mut settings);
     settings
 }
 
 /// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
 fn without_values(settings: &mut Value) {
-    each(settings.get_mut("contact"), |contact| without(contact, &["gap", "layer", "reference"]));
-    each(settings.get_mut("body"), |body| {
-        without(body, &["force", "path"]);
+    items(settings.get_mut("contact")).for_each(|contact| remove(contact, "", &["gap", "layer", "reference"]));
+    for body in items(settings.get_mut("body")) {
+        remove(body, "", &["force", "path"]);
         if let Some(Value::Array(loads)) = body.get_mut("load") {
             // only rigid surfaces change the dofs: they join them
             loads.retain(|load| load["rigid"] == true);
         }
         for key in ["load", "fix"] {
-            each(body.get_mut(key), |item| {
-                without(item, &["path"]);
+            for item in items(body.get_mut(key)) {
+                remove(item, "", &["path"]);
                 for key in ["force", "moment", "x", "y", "z", "normal"] {
                     item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
                 }
-            });
+            }
         }
-    });
+    }
 }
 
-fn without(table: &mut Map<String, Value>, keys: &[&str]) {
-    keys.iter().for_each(|key| drop(table.remove(*key)));
-}
-
-/// Edit each table of a list in the settings.
-fn each(list: Option<&mut Value>, edit: impl FnMut(&mut Map<String, Value>)) {
-    let tables = list.and_then(Value::as_array_mut).into_iter().flatten();
-    tables.filter_map(Value::as_object_mut).for_each(edit);
+/// Return the items of a list in the settings.
+fn items(list: Option<&mut Value>) -> impl Iterator<Item = &mut Value> {
+    list.and_then(Value::as_array_mut).into_iter().flatten()
 }
 
 /// Refuse, on all ranks, scenes that differ between ranks, data and tables included. Files of the mesh are not compared, as only the

@@ -8,6 +8,7 @@ use crate::discretize::{Balance, BodyInfo, Discrete};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
+use crate::fem::{length, minus};
 use crate::linalg::{around, bounds, dot};
 use crate::model::{Body, BodySlot, Model};
 use crate::output::report::readable;
@@ -82,8 +83,7 @@ impl Extremes {
         for s in &field.principal {
             extremes.principal = [extremes.principal[0].min(s[2]), extremes.principal[1].max(s[0])];
         }
-        let length = |u: &[f64; 3]| u.iter().map(|x| x * x).sum::<f64>().sqrt();
-        extremes.displacement = field.displacement.iter().map(length).fold(0.0, f64::max);
+        extremes.displacement = field.displacement.iter().map(|&u| length(u)).fold(0.0, f64::max);
         extremes.extent = bounds(field.points.iter().copied());
         extremes.strain = info.post().strain(&recovered.bent);
         extremes.norms = info.post().errors(&recovered.state);
@@ -121,8 +121,7 @@ impl Extremes {
     /// Whether the largest displacement exceeds [`SMALL`] times the diagonal of the body.
     fn is_moved_far(&self) -> bool {
         let [low, high] = self.extent;
-        let diagonal = (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt();
-        self.displacement > SMALL * diagonal
+        self.displacement > SMALL * length(minus(high, low))
     }
 }
 
@@ -312,7 +311,7 @@ fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
     let pair = &model.pairs[i];
     let points = || pair.weight.iter().zip(&pair.resultant[0]);
     let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(weight, n)| weight * n[k]).sum());
-    let (size, total) = (sum.iter().map(|n| n * n).sum::<f64>().sqrt(), pair.weight.iter().sum::<f64>());
+    let (size, total) = (length(sum), pair.weight.iter().sum::<f64>());
     (size > CANCELS * total).then(|| sum.map(|n| n / size))
 }
 
@@ -383,8 +382,7 @@ fn balance(info: &BodyInfo, numbers: &[f64]) -> BalanceReport {
 /// Return the norm of the sum of vectors, relative to the sum of the sizes of all nodal contributions; zero if that is zero.
 fn imbalance(vectors: impl Iterator<Item = [f64; 3]> + Clone, size: f64) -> f64 {
     let sum = |c: usize| vectors.clone().map(|vector| vector[c]).sum::<f64>();
-    let norm = (0..3).map(|c| sum(c).powi(2)).sum::<f64>().sqrt();
-    if size > 0.0 { norm / size } else { 0.0 }
+    if size > 0.0 { length([0, 1, 2].map(sum)) / size } else { 0.0 }
 }
 
 /// The estimates for a pair.

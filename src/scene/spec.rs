@@ -7,8 +7,8 @@ use crate::error::{Located, Place, Result};
 use crate::file::digest;
 use crate::output::fields::Encoding;
 use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
-use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, table, word, words};
-use serde_json::{Value, Value as Json, json};
+use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, remove, table, word, words};
+use serde_json::{Value as Json, json};
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -206,17 +206,12 @@ impl Scene {
 impl Scene {
     /// Return the settings without the names of files and folders. The name of each data file is replaced by a digest of its numbers;
     /// the settings have the numbers of tables themselves. The contents of the mesh's files are not included.
-    pub fn contents(&self) -> Value {
+    pub fn contents(&self) -> Json {
         let mut settings = self.settings();
-        let mut remove = |place: &str, keys: &[&str]| {
-            if let Some(table) = settings.pointer_mut(place).and_then(Value::as_object_mut) {
-                keys.iter().for_each(|key| drop(table.remove(*key)));
-            }
-        };
-        remove("", &["scene"]);
-        remove("/mesh", &["geo", "msh"]);
-        remove("/method/steps", &["table"]);
-        remove("/output", &["dir"]);
+        remove(&mut settings, "", &["scene"]);
+        remove(&mut settings, "/mesh", &["geo", "msh"]);
+        remove(&mut settings, "/method/steps", &["table"]);
+        remove(&mut settings, "/output", &["dir"]);
         for data in self.data.values() {
             settings["data"][&data.spec.name]["file"] = json!(digest(&data.numbers().collect::<Vec<f64>>()));
         }
@@ -224,11 +219,9 @@ impl Scene {
     }
 
     /// Return the contents without the keys that change neither problem nor method: title, units and output.
-    pub fn problem(&self) -> Value {
+    pub fn problem(&self) -> Json {
         let mut contents = self.contents();
-        if let Some(table) = contents.as_object_mut() {
-            ["title", "units", "output"].iter().for_each(|key| drop(table.remove(*key)));
-        }
+        remove(&mut contents, "", &["title", "units", "output"]);
         contents
     }
 }

@@ -36,6 +36,13 @@ pub fn entries<const N: usize>(pairs: [(&str, Json); N]) -> Entries {
     pairs.into_iter().filter(|(_, value)| !value.is_null()).map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
+/// Remove keys of the table at a place (a JSON pointer) of settings, if it is there.
+pub fn remove(settings: &mut Json, place: &str, keys: &[&str]) {
+    if let Some(table) = settings.pointer_mut(place).and_then(Json::as_object_mut) {
+        keys.iter().for_each(|key| drop(table.remove(*key)));
+    }
+}
+
 /// The context in which values are decoded.
 pub struct Context<'a> {
     /// Space dimension: 2 or 3.

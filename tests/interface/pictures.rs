@@ -105,7 +105,11 @@ fn a_plane_run_has_a_page_of_its_own() {
         // the script has drawn
         assert!(dom.contains("<output>× ") && dom.contains("<span style=\"background"), "the view is not drawn");
     }
-    // single pictures
+    single_pictures_are_drawn(&run);
+}
+
+/// Each single picture of a plane run says what it shows.
+fn single_pictures_are_drawn(run: &Run) {
     let folder = run.folder.to_str().expect("a name");
     for (what, words) in [
         ("stress", "von Mises stress, MPa"),

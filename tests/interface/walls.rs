@@ -43,7 +43,7 @@ const NARROW: [(&str, &str); 5] = [
     ("model", "error exchange linalg contact"),
     ("robin", "error exchange linalg contact problem model"),
     ("ddm", "error exchange linalg contact problem model robin"),
-    ("output", "error ddm"),
+    ("output", "error file ddm"),
     ("discretize", "error exchange linalg expression problem mesh fem contact model parallel output scene"),
 ];
 

@@ -320,30 +320,32 @@ fn memory_ends_with_a_message() {
     assert!(reports > 0);
 }
 
+/// A stack of two blocks under a share of its loads.
+fn stack_under(share: f64) -> Scene {
+    let geo = root().join("meshes/stack/stack.geo").display().to_string();
+    let block = |name: &str, fix: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0.3\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
+        )
+    };
+    Scene::new(format!(
+        "dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}\
+         load = [{{ on = \"b1_right\", pressure = {} }}]\n{}[[contact]]\nbetween = [\"b1_top\", \"b2_bottom\"]\n\
+         gap = 0.002\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
+        block("b1", "{ on = \"b1_bottom\", y = 0 }"),
+        0.3 * share,
+        block("b2", &format!("{{ on = \"b2_top\", y = {} }}", -0.02 * share))
+    ))
+}
+
 /// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper
 /// block is carried by its supports as one.
 #[test]
 fn an_interrupted_load_step_has_its_share_of_the_loads() {
-    let geo = root().join("meshes/stack/stack.geo").display().to_string();
-    let scene = |share: f64| {
-        let block = |name: &str, fix: &str| {
-            format!(
-                "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0.3\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
-            )
-        };
-        Scene::new(format!(
-            "dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}\
-             load = [{{ on = \"b1_right\", pressure = {} }}]\n{}[[contact]]\nbetween = [\"b1_top\", \"b2_bottom\"]\n\
-             gap = 0.002\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
-            block("b1", "{ on = \"b1_bottom\", y = 0 }"),
-            0.3 * share,
-            block("b2", &format!("{{ on = \"b2_top\", y = {} }}", -0.02 * share))
-        ))
-    };
     let method =
         |steps: &str, most: usize| format!("method={{gamma=1e-6, {steps} stop={{residual=1e-15, iterations={most}}}}}");
     for solver in ["solver=condensed", "solver=mumps"] {
-        let (whole, endless) = (scene(1.0), method("steps=[0.5, 1],", 100_000_000));
+        let (whole, endless) = (stack_under(1.0), method("steps=[0.5, 1],", 100_000_000));
         let mut run = Working::start(&words(&whole.path, &["--set", &endless, "--set", solver]), 1);
         run.until_rows(5);
         run.signal("TERM");
@@ -352,7 +354,7 @@ fn an_interrupted_load_step_has_its_share_of_the_loads() {
         let folder = scratch.path().join("results");
         let report = report(&folder);
         let most = report["iterations"].as_u64().expect("a number") as usize;
-        let half = solve(scene(0.5), &["--set", &method("", most), "--set", solver]);
+        let half = solve(stack_under(0.5), &["--set", &method("", most), "--set", solver]);
         let table = |folder: &Path| -> Vec<f64> {
             let text = fs::read_to_string(folder.join("contact-b1-b2.csv")).expect("a table");
             text.lines().skip(1).flat_map(|line| line.split(',')).map(|word| word.parse().expect("a number")).collect()

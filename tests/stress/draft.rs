@@ -4,6 +4,16 @@ use crate::laws;
 use crate::random::Random;
 use std::fmt::Write;
 
+/// Materials of the bodies and orders of their elements.
+pub struct Bodies {
+    /// Young's moduli.
+    pub young: Vec<f64>,
+    /// Poisson's ratios.
+    pub poisson: Vec<f64>,
+    /// Orders of the elements.
+    pub order: Vec<usize>,
+}
+
 /// A scene in the making.
 pub struct Draft {
     /// The stream of its numbers.
@@ -12,9 +22,7 @@ pub struct Draft {
     pub text: String,
     /// The scene in a line.
     pub line: String,
-    young: Vec<f64>,
-    poisson: Vec<f64>,
-    order: Vec<usize>,
+    bodies: Bodies,
     /// Number of coordinates.
     pub dimension: usize,
     /// Pressure of the loads, zero for none.
@@ -23,8 +31,6 @@ pub struct Draft {
     pub level: f64,
     /// Pressure that would matter.
     pub pressure: f64,
-    /// What all layers and bodies give way under the load.
-    pub compliance: f64,
 }
 
 /// Supports, loads and springs of a body as lists of the scene file.
@@ -40,37 +46,80 @@ pub struct Holds {
     pub weight: f64,
 }
 
-impl Draft {
-    /// Draws bodies and loads.
-    pub fn new(mut random: Random, name: &str, dimension: usize, bodies: usize) -> Self {
+/// A support, load or spring on a group of a body, numbered from 0.
+pub fn on(body: usize, place: &str, what: &str) -> String {
+    format!("{{ on = \"b{}_{place}\", {what} }}", body + 1)
+}
+
+impl Bodies {
+    /// Draws the bodies.
+    pub fn draw(random: &mut Random, count: usize) -> Self {
         let unit = random.power_of_ten(0.0, 11.0);
         let equal = random.chance(0.35);
-        let young: Vec<f64> =
-            (0..bodies).map(|_| if equal { unit } else { unit * random.power_of_ten(-3.0, 3.0) }).collect();
+        let young = (0..count).map(|_| if equal { unit } else { unit * random.power_of_ten(-3.0, 3.0) }).collect();
         let ratio = |random: &mut Random| match random.pick(&[0, 1, 1, 2, 3]) {
             0 => 0.0,
             1 => 0.3,
             2 => random.uniform(0.0, 0.49),
             _ => 0.4999,
         };
-        let poisson = (0..bodies).map(|_| ratio(&mut random)).collect();
+        let poisson = (0..count).map(|_| ratio(random)).collect();
         let order = match random.pick(&[0, 0, 1, 2]) {
-            0 => vec![1; bodies],
-            1 => vec![2; bodies],
-            _ => (0..bodies).map(|_| random.pick(&[1, 2])).collect(),
+            0 => vec![1; count],
+            1 => vec![2; count],
+            _ => (0..count).map(|_| random.pick(&[1, 2])).collect(),
         };
-        let softest = young.iter().copied().fold(f64::INFINITY, f64::min);
-        let level = softest * random.power_of_ten(-8.0, -3.0);
+        Self { young, poisson, order }
+    }
+
+    /// The smallest of Young's moduli.
+    pub fn softest(&self) -> f64 {
+        self.young.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// Young's moduli of two bodies, the smaller one first.
+    pub fn soft_and_stiff(&self, bodies: [usize; 2]) -> [f64; 2] {
+        let [a, b] = bodies.map(|body| self.young[body]);
+        [a.min(b), a.max(b)]
+    }
+
+    /// Young's moduli in words.
+    pub fn moduli(&self) -> String {
+        self.young.iter().map(|v| format!("{v:.1e}")).collect::<Vec<_>>().join(" ")
+    }
+
+    /// Writes a body, numbered from 0.
+    pub fn write(&self, text: &mut String, body: usize, holds: &Holds, dimension: usize) {
+        let (young, poisson, order) = (self.young[body], self.poisson[body], self.order[body]);
+        let _ = writeln!(text, "\n[[body]]\nname = \"b{}\"\nyoung = {young:e}\npoisson = {poisson}", body + 1);
+        let _ = writeln!(text, "order = {order}\nfix = [{}]", holds.fix.join(", "));
+        for (key, list) in [("load", &holds.load), ("spring", &holds.spring)] {
+            if !list.is_empty() {
+                let _ = writeln!(text, "{key} = [{}]", list.join(", "));
+            }
+        }
+        if holds.weight != 0.0 {
+            let zero = if dimension == 3 { ", 0" } else { "" };
+            let _ = writeln!(text, "force = [0, {:e}{zero}]", -holds.weight);
+        }
+    }
+}
+
+impl Draft {
+    /// Draws bodies and loads.
+    pub fn new(mut random: Random, name: &str, dimension: usize, bodies: usize) -> Self {
+        let bodies = Bodies::draw(&mut random, bodies);
+        let level = bodies.softest() * random.power_of_ten(-8.0, -3.0);
         let load = if random.chance(0.06) { 0.0 } else { level };
-        let numbers = young.iter().map(|v: &f64| format!("{v:.1e}")).collect::<Vec<_>>().join(" ");
-        let line = format!("{name} P{order:?} E {numbers} nu {poisson:.4?} q {load:.1e}");
+        let Bodies { poisson, order, .. } = &bodies;
+        let line = format!("{name} P{order:?} E {} nu {poisson:.4?} q {load:.1e}", bodies.moduli());
         let text = format!("dimension = {dimension}\n");
-        Self { random, text, line, young, poisson, order, dimension, load, level, pressure: level, compliance: 0.0 }
+        Self { random, text, line, bodies, dimension, load, level, pressure: level }
     }
 
     /// Sets the pressure of the loads, if there are any, to this share of the softest modulus.
     pub fn press(&mut self, share: f64) {
-        self.level = share * self.young.iter().copied().fold(f64::INFINITY, f64::min);
+        self.level = share * self.bodies.softest();
         self.load = if self.load == 0.0 { 0.0 } else { self.level };
         self.pressure = self.level;
         let _ = write!(self.line, " pressed {:.1e}", self.load);
@@ -78,7 +127,7 @@ impl Draft {
 
     /// A spring of a body, numbered from 0, with this ratio of stiffness to its modulus.
     pub fn spring(&self, key: &str, body: usize, ratio: f64) -> String {
-        format!("{key} = {:e}", ratio * self.young[body])
+        format!("{key} = {:e}", ratio * self.bodies.young[body])
     }
 
     /// The mesh, a script with numbers set in it.
@@ -97,14 +146,12 @@ impl Draft {
         along: Option<&str>,
         apart: f64,
     ) {
-        let (a, b) = (self.young[bodies[0]], self.young[bodies[1]]);
-        let (soft, stiff) = (a.min(b), a.max(b));
+        let [soft, stiff] = self.bodies.soft_and_stiff(bodies);
         let random = &mut self.random;
         let kappa = random.power_of_ten(-6.0 + (stiff / soft).log10(), 6.0) * soft / size;
         let _ = write!(self.line, " | kappa {:.1e}", kappa * size / soft);
         let law = laws::any(random, level, kappa, &mut self.line);
         let closes = level * size / soft + law.closing;
-        self.compliance += closes;
         let depth = closes * random.power_of_ten(-2.0, 1.5);
         let gap = match (random.pick(&[0, 0, 1, 2, 3, 4, 5, 6]), along) {
             (1, Some(s)) => format!("{depth:e} * max(0, 1 - (({s} - 1)/0.3)^2)^1.5"),
@@ -130,18 +177,6 @@ impl Draft {
 
     /// A body, numbered from 0.
     pub fn body(&mut self, body: usize, holds: &Holds) {
-        let (young, poisson, order) = (self.young[body], self.poisson[body], self.order[body]);
-        let text = &mut self.text;
-        let _ = writeln!(text, "\n[[body]]\nname = \"b{}\"\nyoung = {young:e}\npoisson = {poisson}", body + 1);
-        let _ = writeln!(text, "order = {order}\nfix = [{}]", holds.fix.join(", "));
-        for (key, list) in [("load", &holds.load), ("spring", &holds.spring)] {
-            if !list.is_empty() {
-                let _ = writeln!(text, "{key} = [{}]", list.join(", "));
-            }
-        }
-        if holds.weight != 0.0 {
-            let zero = if self.dimension == 3 { ", 0" } else { "" };
-            let _ = writeln!(text, "force = [0, {:e}{zero}]", -holds.weight);
-        }
+        self.bodies.write(&mut self.text, body, holds, self.dimension);
     }
 }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // the example and the test each use their own part
 
+use crate::draft::{Bodies, Holds, on};
+use crate::laws::Law;
 use crate::random::Random;
 use std::fmt::Write;
 use std::path::Path;
@@ -138,230 +140,305 @@ const HOLDS: [Hold; 20] = [
     Hold::Lifted,
 ];
 
+/// A contact of two blocks, numbered from 0.
+#[derive(Clone, Copy)]
+struct Joint {
+    blocks: [usize; 2],
+    is_upright: bool,
+}
+
+const fn joint(blocks: [usize; 2], is_upright: bool) -> Joint {
+    Joint { blocks, is_upright }
+}
+
+/// The contacts of a ring, in the order in which they are drawn.
+const RING: [Joint; 4] = [joint([0, 2], false), joint([1, 3], false), joint([0, 1], true), joint([2, 3], true)];
+/// Those of a stack of three.
+const STACK: [Joint; 2] = [joint([0, 1], false), joint([1, 2], false)];
+
+/// A scene in the making.
+struct Blocks {
+    random: Random,
+    index: usize,
+    shape: Shape,
+    hold: Hold,
+    bodies: Bodies,
+    /// Pressure that loads could make, never zero.
+    level: f64,
+    /// Pressure of the loads, zero for none.
+    load: f64,
+    /// How much more a load presses at the end of its face than in the middle.
+    lean: f64,
+    /// The scene in a line.
+    line: String,
+    /// Pressure that would matter.
+    pressure: f64,
+    /// What all layers and bodies give way under the load.
+    compliance: f64,
+}
+
 /// Scene `index` of the series `seed`; `root` is the folder of the program.
 pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
-    let mut random = Random::new(seed, index);
-    let shape = random.pick(&SHAPES);
-    // an end that holds a tall block keeps the load away from the contact
-    let hold = match random.pick(&HOLDS) {
-        Hold::Ends if shape.height > shape.width => Hold::Roller,
-        Hold::Lifted if shape.height > shape.width => Hold::Pressed,
-        hold => hold,
-    };
-    let is_ring = shape.columns == 2;
-
-    // bodies: units, ratios, Poisson
-    let unit = random.power_of_ten(0.0, 11.0);
-    let equal = random.chance(0.35);
-    let young: Vec<f64> =
-        (0..shape.blocks).map(|_| if equal { unit } else { unit * random.power_of_ten(-3.0, 3.0) }).collect();
-    let poisson: Vec<f64> = (0..shape.blocks)
-        .map(|_| match random.pick(&[0, 1, 1, 2, 3]) {
-            0 => 0.0,
-            1 => 0.3,
-            2 => random.uniform(0.0, 0.49),
-            _ => 0.4999,
-        })
-        .collect();
-    let order: Vec<usize> = match random.pick(&[0, 0, 1, 2]) {
-        0 => vec![1; shape.blocks],
-        1 => vec![2; shape.blocks],
-        _ => (0..shape.blocks).map(|_| random.pick(&[1, 2])).collect(),
-    };
-
-    // load
-    let softest = young.iter().copied().fold(f64::INFINITY, f64::min);
-    let level = softest * random.power_of_ten(-8.0, -3.0);
-    let load = if random.chance(0.08) { 0.0 } else { level };
-    let lean = if random.chance(0.3) { random.uniform(-0.8, 0.8) } else { 0.0 };
-
-    let mut text = String::new();
-    let mut line = String::new();
-    let set = shape.along.iter().take(shape.blocks).enumerate().map(|(i, n)| format!("n{} = {n}", i + 1));
-    let _ = writeln!(text, "dimension = 2");
-    let _ = writeln!(
-        text,
-        "mesh = {{ geo = \"{}\", set = {{ rows = {}, columns = {}, width = {}, height = {}, {} }} }}",
-        root.join("meshes/stack/stack.geo").display(),
-        shape.blocks / shape.columns,
-        shape.columns,
-        shape.width,
-        shape.height,
-        set.collect::<Vec<_>>().join(", ")
-    );
-    let what = if is_ring { "ring".to_owned() } else { format!("{} {}x{}", shape.blocks, shape.width, shape.height) };
-    let numbers = |values: &[f64]| values.iter().map(|v| format!("{v:.1e}")).collect::<Vec<_>>().join(" ");
-    let _ = write!(
-        line,
-        "{what} n {:?} P{order:?} {hold:?} E {} nu {:?} q {load:.1e}",
-        &shape.along[..shape.blocks],
-        numbers(&young),
-        poisson.iter().map(|nu| (nu * 1e4).round() / 1e4).collect::<Vec<_>>(),
-    );
-    if lean != 0.0 {
-        let _ = write!(line, " lean {lean:.2}");
-    }
-
-    // contacts: the law at the level of pressure, then the gap by what the load closes
-    let mut contacts = String::new();
-    let between: &[([usize; 2], bool)] = if is_ring {
-        &[([1, 3], false), ([2, 4], false), ([1, 2], true), ([3, 4], true)]
-    } else {
-        &[([1, 2], false), ([2, 3], false)][..shape.blocks - 1]
-    };
-    let mut pressure_scale = level;
-    let mut compliance = 0.0;
-    for &([a, b], upright) in between {
-        // kappa h/E from 1e-6 to 1e6 for both bodies
-        let (soft, stiff) = (young[a - 1].min(young[b - 1]), young[a - 1].max(young[b - 1]));
-        let kappa = random.power_of_ten(-6.0 + (stiff / soft).log10(), 6.0) * soft / shape.height;
-        let (law, closing) = if random.chance(0.3) {
-            let _ = write!(line, " | kappa {:.1e}", kappa * shape.height / soft);
-            (format!("linear = {{ stiffness = {kappa:e} }}"), level / kappa)
-        } else {
-            let exponent = random.pick(&[0.1, 0.3, 0.5, 1.0, random_exponent(index)]);
-            // p' = p^(1-a) / (a B) = kappa where the pressure is `level`
-            let b = level.powf(1.0 - exponent) / (exponent * kappa);
-            let _ = write!(line, " | kappa {:.1e} a {exponent:.2}", kappa * shape.height / soft);
-            (format!("power = {{ B = {b:e}, a = {exponent} }}"), level / (exponent * kappa))
-        };
-        let shortening = level * shape.height / soft;
-        compliance += shortening + closing;
-        let (axis, length) = if upright { ("y", shape.height) } else { ("x", shape.width) };
-        // places are measured from the start of the common face
-        let start = match (upright, a) {
-            (false, 2) if is_ring => shape.width,
-            (true, 3) => shape.height,
-            _ => 0.0,
-        };
-        let s = format!("({axis} - {start})/{length}");
-        let depth = (shortening + closing) * random.power_of_ten(-2.0, 1.5);
-        let gap = match random.pick(&[0, 0, 1, 2, 3, 4, 5]) {
-            0 => String::new(),
-            1 => format!("{depth:e} * max(0, 1 - (({s} - 1)/0.3)^2)^1.5"),
-            2 => format!("{depth:e} * (1 - cos(2*pi*{}*{s}))", random.pick(&[0.5, 1.0, 2.0])),
-            3 => format!("{depth:e} * {s}"),
-            // never touches, where a support holds the blocks; else they fall far, by what rounding leaves of it
-            4 => format!(
-                "{:e}",
-                if matches!(hold, Hold::Ends | Hold::Lifted | Hold::Pressed) {
-                    10.0 * shape.height.max(1e2 * (shortening + closing))
-                } else {
-                    1e3 * (shortening + closing)
-                }
-            ),
-            _ => {
-                let overlap = (shortening + closing) * random.power_of_ten(-2.0, 0.3);
-                pressure_scale = f64::max(pressure_scale, softest * overlap / shape.height);
-                format!("{:e}", -overlap)
-            }
-        };
-        let names = if upright { ["right", "left"] } else { ["top", "bottom"] };
-        let _ = writeln!(contacts, "\n[[contact]]\nbetween = [\"b{a}_{}\", \"b{b}_{}\"]", names[0], names[1]);
-        if !gap.is_empty() {
-            let _ = writeln!(contacts, "gap = \"{gap}\"");
-            let _ = write!(line, " gap {gap}");
-        }
-        let _ = writeln!(contacts, "layer = {{ {law} }}");
-    }
-
-    // bodies
-    let sign = if matches!(hold, Hold::Pulled | Hold::Lifted) { -1.0 } else { 1.0 };
-    let top = shape.blocks;
-    let mut hanging = false;
-    for block in 1..=shape.blocks {
-        let (mut fix, mut loads) = (Vec::new(), Vec::new());
-        let on = |place: &str, what: String| format!("{{ on = \"b{block}_{place}\", {what} }}");
-        let pressure = |at: &str, width: f64| match lean {
-            0.0 => format!("pressure = {:e}", sign * load),
-            _ => format!("pressure = \"{:e} * (1 + {lean}*(2*{at}/{width} - 1))\"", sign * load),
-        };
-        if is_ring {
-            let (lower, inner) = (block <= 2, block % 2 == 1);
-            if matches!(hold, Hold::Ends | Hold::Lifted) {
-                fix.push(on("pin", "x = 0, y = 0".into()));
-                fix.push(on(if lower { "bottom" } else { "top" }, "y = 0".into()));
-            } else {
-                if lower {
-                    fix.push(on("bottom", "y = 0".into()));
-                }
-                if inner {
-                    fix.push(on("left", "x = 0".into()));
-                }
-                hanging |= !lower || !inner;
-            }
-            if !lower && !matches!(hold, Hold::Ends | Hold::Lifted) {
-                loads.push(on("top", format!("pressure = {:e}", sign * load)));
-            }
-            if !inner {
-                loads.push(on("right", format!("pressure = {:e}", sign * load)));
-            }
-        } else if matches!(hold, Hold::Ends | Hold::Lifted) {
-            fix.push(on("left", "x = 0, y = 0".into()));
-            fix.push(on("right", "x = 0".into()));
-            if block == 1 {
-                loads.push(on("bottom", pressure("x", shape.width)));
-            }
-            if block == top {
-                loads.push(on("top", pressure("x", shape.width)));
-            }
-        } else if block == 1 {
-            fix.push(on("bottom", "y = 0".into()));
-            fix.push(on("left", "x = 0".into()));
-        } else {
-            let turns = matches!(hold, Hold::Pinned | Hold::Loose | Hold::Sliding);
-            if !(block == top && matches!(hold, Hold::Loose | Hold::Sliding)) {
-                fix.push(on(if turns { "pin" } else { "left" }, "x = 0".into()));
-            }
-            if block == top && hold == Hold::Pressed {
-                let depth = if load == 0.0 { 0.0 } else { compliance };
-                pressure_scale = f64::max(pressure_scale, softest * depth / shape.height);
-                fix.push(on("top", format!("y = {:e}", -depth)));
-                body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
-                continue;
-            }
-            hanging = true;
-            if block == top {
-                loads.push(on("top", pressure("x", shape.width)));
-                if hold == Hold::Sliding {
-                    loads.push(on("right", format!("pressure = {:e}", 0.01 * load)));
-                }
-            }
-        }
-        body(&mut text, block, young[block - 1], poisson[block - 1], order[block - 1], &fix, &loads);
+    let mut blocks = Blocks::draw(seed, index);
+    let joints = if blocks.is_ring() { &RING[..] } else { &STACK[..blocks.shape.blocks - 1] };
+    let contacts: String = joints.iter().map(|&joint| blocks.contact(joint)).collect();
+    let mut text = blocks.mesh(root);
+    for block in 0..blocks.shape.blocks {
+        let holds = blocks.holds(block);
+        blocks.bodies.write(&mut text, block, &holds, 2);
     }
     text.push_str(&contacts);
-    let expect = match hold {
-        Hold::Ends | Hold::Pressed | Hold::Lifted | Hold::Roller | Hold::Pinned => Expect::Solution,
-        Hold::Loose if is_ring => Expect::Solution,
-        Hold::Sliding if is_ring => Expect::Solution,
-        Hold::Loose => Expect::Gauge,
-        Hold::Sliding | Hold::Pulled if load == 0.0 => Expect::Gauge,
-        Hold::Sliding | Hold::Pulled => Expect::Nothing,
-    };
-    let statics = !is_ring && matches!(hold, Hold::Roller | Hold::Pinned);
+    let statics = !blocks.is_ring() && matches!(blocks.hold, Hold::Roller | Hold::Pinned);
     Case {
         index,
         text,
-        line,
-        expect: if load == 0.0 && hanging && expect == Expect::Solution { Expect::Gauge } else { expect },
-        hanging,
-        pressure: pressure_scale,
-        carried: statics.then_some(load * shape.width),
-        gamma: random.power_of_ten(-2.0, 0.08),
+        expect: blocks.expect(),
+        hanging: blocks.hangs(),
+        pressure: blocks.pressure,
+        carried: statics.then_some(blocks.load * blocks.shape.width),
+        gamma: blocks.random.power_of_ten(-2.0, 0.08),
         start: None,
+        line: blocks.line,
+    }
+}
+
+impl Blocks {
+    /// Draws shape, hold, bodies and load.
+    fn draw(seed: u64, index: usize) -> Self {
+        let mut random = Random::new(seed, index);
+        let shape = random.pick(&SHAPES);
+        // an end that holds a tall block keeps the load away from the contact
+        let hold = match random.pick(&HOLDS) {
+            Hold::Ends if shape.height > shape.width => Hold::Roller,
+            Hold::Lifted if shape.height > shape.width => Hold::Pressed,
+            hold => hold,
+        };
+        let bodies = Bodies::draw(&mut random, shape.blocks);
+        let level = bodies.softest() * random.power_of_ten(-8.0, -3.0);
+        let load = if random.chance(0.08) { 0.0 } else { level };
+        let lean = if random.chance(0.3) { random.uniform(-0.8, 0.8) } else { 0.0 };
+        let line = String::new();
+        let mut blocks =
+            Self { random, index, shape, hold, bodies, level, load, lean, line, pressure: level, compliance: 0.0 };
+        blocks.line = blocks.described();
+        blocks
+    }
+
+    /// Shape, hold, bodies and load in words.
+    fn described(&self) -> String {
+        let Self { shape, hold, bodies, load, lean, .. } = self;
+        let Shape { blocks, width, height, .. } = *shape;
+        let what = if self.is_ring() { "ring".to_owned() } else { format!("{blocks} {width}x{height}") };
+        let leans = if *lean == 0.0 { String::new() } else { format!(" lean {lean:.2}") };
+        format!(
+            "{what} n {:?} P{:?} {hold:?} E {} nu {:?} q {load:.1e}{leans}",
+            &shape.along[..blocks],
+            bodies.order,
+            bodies.moduli(),
+            bodies.poisson.iter().map(|nu| (nu * 1e4).round() / 1e4).collect::<Vec<_>>(),
+        )
+    }
+
+    fn is_ring(&self) -> bool {
+        self.shape.columns == 2
+    }
+
+    /// Whether supports hold every block.
+    fn are_held(&self) -> bool {
+        matches!(self.hold, Hold::Ends | Hold::Lifted)
+    }
+
+    /// Whether contact alone holds some block.
+    fn hangs(&self) -> bool {
+        !self.are_held() && (self.is_ring() || self.shape.blocks > 2 || self.hold != Hold::Pressed)
+    }
+
+    fn mesh(&self, root: &Path) -> String {
+        let Shape { blocks, columns, width, height, along } = self.shape;
+        let set = along.iter().take(blocks).enumerate().map(|(i, n)| format!("n{} = {n}", i + 1));
+        format!(
+            "dimension = 2\nmesh = {{ geo = \"{}\", set = {{ rows = {}, columns = {columns}, width = {width}, height = {height}, {} \
+             }} }}\n",
+            root.join("meshes/stack/stack.geo").display(),
+            blocks / columns,
+            set.collect::<Vec<_>>().join(", ")
+        )
+    }
+
+    /// A contact: the law at the level of pressure, then the gap by what the load closes.
+    fn contact(&mut self, joint: Joint) -> String {
+        let Shape { width, height, .. } = self.shape;
+        let [soft, stiff] = self.bodies.soft_and_stiff(joint.blocks);
+        // kappa h/E from 1e-6 to 1e6 for both bodies
+        let kappa = self.random.power_of_ten(-6.0 + (stiff / soft).log10(), 6.0) * soft / height;
+        let _ = write!(self.line, " | kappa {:.1e}", kappa * height / soft);
+        let Law { text: law, closing } = self.law(kappa);
+        let closes = self.level * height / soft + closing;
+        self.compliance += closes;
+        let (axis, length) = if joint.is_upright { ("y", height) } else { ("x", width) };
+        // places are measured from the start of the common face
+        let start = match (joint.is_upright, joint.blocks[0]) {
+            (false, 1) if self.is_ring() => width,
+            (true, 2) => height,
+            _ => 0.0,
+        };
+        let gap = self.gap(&format!("({axis} - {start})/{length}"), closes);
+        let [a, b] = joint.blocks.map(|block| block + 1);
+        let [from, to] = if joint.is_upright { ["right", "left"] } else { ["top", "bottom"] };
+        let mut text = format!("\n[[contact]]\nbetween = [\"b{a}_{from}\", \"b{b}_{to}\"]\n");
+        if !gap.is_empty() {
+            let _ = writeln!(text, "gap = \"{gap}\"");
+            let _ = write!(self.line, " gap {gap}");
+        }
+        let _ = writeln!(text, "layer = {{ {law} }}");
+        text
+    }
+
+    /// A linear law or a power law with p' = `kappa` at the level of pressure.
+    fn law(&mut self, kappa: f64) -> Law {
+        let level = self.level;
+        if self.random.chance(0.3) {
+            return Law { text: format!("linear = {{ stiffness = {kappa:e} }}"), closing: level / kappa };
+        }
+        let exponent = self.random.pick(&[0.1, 0.3, 0.5, 1.0, random_exponent(self.index)]);
+        // p' = p^(1-a) / (a B) = kappa where the pressure is `level`
+        let b = level.powf(1.0 - exponent) / (exponent * kappa);
+        let _ = write!(self.line, " a {exponent:.2}");
+        Law { text: format!("power = {{ B = {b:e}, a = {exponent} }}"), closing: level / (exponent * kappa) }
+    }
+
+    /// A gap along `s` from 0 to 1, or none; the load closes about `closes`.
+    fn gap(&mut self, s: &str, closes: f64) -> String {
+        let depth = closes * self.random.power_of_ten(-2.0, 1.5);
+        match self.random.pick(&[0, 0, 1, 2, 3, 4, 5]) {
+            0 => String::new(),
+            1 => format!("{depth:e} * max(0, 1 - (({s} - 1)/0.3)^2)^1.5"),
+            2 => format!("{depth:e} * (1 - cos(2*pi*{}*{s}))", self.random.pick(&[0.5, 1.0, 2.0])),
+            3 => format!("{depth:e} * {s}"),
+            // never touches, where a support holds the blocks; else they fall far, by what rounding leaves of it
+            4 if self.are_held() || self.hold == Hold::Pressed => {
+                format!("{:e}", 10.0 * self.shape.height.max(1e2 * closes))
+            }
+            4 => format!("{:e}", 1e3 * closes),
+            _ => {
+                let overlap = closes * self.random.power_of_ten(-2.0, 0.3);
+                self.matters(overlap);
+                format!("{:e}", -overlap)
+            }
+        }
+    }
+
+    /// Pressures matter that a displacement makes.
+    fn matters(&mut self, displacement: f64) {
+        self.pressure = self.pressure.max(self.bodies.softest() * displacement / self.shape.height);
+    }
+
+    /// Supports and loads of a block, numbered from 0.
+    fn holds(&mut self, block: usize) -> Holds {
+        match self.is_ring() {
+            true => self.in_ring(block),
+            false if self.are_held() => self.held(block),
+            false if block == 0 => {
+                Holds { fix: vec![on(0, "bottom", "y = 0"), on(0, "left", "x = 0")], ..Holds::default() }
+            }
+            false => self.carried(block),
+        }
+    }
+
+    /// The load, which pulls where the hold says so.
+    fn signed_load(&self) -> f64 {
+        if matches!(self.hold, Hold::Pulled | Hold::Lifted) { -self.load } else { self.load }
+    }
+
+    /// The load on a face of a stack.
+    fn on_face(&self, block: usize, face: &str) -> String {
+        let (load, lean, width) = (self.signed_load(), self.lean, self.shape.width);
+        let pressure = match lean {
+            0.0 => format!("pressure = {load:e}"),
+            _ => format!("pressure = \"{load:e} * (1 + {lean}*(2*x/{width} - 1))\""),
+        };
+        on(block, face, &pressure)
+    }
+
+    fn in_ring(&self, block: usize) -> Holds {
+        let mut holds = Holds::default();
+        let (is_lower, is_left) = (block < 2, block.is_multiple_of(2));
+        let pressure = format!("pressure = {:e}", self.signed_load());
+        if self.are_held() {
+            holds.fix.push(on(block, "pin", "x = 0, y = 0"));
+            holds.fix.push(on(block, if is_lower { "bottom" } else { "top" }, "y = 0"));
+        } else {
+            if is_lower {
+                holds.fix.push(on(block, "bottom", "y = 0"));
+            } else {
+                holds.load.push(on(block, "top", &pressure));
+            }
+            if is_left {
+                holds.fix.push(on(block, "left", "x = 0"));
+            }
+        }
+        if !is_left {
+            holds.load.push(on(block, "right", &pressure));
+        }
+        holds
+    }
+
+    /// A block of a stack that is held at its ends.
+    fn held(&self, block: usize) -> Holds {
+        let mut holds =
+            Holds { fix: vec![on(block, "left", "x = 0, y = 0"), on(block, "right", "x = 0")], ..Holds::default() };
+        if block == 0 {
+            holds.load.push(self.on_face(block, "bottom"));
+        }
+        if block + 1 == self.shape.blocks {
+            holds.load.push(self.on_face(block, "top"));
+        }
+        holds
+    }
+
+    /// A block above the lowest of a stack.
+    fn carried(&mut self, block: usize) -> Holds {
+        let mut holds = Holds::default();
+        let is_top = block + 1 == self.shape.blocks;
+        let is_free = is_top && matches!(self.hold, Hold::Loose | Hold::Sliding);
+        if !is_free {
+            let turns = matches!(self.hold, Hold::Pinned | Hold::Loose | Hold::Sliding);
+            holds.fix.push(on(block, if turns { "pin" } else { "left" }, "x = 0"));
+        }
+        match self.hold {
+            _ if !is_top => {}
+            Hold::Pressed => {
+                let depth = if self.load == 0.0 { 0.0 } else { self.compliance };
+                self.matters(depth);
+                holds.fix.push(on(block, "top", &format!("y = {:e}", -depth)));
+            }
+            _ => holds.load.push(self.on_face(block, "top")),
+        }
+        if is_top && self.hold == Hold::Sliding {
+            holds.load.push(on(block, "right", &format!("pressure = {:e}", 0.01 * self.load)));
+        }
+        holds
+    }
+
+    /// What the scene must lead to.
+    fn expect(&self) -> Expect {
+        let is_idle = self.load == 0.0;
+        match self.hold {
+            Hold::Loose | Hold::Sliding if self.is_ring() => self.expect_held(),
+            Hold::Loose => Expect::Gauge,
+            Hold::Sliding | Hold::Pulled if is_idle => Expect::Gauge,
+            Hold::Sliding | Hold::Pulled => Expect::Nothing,
+            Hold::Ends | Hold::Pressed | Hold::Lifted | Hold::Roller | Hold::Pinned => self.expect_held(),
+        }
+    }
+
+    /// A solution, unless a body that contact alone holds has no load.
+    fn expect_held(&self) -> Expect {
+        if self.load == 0.0 && self.hangs() { Expect::Gauge } else { Expect::Solution }
     }
 }
 
 /// An exponent of the layer's law anywhere in its range; by index, so that it does not shift the stream.
 fn random_exponent(index: usize) -> f64 {
     (Random::new(7, index).uniform(0.1, 1.0) * 100.0).round() / 100.0
-}
-
-fn body(text: &mut String, block: usize, young: f64, poisson: f64, order: usize, fix: &[String], loads: &[String]) {
-    let _ = writeln!(text, "\n[[body]]\nname = \"b{block}\"\nyoung = {young:e}\npoisson = {poisson}\norder = {order}");
-    let _ = writeln!(text, "fix = [{}]", fix.join(", "));
-    if !loads.is_empty() {
-        let _ = writeln!(text, "load = [{}]", loads.join(", "));
-    }
 }

@@ -1,6 +1,6 @@
 //! Random scenes of slender bodies: leaves, plates, frames and hoops, from 1:5 to 1:200.
 
-use crate::draft::{Draft, Holds};
+use crate::draft::{Draft, Holds, on};
 use crate::random::Random;
 use crate::scenes::{Case, Expect};
 use std::path::Path;
@@ -75,11 +75,6 @@ pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
     }
 }
 
-/// A support or load on a group of a body, numbered from 0.
-fn on(body: usize, place: &str, what: &str) -> String {
-    format!("{{ on = \"b{}_{place}\", {what} }}", body + 1)
-}
-
 /// Draws materials, thicknesses and the load, under which a leaf that is clamped at one end bends by 1e-4 to ten times its thickness.
 fn begin(mut random: Random, kind: Kind, bodies: usize, hold: Hold) -> Slender {
     let any = random.power_of_ten(0.7, 2.3);
@@ -114,6 +109,48 @@ impl Slender {
         let level = self.draft.level * self.draft.random.power_of_ten(0.0, 2.0);
         self.draft.contact(surfaces, bodies, (size, level), along, 0.0);
     }
+
+    /// Leaves or discs with their supports and loads. The last one is pressed along its length, or at its tip by a force or a displacement.
+    fn leaves(&mut self, kind: Kind, count: usize) {
+        let Self { draft, hold, is_bridge, thickness } = self;
+        let space = kind == Kind::Plates;
+        let drive = draft.random.pick(&["top", "top", "tip", "moved"]);
+        let moved = draft.random.power_of_ten(-3.0, 0.5) * thickness[count - 1];
+        // discs are clamped at their rim: the other end is the axis
+        let (end, other) = if kind == Kind::Discs { ("right", "left") } else { ("left", "right") };
+        let clamp = if space { "x = 0, y = 0, z = 0" } else { "x = 0, y = 0" };
+        for body in 0..count {
+            let mut holds = Holds::default();
+            if body == 0 || *hold == Hold::Clamped {
+                holds.fix.push(on(body, end, clamp));
+                if body == 0 && *is_bridge && kind != Kind::Discs {
+                    holds.fix.push(on(body, other, "y = 0"));
+                }
+            } else {
+                if kind != Kind::Discs {
+                    holds.fix.push(on(body, "pin", "x = 0"));
+                }
+                if space {
+                    holds.fix.push(on(body, "pin", "z = 0"));
+                    holds.fix.push(on(body, "spin", "z = 0"));
+                }
+            }
+            if body + 1 == count {
+                match (drive, *hold) {
+                    ("tip", Hold::Clamped) if kind != Kind::Discs => {
+                        let zero = if space { ", 0" } else { "" };
+                        holds.load.push(on(body, "right", &format!("force = [0, {:e}{zero}]", -0.4 * draft.load)));
+                    }
+                    ("moved", Hold::Clamped) if kind != Kind::Discs && draft.load > 0.0 => {
+                        holds.fix.push(on(body, "right", &format!("y = {:e}", -moved)));
+                        draft.line += &format!(" moved {moved:.1e}");
+                    }
+                    _ => holds.load.push(on(body, "top", &format!("pressure = {:e}", draft.load))),
+                }
+            }
+            draft.body(body, &holds);
+        }
+    }
 }
 
 fn leaves(mut random: Random, kind: Kind, scripts: &Path) -> Slender {
@@ -139,44 +176,7 @@ fn leaves(mut random: Random, kind: Kind, scripts: &Path) -> Slender {
         set += &format!(", depth = {}, across = {across}", scene.draft.random.pick(&[0.1, 0.4, 1.0]));
     }
     scene.draft.mesh(&scripts.join("leaves.geo"), &set);
-    let draft = &mut scene.draft;
-    // the last leaf is pressed along its length, or at its tip by a force or a displacement
-    let drive = draft.random.pick(&["top", "top", "tip", "moved"]);
-    let moved = draft.random.power_of_ten(-3.0, 0.5) * scene.thickness[count - 1];
-    // discs are clamped at their rim: the other end is the axis
-    let (end, other) = if kind == Kind::Discs { ("right", "left") } else { ("left", "right") };
-    let clamp = if space { "x = 0, y = 0, z = 0" } else { "x = 0, y = 0" };
-    for body in 0..count {
-        let mut holds = Holds::default();
-        if body == 0 || hold == Hold::Clamped {
-            holds.fix.push(on(body, end, clamp));
-            if body == 0 && scene.is_bridge && kind != Kind::Discs {
-                holds.fix.push(on(body, other, "y = 0"));
-            }
-        } else {
-            if kind != Kind::Discs {
-                holds.fix.push(on(body, "pin", "x = 0"));
-            }
-            if space {
-                holds.fix.push(on(body, "pin", "z = 0"));
-                holds.fix.push(on(body, "spin", "z = 0"));
-            }
-        }
-        if body + 1 == count {
-            match (drive, hold) {
-                ("tip", Hold::Clamped) if kind != Kind::Discs => {
-                    let zero = if space { ", 0" } else { "" };
-                    holds.load.push(on(body, "right", &format!("force = [0, {:e}{zero}]", -0.4 * draft.load)));
-                }
-                ("moved", Hold::Clamped) if kind != Kind::Discs && draft.load > 0.0 => {
-                    holds.fix.push(on(body, "right", &format!("y = {:e}", -moved)));
-                    draft.line += &format!(" moved {moved:.1e}");
-                }
-                _ => holds.load.push(on(body, "top", &format!("pressure = {:e}", draft.load))),
-            }
-        }
-        draft.body(body, &holds);
-    }
+    scene.leaves(kind, count);
     for body in 0..count - 1 {
         let names = [format!("b{}_top", body + 1), format!("b{}_bottom", body + 2)];
         let s = format!("(x/{:.4})", lengths[body].min(lengths[body + 1]));

@@ -1,6 +1,6 @@
 //! Random scenes of the wider box: bodies in space, many bodies, curved contacts, small bodies, walls, springs, all laws, given starts.
 
-use crate::draft::{Draft, Holds};
+use crate::draft::{Draft, Holds, on};
 use crate::random::Random;
 use crate::scenes::{Case, Expect};
 use std::path::Path;
@@ -133,11 +133,6 @@ fn given(random: &mut Random) -> Option<String> {
     }
 }
 
-/// A support, load or spring on a group of a body, numbered from 0.
-fn on(body: usize, place: &str, what: &str) -> String {
-    format!("{{ on = \"b{}_{place}\", {what} }}", body + 1)
-}
-
 /// Springs, for one scene in four that they keep what it is to be, and their stiffness over the modulus of the body that they are on. In
 /// the body's matrix double precision leaves 1e-16 of its modulus: a spring of 1e-6 keeps ten digits.
 fn springs(draft: &mut Draft, hold: Hold) -> (Springs, f64) {
@@ -180,6 +175,24 @@ fn numbered(n: &[usize]) -> String {
     n.iter().enumerate().map(|(i, n)| format!("n{} = {n}", i + 1)).collect::<Vec<_>>().join(", ")
 }
 
+/// Blocks beside and on each other.
+struct Grid {
+    kind: Kind,
+    hold: Hold,
+    rows: usize,
+    columns: usize,
+    /// Sizes of a block.
+    width: f64,
+    height: f64,
+    springs: Springs,
+    /// Stiffness of the springs over the modulus of their body.
+    ratio: f64,
+    /// How much more the load presses at the end of its face than in the middle.
+    lean: f64,
+    /// Body force.
+    weight: f64,
+}
+
 fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
     let space = kind == Kind::Blocks;
     let plane = [(2, 2), (3, 2), (2, 3), (3, 3), (1, 3), (1, 2), (3, 1), (4, 1), (6, 1)];
@@ -209,68 +222,96 @@ fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
     let lean = if draft.random.chance(0.3) { draft.random.uniform(-0.8, 0.8) } else { 0.0 };
     let weight = weight(&mut draft) / height / rows as f64;
     let (springs, ratio) = springs(&mut draft, hold);
-    let sign = if hold == Hold::Pulled { -1.0 } else { 1.0 };
-    for row in 0..rows {
-        for column in 0..columns {
-            let body = row * columns + column;
-            let mut holds = Holds { weight, ..Holds::default() };
-            if row == 0 {
-                match springs {
-                    Springs::Below => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
-                    _ => holds.fix.push(on(body, "bottom", "y = 0")),
-                }
-            }
-            let slides = row + 1 == rows && matches!(hold, Hold::Loose | Hold::Sliding);
-            if column == 0 && !slides && kind != Kind::Rings {
-                let turns = row > 0 && columns == 1 && hold != Hold::Roller;
-                holds.fix.push(on(body, if turns { "pin" } else { "left" }, "x = 0"));
-            }
-            if space && hold == Hold::Roller {
-                holds.fix.push(on(body, "front", "z = 0"));
-            } else if space {
-                holds.fix.push(on(body, "pin", "z = 0"));
-                holds.fix.push(on(body, "spin", "z = 0"));
-            }
-            if springs == Springs::All && (row > 0 || column > 0) {
-                holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio)));
-            }
-            if row + 1 == rows && (rows > 1 || columns == 1) {
-                let pressure = format!("{:e} * (1 + {lean}*(2*x/{} - 1))", sign * draft.load, width * columns as f64);
-                holds.load.push(on(body, "top", &format!("pressure = \"{pressure}\"")));
-            }
-            if column + 1 == columns && columns > 1 {
-                holds.load.push(on(body, "right", &format!("pressure = {:e}", sign * draft.load)));
-            } else if slides && hold == Hold::Sliding {
-                holds.load.push(on(body, "right", &format!("pressure = {:e}", 0.01 * draft.load)));
-            }
-            draft.body(body, &holds);
-        }
+    let grid = Grid { kind, hold, rows, columns, width, height, springs, ratio, lean, weight };
+    for body in 0..rows * columns {
+        let holds = grid.holds(&draft, body);
+        draft.body(body, &holds);
     }
-    let level = draft.level;
-    for row in 0..rows {
-        for column in 0..columns {
-            let body = row * columns + column;
-            let name = |body: usize, place: &str| format!("b{}_{place}", body + 1);
-            if row + 1 < rows {
-                let above = body + columns;
-                let s = format!("(x/{width} - {column})");
-                let names = [name(body, "top"), name(above, "bottom")];
-                draft.contact(names, [body, above], (height, level), Some(&s), 0.0);
-            }
-            if column + 1 < columns {
-                let s = format!("(y/{height} - {row})");
-                let names = [name(body, "right"), name(body + 1, "left")];
-                draft.contact(names, [body, body + 1], (width, level), Some(&s), 0.0);
+    for body in 0..rows * columns {
+        grid.contacts(&mut draft, body);
+    }
+    let expect = grid.expect(&draft);
+    Made { draft, expect, hanging: rows * columns > 1 }
+}
+
+impl Grid {
+    /// Supports, springs and loads of a block.
+    fn holds(&self, draft: &Draft, body: usize) -> Holds {
+        let &Self { kind, hold, columns, springs, ratio, weight, .. } = self;
+        let (row, column) = (body / columns, body % columns);
+        let space = kind == Kind::Blocks;
+        let mut holds = Holds { weight, ..Holds::default() };
+        if row == 0 {
+            match springs {
+                Springs::Below => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
+                _ => holds.fix.push(on(body, "bottom", "y = 0")),
             }
         }
+        if column == 0 && !self.slides(row) && kind != Kind::Rings {
+            let turns = row > 0 && columns == 1 && hold != Hold::Roller;
+            holds.fix.push(on(body, if turns { "pin" } else { "left" }, "x = 0"));
+        }
+        if space && hold == Hold::Roller {
+            holds.fix.push(on(body, "front", "z = 0"));
+        } else if space {
+            holds.fix.push(on(body, "pin", "z = 0"));
+            holds.fix.push(on(body, "spin", "z = 0"));
+        }
+        if springs == Springs::All && (row > 0 || column > 0) {
+            holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio)));
+        }
+        self.add_loads(&mut holds, draft, body);
+        holds
     }
-    let hanging = rows * columns > 1;
-    // a ring that is pulled outwards holds itself
-    let holds_itself = kind == Kind::Rings && rows == 1;
-    let expect = if holds_itself { Expect::Solution } else { expect(&draft, hold, springs, weight) };
-    // a weight holds nothing sideways
-    let expect = if columns > 1 && draft.load == 0.0 && springs != Springs::All { Expect::Gauge } else { expect };
-    Made { draft, expect, hanging }
+
+    /// Whether the blocks of a row may slide.
+    fn slides(&self, row: usize) -> bool {
+        row + 1 == self.rows && matches!(self.hold, Hold::Loose | Hold::Sliding)
+    }
+
+    fn add_loads(&self, holds: &mut Holds, draft: &Draft, body: usize) {
+        let &Self { hold, rows, columns, width, lean, .. } = self;
+        let (row, column) = (body / columns, body % columns);
+        let load = if hold == Hold::Pulled { -draft.load } else { draft.load };
+        if row + 1 == rows && (rows > 1 || columns == 1) {
+            let pressure = format!("{load:e} * (1 + {lean}*(2*x/{} - 1))", width * columns as f64);
+            holds.load.push(on(body, "top", &format!("pressure = \"{pressure}\"")));
+        }
+        if column + 1 == columns && columns > 1 {
+            holds.load.push(on(body, "right", &format!("pressure = {load:e}")));
+        } else if self.slides(row) && hold == Hold::Sliding {
+            holds.load.push(on(body, "right", &format!("pressure = {:e}", 0.01 * draft.load)));
+        }
+    }
+
+    /// Contacts of a block with the one above and the one beside.
+    fn contacts(&self, draft: &mut Draft, body: usize) {
+        let &Self { rows, columns, width, height, .. } = self;
+        let (row, column, level) = (body / columns, body % columns, draft.level);
+        let name = |body: usize, place: &str| format!("b{}_{place}", body + 1);
+        if row + 1 < rows {
+            let above = body + columns;
+            let s = format!("(x/{width} - {column})");
+            let names = [name(body, "top"), name(above, "bottom")];
+            draft.contact(names, [body, above], (height, level), Some(&s), 0.0);
+        }
+        if column + 1 < columns {
+            let s = format!("(y/{height} - {row})");
+            let names = [name(body, "right"), name(body + 1, "left")];
+            draft.contact(names, [body, body + 1], (width, level), Some(&s), 0.0);
+        }
+    }
+
+    fn expect(&self, draft: &Draft) -> Expect {
+        let &Self { kind, hold, rows, columns, springs, weight, .. } = self;
+        match kind {
+            // a weight holds nothing sideways
+            _ if columns > 1 && draft.load == 0.0 && springs != Springs::All => Expect::Gauge,
+            // a ring that is pulled outwards holds itself
+            Kind::Rings if rows == 1 => Expect::Solution,
+            _ => expect(draft, hold, springs, weight),
+        }
+    }
 }
 
 fn round(mut random: Random, kind: Kind, scripts: &Path) -> Made {

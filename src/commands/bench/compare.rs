@@ -1,7 +1,7 @@
 //! The error of a contact pressure, against a table or against the closed form of the scene.
 
 use super::plan::{Plan, usage};
-use crate::commands::transfer::{Planes, mean};
+use crate::commands::interpolate::{EXACT, Scattered, Squares, mean};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::scene::Scene;
@@ -109,20 +109,18 @@ pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points])
     if run.len() != reference.len() {
         return None;
     }
-    let mut squares = Squares::default();
-    for own in run {
+    let known = |own: &Points| -> Option<Vec<f64>> {
         // tables of the same pair, or the only two
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
-        let known: Vec<f64> = match dimension {
+        Some(match dimension {
             2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
             _ => {
-                let planes = Planes::exact(&other.at);
-                own.at.iter().map(|x| mean(&planes.weights(x), &other.pressure)).collect()
+                let scattered = Scattered::new(&other.at);
+                own.at.iter().map(|x| mean(&scattered.plane(x, EXACT), &other.pressure)).collect()
             }
-        };
-        squares.add(own, &known);
-    }
-    squares.relative()
+        })
+    };
+    relative(run, &run.iter().map(known).collect::<Option<Vec<_>>>()?)
 }
 
 /// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without one, or with several pairs.
@@ -131,31 +129,16 @@ pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
     let ([contact], [own]) = (&scene.contacts[..], run) else { return None };
     let field = contact.reference.as_ref()?;
     let known: Vec<f64> = own.at.iter().map(|&x| field.eval(x)).collect();
+    relative(run, &[known])
+}
+
+/// Return the relative error of a run against the known pressures at its points, n for each pair; `None` if it is not finite.
+fn relative(run: &[Points], known: &[Vec<f64>]) -> Option<f64> {
     let mut squares = Squares::default();
-    squares.add(own, &known);
-    squares.relative()
-}
-
-/// Squares of pressures, integrated over contact surfaces.
-#[derive(Default)]
-struct Squares {
-    error: f64,
-    reference: f64,
-}
-
-impl Squares {
-    /// Add the pressures of a run at points with known pressures (n).
-    fn add(&mut self, run: &Points, known: &[f64]) {
-        for q in 0..known.len() {
-            self.error += run.weight[q] * (run.pressure[q] - known[q]).powi(2);
-            self.reference += run.weight[q] * known[q].powi(2);
-        }
+    for (run, known) in run.iter().zip(known) {
+        (0..known.len()).for_each(|q| squares.add(run.weight[q], known[q], run.pressure[q]));
     }
-
-    /// Return the relative error; `None` if it is not finite.
-    fn relative(&self) -> Option<f64> {
-        Some((self.error / self.reference).sqrt()).filter(|relative| relative.is_finite())
-    }
+    Some((squares.difference / squares.old).sqrt()).filter(|relative| relative.is_finite())
 }
 
 /// Return the pressure at the point of a curve that is nearest to `x`, linear between the points of the table.

@@ -17,9 +17,9 @@ use crate::petsc::Session;
 use crate::scene::Scene;
 use compare::References;
 use plan::{Case, Plan, usage};
-use process::Runner;
+use process::{Run, Runner};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use table::{Row, SKIPPED, Table};
 
@@ -103,7 +103,10 @@ fn measure(
 ) -> Result<Row> {
     let scene = match scene {
         Ok(scene) => scene,
-        Err(error) => return Ok(Row::refused(case, &error)),
+        Err(error) => {
+            let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
+            return Ok(Row::unsolved(case, "refused", &format!("error: {}{help}", error.message())));
+        }
     };
     // the mesh is made before times are measured
     if meshed.insert(case.mesh_overrides.clone()) {
@@ -113,7 +116,7 @@ fn measure(
     let mut row = Row::new(case, &runs);
     if row.is_good()
         && !case.is_linear()
-        && let Some((error, what)) = known_error(&scene, &row, reference, runner, case)
+        && let Some((error, what)) = known_error(&scene, &runs, reference, &runner.folder(case))
     {
         row.set_error(error, what);
     }
@@ -122,18 +125,12 @@ fn measure(
 
 /// Return the error of a run against a known solution, and what it is measured in and against. The solution is that of `--against`, or a closed
 /// form of the scene.
-fn known_error(
-    scene: &Scene,
-    row: &Row,
-    reference: &References,
-    runner: &Runner,
-    case: &Case,
-) -> Option<(f64, &'static str)> {
-    let tables = compare::tables(&runner.folder(case)).ok()?;
+fn known_error(scene: &Scene, runs: &[Run], reference: &References, folder: &Path) -> Option<(f64, &'static str)> {
+    let tables = compare::tables(folder).ok()?;
     if let Some(error) = reference.error(scene, &tables) {
         return Some((error, "pressure, --against"));
     }
-    if let Some(error) = row.displacement_error {
+    if let Some(error) = runs.first().and_then(|run| run.largest("error_l2")) {
         return Some((error, "displacement, exact"));
     }
     Some((compare::closed_form(scene, &tables)?, "pressure, reference"))

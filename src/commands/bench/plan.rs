@@ -1,7 +1,7 @@
 //! The command line of `winkler bench`, and the plan that it asks for: all combinations of scenes, keys, orders, methods, solvers and ranks.
 
+use crate::commands::axes::{Axis, Choice, combinations, named};
 use crate::commands::case_of;
-use crate::commands::sweep::{Axis, Choice, combinations, named};
 use crate::error::{Error, Kind, Result};
 use crate::problem::{Order, Preset};
 use crate::scene::Scene;
@@ -13,7 +13,8 @@ pub(super) struct Plan {
     pub scenes: Vec<Scene>,
     /// Their names in the table.
     pub names: Vec<String>,
-    pub keys: Vec<String>,
+    /// Names of the columns of a key: the scene, the keys of `--over`, and [`COLUMNS`].
+    pub columns: Vec<String>,
     /// The combinations, ordered by scene, values of the keys, order, method, solver and ranks; the last changes first.
     pub cases: Vec<Case>,
 }
@@ -22,7 +23,7 @@ pub(super) struct Plan {
 #[derive(Debug, Clone)]
 pub(super) struct Case {
     pub scene: PathBuf,
-    /// Values of the columns that distinguish it from other cases: see [`Plan::columns`].
+    /// Values of the columns that distinguish it from other cases: those of [`Plan::columns`].
     pub key: Vec<String>,
     /// A text that distinguishes it from the other cases of the plan.
     pub label: String,
@@ -30,6 +31,8 @@ pub(super) struct Case {
     /// Those overrides that the mesh depends on.
     pub mesh_overrides: Vec<String>,
     pub petsc: Vec<String>,
+    /// The method that was asked for.
+    pub method: String,
     pub ranks: usize,
 }
 
@@ -71,11 +74,12 @@ impl Plan {
         let overrides = request.all_overrides();
         let scenes =
             request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
-        let keys = over.iter().map(|axis| axis.name.clone()).collect();
-        let mut axes = over;
-        let mut plan = Plan { names: names(&scenes), scenes, keys, cases: Vec::new() };
+        let keys = over.iter().map(|axis| axis.name.as_str());
+        let columns = std::iter::once("scene").chain(keys).chain(COLUMNS).map(str::to_owned).collect();
+        let mut plan = Plan { names: names(&scenes), scenes, columns, cases: Vec::new() };
+        let (mut axes, keys) = (over, plan.keys().len());
         for index in 0..plan.scenes.len() {
-            axes.truncate(plan.keys.len());
+            axes.truncate(keys);
             axes.extend(plan.own_axes(index, request, &solvers));
             let cases = combinations(&axes).into_iter().filter_map(|choices| plan.case(index, request, &choices));
             let cases: Vec<Case> = cases.collect();
@@ -127,6 +131,7 @@ impl Plan {
             mesh_overrides,
             // what is typed for all runs wins over the precision of a reference cost, and a solver over both
             petsc: [&method.petsc[..], &request.petsc, &solver.petsc].concat(),
+            method: method.text.clone(),
             ranks: ranks.text.parse().ok()?,
         })
     }
@@ -136,23 +141,36 @@ impl Plan {
         self.names.iter().position(|known| known == name).map(|index| &self.scenes[index])
     }
 
-    /// Return the names of the columns of a key.
-    pub fn columns(&self) -> Vec<String> {
-        let keys = self.keys.iter().map(String::as_str);
-        std::iter::once("scene").chain(keys).chain(COLUMNS).map(str::to_owned).collect()
+    /// Return the keys of `--over`.
+    pub fn keys(&self) -> &[String] {
+        &self.columns[1..self.columns.len() - COLUMNS.len()]
+    }
+
+    /// Return the place of a column in a key.
+    pub fn column(&self, name: &str) -> usize {
+        self.columns.iter().position(|column| column == name).unwrap_or(0)
+    }
+
+    /// Return the columns of a key that differ between some keys.
+    pub fn varied<'a>(&self, keys: impl Iterator<Item = &'a Vec<String>> + Clone) -> Vec<usize> {
+        let differs = |&column: &usize| {
+            let mut values = keys.clone().map(|key| &key[column]);
+            let first = values.next();
+            values.any(|value| Some(value) != first)
+        };
+        (0..self.columns.len()).filter(differs).collect()
     }
 
     /// Give every case its label: the values of its key that differ within the plan, or else the solver.
     fn label_cases(&mut self) {
-        let columns = self.columns();
-        let differs = |column: &usize| self.cases.iter().any(|case| case.key[*column] != self.cases[0].key[*column]);
-        let mut shown: Vec<usize> = (0..columns.len()).filter(differs).collect();
+        let mut shown = self.varied(self.cases.iter().map(|case| &case.key));
         if shown.is_empty() {
-            shown.push(columns.len() - COLUMNS.len());
+            shown.push(self.column("solver"));
         }
+        let columns = &self.columns;
         for case in &mut self.cases {
             let parts: Vec<String> =
-                shown.iter().map(|&column| part(&columns[column], &case.key[column], &columns)).collect();
+                shown.iter().map(|&column| part(&columns[column], &case.key[column], columns)).collect();
             case.label = parts.join(", ");
         }
     }
@@ -167,14 +185,9 @@ fn choices<T>(requested: &[T], choice: impl Fn(&T) -> Choice, own: impl Fn() -> 
 }
 
 impl Case {
-    /// Return the method that was asked for.
-    pub fn requested_method(&self) -> &str {
-        &self.key[self.key.len() - 3]
-    }
-
     /// Return whether it is one linear factor-and-solve.
     pub fn is_linear(&self) -> bool {
-        self.requested_method() == LINEAR
+        self.method == LINEAR
     }
 }
 

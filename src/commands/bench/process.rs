@@ -39,6 +39,16 @@ impl Run {
     pub fn number(&self, path: &str) -> Option<f64> {
         self.report.pointer(path).and_then(Value::as_f64)
     }
+
+    /// Return the largest number of this name of the bodies of the report that have it.
+    pub fn largest(&self, key: &str) -> Option<f64> {
+        items(&self.report["bodies"]).iter().filter_map(|body| body[key].as_f64()).reduce(f64::max)
+    }
+}
+
+/// Return the items of a list of a report; none if it is no list.
+pub(super) fn items(list: &Value) -> &[Value] {
+    list.as_array().map_or(&[], Vec::as_slice)
 }
 
 /// The program that starts runs, and their limits.

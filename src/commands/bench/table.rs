@@ -3,8 +3,8 @@
 
 use super::compare::{self, References};
 use super::plan::{ASKED, Case, LINEAR, Plan, Request, is_of_mesh, part};
-use super::process::{RUNS, Run, folder_of};
-use crate::error::{Error, Result};
+use super::process::{RUNS, Run, folder_of, items};
+use crate::error::Result;
 use crate::linalg::fit;
 use crate::output::{Axis, Color, Folder, Plot, RowFile, Series, Style, sci, seconds};
 use comfy_table::{CellAlignment, presets};
@@ -30,7 +30,7 @@ const SETTINGS: &str = "bench.txt";
 impl<'a> Table<'a> {
     /// Open the file of a plan. With `--resume` its rows are read first, if they were made with the same settings.
     pub fn open(folder: &'a Folder, plan: &'a Plan, request: &Request, reference: &References) -> Result<Self> {
-        let columns: Vec<String> = plan.columns().into_iter().chain(Row::columns().map(str::to_owned)).collect();
+        let columns: Vec<String> = plan.columns.iter().cloned().chain(Row::columns().map(str::to_owned)).collect();
         let settings = settings(request, reference);
         let path = folder.path().join(SETTINGS);
         let is_known = request.resume && crate::file::read(&path).is_ok_and(|old| old == settings.as_bytes());
@@ -50,8 +50,8 @@ impl<'a> Table<'a> {
 
     /// Return whether a case differs only by its mesh from a row that did not end in time. Lists of meshes go from coarse to fine.
     pub fn is_beyond(&self, case: &Case) -> bool {
-        let columns = self.plan.columns();
-        let is_like = |row: &Row| (0..row.key.len()).all(|k| is_of_mesh(&columns[k]) || row.key[k] == case.key[k]);
+        let columns = &self.plan.columns;
+        let is_like = |row: &Row| (0..columns.len()).all(|k| is_of_mesh(&columns[k]) || row.key[k] == case.key[k]);
         self.rows.iter().any(|row| row.text("status") == "timeout" && is_like(row))
     }
 
@@ -77,12 +77,13 @@ impl<'a> Table<'a> {
     /// Rows of the finest mesh have no error. Of several rows with as many dofs and the same order, the one with the smallest residual is the
     /// reference.
     fn compare_with_finest(&mut self) {
+        let (columns, order) = (&self.plan.columns, self.plan.column("order"));
         // the first columns of the table are the scene and the keys
-        let first = &self.plan.columns()[..=self.plan.keys.len()];
-        let is_alike = |a: &Row, b: &Row| (0..first.len()).all(|k| is_of_mesh(&first[k]) || a.key[k] == b.key[k]);
+        let is_alike =
+            |a: &Row, b: &Row| (0..=self.plan.keys().len()).all(|k| is_of_mesh(&columns[k]) || a.key[k] == b.key[k]);
         let is_comparable = |row: &Row| row.is_good() && !row.is_linear();
         // dofs, and the order of the elements
-        let fineness = |row: &Row| (row.number("dofs").unwrap_or(0.0), row.key[row.key.len() - 2].clone());
+        let fineness = |row: &Row| (row.number("dofs").unwrap_or(0.0), row.key[order].clone());
         let residual = |row: &Row| row.number("residual").unwrap_or(f64::INFINITY);
         let mut found = Vec::new();
         for (index, row) in self.rows.iter().enumerate() {
@@ -114,8 +115,8 @@ impl<'a> Table<'a> {
     ///
     /// Their reference cost is that of the fastest solver with a row of the method `linear`.
     fn compare_with_linear(&mut self) {
-        let solver = 1 + self.plan.keys.len();
-        let same = |a: &Row, b: &Row| (0..a.key.len()).all(|k| k == solver || k == solver + 1 || a.key[k] == b.key[k]);
+        let others = ["solver", ASKED].map(|name| self.plan.column(name));
+        let same = |a: &Row, b: &Row| (0..a.key.len()).all(|k| others.contains(&k) || a.key[k] == b.key[k]);
         let linear: Vec<Row> = self.rows.iter().filter(|row| row.is_linear()).cloned().collect();
         for row in self.rows.iter_mut().filter(|row| row.is_good() && !row.is_linear()) {
             let alike = linear.iter().filter(|other| same(row, other));
@@ -186,8 +187,8 @@ const NUMBERS: [(&str, Number); 25] = [
     ("linear_seconds", |runs| runs.linear_seconds()),
     ("linear_solves", |_| None),
     ("error", |_| None),
-    ("error_h1", |runs| runs.largest("error_h1")),
-    ("error_energy", |runs| runs.largest("error_energy")),
+    ("error_h1", |runs| runs.shown.largest("error_h1")),
+    ("error_energy", |runs| runs.shown.largest("error_energy")),
 ];
 
 /// Columns after the numbers.
@@ -203,8 +204,6 @@ pub(super) struct Row {
     pub key: Vec<String>,
     /// The texts of the other columns, as they are in the file; those that are empty may be missing.
     values: BTreeMap<&'static str, String>,
-    /// Relative error of the displacements from the report, where the scene has their closed form.
-    pub displacement_error: Option<f64>,
 }
 
 impl Row {
@@ -235,21 +234,14 @@ impl Row {
         for (name, number) in NUMBERS {
             number(&runs).filter(|value| value.is_finite()).iter().for_each(|value| row.set(name, value));
         }
-        row.displacement_error = runs.largest("error_l2");
         row
-    }
-
-    /// Return the row of a case whose scene is refused.
-    pub fn refused(case: &Case, error: &Error) -> Self {
-        let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
-        Self::unsolved(case, "refused", &format!("error: {}{help}", error.message()))
     }
 
     /// Return the row of a case without results.
     pub fn unsolved(case: &Case, status: &str, message: &str) -> Self {
-        let texts = [("runs", "0"), ("status", status), ("message", message), ("method", case.requested_method())];
+        let texts = [("runs", "0"), ("status", status), ("message", message), ("method", case.method.as_str())];
         let values = texts.map(|(name, text)| (name, text.to_owned())).into();
-        Self { key: case.key.clone(), values, displacement_error: None }
+        Self { key: case.key.clone(), values }
     }
 
     /// Return whether the run ended as it should.
@@ -309,7 +301,7 @@ impl Row {
     fn parse(record: &csv::StringRecord) -> Self {
         let mut key: Vec<String> = record.iter().map(str::to_owned).collect();
         let values = key.split_off(record.len() - Self::columns().count());
-        Self { key, values: Self::columns().zip(values).collect(), displacement_error: None }
+        Self { key, values: Self::columns().zip(values).collect() }
     }
 }
 
@@ -347,11 +339,6 @@ impl Runs<'_> {
         (!pairs.is_empty()).then(|| pairs.iter())
     }
 
-    /// Return the largest number of this name of the bodies that have it.
-    fn largest(&self, key: &str) -> Option<f64> {
-        items(&self.shown.report["bodies"]).iter().filter_map(|body| body[key].as_f64()).reduce(f64::max)
-    }
-
     /// Return the seconds of one linear factor-and-solve of all bodies, from a run with one update.
     ///
     /// The start of the run solves with very stiff springs, which takes an iterative solver longer. The sweep therefore has the share of the
@@ -375,11 +362,6 @@ fn of(pair: &Value, key: &str) -> f64 {
 /// Return the coupling theta of a pair, the geometric mean of those of its sides.
 fn coupling(pair: &Value) -> f64 {
     items(&pair["theta"]).iter().filter_map(Value::as_f64).product::<f64>().sqrt()
-}
-
-/// Return the items of a list of a report; none if it is no list.
-fn items(list: &Value) -> &[Value] {
-    list.as_array().map_or(&[], Vec::as_slice)
 }
 
 /// Return the median of some numbers, which is the mean of the two middle ones if their count is even.
@@ -410,10 +392,9 @@ const SHOWN: [(&str, &str, Format); 8] = [
 
 /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
 pub(super) fn summary(rows: &[Row], plan: &Plan) -> comfy_table::Table {
-    let columns = plan.columns();
-    let differs =
-        |column: &usize| columns[*column] != ASKED && rows.iter().any(|row| row.key[*column] != rows[0].key[*column]);
-    let named: Vec<usize> = (0..columns.len()).filter(differs).collect();
+    let columns = &plan.columns;
+    let mut named = plan.varied(rows.iter().map(|row| &row.key));
+    named.retain(|&column| columns[column] != ASKED);
     let known = |name: &str| rows.iter().any(|row| row.number(name).is_some());
     let numbers: Vec<_> = SHOWN.iter().filter(|(_, name, _)| known(name)).collect();
     let mut table = comfy_table::Table::new();
@@ -486,7 +467,7 @@ impl Chart<'_> {
 
     /// Return the plot of sweeps against 1/(1 - theta), with the coupling theta of the bodies; none if theta was not varied.
     fn iterations_theta(&self) -> Option<Plot> {
-        let is_over = |column: &str| !is_of_mesh(column) && self.plan.keys.iter().any(|key| key == column);
+        let is_over = |column: &str| !is_of_mesh(column) && self.plan.keys().iter().any(|key| key == column);
         let point = |row: &Row| Some((1.0 / (1.0 - row.number("theta")?), row.number("sweeps")?));
         let series = self.series(is_over, point, |_| String::new());
         let varied = |series: &Series| series.points.windows(2).any(|pair| pair[1].0 > pair[0].0);
@@ -504,19 +485,21 @@ impl Chart<'_> {
         point: impl Fn(&Row) -> Option<(f64, f64)>,
         suffix: impl Fn(&[(f64, f64)]) -> String,
     ) -> Vec<Series> {
-        let columns = self.plan.columns();
+        let (columns, solver, asked) = (&self.plan.columns, self.plan.column("solver"), self.plan.column(ASKED));
         // the method of a curve is the one that ran
-        let value = |row: &Row, column: usize| -> String {
-            if columns[column] == ASKED { row.text("method").to_owned() } else { row.key[column].clone() }
+        let key = |row: &&Row| {
+            let mut key = row.key.clone();
+            key[asked] = row.text("method").to_owned();
+            key
         };
-        let differs = |&column: &usize| self.rows.iter().any(|row| value(row, column) != value(self.rows[0], column));
-        let named: Vec<usize> = (1..columns.len()).filter(|&column| !along(&columns[column])).filter(differs).collect();
-        let solver = columns.len() - 4;
+        let keys: Vec<Vec<String>> = self.rows.iter().map(key).collect();
+        let mut named = self.plan.varied(keys.iter());
+        named.retain(|&column| columns[column] != "scene" && !along(&columns[column]));
         let mut all: Vec<Series> = Vec::new();
-        for row in self.rows {
+        for (row, key) in self.rows.iter().zip(&keys) {
             let Some(point) = point(row) else { continue };
-            let parts: Vec<String> = named.iter().map(|&k| part(&columns[k], &value(row, k), &columns)).collect();
-            let label = if parts.is_empty() { row.key[solver].clone() } else { parts.join(", ") };
+            let parts: Vec<String> = named.iter().map(|&k| part(&columns[k], &key[k], columns)).collect();
+            let label = if parts.is_empty() { key[solver].clone() } else { parts.join(", ") };
             match all.iter_mut().find(|series| series.label == label) {
                 Some(series) => series.points.push(point),
                 None => all.push(Series::new(label, vec![point], Style::LineMarkers)),
