@@ -96,10 +96,11 @@ impl<'a> Table<'a> {
                 x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)).then(residual(b).total_cmp(&residual(a)))
             });
             let Some(finest) = finest.filter(|finest| fineness(finest) != fineness(row)) else { continue };
-            found.extend(self.difference(row, finest).map(|error| (index, error)));
+            let of_finest = format!("pressure, mesh of {} dofs", finest.text("dofs"));
+            found.extend(self.difference(row, finest).map(|error| (index, error, of_finest)));
         }
-        for (index, error) in found {
-            self.rows[index].set_error(error, "pressure, finest mesh");
+        for (index, error, of_finest) in found {
+            self.rows[index].set_error(error, &of_finest);
         }
     }
 
@@ -283,8 +284,8 @@ impl Row {
         if let Some(time) = self.number("seconds") {
             line += &format!(", {} s", seconds(time));
         }
-        if let (Some(dofs), Some(sweeps)) = (self.number("dofs"), self.number("sweeps")) {
-            line += &format!(", {dofs} dofs, {sweeps} sweeps");
+        if let (Some(dofs), Some(iterations)) = (self.number("dofs"), self.number("iterations")) {
+            line += &format!(", {dofs} dofs, {iterations} iterations");
         }
         if let Some(error) = self.number("error") {
             line += &format!(", error {}", sci(error, 2));
@@ -379,10 +380,11 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 type Format = fn(f64) -> String;
 
 /// Columns with a number: heading, name in the rows, format.
-const SHOWN: [(&str, &str, Format); 8] = [
+const SHOWN: [(&str, &str, Format); 9] = [
     ("dofs", "dofs", |value| format!("{value:.0}")),
     ("iterations", "iterations", |value| format!("{value:.0}")),
     ("sweeps", "sweeps", |value| format!("{value:.0}")),
+    ("inner iterations", "inner_iterations", |value| format!("{value:.0}")),
     ("s", "seconds", seconds),
     ("CPU s", "cpu_seconds", seconds),
     ("MB", "memory_mb", |value| format!("{value:.0}")),
@@ -453,7 +455,10 @@ impl Chart<'_> {
         let all: Vec<(f64, f64)> = series.iter().flat_map(|series| series.points.iter().copied()).collect();
         let front = Series::new("Pareto front", pareto(all), Style::Dashed).color(Color::Grey);
         series.push(front);
-        let of = self.rows.iter().map(|row| row.text("error_of")).find(|of| !of.is_empty())?;
+        let mut of = self.rows.iter().map(|row| row.text("error_of")).filter(|of| !of.is_empty());
+        let first = of.next()?;
+        // keys other than those of the mesh may give several references
+        let of = if of.all(|other| other == first) { first } else { "pressure, finest mesh" };
         self.plot(&format!("relative error ({of})"), "wall time, s", series)
     }
 
