@@ -377,14 +377,14 @@ impl Scale {
         if log { Self::logarithmic(bounds) } else { Self::linear(bounds.unwrap_or((0.0, 1.0))) }
     }
 
-    /// Return a logarithmic scale, which begins at a power of ten.
+    /// Return a logarithmic scale. It begins and ends at a power of ten, or at a multiple of one if it has fewer than three of them, since
+    /// other numbers have labels then, too.
     fn logarithmic(bounds: Option<(f64, f64)>) -> Self {
-        let (low, high) = bounds.map_or((0.0, 1.0), |(low, high)| (low.log10().floor(), high.log10()));
-        let power = high.floor();
-        let high = match high - low {
-            // fewer than three powers of ten: other numbers have labels, too
-            decades if decades < 2.0 => power + (10f64.powf(high - power).floor() + 1.0).log10(),
-            _ => high.ceil(),
+        let (low, high) = bounds.map_or((0.0, 1.0), |(low, high)| (low.log10(), high.log10()));
+        let digit = |log: f64| 10f64.powf(log - log.floor()).floor();
+        let (low, high) = match high - low.floor() {
+            decades if decades < 2.0 => (low.floor() + digit(low).log10(), high.floor() + (digit(high) + 1.0).log10()),
+            _ => (low.floor(), high.ceil()),
         };
         // the margin keeps the ticks at both ends in spite of rounding
         Self::Log((10f64.powf(low) * (1.0 - 1e-9)..10f64.powf(high) * (1.0 + 1e-9)).log_scale().into())
@@ -415,7 +415,7 @@ impl Scale {
     /// Return the number of labels to ask plotters for. Whole numbers have no ticks between them.
     pub fn labels(&self, values: &[f64]) -> usize {
         match self {
-            Self::Log(axis) if axis.range().end < 99.0 * axis.range().start => DIVIDED,
+            Self::Log(axis) if is_divided(axis) => DIVIDED,
             Self::Log(_) => TICKS,
             Self::Linear(axis, 0) if values.iter().all(|value| value.fract() == 0.0) => {
                 let range = axis.range();
@@ -434,6 +434,18 @@ impl Scale {
     }
 }
 
+/// Whether a logarithmic axis has fewer than three powers of ten.
+fn is_divided(axis: &LogCoord<f64>) -> bool {
+    axis.range().end < 99.0 * axis.range().start
+}
+
+/// Return the multiples of powers of ten in a range. plotters finds them only if the range begins at a power of ten.
+fn multiples(range: &Range<f64>) -> Vec<f64> {
+    let [first, last] = [range.start, range.end].map(|end| end.log10().floor() as i32);
+    let all = (first..=last).flat_map(|power| (1..10).map(move |digit| f64::from(digit) * 10f64.powi(power)));
+    all.filter(|value| range.contains(value)).collect()
+}
+
 impl Ranged for Scale {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
@@ -448,6 +460,7 @@ impl Ranged for Scale {
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
         match self {
             Self::Linear(axis, power) => axis.key_points(hint).iter().map(|key| key * 10f64.powi(*power)).collect(),
+            Self::Log(axis) if is_divided(axis) => multiples(&axis.range()),
             Self::Log(axis) => {
                 // plotters returns both the last number of a decade and the first of the next one
                 let mut keys = axis.key_points(hint);
@@ -478,12 +491,13 @@ impl ValueFormatter<f64> for Scale {
                 let text = format!("{:.digits$}", value / 10f64.powi(*power));
                 if trimmed(&text) == "-0" { "0".to_owned() } else { trimmed(&text).replace('-', "−") }
             }
-            Self::Log(_) => {
+            Self::Log(axis) => {
                 let power = (value.log10() + 1e-6).floor();
                 let exponent = superscript(power as i32);
+                let is_short = axis.range().end < 10.0 * axis.range().start;
                 match (value / 10f64.powf(power)).round() as i32 {
                     1 => format!("10{exponent}"),
-                    digit @ (2 | 5) => format!("{digit}·10{exponent}"),
+                    digit if is_short || matches!(digit, 2 | 5) => format!("{digit}·10{exponent}"),
                     _ => String::new(),
                 }
             }
@@ -549,7 +563,9 @@ mod tests {
             (&[0.0, 4e-6], false, "(×10⁻⁶) 0 1 2 3 4"),
             (&[1.0, 2e-3, f64::NAN, 0.0, -1.0], true, "10⁻³ 10⁻² 10⁻¹ 10⁰"),
             (&[1.0, 1e-16], true, "10⁻¹⁴ 10⁻¹² 10⁻¹⁰ 10⁻⁸ 10⁻⁶ 10⁻⁴ 10⁻² 10⁰"),
-            (&[3.0, 15.0], true, "10⁰ 2·10⁰ 5·10⁰ 10¹ 2·10¹"),
+            (&[3.0, 15.0], true, "3·10⁰ 4·10⁰ 5·10⁰ 6·10⁰ 7·10⁰ 8·10⁰ 9·10⁰ 10¹ 2·10¹"),
+            (&[3006.0, 5688.0], true, "3·10³ 4·10³ 5·10³ 6·10³"),
+            (&[3.0, 45.0], true, "5·10⁰ 10¹ 2·10¹ 5·10¹"),
         ] {
             assert_eq!(labels(values, log), format!("{expected} −1 0 1"));
         }
@@ -610,7 +626,9 @@ mod tests {
                 let range = scale.range();
                 assert!(values.iter().all(|value| range.contains(value)), "{a} {b} {log} {range:?}");
                 let ticks = scale.key_points(TICKS).into_iter().filter(|tick| range.contains(tick)).count();
-                assert!((1..=TICKS + 1).contains(&ticks), "{a} {b} {log} {ticks}");
+                // a divided axis has all digits of two decades
+                let most = if log { 18 } else { TICKS };
+                assert!((1..=most + 1).contains(&ticks), "{a} {b} {log} {ticks}");
             }
         }
     }
