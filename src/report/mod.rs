@@ -302,7 +302,8 @@ impl Results {
 
 const WHAT: [&str; 6] = ["stress", "displacement", "pressure", "convergence", "area", "force"];
 
-/// Draw one of the pictures [`WHAT`] from a folder of results, and return the paths of the files.
+/// Draw one of the pictures `stress`, `displacement`, `pressure`, `convergence`, `area` and `force` from a folder of results, and return the
+/// paths of the files.
 ///
 /// The file is `out`, or an SVG file of the picture's name in the folder. Each pair has a picture of its own, numbered from the
 /// second one on.

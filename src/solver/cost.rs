@@ -93,7 +93,7 @@ pub struct Cost {
 const BRIEF: f64 = 0.5;
 
 impl Cost {
-    /// Return the cost as text. The estimate of a time below [`BRIEF`] is not worth a number.
+    /// Return the cost as text. A time below `BRIEF` is not worth a number.
     pub fn words(&self) -> String {
         let megabytes = self.bytes / 1e6;
         let digits = |value: f64| if value < 10.0 { format!("{value:.1}") } else { format!("{value:.0}") };
