@@ -43,7 +43,7 @@ pub struct Estimate {
     pub guesses: Vec<Option<Guess>>,
     /// Relative change of the pressures of each pair if the other side gave the normals.
     pub sides: Vec<f64>,
-    /// Relative error of the normal displacements of all contact surfaces, measured likewise.
+    /// Relative error of the normal displacements of all contact surfaces, prescribed ones included, measured likewise.
     pub displacement: f64,
 }
 
@@ -58,7 +58,8 @@ impl Estimate {
 /// wrong by half of the square of this. Pressures changed by at most 0.3 % from those with a tolerance of 0.01.
 const TOLERANCE: f64 = 0.1;
 
-/// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies. Collective.
+/// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies, and `share` is the factor of prescribed
+/// displacements to which the iterate belongs. Collective.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -68,6 +69,7 @@ pub fn estimate(
     step: &mut dyn LinearStep,
     iterate: &Field,
     layer: &Layer,
+    share: f64,
 ) -> Result<Estimate> {
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
@@ -93,7 +95,7 @@ pub fn estimate(
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
     let pressures = PressureErrors::new(meshes, model, layer, &closing);
-    let mut trace = iterate.trace.clone();
+    let mut trace = normal_displacements(model, iterate, share);
     held.add_trace(model, -1.0, &mut trace);
     let square = |values: &[f64]| -> f64 {
         values.iter().zip(model.weight.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
@@ -111,6 +113,18 @@ pub fn estimate(
         layers,
         sides,
     })
+}
+
+/// Return the outer normal displacements of all contact points, those of sides a before those of sides b. These are the displacements of the
+/// contact tables, prescribed ones included.
+fn normal_displacements(model: &Model, iterate: &Field, share: f64) -> Vec<f64> {
+    let mut trace = iterate.trace.clone();
+    for (side, trace) in trace.chunks_exact_mut(model.points().max(1)).enumerate() {
+        for (index, pair) in model.pairs.iter().enumerate() {
+            axpy(share, &pair.prescribed[side], &mut trace[model.range(index)]);
+        }
+    }
+    trace
 }
 
 /// Return the displacements of all nodes of each body, on the rank that owns it. Collective.
@@ -317,7 +331,7 @@ pub struct Nodal(pub Rc<dyn Meshes>);
 
 impl Discretisation for Nodal {
     fn error(&mut self, model: &mut Model, step: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64> {
-        let estimate = estimate(&*self.0, model, step, iterate, layer)?;
+        let estimate = estimate(&*self.0, model, step, iterate, layer, 1.0)?;
         Ok(estimate.nodal.min(estimate.energy))
     }
 }

@@ -267,7 +267,8 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     let good = status.is_solved() || *status == Status::IterationLimit;
     let discrete = &mut done.built.discrete;
     let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
-    let estimate = estimate::estimate(&*meshes, &mut discrete.model, done.method.linear(), iterate, layer)?;
+    let model = &mut discrete.model;
+    let estimate = estimate::estimate(&*meshes, model, done.method.linear(), iterate, layer, done.share)?;
     if let Some((body, place)) = estimate::lost_at(&*meshes, &discrete.model, &estimate) {
         let (name, place) = (&discrete.bodies[body].name, point(place));
         done.warnings.push(format!(

@@ -373,6 +373,25 @@ fn pressures_of_quadratic_tetrahedra() {
     }
 }
 
+/// The error of displacements is relative to those of the contact tables, prescribed ones included: it does not matter for the error itself which of two
+/// bodies is moved towards the other.
+#[test]
+fn errors_of_displacements_are_relative_to_the_tables() {
+    let absolute = |lower: &str, upper: &str| {
+        let sets = [format!("body.0.fix.2.z={lower}"), format!("body.1.fix.2.z={upper}")];
+        let coarse =
+            ["estimate=true", "mesh.set.n=4", "body.0.order=1", "body.1.order=1", "contact.0.gap=1e-4*(x^2+y^2)"];
+        let sets = sets.iter().map(String::as_str).chain(coarse).map(str::to_owned);
+        let run = solve_with(case("rough"), &sets.collect::<Vec<_>>()).converged();
+        let table = run.contact();
+        let square = |q: usize| table["weight"][q] * (table["u_n_lower"][q].powi(2) + table["u_n_upper"][q].powi(2));
+        let size = (0..table.rows()).map(square).sum::<f64>().sqrt();
+        run.number("discretization_error/displacement") * size
+    };
+    let (upper_moves, lower_moves) = (absolute("0", "-1e-3"), absolute("2e-3", "1e-3"));
+    assert!((upper_moves / lower_moves - 1.0).abs() < 1e-6, "{upper_moves} {lower_moves}");
+}
+
 /// Two plates with holes and round edges: the error that was asked for is reached on meshes none of whose cells is folded. The scene's own stop rule is respected.
 /// An error of 2e-2, which docs/theory.md has, takes five meshes and most of a minute; this one takes four.
 #[test]
