@@ -95,8 +95,10 @@ pub fn estimate(
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
     let pressures = PressureErrors::new(meshes, model, layer, &closing);
-    let mut trace = normal_displacements(model, iterate, share);
+    let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
+    let both = [0, 1].into_iter().flat_map(|side| (0..model.pairs.len()).map(move |pair| (pair, side)));
+    let trace: Vec<f64> = both.flat_map(|(pair, side)| model.displacement(&trace, pair, side, share)).collect();
     let square = |values: &[f64]| -> f64 {
         values.iter().zip(model.weight.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
     };
@@ -113,18 +115,6 @@ pub fn estimate(
         layers,
         sides,
     })
-}
-
-/// Return the outer normal displacements of all contact points, those of sides a before those of sides b. These are the displacements of the
-/// contact tables, prescribed ones included.
-fn normal_displacements(model: &Model, iterate: &Field, share: f64) -> Vec<f64> {
-    let mut trace = iterate.trace.clone();
-    for (side, trace) in trace.chunks_exact_mut(model.points().max(1)).enumerate() {
-        for (index, pair) in model.pairs.iter().enumerate() {
-            axpy(share, &pair.prescribed[side], &mut trace[model.range(index)]);
-        }
-    }
-    trace
 }
 
 /// Return the displacements of all nodes of each body, on the rank that owns it. Collective.

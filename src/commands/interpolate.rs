@@ -11,17 +11,16 @@ pub type Weights = Vec<(usize, f64)>;
 /// Scattered points in a search tree, each with its index.
 pub struct Scattered(RTree<GeomWithData<[f64; 3], usize>>);
 
-/// Points that a linear function is fitted to: twice the four that determine one in space.
+/// Number of points that a linear function is fitted to. Four points determine the function, a constant and three slopes; twice as many leave the
+/// fit determined where half of them lie on a line or have nearly one place.
 const NEAREST: usize = 8;
 
-/// Weight of the slopes with which a plane follows the values as they are. Points of a plane determine no slope across it: this weight alone
-/// makes it zero.
+/// Weight of the slopes for a plane that follows the values. Weights of points are one at least, so that it changes a fitted value by the relative
+/// amount 1e-6^2, which is below the last digit in tables. Points of a plane determine no slope across it, and this weight makes that slope zero.
 pub const EXACT: f64 = 1e-6;
 
-/// Weight of the slopes with which a plane leans towards the values of the nearest points.
-///
-/// Points of a surface hardly differ across it, so that the data determine no slope there. Along the surface the squares of the data's
-/// weights are some hundred times that of the slopes.
+/// Weight of the slopes for a plane that tends to the values of the nearest points. Weights of points are one at least, so that the slopes have a
+/// hundredth of their part in the sum of squares. Rounding of the surface's coordinates then causes no slope across the surface.
 pub const DAMPED: f64 = 0.1;
 
 impl Scattered {
@@ -75,25 +74,22 @@ pub fn clamped_mean(weights: &[(usize, f64)], column: &[f64]) -> f64 {
     mean(weights, column).clamp(least, most)
 }
 
-/// Sums of squares over contact surfaces, weighted by the areas of the points.
+/// Integrals over contact surfaces of the squares of an old function, a new function, and their difference.
 #[derive(Debug, Default)]
 pub struct Squares {
-    /// Of the difference of both functions.
-    pub difference: f64,
-    /// Of the function that is known, or of the earlier mesh.
-    pub old: f64,
-    /// Of the function that is compared with it.
+    difference: f64,
+    old: f64,
     new: f64,
 }
 
-/// The roots of [`Squares`].
+/// The L2 norms of an old function, a new function, and their difference. The old function is that of the reference or of the earlier mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Norms {
-    /// Norm of the difference of both functions.
+    /// The norm of the new function less the old one.
     pub difference: f64,
-    /// Norm of the function that is known, or of the earlier mesh.
+    /// The norm of the old function.
     pub old: f64,
-    /// Norm of the function that is compared with it.
+    /// The norm of the new function.
     pub new: f64,
 }
 

@@ -468,4 +468,18 @@ mod tests {
             assert!(turned.abs() < 1e-10 * quarter, "{order:?}: {turned}");
         }
     }
+
+    /// The work that contact pressures do on the interpolation error is not done by the load of a softer body. In the wave, that load does half of the
+    /// squared energy error.
+    #[test]
+    fn work_on_the_interpolation_error_does_not_soften() {
+        let space = block::<3>(3, Order::P1);
+        let u: Vec<f64> = space.nodes.iter().flat_map(wave).collect();
+        let steel = steel();
+        let recovery = Recovery::new(&space, &steel, &u);
+        let squared_error: f64 = recovery.errors(0.0).cells.iter().sum();
+        let work = 0.1 * squared_error;
+        let lost = dot(&recovery.errors(0.0).load, &u) - dot(&recovery.errors(work).load, &u);
+        assert!((lost / work - 1.0).abs() < 1e-10, "{lost} {work}");
+    }
 }

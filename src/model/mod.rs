@@ -176,6 +176,12 @@ impl Model {
         self.offset[i]..self.offset[i + 1]
     }
 
+    /// Return the outer normal displacements of a side of pair `i`, one for each of its points: those of `trace`, and `share` times the prescribed ones.
+    pub fn displacement(&self, trace: &[f64], i: usize, side: usize, share: f64) -> Vec<f64> {
+        let free = &trace[side * self.points()..][self.range(i)];
+        free.iter().zip(&self.pairs[i].prescribed[side]).map(|(free, prescribed)| free + share * prescribed).collect()
+    }
+
     /// Return the ranges of a trace vector that belong to the rows of a body, in the order of the rows.
     pub fn trace_ranges(&self, body: usize) -> impl Iterator<Item = Range<usize>> + '_ {
         let points = self.points();

@@ -9,7 +9,8 @@ thread_local! {
     static CAUGHT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
 }
 
-/// The longest text of one print statement in bytes. PETSc prints line by line.
+/// The longest text of one print statement in bytes; a longer one is cut. PETSc prints line by line, and the longest line of `-help`
+/// for `hertz-sphere` with hypre has 402 bytes.
 const LONGEST: usize = 1 << 16;
 
 /// Run `action`, and return its result and PETSc's output meanwhile, which is not shown.

@@ -312,12 +312,9 @@ fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
 /// Return the contact table of pair `i`, with sides in the order of the scene.
 pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> ContactTable {
     let (model, outcome) = (done.model(), &done.outcome);
-    let (pair, range, points) = (&model.pairs[i], model.range(i), model.points());
+    let (pair, range) = (&model.pairs[i], model.range(i));
     let sides = done.built.discrete.sides(i);
-    let displacement = |side: usize| -> Vec<f64> {
-        let trace = &outcome.iterate.trace[side * points + range.start..side * points + range.end];
-        trace.iter().zip(&pair.prescribed[side]).map(|(free, prescribed)| free + done.share * prescribed).collect()
-    };
+    let displacement = |side: usize| model.displacement(&outcome.iterate.trace, i, side, done.share);
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.position.clone(),

@@ -138,7 +138,8 @@ fn relative(run: &[Points], known: &[Vec<f64>]) -> Option<f64> {
     for (run, known) in run.iter().zip(known) {
         (0..known.len()).for_each(|q| squares.add(run.weight[q], known[q], run.pressure[q]));
     }
-    Some((squares.difference / squares.old).sqrt()).filter(|relative| relative.is_finite())
+    let norms = squares.norms();
+    Some(norms.difference / norms.old).filter(|relative| relative.is_finite())
 }
 
 /// Return the pressure at the point of a curve that is nearest to `x`, linear between the points of the table.
