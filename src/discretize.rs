@@ -21,10 +21,9 @@ pub use assembler::{Assembled, Factory, Outline};
 pub use local::BodyInfo;
 pub use mechanism::Balanced;
 pub use pairs::ContactInfo;
-pub use post::{Balance, Post, Resultant, Unbalanced};
+pub use post::{Balance, Unbalanced};
 pub use roster::point;
-pub use surface::{ContactSurface, Resolution, resolution};
-pub use unassembled::Gauged;
+pub use surface::{Resolution, resolution};
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};

@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::sync::Arc;
-use winkler::data::{Data, DataSpec, Interpolation, Outside};
+use winkler::internals::data::{Data, DataSpec, Interpolation, Outside};
 use winkler::error::{Place, Source};
 
 fuzz_target!(|bytes: &[u8]| {

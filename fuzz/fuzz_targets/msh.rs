@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
-use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
+use winkler::internals::mesh::{Asked, Duty, Maker, Mesh, parse};
 
 fuzz_target!(|bytes: &[u8]| {
     read::<2>(bytes);

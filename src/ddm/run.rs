@@ -372,7 +372,7 @@ pub struct Row {
 pub trait Observer {
     /// Take a complete row.
     fn row(&mut self, row: &Row);
-    /// Return the requests from outside, as [`ASKS`](crate::exchange::ASKS) bits whose meaning is the caller's own; called once an iterate. The
+    /// Return the requests from outside, as `exchange::ASKS` bits whose meaning is the caller's own; called once an iterate. The
     /// requests of one rank reach all ranks, and the run ends with [`Status::Paused`](super::Status::Paused), from where it can go on.
     fn asked(&self) -> u8 {
         0

@@ -19,11 +19,11 @@ mod tests;
 
 pub use crate::linalg::{cross, length, minus, pad, unit};
 pub use assemble::{Couplings, ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
-pub use elasticity::{Elasticity, Material};
+pub use elasticity::Elasticity;
 pub use element::{EDGES, Parts};
 pub use facets::{Facets, area_vector};
 pub use frame::{Frame, Levers, place};
 pub use interpolation::Interpolation;
 pub use recovery::{Errors, Recovery};
-pub use rigid::{Extent, FreeMotion, RigidMotion};
-pub use space::{Slope, Space};
+pub use rigid::{Extent, RigidMotion};
+pub use space::Space;

@@ -83,11 +83,6 @@ impl<'a> Motions<'a> {
         Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &motions(slot)[..])), &points)
     }
 
-    /// Return the motions of each body.
-    pub fn bodies(&self) -> &[&'a [Motion]] {
-        &self.bodies
-    }
-
     /// Return the number of all motions.
     pub fn count(&self) -> usize {
         self.first[self.first.len() - 1]
@@ -348,9 +343,6 @@ impl Coarse {
 
 /// Binary digits of the amounts of motions in an origin. Their products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
-
-/// Largest relative difference between an amount of the start and that in its origin.
-pub const ROUNDING: f64 = 1.0 / (1 << DIGITS) as f64;
 
 /// Rigid motions of the start that were subtracted from displacements and gaps: the origin of displacements.
 ///

@@ -1,11 +1,27 @@
 //! What a state of a body is: deformation and rigid motion apart, with the contact rows.
 
 use super::body::Distribution;
-use crate::fem::rigid::FreeMotion;
 use crate::linalg::portable::log2;
 use crate::linalg::{Csr, axpy, dot};
 use nalgebra::DVector;
 use std::rc::Rc;
+
+/// A rigid motion that supports leave unconstrained.
+#[derive(Debug, Clone)]
+pub struct FreeMotion {
+    /// Displacement, one entry a dof of the nodes that this rank has, zero at supports.
+    pub displacement: Vec<f64>,
+    /// Work of all loads on the motion.
+    pub work: f64,
+}
+
+impl FreeMotion {
+    /// Make the motion from the displacements of dofs, which are set to zero at prescribed ones. `work` gives the work of the loads.
+    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], work: impl Fn(&[f64]) -> f64) -> Self {
+        prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
+        Self { work: work(&displacement), displacement }
+    }
+}
 
 /// The states of a body: their dofs, contact rows and prescribed values, and the rigid motions that supports leave free.
 ///

@@ -19,7 +19,7 @@ mod robin;
 mod sparse;
 
 pub use coarse::RigidSpace;
-pub use condensed::{CondensedBody, Retained, Uncondensed};
+pub use condensed::{Retained, Uncondensed};
 pub use dense::Dense;
 pub use krylov::Krylov;
 pub use monolithic::{Monolithic, Union};

@@ -2,10 +2,9 @@
 
 use super::{InnerSolver, RobinMatrix};
 use crate::error::{Error, Kind, Result};
-use crate::fem::rigid::FreeMotion;
 use crate::fem::{Couplings, ElasticBody};
 use crate::linalg::{Csr, dot};
-use crate::model::{Body, BodyCounts, Distribution, Energy, Solved, States};
+use crate::model::{Body, BodyCounts, Distribution, Energy, FreeMotion, Solved, States};
 use crate::petsc::Rows;
 use std::rc::Rc;
 

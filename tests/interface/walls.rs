@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: [&str; 28] = [
+const MODULES: [&str; 29] = [
     "error",
     "exchange",
     "file",
@@ -34,6 +34,7 @@ const MODULES: [&str; 28] = [
     "run",
     "api",
     "commands",
+    "internals",
     "cli",
     "main",
 ];

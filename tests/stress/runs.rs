@@ -4,14 +4,14 @@
 
 use crate::scenes::{Case, Expect};
 use std::path::Path;
-use winkler::ddm::Silent;
+use winkler::api::Silent;
+use winkler::api::load as load_scene;
 use winkler::error::Result;
-use winkler::interrupt::Interrupt;
+use winkler::internals::Interrupt;
+use winkler::internals::run;
+use winkler::internals::run::stages::{Begin, Clock};
+use winkler::internals::run::{report, results};
 use winkler::petsc::Session;
-use winkler::run;
-use winkler::run::stages::{Begin, Clock};
-use winkler::run::{report, results};
-use winkler::scene;
 
 /// Relative residual that methods are asked for.
 pub const RESIDUAL: f64 = 1e-8;
@@ -121,7 +121,7 @@ pub fn solve(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> 
 
 fn attempt(session: &Session, path: &Path, recipe: &Recipe, residual: f64) -> Result<Answer> {
     let (mut clock, interrupt) = (Clock::default(), Interrupt::default());
-    let scene = scene::load(path, &[format!("method={}", recipe.value(residual))])?;
+    let scene = load_scene(path, &[format!("method={}", recipe.value(residual))])?;
     let built = run::build(session, scene, &interrupt, &mut clock)?;
     let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
     let done = run::iterate(ready, &interrupt, &mut Silent, &mut clock)?;

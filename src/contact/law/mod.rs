@@ -18,8 +18,11 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use forms::{Cubic, Exponential, Linear, Power};
-pub use make::{OwnLaws, Typed, make};
+pub use forms::Linear;
+#[cfg(test)]
+pub use forms::{Cubic, Exponential, Power};
+pub use make::{OwnLaws, make};
+#[cfg(feature = "internals")]
 pub use table::Table;
 
 use std::rc::Rc;
