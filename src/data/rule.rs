@@ -70,7 +70,6 @@ impl Detrend {
 /// What stands in a file for points without a height. NaN always does.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Missing {
-    /// Numbers.
     pub numbers: Vec<f64>,
     /// Words in the place of a number; the empty word is a field without characters.
     pub words: Vec<String>,
@@ -95,7 +94,6 @@ impl Missing {
 /// A value and its gradient; NaN where there is no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// The value.
     pub value: f64,
     /// The derivatives by both arguments; the second is zero for a profile.
     pub gradient: [f64; 2],
@@ -111,7 +109,6 @@ impl Sample {
 pub struct DataSpec {
     /// Name of the function.
     pub name: String,
-    /// The file.
     pub file: PathBuf,
     /// The place in the scene where the file is named.
     pub place: Place,
@@ -155,7 +152,6 @@ pub struct Frame {
 /// Numbers in rows of one length. Once [`read`](super::read) has checked them, coordinates are finite, and a height is finite or NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Rows {
-    /// Number of columns.
     pub columns: usize,
     /// The numbers, row by row.
     pub values: Vec<f64>,

@@ -63,7 +63,6 @@ pub struct Settings {
     pub interval: bool,
     /// The estimator of the discretisation error, if the run is to stop where more iterations would change nothing.
     pub balance: Option<Box<dyn Discretisation>>,
-    /// The start.
     pub start: Start,
 }
 

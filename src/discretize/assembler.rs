@@ -20,11 +20,9 @@ use std::rc::Rc;
 
 /// The assembly of all bodies on one rank.
 pub struct Assembler<'a, const D: usize, F> {
-    /// The mesh.
     pub mesh: &'a Mesh<D>,
     /// Kind of a plane problem.
     pub plane: Plane,
-    /// This rank.
     pub rank: usize,
     /// The maker of solvers.
     pub factory: &'a mut F,

@@ -419,7 +419,6 @@ pub struct BodyFacts {
     pub points: Vec<u32>,
     /// Number of nodes of the body and their extent.
     pub extent: Extent,
-    /// Number of cells.
     pub cells: usize,
     /// Area (volume) of the body; in a body of revolution the volume of the rings.
     pub volume: f64,

@@ -20,7 +20,6 @@ pub struct Gmsh {
 
 /// A script for Gmsh to mesh, with the settings of the run.
 pub struct Task<'a> {
-    /// The script.
     pub script: &'a Path,
     /// The script that the user wrote.
     pub shown: &'a Path,

@@ -11,12 +11,12 @@ pub mod linear;
 pub mod rigid;
 pub mod states;
 
-pub use body::{Body, BodyCounts, Distribution, Energy, Joint, Loads, Local, Solved};
+pub use body::{Body, BodyCounts, Energy, Joint, Loads, Local, Solved};
 pub use field::Field;
 pub use layer::Layer;
 pub use linear::LinearStep;
 pub use rigid::{Motions, Moved};
-pub use states::{FreeMotion, States};
+pub use states::{Distribution, FreeMotion, States};
 
 use crate::contact::ContactPair;
 use crate::error::Result;

@@ -18,7 +18,6 @@ use std::time::Instant;
 
 /// A scene with its discrete problem. Bodies have their inner solvers, but nothing is factorised yet.
 pub struct Built {
-    /// The scene.
     pub scene: Rc<Scene>,
     /// The discrete problem.
     pub discrete: Discrete,

@@ -207,7 +207,6 @@ static NUMBERINGS: [Numbering; 7] = [
 /// A shape with or without middle nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kind {
-    /// The shape.
     pub shape: &'static Shape,
     /// How Abaqus numbers it.
     pub own: &'static Numbering,
