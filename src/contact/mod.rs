@@ -15,5 +15,5 @@ pub use basis::Carriers;
 pub use fine::{Fine, FinePoints};
 pub use law::{LayerLaw, Response};
 pub use pair::{ContactPair, Coverage, Fault, Left, LostPieces, OwnSurface, add, assemble, moment_in_scene};
-pub use review::{Chords, End};
-pub use side::{Faces, ROUNDING, Side};
+pub use review::{Chords, UncoveredPoint};
+pub use side::{ROUNDING, Side, SmoothFaces};

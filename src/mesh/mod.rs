@@ -27,12 +27,12 @@ mod split;
 mod tests;
 mod trust;
 
-pub use check::{Asked, Checked, Duty, Parts};
+pub use check::{Asked, BodyCheck, Components, Duty};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
-pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};
+pub use load::{Loaded, MeshOrigin, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
-pub use msh::{Maker, parse};
+pub use msh::{MeshProducer, parse};
 pub use script::{unstructured, view};
 pub use simplex::{EDGES, Quality};
 pub use trust::{Breach, breach};

@@ -13,11 +13,11 @@ use std::rc::Rc;
 
 /// A body with assembled K and f, its contact rows B, and a solver for G = K + B' diag(d) B.
 ///
-/// A state is (v, a) for the displacement v + R a (`Split`).
+/// A state is (v, a) for the displacement v + R a (`RigidSplit`).
 pub struct SparseBody<S> {
     body: ElasticBody,
     rows: Csr,
-    split: Split,
+    split: RigidSplit,
     /// How its dofs are distributed over the ranks, if they are. K and B then have the dofs that this rank owns. The columns of K are those of the
     /// distributed matrix that has its rows.
     distribution: Option<Rc<Distribution>>,
@@ -30,7 +30,7 @@ pub struct SparseBody<S> {
 enum Lazy<S> {
     Later {
         /// The function that makes a solver of K; `None` if it has failed.
-        make: Option<Maker<S>>,
+        make: Option<SolverBuilder<S>>,
         /// Description of the solver to be made, for reports.
         words: String,
     },
@@ -38,7 +38,7 @@ enum Lazy<S> {
 }
 
 /// A function that makes a solver of K.
-type Maker<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
+type SolverBuilder<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
 
 /// What remains of a row of K.
 struct RowSize {
@@ -63,7 +63,7 @@ impl<S: InnerSolver> SparseBody<S> {
     ) -> Self {
         let robin = Lazy::Later { make: Some(Box::new(make)), words };
         let distribution = distribution.map(Rc::new);
-        let split = Split::new(free, &rows, distribution.clone());
+        let split = RigidSplit::new(free, &rows, distribution.clone());
         body.held = Couplings::default();
         let owned = |places: &[u32]| rows.of_columns(places.len(), |dof| places.binary_search(&(dof as u32)).ok());
         let rows = distribution.as_ref().map(|distribution| owned(&distribution.places)).unwrap_or(rows);
@@ -73,7 +73,7 @@ impl<S: InnerSolver> SparseBody<S> {
     /// Replace the loads by those of a body without K, and keep K. The work of the loads on the motions that supports leave is in `free`.
     pub fn reload(&mut self, with_loads: ElasticBody, free: &[FreeMotion]) {
         self.body = ElasticBody { stiffness: std::mem::take(&mut self.body.stiffness), ..with_loads };
-        self.split = Split::new(free, &self.rows, None);
+        self.split = RigidSplit::new(free, &self.rows, None);
     }
 
     /// Return the displacements of all dofs for a state.
@@ -319,7 +319,7 @@ impl<S: InnerSolver> Body for SparseBody<S> {
 /// its displacement is v + R a with v orthogonal to R, a state is (v, a), and K multiplies v alone. A force is (r, R'r), so that the product of a force and a
 /// state is the work on the displacement. The rigid part R'r comes from loads and contact forces, without K.
 #[derive(Default)]
-pub struct Split {
+pub struct RigidSplit {
     /// R, one vector over the dofs for each motion. Their lengths lie between 1 and 2. They are scaled by powers of two, so that a
     /// translation of a flat surface has the same few digits at all points.
     motions: Vec<Rc<[f64]>>,
@@ -333,7 +333,7 @@ pub struct Split {
     distribution: Option<Rc<Distribution>>,
 }
 
-impl Split {
+impl RigidSplit {
     /// Orthogonalise the independent rigid motions `free` that a body's supports leave; `rows` are its contact rows. For a distributed body both have
     /// the dofs of the owned and ghost nodes of this rank, and forces on rigid motions belong to the rank that owns the body.
     pub fn new(free: &[FreeMotion], rows: &Csr, distribution: Option<Rc<Distribution>>) -> Self {
@@ -477,7 +477,7 @@ mod tests {
         let mut rows = Csr::new(6);
         (0..3).for_each(|node| rows.push_row([(2 * node, 1.0)]));
         let free = [free([1.0, 0.0, 1.0, 0.0, 1.0, 0.0]), free([0.5, 0.5, 0.5, 0.0, 0.5, -0.5])];
-        let split = Split::new(&free, &rows, None);
+        let split = RigidSplit::new(&free, &rows, None);
         assert_eq!(split.traces()[0], [1.0; 3]);
         assert!(dot(&split.motions()[0], &split.motions()[1]).abs() < 1e-15);
         // half of the first motion is taken away from the second, with its work

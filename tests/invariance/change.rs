@@ -5,7 +5,7 @@ use winkler::api::{
     Constants, ContactSpec, ElasticitySpec, Error, Field, LayerSpec, LoadKind, MeshArrays, MeshSource, Plane, Result,
     Scene, SpringKind, Start,
 };
-use winkler::expression::{Expression, Scope};
+use winkler::expression::{Expression, KnownNames};
 use winkler::fem::cross;
 use winkler::mesh::Mesh;
 use winkler::problem::{AxesSpec, BodySpec, Depths, LawKind};
@@ -238,7 +238,7 @@ impl Change {
             Some(format!("(({:e})*({}/({:e}) - ({:e})))", self.sign[i], names[1 + i], self.length, self.shift[i]))
         };
         let text = format!("({:e})*({})", self.stress, substituted(law.text(), &old));
-        Expression::parse(&text, law.place(), Scope::of(&names[..=dimension]))
+        Expression::parse(&text, law.place(), KnownNames::of(&names[..=dimension]))
     }
 }
 
