@@ -1,7 +1,7 @@
 //! Random scenes by every method, as a Markdown table with every failure below. `scripts/stress --help`.
 
-#[path = "../tests/stress/draft.rs"]
-mod draft;
+#[path = "../tests/stress/builder.rs"]
+mod builder;
 #[path = "../tests/stress/laws.rs"]
 mod laws;
 #[path = "../tests/stress/random.rs"]

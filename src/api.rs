@@ -45,8 +45,8 @@ pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{
     AsperitySpec, AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, GroupArrays,
-    History, LawKind, LayerSpec, Linear, Load, LoadKind, MeshArrays, MeshSource, MethodName, MethodSpec, Order,
-    Overlap, Plane, Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, Step, StopRule, Support,
+    History, LawKind, LayerSpec, Linear, Load, LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec,
+    Order, Overlap, Plane, Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support,
     Units, Zone,
 };
 pub use crate::robin::Ritz;

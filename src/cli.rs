@@ -74,9 +74,9 @@ enum Command {
     Solving(Solving),
     /// Compare meshes, orders, inner solvers, methods and ranks: time, memory, counts and errors
     #[command(after_help = BENCH)]
-    Bench(bench::Request),
+    Bench(bench::BenchArgs),
     /// Make the mesh of a scene, or find it in the cache, and print what it has
-    Mesh(mesh::Request),
+    Mesh(mesh::MeshArgs),
     /// Write a page with pictures and tables of a run, from its files alone: one HTML file
     Report {
         /// Folder of results
@@ -131,13 +131,13 @@ enum Command {
 enum Solving {
     /// Solve a scene and write its results
     #[command(after_help = SOLVE)]
-    Solve(solve::Request),
+    Solve(solve::SolveArgs),
     /// Build the problem of a scene and print what it has, without solving it
     #[command(after_help = CHECK)]
-    Check(check::Request),
+    Check(check::CheckArgs),
     /// Solve a scene for every combination of values of its keys
     #[command(after_help = SWEEP)]
-    Sweep(sweep::Request),
+    Sweep(sweep::SweepArgs),
 }
 
 /// Return the first word among PETSc options that is an option of the program, typed with one dash instead of two. It has no dashes.
@@ -149,14 +149,14 @@ fn option_with_one_dash(petsc: &[String]) -> Option<String> {
 }
 
 /// The reason why a command line leads to no command.
-enum Refusal {
+enum CliError {
     /// A refusal of this program.
     Ours(Error),
     /// A refusal of the parser, or help or the version if the user asked for them.
     Parser(clap::Error),
 }
 
-impl Refusal {
+impl CliError {
     /// Print the refusal, and return the exit code.
     fn print(&self) -> i32 {
         match self {
@@ -189,7 +189,7 @@ pub fn run(words: Vec<OsString>) -> i32 {
     };
     let is_first = session.as_ref().is_none_or(|session| session.rank() == 0);
     let are_alike = session.as_ref().map_or(Ok(()), |session| refuse_other_words(session, &words));
-    let (cli, petsc) = match are_alike.map_err(Refusal::Ours).and_then(|()| parse(words)) {
+    let (cli, petsc) = match are_alike.map_err(CliError::Ours).and_then(|()| parse(words)) {
         Ok(parsed) => parsed,
         Err(refusal) => return if is_first { refusal.print() } else { refusal.exit_code() },
     };
@@ -209,8 +209,8 @@ pub fn run(words: Vec<OsString>) -> i32 {
 }
 
 /// Parse the words of a command line into a command and the options of PETSc.
-fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusal> {
-    let refuse = |message: String, help: String| Err(Refusal::Ours(Error::new(Kind::Usage, message).help(help)));
+fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliError> {
+    let refuse = |message: String, help: String| Err(CliError::Ours(Error::new(Kind::Usage, message).help(help)));
     let mut words = words.into_iter();
     let name = words.next().map_or("winkler".into(), |name| name.to_string_lossy().into_owned());
     let words = match words.map(OsString::into_string).collect::<std::result::Result<Vec<String>, _>>() {
@@ -245,7 +245,7 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), Refusa
     }
     // the parser suggests `--` before the word, but the program takes no such words
     refusal.remove(ContextKind::Suggested);
-    Err(Refusal::Parser(refusal))
+    Err(CliError::Parser(refusal))
 }
 
 /// Run a command that needs neither MPI nor PETSc; it may start other programs.

@@ -15,10 +15,10 @@ mod tests;
 pub use arrange::Trend;
 pub use grid::{Grid, Roughness, Summits};
 pub use raster::has_header;
-pub use rule::{DataSpec, Detrend, Fill, Interpolation, Missing, Outside, Sample};
+pub use rule::{DataSpec, Detrend, Fill, Interpolation, NoData, Outside, Sample};
 
 use crate::error::{Error, Place, Result, shown};
-use arrange::{Arranged, Shape};
+use arrange::{Arranged, PointLayout};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
@@ -54,7 +54,7 @@ impl Data {
     }
 
     /// Return the function, if the file is read.
-    fn shape(&self) -> Option<&Shape> {
+    fn shape(&self) -> Option<&PointLayout> {
         self.arranged.get().map(|arranged| &arranged.shape)
     }
 
@@ -71,8 +71,8 @@ impl Data {
     /// Return the number of arguments: 1 for a profile, 2 for a surface.
     pub fn arguments(&self) -> usize {
         match self.shape() {
-            Some(Shape::Grid(grid)) if grid.axes[1].count > 1 => 2,
-            Some(Shape::Scattered(..)) => 2,
+            Some(PointLayout::Grid(grid)) if grid.axes[1].count > 1 => 2,
+            Some(PointLayout::Scattered(..)) => 2,
             _ => 1,
         }
     }
@@ -82,9 +82,9 @@ impl Data {
         let at = [place.first(), place.get(1)].map(|x| x.copied().unwrap_or(0.0));
         let holds = self.spec.outside == Outside::Clamp;
         match self.shape() {
-            Some(Shape::Grid(grid)) => grid.sample(at),
-            Some(Shape::Knots(knots)) => knots.sample(at[0], holds),
-            Some(Shape::Scattered(scattered, _)) => scattered.sample(at, holds),
+            Some(PointLayout::Grid(grid)) => grid.sample(at),
+            Some(PointLayout::Knots(knots)) => knots.sample(at[0], holds),
+            Some(PointLayout::Scattered(scattered, _)) => scattered.sample(at, holds),
             None => Sample::NONE,
         }
     }
@@ -92,12 +92,12 @@ impl Data {
     /// Return all its numbers in a fixed order; none if the file is not read yet.
     pub fn numbers(&self) -> Box<dyn Iterator<Item = f64> + '_> {
         match self.shape() {
-            Some(Shape::Grid(Grid { axes, values, .. })) => {
+            Some(PointLayout::Grid(Grid { axes, values, .. })) => {
                 let counts = axes.iter().flat_map(|axis| [axis.origin, axis.spacing, axis.count as f64]);
                 Box::new(counts.chain(values.iter().copied()))
             }
-            Some(Shape::Knots(knots)) => Box::new(knots.0.iter().flatten().copied()),
-            Some(Shape::Scattered(scattered, _)) => Box::new(scattered.numbers()),
+            Some(PointLayout::Knots(knots)) => Box::new(knots.0.iter().flatten().copied()),
+            Some(PointLayout::Scattered(scattered, _)) => Box::new(scattered.numbers()),
             None => Box::new(std::iter::empty()),
         }
     }
@@ -105,7 +105,7 @@ impl Data {
     /// Return the regular grid, if the file is read and has one.
     pub fn grid(&self) -> Option<&Grid> {
         match self.shape() {
-            Some(Shape::Grid(grid)) => Some(grid),
+            Some(PointLayout::Grid(grid)) => Some(grid),
             _ => None,
         }
     }
@@ -114,9 +114,9 @@ impl Data {
     pub fn outside(&self, here: &Place, what: &str, place: &[f64]) -> Error {
         let join = |coordinates: &[f64]| coordinates.iter().map(|&x| shown(x)).collect::<Vec<_>>().join(", ");
         let range = match self.shape() {
-            Some(Shape::Grid(grid)) => grid.axes.map(|axis| axis.range()),
-            Some(Shape::Knots(knots)) => [knots.range(); 2],
-            Some(Shape::Scattered(_, range)) => *range,
+            Some(PointLayout::Grid(grid)) => grid.axes.map(|axis| axis.range()),
+            Some(PointLayout::Knots(knots)) => [knots.range(); 2],
+            Some(PointLayout::Scattered(_, range)) => *range,
             None => [[f64::NAN; 2]; 2],
         };
         let range: Vec<String> = range[..place.len().min(2)]

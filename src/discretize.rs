@@ -9,9 +9,9 @@ mod mechanism;
 pub mod meshes;
 mod pairs;
 mod part;
+mod patterns;
 mod post;
 mod prepare;
-mod roster;
 mod supports;
 mod surface;
 mod unassembled;
@@ -21,8 +21,8 @@ pub use assembler::{Assembled, Factory, Outline};
 pub use local::BodyInfo;
 pub use mechanism::Balanced;
 pub use pairs::ContactInfo;
-pub use post::{Balance, Unbalanced};
-pub use roster::point;
+pub use patterns::point;
+pub use post::{ForceBalance, Unbalanced};
 pub use surface::{Resolution, resolution};
 pub use verify::{Verified, verify};
 
@@ -36,7 +36,7 @@ use crate::scene::Scene;
 use assembler::Assembler;
 use local::LocalBody;
 use meshes::{Kept, Meshes};
-use prepare::{Shared, Whole, prepare};
+use prepare::{ReplicatedProblem, Whole, prepare};
 use std::rc::Rc;
 
 /// The discrete problem, with the facts of its origin that reports need.
@@ -93,7 +93,7 @@ where
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let Shared { bodies: shared, mut pairs, contacts, mechanisms, balanced, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, balanced, fine, plan } = shared;
     let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {

@@ -98,9 +98,9 @@ impl Kind {
 }
 
 /// An error that a user can act on. `{:?}` also formats the whole message, because `main` of a program prints that.
-pub struct Error(Box<Inner>);
+pub struct Error(Box<ErrorData>);
 
-struct Inner {
+struct ErrorData {
     kind: Kind,
     message: String,
     place: Option<Place>,
@@ -122,7 +122,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 impl Error {
     /// Return an error of a kind; `message` is a fragment without a full stop.
     pub fn new(kind: Kind, message: impl Into<String>) -> Self {
-        Error(Box::new(Inner {
+        Error(Box::new(ErrorData {
             kind,
             message: message.into(),
             place: None,

@@ -9,7 +9,7 @@ mod pressure;
 pub mod sizes;
 
 use crate::ddm::{Discretisation, respond};
-use crate::discretize::meshes::{Meshes, Recovered};
+use crate::discretize::meshes::{Meshes, RecoveredFields};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Errors;
 use crate::linalg::axpy;
@@ -174,7 +174,7 @@ fn relative_norm(squared: f64, reference: f64, held: f64) -> f64 {
 }
 
 /// The recovered displacement of each body, on the rank that owns it.
-type RecoveredBodies<'a> = [Option<Box<dyn Recovered + 'a>>];
+type RecoveredBodies<'a> = [Option<Box<dyn RecoveredFields + 'a>>];
 
 /// The errors that recovered displacements show without a solve.
 struct LocalErrors {

@@ -148,7 +148,7 @@ pub mod crowd {
     use std::collections::{HashMap, VecDeque};
     use std::sync::{Barrier, Condvar, Mutex};
 
-    struct Common {
+    struct SharedMemory {
         barrier: Barrier,
         slots: Mutex<Vec<Vec<Vec<u8>>>>,
         sent: Mutex<HashMap<[usize; 2], VecDeque<Vec<u8>>>>,
@@ -158,13 +158,13 @@ pub mod crowd {
     struct Member<'a> {
         rank: usize,
         ranks: usize,
-        common: &'a Common,
+        common: &'a SharedMemory,
     }
 
     /// Return the result of `work` on each of so many ranks.
     pub fn on<T: Send>(ranks: usize, work: impl Fn(&dyn Exchange) -> T + Sync) -> Vec<T> {
         let (slots, sent) = (Mutex::new(vec![Vec::new(); ranks]), Mutex::default());
-        let common = &Common { barrier: Barrier::new(ranks), slots, sent, news: Condvar::new() };
+        let common = &SharedMemory { barrier: Barrier::new(ranks), slots, sent, news: Condvar::new() };
         let member = |rank| Member { rank, ranks, common };
         std::thread::scope(|scope| {
             let work = &work;

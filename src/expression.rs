@@ -5,12 +5,12 @@ mod program;
 #[cfg(test)]
 mod tests;
 
-pub use grammar::Scope;
+pub use grammar::KnownNames;
 
 use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result};
 use grammar::Text;
-use program::{Dual, MOST_VARIABLES, Program, Step, Values};
+use program::{Dual, MOST_VARIABLES, Operation, Program, Values};
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -40,16 +40,16 @@ impl Expression {
     ///
     /// # Errors
     /// Texts that are no expression, and data that cannot be read.
-    pub fn parse(text: &str, place: &Place, scope: Scope) -> Result<Self> {
+    pub fn parse(text: &str, place: &Place, scope: KnownNames) -> Result<Self> {
         Self::parse_with(text, place, scope, |slot| slot)
     }
 
     /// Parse a text; `slot` returns the index of the value for each variable of the scope.
-    fn parse_with(text: &str, place: &Place, scope: Scope, slot: impl Fn(usize) -> usize) -> Result<Self> {
+    fn parse_with(text: &str, place: &Place, scope: KnownNames, slot: impl Fn(usize) -> usize) -> Result<Self> {
         debug_assert!(scope.variables.len() <= MOST_VARIABLES);
         let mut code = grammar::parse(Text { text, place }, scope)?;
         for step in &mut code {
-            if let Step::Variable(variable) = step {
+            if let Operation::Variable(variable) = step {
                 *variable = slot(*variable);
             }
         }
@@ -155,7 +155,7 @@ impl Field {
             })
             .collect();
         let slot = |variable: usize| coordinate(names[variable]).unwrap_or(variable);
-        let expression = Expression::parse_with(text, place, Scope { variables: &names, data }, slot)?;
+        let expression = Expression::parse_with(text, place, KnownNames { variables: &names, data }, slot)?;
         if !expression.is_constant() {
             return Ok(Field::Expression(expression));
         }

@@ -25,17 +25,17 @@ pub mod ddm {
 
 pub mod expression {
     //! Numbers written as expressions.
-    pub use crate::expression::{Expression, Field, Scope};
+    pub use crate::expression::{Expression, Field, KnownNames};
 }
 
 pub mod fem {
     //! Finite elements.
-    pub use crate::fem::{Elasticity, Facets, Frame, Parts, Space, assemble, cross, displacement, pad, surface};
+    pub use crate::fem::{Elasticity, Facets, Frame, Space, Subdivision, assemble, cross, displacement, pad, surface};
 }
 
 pub mod mesh {
     //! Meshes.
-    pub use crate::mesh::{Asked, Duty, Group, Maker, Mesh, breach, load, parse, unstructured};
+    pub use crate::mesh::{Asked, Duty, Group, Mesh, MeshProducer, breach, load, parse, unstructured};
 }
 
 pub mod model {

@@ -3,9 +3,9 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::sync::Arc;
-use winkler::internals::data::Library;
 use winkler::error::{Place, Source};
-use winkler::internals::expression::{Expression, Field, Scope};
+use winkler::internals::data::Library;
+use winkler::internals::expression::{Expression, Field, KnownNames};
 
 fuzz_target!(|text: &str| {
     let source = Source { name: "scene.toml".to_owned(), text: text.to_owned() };
@@ -16,7 +16,7 @@ fuzz_target!(|text: &str| {
             Err(error) => assert!(!error.to_string().is_empty()),
         }
     }
-    let scope = Scope::of(&["c", "x", "y"]);
+    let scope = KnownNames::of(&["c", "x", "y"]);
     let Ok(plain) = Expression::parse(text, &place, scope) else { return };
     for values in [[0.0, 0.0, 0.0], [1e-3, 4.0, -1.0], [-1e300, 1e-300, 0.5]] {
         let (one, two) = (plain.eval(&values), plain.eval_by(0, &values).0);

@@ -1,9 +1,9 @@
 //! The rounds of a run on several meshes: meshes adapted to an error, or one coarse mesh whose solution is the start on the scene's own. The sizes of
 //! the mesh that an adaptation ended with are saved: the next run begins with them, and `winkler mesh --adapted` makes the mesh of them.
 
-use super::checkpoint::{Checkpoint, Head, settings_digest};
+use super::checkpoint::{Checkpoint, CheckpointHeader, settings_digest};
 use super::transfer::{self, EstimatedSolution};
-use crate::ddm::{Start, Status};
+use crate::ddm::{InitialGuess, Status};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
@@ -41,7 +41,7 @@ const GROWTH: f64 = 2.0;
 const MOST_WORSE: usize = 2;
 
 /// The state of a run on several meshes. A round is one mesh, with the solution on it.
-pub struct Plan {
+pub struct AdaptiveRun {
     pub scene: Rc<Scene>,
     /// Reports of the rounds so far.
     pub rounds: Vec<RoundReport>,
@@ -90,7 +90,7 @@ struct Best {
     worse: usize,
 }
 
-impl Plan {
+impl AdaptiveRun {
     /// Return the plan whose first round is on the scene's own mesh, a coarse one, the one that an earlier run ended with, or that of a
     /// checkpoint.
     ///
@@ -144,7 +144,7 @@ impl Plan {
     }
 
     /// Go on where the checkpoint with this head ended: on its mesh, and after its load steps or as the best mesh once more.
-    fn resume(&mut self, head: &Head) {
+    fn resume(&mut self, head: &CheckpointHeader) {
         let scene = Rc::make_mut(&mut self.scene);
         follow(scene, head.sizes.clone());
         if self.goal.is_none() || head.on_last_mesh {
@@ -254,24 +254,24 @@ impl Plan {
     }
 
     /// Return the head of a checkpoint of this round; none for a coarse mesh that only gives the start.
-    pub fn head(&self) -> Option<Head> {
-        self.finer.is_none().then(|| Head {
+    pub fn head(&self) -> Option<CheckpointHeader> {
+        self.finer.is_none().then(|| CheckpointHeader {
             settings: settings_digest(&self.requested),
             rounds: self.rounds.clone(),
             sizes: self.sizes().map(|view| view.to_string()),
             on_last_mesh: self.is_stepping() || self.repeats_best,
             limit: self.limit.clone(),
-            ..Head::default()
+            ..CheckpointHeader::default()
         })
     }
 
     /// Return the start of this round, if an earlier round gives it.
-    fn start(&self, built: &Built) -> Option<Start> {
+    fn start(&self, built: &Built) -> Option<InitialGuess> {
         let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
         (!self.start_from.is_empty()).then(|| match newton {
-            true => Start::Pressure(transfer::pressure(&self.start_from, discrete)),
-            false => Start::Trace(transfer::trace(&self.start_from, discrete)),
+            true => InitialGuess::Pressure(transfer::pressure(&self.start_from, discrete)),
+            false => InitialGuess::Trace(transfer::trace(&self.start_from, discrete)),
         })
     }
 
@@ -456,10 +456,10 @@ mod tests {
     use std::path::Path;
 
     /// Return the plan of a scene that is adapted, without load steps.
-    fn plan() -> Plan {
+    fn plan() -> AdaptiveRun {
         let scene =
             load(Path::new("meshes/groove-held/scene.toml"), &["adapt.error=1e-3".to_owned()]).expect("a scene");
-        Plan::of(Rc::new(scene), None)
+        AdaptiveRun::of(Rc::new(scene), None)
     }
 
     /// A run that was interrupted on its best mesh once more ends there after a restart, with its reason. On any other mesh it goes on with the adaptation.

@@ -3,31 +3,31 @@
 use crate::error::{Error, Kind, Result};
 
 /// What varies between runs.
-pub struct Axis {
+pub struct SweepAxis {
     pub name: String,
     /// Values in the order of the runs.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<AxisValue>,
 }
 
 /// A value of an axis, and what it means for a run.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Choice {
+pub struct AxisValue {
     /// Its text in the table.
     pub text: String,
     pub overrides: Vec<String>,
     pub petsc: Vec<String>,
 }
 
-impl Choice {
+impl AxisValue {
     /// Return a value that overrides keys of the scene.
     pub fn of_scene(text: impl Into<String>, overrides: Vec<String>) -> Self {
         Self { text: text.into(), overrides, petsc: Vec::new() }
     }
 }
 
-impl Axis {
+impl SweepAxis {
     /// Return an axis.
-    pub fn new(name: &str, choices: Vec<Choice>) -> Self {
+    pub fn new(name: &str, choices: Vec<AxisValue>) -> Self {
         Self { name: name.to_owned(), choices }
     }
 
@@ -47,7 +47,7 @@ impl Axis {
         if key.is_empty() || values.iter().any(|value| value.trim().is_empty()) {
             return Err(refuse());
         }
-        let choice = |value: &String| Choice::of_scene(value.trim(), vec![format!("{key}={}", value.trim())]);
+        let choice = |value: &String| AxisValue::of_scene(value.trim(), vec![format!("{key}={}", value.trim())]);
         Ok(Self::new(key, values.iter().map(choice).collect()))
     }
 }
@@ -76,8 +76,8 @@ fn split(list: &str) -> Vec<String> {
 }
 
 /// Return all combinations with one choice of each axis; those of the last axis change first.
-pub fn combinations(axes: &[Axis]) -> Vec<Vec<&Choice>> {
-    axes.iter().fold(vec![Vec::new()], |combinations, Axis { choices, .. }| {
+pub fn combinations(axes: &[SweepAxis]) -> Vec<Vec<&AxisValue>> {
+    axes.iter().fold(vec![Vec::new()], |combinations, SweepAxis { choices, .. }| {
         combinations
             .iter()
             .flat_map(|before| choices.iter().map(move |choice| [before.clone(), vec![choice]].concat()))
@@ -98,13 +98,13 @@ mod tests {
 
     #[test]
     fn values_are_split_at_commas_outside_brackets_and_all_combinations_made() {
-        let texts = |axis: &Axis| axis.choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
-        let a = Axis::over("method.gamma=0.3, 0.6").expect("two numbers");
+        let texts = |axis: &SweepAxis| axis.choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
+        let a = SweepAxis::over("method.gamma=0.3, 0.6").expect("two numbers");
         assert_eq!((a.name.as_str(), texts(&a)), ("method.gamma", vec!["0.3".to_owned(), "0.6".to_owned()]));
         assert_eq!(a.choices[1].overrides, ["method.gamma=0.6"]);
-        let b = Axis::over("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
+        let b = SweepAxis::over("contact.0.gap=\"max(x, 1)\",0").expect("an expression and a number");
         assert_eq!(texts(&b), ["\"max(x, 1)\"", "0"]);
-        assert!(Axis::over("method.gamma").is_err() && Axis::over("method.gamma=1,,2").is_err());
+        assert!(SweepAxis::over("method.gamma").is_err() && SweepAxis::over("method.gamma=1,,2").is_err());
         let axes = [a, b];
         let runs = combinations(&axes);
         assert_eq!(runs.len(), 4);

@@ -7,10 +7,10 @@ use crate::discretize::{BodyInfo, Resolution, resolution};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::linalg::range;
-use crate::output::{Axis, Folder, LISTED, Plot, Series, Style, safe_name, say, sci, warning_lines};
+use crate::output::{Folder, LISTED, Plot, PlotAxis, Series, Style, safe_name, say, sci, warning_lines};
 use crate::petsc::Session;
 use crate::problem::{AsperitySpec, ContactSpec, Depths, LayerSpec, label, name_of};
-use crate::run::results::{self, Coupling};
+use crate::run::results::{self, CouplingEstimate};
 use crate::run::{self, Built, in_words, numbered, report};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// The command line of `winkler check`.
 #[derive(clap::Args)]
-pub struct Request {
+pub struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Folder for pictures of measured surfaces and layers of asperities [default: none are drawn]
@@ -35,7 +35,7 @@ pub struct Request {
 ///
 /// # Errors
 /// Refusals of scene and mesh; pictures that cannot be written.
-pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
+pub fn check(session: &Session, interrupt: &Interrupt, request: &CheckArgs) -> Result<i32> {
     let mut clock = clock_with_phases(session.rank() == 0 && !request.scene.json);
     let mut scene = load(session, &request.scene.scene, &request.scene.overrides())?;
     let settings = scene.settings();
@@ -46,7 +46,7 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     // nothing is solved, so that no line may name a next phase
     clock.watch = None;
     clock.total();
-    let shared = report::Shared::gather(&built.discrete);
+    let shared = report::GatheredCounters::gather(&built.discrete);
     if session.rank() != 0 {
         return Ok(0);
     }
@@ -205,7 +205,7 @@ const MOST_SWEEPS: f64 = 1e6;
 /// Return theta and the expected number of sweeps of a pair as a text.
 ///
 /// Each side has theta = kappa/(k + kappa), with the stiffness k of its body and the tangent kappa of the layer.
-fn expected(coupling: &Coupling) -> String {
+fn expected(coupling: &CouplingEstimate) -> String {
     let sweeps = coupling.sweeps.iter().map(|(method, count)| match *count {
         ..=MOST_SWEEPS => format!("{method} {count:.0}"),
         count if count.is_finite() => format!("{method} more than {MOST_SWEEPS}"),
@@ -230,14 +230,14 @@ fn all_pairs(built: &Built) -> Vec<String> {
         sci(high, 3)
     )];
     let all = (0..pairs.len()).map(|i| (&pairs[i], results::coupling(built, i)));
-    let pressed: Vec<(&ContactPair, Coupling)> = all.filter(|(_, coupling)| coupling.pressure > 0.0).collect();
+    let pressed: Vec<(&ContactPair, CouplingEstimate)> = all.filter(|(_, coupling)| coupling.pressure > 0.0).collect();
     if pressed.len() < pairs.len() {
         let rest = pairs.len() - pressed.len();
         lines.push(format!(
             "    {rest} of them have no load of a body as a whole across: their pressure cannot be estimated"
         ));
     }
-    let product = |coupling: &Coupling| coupling.theta[0] * coupling.theta[1];
+    let product = |coupling: &CouplingEstimate| coupling.theta[0] * coupling.theta[1];
     if let Some((pair, coupling)) = pressed.iter().max_by(|(_, a), (_, b)| product(a).total_cmp(&product(b))) {
         let pressures = || pressed.iter().map(|(_, coupling)| coupling.pressure);
         let [least, most] = [f64::min, f64::max].map(|pick| pressures().reduce(pick));
@@ -452,8 +452,8 @@ pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
             let units = built.scene.units.as_ref();
             let plot = Plot {
                 title: format!("Layer of asperities of {}", pairs[pair].surfaces.join(" - ")),
-                x: Axis::linear(label("compression", units.map(|units| units.length))),
-                y: Axis::linear(label("pressure", units.map(|units| units.stress))),
+                x: PlotAxis::linear(label("compression", units.map(|units| units.length))),
+                y: PlotAxis::linear(label("pressure", units.map(|units| units.stress))),
                 series: vec![Series::new("", points, Style::Line)],
             };
             folder.write(&format!("{stem}.svg"), |out| plot.write(out))?;
@@ -476,5 +476,5 @@ fn profiles(data: &Data, built: &Built) -> Option<Plot> {
     }
     // data can be heights, moduli or loads
     let (x, y) = (label("place", built.scene.units.as_ref().map(|units| units.length)), data.spec.name.clone());
-    Some(Plot { title: format!("Data {y}"), x: Axis::linear(x), y: Axis::linear(y), series })
+    Some(Plot { title: format!("Data {y}"), x: PlotAxis::linear(x), y: PlotAxis::linear(y), series })
 }

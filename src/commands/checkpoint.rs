@@ -3,7 +3,7 @@
 //! The file `checkpoint` has a line that names its format, a line of JSON (the head), numbers as `postcard` writes them, and the SHA-256 of
 //! all that. It is replaced as a whole, so that there is always a good one.
 
-use crate::ddm::{Row, Start, State};
+use crate::ddm::{InitialGuess, Row, State};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, all_gather, broadcast};
 use crate::file::digest;
@@ -34,7 +34,7 @@ const DIGEST_BYTES: usize = 32;
 
 /// The part of a checkpoint that is written as JSON.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Head {
+pub struct CheckpointHeader {
     /// Digest of the scene's settings.
     pub settings: String,
     /// Digest of the file of the mesh, and of the bodies and contact points that were made from it.
@@ -55,7 +55,7 @@ pub struct Head {
 pub struct Checkpoint {
     path: PathBuf,
     /// The part that is JSON.
-    pub head: Head,
+    pub head: CheckpointHeader,
     /// Rows of the history of earlier load steps.
     earlier: Vec<Row>,
     state: State,
@@ -63,13 +63,13 @@ pub struct Checkpoint {
 
 impl Checkpoint {
     /// Write the state of a paused run into a folder. Collective; the rank with `writes` writes the file.
-    pub fn write(folder: &Path, head: Head, done: &Done, writes: bool) -> Result<()> {
+    pub fn write(folder: &Path, head: CheckpointHeader, done: &Done, writes: bool) -> Result<()> {
         let (model, Done { built, outcome, steps, earlier, .. }) = (done.model(), done);
         let states = gather(model, &outcome.iterate);
         if !writes {
             return Ok(());
         }
-        let head = Head { mesh: mesh_digest(built), steps: steps.clone(), ..head };
+        let head = CheckpointHeader { mesh: mesh_digest(built), steps: steps.clone(), ..head };
         let failed = |cause: String| Error::new(Kind::File, "the checkpoint cannot be written").because(cause);
         let json = serde_json::to_string(&head).map_err(|cause| failed(cause.to_string()))?;
         let next = outcome.next_states();
@@ -125,7 +125,7 @@ impl Checkpoint {
                 *state = distribution.scatter(state);
             }
         }
-        Ok(Begin { start: Some(Start::Continue(Box::new(state))), steps: head.steps, earlier })
+        Ok(Begin { start: Some(InitialGuess::Continue(Box::new(state))), steps: head.steps, earlier })
     }
 
     /// Return the refusal of a checkpoint that is of another scene or mesh.
@@ -162,7 +162,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
     let (text, digest) = bytes.split_at_checked(bytes.len().checked_sub(DIGEST_BYTES)?)?;
     let mut lines = text.splitn(3, |&byte| byte == b'\n');
     let is_ours = lines.next()? == FORMAT.as_bytes() && Sha256::digest(text)[..] == *digest;
-    let head: Head = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
+    let head: CheckpointHeader = serde_json::from_slice(lines.next()?).ok().filter(|_| is_ours)?;
     let (earlier, rows, compression, smoothing, trace, states) = postcard::from_bytes(lines.next()?).ok()?;
     let state = State { field: Field { states, trace }, compression, smoothing, rows, memory: None };
     Some(Checkpoint { path: path.to_owned(), head, earlier, state })

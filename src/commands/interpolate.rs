@@ -9,7 +9,7 @@ use rstar::primitives::GeomWithData;
 pub type Weights = Vec<(usize, f64)>;
 
 /// Scattered points in a search tree, each with its index.
-pub struct Scattered(RTree<GeomWithData<[f64; 3], usize>>);
+pub struct PointTree(RTree<GeomWithData<[f64; 3], usize>>);
 
 /// Number of points that a linear function is fitted to. Four points determine the function, a constant and three slopes; twice as many leave the
 /// fit determined where half of them lie on a line or have nearly one place.
@@ -23,7 +23,7 @@ pub const EXACT: f64 = 1e-6;
 /// hundredth of their part in the sum of squares. Rounding of the surface's coordinates then causes no slope across the surface.
 pub const DAMPED: f64 = 0.1;
 
-impl Scattered {
+impl PointTree {
     /// Return the tree of some points.
     pub fn new(points: &[[f64; 3]]) -> Self {
         Self(RTree::bulk_load(points.iter().enumerate().map(|(q, &x)| GeomWithData::new(x, q)).collect()))
@@ -84,7 +84,7 @@ pub struct Squares {
 
 /// The L2 norms of an old function, a new function, and their difference. The old function is that of the reference or of the earlier mesh.
 #[derive(Debug, Clone, Copy)]
-pub struct Norms {
+pub struct L2Norms {
     /// The norm of the new function less the old one.
     pub difference: f64,
     /// The norm of the old function.
@@ -102,7 +102,7 @@ impl Squares {
     }
 
     /// Return the norms.
-    pub fn norms(&self) -> Norms {
-        Norms { difference: self.difference.sqrt(), old: self.old.sqrt(), new: self.new.sqrt() }
+    pub fn norms(&self) -> L2Norms {
+        L2Norms { difference: self.difference.sqrt(), old: self.old.sqrt(), new: self.new.sqrt() }
     }
 }

@@ -7,10 +7,10 @@ use crate::exchange::Serial;
 use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::linalg::bounds;
-use crate::mesh::{Group, Loaded, Mesh, Origin};
+use crate::mesh::{Group, Loaded, Mesh, MeshOrigin};
 use crate::output::report::readable;
-use crate::output::terminal::Line;
-use crate::output::{CellKind, Encoding, Grid, say, write_whole};
+use crate::output::terminal::ProgressLine;
+use crate::output::{CellKind, Encoding, UnstructuredGrid, say, write_whole};
 use crate::problem::{MeshSource, Order};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
@@ -20,7 +20,7 @@ use std::time::Instant;
 
 /// The command line of `winkler mesh`.
 #[derive(clap::Args)]
-pub struct Request {
+pub struct MeshArgs {
     /// Scene file (TOML)
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
@@ -50,7 +50,7 @@ pub struct Request {
 ///
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
-pub fn mesh(interrupt: &Interrupt, request: &Request) -> Result<i32> {
+pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
     interrupt.hold();
     let tolerance = request.tolerance.iter().map(|error| format!("--tolerance {error}"));
     let flags = flags([(request.trust_geo, "--trust-geo")]);
@@ -90,11 +90,11 @@ fn show<const D: usize>(
     scene: &Scene,
     is_reached: Option<bool>,
     interrupt: &Interrupt,
-    request: &Request,
+    request: &MeshArgs,
 ) -> Result<i32> {
     let began = Instant::now();
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let line = (!request.json).then(|| Line::new("mesh", None));
+    let line = (!request.json).then(|| ProgressLine::new("mesh", None));
     let loaded = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
     drop(line);
     let seconds = began.elapsed().as_secs_f64();
@@ -122,9 +122,9 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
         "title": scene.title,
         "file": file,
         "origin": match origin {
-            Origin::File => "the scene's own file",
-            Origin::Cache => "from the cache",
-            Origin::Gmsh => "made by Gmsh",
+            MeshOrigin::File => "the scene's own file",
+            MeshOrigin::Cache => "from the cache",
+            MeshOrigin::Gmsh => "made by Gmsh",
         },
         "unkept": unkept,
         "notes": notes.iter().chain(&verified.notes).collect::<Vec<_>>(),
@@ -242,9 +242,9 @@ fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
 }
 
 /// Return the cells of the mesh, each with the index of its group.
-fn grid<const D: usize>(loaded: &Loaded<D>) -> Grid {
+fn grid<const D: usize>(loaded: &Loaded<D>) -> UnstructuredGrid {
     let mesh = &loaded.mesh;
-    let mut grid = Grid {
+    let mut grid = UnstructuredGrid {
         title: mesh.path.display().to_string(),
         points: mesh.points.iter().map(|&x| mesh.in_scene(x)).collect(),
         cell: CellKind::simplex(D, mesh.order.degree()),

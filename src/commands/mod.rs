@@ -16,10 +16,10 @@ mod write;
 
 use crate::error::Result;
 use crate::output::LISTED;
-use crate::output::terminal::Line;
+use crate::output::terminal::ProgressLine;
 use crate::petsc::Session;
 use crate::problem::MethodName;
-use crate::run::report::{Shared, solvers_in_words};
+use crate::run::report::{GatheredCounters, solvers_in_words};
 use crate::run::{self, Clock, Prepared};
 use crate::scene::Scene;
 use clap::Args;
@@ -70,7 +70,7 @@ impl Terminal {
         }
         let built = &ready.built;
         let (scene, discrete) = (&built.scene, &built.discrete);
-        let solvers = Shared::gather(discrete).solvers;
+        let solvers = GatheredCounters::gather(discrete).solvers;
         let mut lines = vec![format!("{}: decided", scene.title)];
         let name = scene.method.name.name();
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
@@ -183,11 +183,11 @@ fn clock_with_phases(is_shown: bool) -> Clock {
 }
 
 /// Return the line for the phase that follows the one that has ended. `estimate` is its expected time in seconds, if that is known.
-fn line_after(ended: &str, estimate: Option<f64>) -> Option<Line> {
+fn line_after(ended: &str, estimate: Option<f64>) -> Option<ProgressLine> {
     match ended {
-        "" => Some(Line::new("mesh", None)),
-        "mesh" => Some(Line::new("bodies and contact points", None)),
-        "discretize" => Some(Line::new("factorisations and start", estimate)),
+        "" => Some(ProgressLine::new("mesh", None)),
+        "mesh" => Some(ProgressLine::new("bodies and contact points", None)),
+        "discretize" => Some(ProgressLine::new("factorisations and start", estimate)),
         _ => None,
     }
 }

@@ -1,6 +1,6 @@
 //! `winkler solve`: solve one scene and write all its results.
 
-use super::adapt::Plan;
+use super::adapt::AdaptiveRun;
 use super::checkpoint::{self, Checkpoint};
 use super::write::{ResultFiles, to_json, write_fields};
 use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::interrupt::Interrupt;
-use crate::output::terminal::Line;
+use crate::output::terminal::ProgressLine;
 use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// The command line of `winkler solve`.
 #[derive(clap::Args)]
-pub struct Request {
+pub struct SolveArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Folder for the results [default: output.dir of the scene, else results/CASE]
@@ -44,7 +44,7 @@ pub struct Request {
     verbosity: VerbosityArgs,
 }
 
-impl Request {
+impl SolveArgs {
     fn overrides(&self) -> Vec<String> {
         let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
         let checkpoint = self.checkpoint.iter().map(|minutes| format!("--checkpoint {minutes}"));
@@ -57,14 +57,14 @@ impl Request {
 /// # Errors
 /// Everything that keeps the run from starting, and failures of the file system. A run that does not converge is no error: it has an exit code
 /// of its own, and all that was computed is written.
-pub fn solve(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
+pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> Result<i32> {
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let mut clock = clock_with_phases(terminal.is_loud());
     let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
     let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
-    let plan = Plan::new(session, scene, checkpoint, interrupt, &mut clock)?;
+    let plan = AdaptiveRun::new(session, scene, checkpoint, interrupt, &mut clock)?;
     let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
     let mut solver = Solver {
@@ -104,7 +104,7 @@ struct Solver<'s> {
     folder: Folder,
     terminal: Terminal,
     clock: Clock,
-    plan: Plan,
+    plan: AdaptiveRun,
     /// The table of iterations on the terminal.
     table: IterationTable,
     tables: Tables,
@@ -199,7 +199,7 @@ impl Solver<'_> {
     /// Write all results of the last mesh, and return the exit code.
     fn finish(self, Round { done, estimate, tables }: Round) -> Result<i32> {
         let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
-        let line = self.terminal.is_loud().then(|| Line::new("stresses and files", None));
+        let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
         let files = ResultFiles { is_last: true, ..self.files(&done, estimate.as_ref(), true) };
         let (report, written) = files.write(&mut self.clock.clone(), |report| {
             if let Some(limit) = &plan.limit {

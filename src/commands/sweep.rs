@@ -1,7 +1,7 @@
 //! `winkler sweep`: solve a scene for every combination of values of its keys, one row of a table for each run.
 //! A run takes over what it can from the run before it.
 
-use super::axes::{Axis, Choice, combinations, named};
+use super::axes::{AxisValue, SweepAxis, combinations, named};
 use super::solve::claim;
 use super::write::{Plots, to_json};
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
@@ -20,7 +20,7 @@ use std::rc::Rc;
 
 /// The command line of `winkler sweep`.
 #[derive(clap::Args)]
-pub struct Request {
+pub struct SweepArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Folder for the results [default: output.dir of the scene, else results/CASE]
@@ -39,16 +39,16 @@ pub struct Request {
 ///
 /// # Errors
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
-pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Result<i32> {
-    let axes = collectively(session, Axis::all_over(&request.over))?;
-    let load = |choices: Vec<&Choice>| Case::load(request, &axes, &choices);
+pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> Result<i32> {
+    let axes = collectively(session, SweepAxis::all_over(&request.over))?;
+    let load = |choices: Vec<&AxisValue>| SweepCase::load(request, &axes, &choices);
     let cases = collectively(session, combinations(&axes).into_iter().map(load).collect::<Result<Vec<_>>>())?;
     let scenes: Vec<&Scene> = cases.iter().map(|case| &*case.scene).collect();
     run::refuse_other_scenes(session, &scenes)?;
     let folder = collectively(session, claim(session, folder_of(scenes[0], request.output.as_ref())))?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = terminal::runs(cases.len(), terminal.is_loud());
-    let mut sweep = Sweep {
+    let mut sweep = SweepOutput {
         session,
         interrupt,
         terminal,
@@ -86,7 +86,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &Request) -> Res
     Ok(exit)
 }
 
-struct Case {
+struct SweepCase {
     /// Values of the keys, in the order of the axes.
     values: Vec<String>,
     /// The values with their keys, as they are printed.
@@ -94,21 +94,21 @@ struct Case {
     scene: Rc<Scene>,
 }
 
-impl Case {
+impl SweepCase {
     /// Load the scene with the values of a run.
-    fn load(request: &Request, axes: &[Axis], choices: &[&Choice]) -> Result<Self> {
+    fn load(request: &SweepArgs, axes: &[SweepAxis], choices: &[&AxisValue]) -> Result<Self> {
         let own = choices.iter().flat_map(|choice| &choice.overrides).map(|text| format!("--over {text}"));
         let overrides: Vec<String> = request.scene.overrides().into_iter().chain(own).collect();
         let scene = Rc::new(crate::scene::load(&request.scene.scene, &overrides)?);
         let values: Vec<String> = choices.iter().map(|choice| choice.text.clone()).collect();
         let keys: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
         let parts: Vec<String> = keys.iter().zip(&values).map(|(key, value)| named(key, value, &keys)).collect();
-        Ok(Case { values, label: parts.join(", "), scene })
+        Ok(SweepCase { values, label: parts.join(", "), scene })
     }
 }
 
 /// The sweep under way: what it prints and the table that it writes.
-struct Sweep<'a> {
+struct SweepOutput<'a> {
     session: &'a Session,
     interrupt: &'a Interrupt,
     terminal: Terminal,
@@ -124,9 +124,15 @@ struct Sweep<'a> {
     reports: Vec<Report>,
 }
 
-impl Sweep<'_> {
+impl SweepOutput<'_> {
     /// Build the problem of a run, with what the run before has left, and set up its method. Collective.
-    fn prepare(&mut self, axes: &[Axis], case: &Case, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
+    fn prepare(
+        &mut self,
+        axes: &[SweepAxis],
+        case: &SweepCase,
+        before: Option<Done>,
+        clock: &mut Clock,
+    ) -> Result<Prepared> {
         let session = self.session;
         let built = run::build_after(session, case.scene.clone(), before, self.interrupt, clock)?;
         let header = header(axes, &built);
@@ -144,7 +150,7 @@ impl Sweep<'_> {
     }
 
     /// Write the row of a run to the table, and print how the run ended.
-    fn write_row(&mut self, case: &Case, done: &Done, report: &Report) -> Result<()> {
+    fn write_row(&mut self, case: &SweepCase, done: &Done, report: &Report) -> Result<()> {
         if let Some(table) = &mut self.table {
             table.push(&line(&case.values, report, case.scene.dimension.value));
             table.complaint().iter().for_each(|text| self.bar.suspend(|| eprintln!("warning: {text}")));
@@ -161,7 +167,7 @@ impl Sweep<'_> {
     }
 
     /// Add a run to the plots and the reports.
-    fn collect(&mut self, case: &Case, done: &Done, report: Report) {
+    fn collect(&mut self, case: &SweepCase, done: &Done, report: Report) {
         let most = case.scene.output.pairs.map_or(LISTED, |most| most.0);
         let shown = self.shown.get_or_insert_with(|| busiest(&report.pairs, most));
         self.plots.add(&case.label, done, shown);
@@ -184,7 +190,7 @@ impl Sweep<'_> {
 }
 
 /// Return the names of the columns; [`line`] has their texts.
-fn header(axes: &[Axis], built: &Built) -> Vec<String> {
+fn header(axes: &[SweepAxis], built: &Built) -> Vec<String> {
     let (pairs, reactions) = (results::pair_names(built), results::reaction_names(built));
     let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
     let mut header: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();

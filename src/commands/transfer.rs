@@ -1,7 +1,7 @@
 //! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, extrapolated and checked
 //! by the earlier one.
 
-use super::interpolate::{DAMPED, Norms, Scattered, Squares, Weights, clamped_mean, mean};
+use super::interpolate::{DAMPED, L2Norms, PointTree, Squares, Weights, clamped_mean, mean};
 use crate::contact::ContactPair;
 use crate::discretize::Discrete;
 use crate::estimate::{Estimate, SAFETY};
@@ -36,7 +36,7 @@ pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
 
 /// Return for each point of a pair the weights of the nearest points of a table.
 fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<Item = Weights> + 'a {
-    let scattered = Scattered::new(&table.points);
+    let scattered = PointTree::new(&table.points);
     // the neighbours on a curve, or around a point of a surface
     let count = if pair.along_curve { 2 } else { 4 };
     pair.position.iter().map(move |x| scattered.inverse_distances(x, count))
@@ -95,7 +95,7 @@ fn bodies(table: &ContactTable) -> [&str; 2] {
 }
 
 /// Return how many times larger a difference is than the relative errors `new` and `old` explain, at least one.
-fn excess(norms: &Norms, new: f64, old: f64) -> f64 {
+fn excess(norms: &L2Norms, new: f64, old: f64) -> f64 {
     let most = new * norms.new + old * norms.old;
     if most > 0.0 && norms.difference.is_finite() { (norms.difference / most).max(1.0) } else { 1.0 }
 }
@@ -105,7 +105,7 @@ fn excess(norms: &Norms, new: f64, old: f64) -> f64 {
 ///
 /// Loads do the work eta^2 on the error of the displacements u_h. If they err by the same shape on both meshes, by eta^2 times it,
 /// u - u_h = (u_h - u_h') eta^2/(eta'^2 - eta^2): Richardson's extrapolation with eta^2 in the place of h^p (Roache 1994).
-fn extrapolated(norms: &Norms, old: f64, new: f64) -> Option<f64> {
+fn extrapolated(norms: &L2Norms, old: f64, new: f64) -> Option<f64> {
     let change = norms.difference / norms.new;
     (new < old && change.is_finite()).then(|| SAFETY * change * new / (old - new))
 }
@@ -113,9 +113,9 @@ fn extrapolated(norms: &Norms, old: f64, new: f64) -> Option<f64> {
 /// Norms of the solutions on two meshes and of their difference.
 struct SolutionNorms {
     /// Norms of the pressures, one entry for each pair.
-    pressure: Vec<Norms>,
+    pressure: Vec<L2Norms>,
     /// Norms of the normal displacements, all contact surfaces together.
-    displacement: Norms,
+    displacement: L2Norms,
 }
 
 /// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
@@ -124,7 +124,7 @@ struct SolutionNorms {
 fn norms(old: &[ContactTable], new: &[ContactTable]) -> SolutionNorms {
     let (mut pressure, mut displacement) = (Vec::new(), Squares::default());
     for (old, new) in old.iter().zip(new) {
-        let scattered = Scattered::new(&new.points);
+        let scattered = PointTree::new(&new.points);
         let mut of_pair = Squares::default();
         for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
             let weights = scattered.plane(point, DAMPED);
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_difference_that_errors_explain_changes_none() {
-        let norms = |difference| Norms { difference, old: 2.0, new: 1.0 };
+        let norms = |difference| L2Norms { difference, old: 2.0, new: 1.0 };
         assert_eq!([0.1, 0.5, 1.0].map(|difference| excess(&norms(difference), 0.1, 0.2)), [1.0, 1.0, 2.0]);
         assert_eq!([excess(&norms(0.1), 0.0, 0.0), excess(&norms(f64::NAN), 0.1, 0.1)], [1.0, 1.0]);
     }
@@ -152,7 +152,7 @@ mod tests {
     /// Two meshes, the later one with a quarter of the squared energy error: a third of the difference is left.
     #[test]
     fn displacements_are_extrapolated_by_the_energy_error() {
-        let norms = Norms { difference: 0.3, old: 0.7, new: 1.0 };
+        let norms = L2Norms { difference: 0.3, old: 0.7, new: 1.0 };
         assert!((extrapolated(&norms, 4.0, 1.0).expect("a smaller error") - SAFETY * 0.1).abs() < 1e-15);
         assert_eq!(extrapolated(&norms, 1.0, 1.0), None);
         let tables = || vec![table(5, 1.0)];
@@ -193,7 +193,7 @@ mod tests {
         // but for the weight of the slopes
         assert!(same.pressure[0].difference < 2e-3 * same.pressure[0].new, "{:?}", same.pressure);
         let off = norms(&[table(5, 1.1)], &[table(8, 1.0)]);
-        let Norms { difference, old, new } = off.pressure[0];
+        let L2Norms { difference, old, new } = off.pressure[0];
         assert!((difference / new - 0.1).abs() < 2e-3 && (old / new - 1.1).abs() < 2e-3, "{:?}", off.pressure);
         assert!((off.displacement.difference / off.displacement.new - 0.1).abs() < 2e-3);
         // fewer points than a plane through the nearest ones takes

@@ -1,7 +1,7 @@
 //! The files of the results of a run: tables, report, plots, and fields, those of each load step included. Small files come first, so that on a full
 //! disk fields are missing and not results.
 
-use super::adapt::Plan;
+use super::adapt::AdaptiveRun;
 use crate::contact::ContactPair;
 use crate::discretize::BodyInfo;
 use crate::error::{Error, Kind, Result};
@@ -9,7 +9,7 @@ use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::fem::length;
 use crate::linalg::bounds;
-use crate::output::fields::{Entry, Tags, write_pvd};
+use crate::output::fields::{CollectionEntry, Tags, write_pvd};
 use crate::output::folder::STEPS;
 use crate::output::{
     BodyField, Checksums, Color, ConvergenceSeries, Folder, LISTED, PairReport, PairRow, Plot, Report, Series,
@@ -30,7 +30,7 @@ pub struct ResultFiles<'a> {
     pub session: &'a Session,
     pub path: &'a Path,
     /// Plan with the meshes before.
-    pub plan: &'a Plan,
+    pub plan: &'a AdaptiveRun,
     pub done: &'a Done,
     pub estimate: Option<&'a Estimate>,
     /// Whether fields may be written, if the scene asks for them.
@@ -314,7 +314,12 @@ fn collection(done: &Done, folder: &Folder, ended: bool) -> Result<()> {
             let exists = |ending: &&str| is_last || folder.path().join(format!("{stem}.{ending}")).is_file();
             if let Some(ending) = [usual, "vtu", "pvtu"].into_iter().find(exists) {
                 let file = format!("{stem}.{ending}");
-                entries.push(Entry { time: history.get(step).map_or(0.0, |step| step.time), part, name, file });
+                entries.push(CollectionEntry {
+                    time: history.get(step).map_or(0.0, |step| step.time),
+                    part,
+                    name,
+                    file,
+                });
             }
         }
     }

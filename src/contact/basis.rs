@@ -1,9 +1,9 @@
 //! The pressure functions mu_q on one facet: which of its nodes carry a pressure, and how means around them are weighted.
 
-use super::pieces::Shared;
+use super::pieces::IntegrationPoint;
 use crate::fem::Facets;
 use crate::fem::element::{self, EDGES};
-use crate::linalg::Joined;
+use crate::linalg::DisjointSets;
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -66,7 +66,7 @@ impl PressureBasis {
     ///
     /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of the jump: an overlap
     /// where there is none.
-    pub fn on<const D: usize>(order: Order, count: usize, chunk: &[Shared<D>], b: &Facets<D>) -> Self {
+    pub fn on<const D: usize>(order: Order, count: usize, chunk: &[IntegrationPoint<D>], b: &Facets<D>) -> Self {
         if are_apart(b, chunk) {
             return Self::Hats;
         }
@@ -93,7 +93,7 @@ impl PressureBasis {
     }
 
     /// Return this basis if the functions of these nodes have steady means on the covered part, otherwise the hat functions.
-    fn or_hats<const D: usize>(self, order: Order, nodes: Range<usize>, chunk: &[Shared<D>]) -> Self {
+    fn or_hats<const D: usize>(self, order: Order, nodes: Range<usize>, chunk: &[IntegrationPoint<D>]) -> Self {
         let (mut integral, mut size) = ([0.0; element::MOST], [0.0; element::MOST]);
         for point in chunk {
             let phi = element::values(order, &point.at_a);
@@ -128,12 +128,12 @@ impl PressureBasis {
 }
 
 /// Return whether the facets of side b at these points are of several parts that have no vertex in common.
-fn are_apart<const D: usize>(b: &Facets<D>, chunk: &[Shared<D>]) -> bool {
+fn are_apart<const D: usize>(b: &Facets<D>, chunk: &[IntegrationPoint<D>]) -> bool {
     let mut facets: Vec<usize> = chunk.iter().map(|point| point.facet_b).collect();
     facets.sort_unstable();
     facets.dedup();
     let vertices = |i: usize| &b.facet(facets[i])[..D];
-    let mut joined = Joined::new(facets.len());
+    let mut joined = DisjointSets::new(facets.len());
     for i in 1..facets.len() {
         for j in (0..i).filter(|&j| vertices(i).iter().any(|node| vertices(j).contains(node))) {
             joined.join(i as u32, j as u32);

@@ -5,7 +5,7 @@
 
 use super::basis::{Carriers, PressureBasis};
 use super::pair::{ContactPair, Coverage, Left};
-use super::pieces::{Common, Shared, WHOLE};
+use super::pieces::{IntegrationPoint, Intersection, WHOLE};
 use super::side::Side;
 use crate::exchange::Plain;
 use crate::fem::{Facets, element, length, minus, unit};
@@ -90,24 +90,26 @@ impl<const D: usize> Fine<D> {
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
-        common: &Common<D>,
+        common: &Intersection<D>,
         pair: &ContactPair,
         gap: &dyn Fn([f64; 3]) -> f64,
         touching: bool,
     ) -> Self {
         let shared = &common.points;
-        let side = |side: &Side<D>, facet: fn(&Shared<D>) -> usize, at: fn(&Shared<D>) -> [f64; D]| FineSide {
+        let side = |side: &Side<D>,
+                    facet: fn(&IntegrationPoint<D>) -> usize,
+                    at: fn(&IntegrationPoint<D>) -> [f64; D]| FineSide {
             facets: side.facets.clone(),
             facet: shared.iter().map(facet).collect(),
             at: shared.iter().map(at).collect(),
         };
         let rounding = a.rounding_along_normals();
-        let rise_of_both = |point: &Shared<D>| match touching {
+        let rise_of_both = |point: &IntegrationPoint<D>| match touching {
             true => 0.0,
             false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover);
-        let of_point = |point: &Shared<D>| FinePoint {
+        let of_point = |point: &IntegrationPoint<D>| FinePoint {
             weight: point.weight,
             gap: gap_at(a, point, rounding, gap) - rise_of_both(point),
             facet: point.facet_a,
@@ -118,8 +120,8 @@ impl<const D: usize> Fine<D> {
             is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].left == Left::Nothing,
             nearest: 0,
         };
-        let normal = |point: &Shared<D>| normal_at(a, point.facet_a, &point.at_a);
-        let tilt = |point: &Shared<D>| {
+        let normal = |point: &IntegrationPoint<D>| normal_at(a, point.facet_a, &point.at_a);
+        let tilt = |point: &IntegrationPoint<D>| {
             let (n_a, n_b) = (normal(point), normal_at(b, point.facet_b, &point.at_b));
             std::array::from_fn(|c| n_a[c] + n_b[c])
         };
@@ -142,7 +144,13 @@ impl<const D: usize> Fine<D> {
 
 impl FinePoints {
     /// Append the rows of the points, facet by facet of side a, and find the contact point nearest to each.
-    fn push_rows<const D: usize>(&mut self, a: &Side<D>, b: &Side<D>, shared: &[Shared<D>], pair: &ContactPair) {
+    fn push_rows<const D: usize>(
+        &mut self,
+        a: &Side<D>,
+        b: &Side<D>,
+        shared: &[IntegrationPoint<D>],
+        pair: &ContactPair,
+    ) {
         let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
         let mut each = self.each.iter_mut();
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
@@ -169,7 +177,12 @@ impl FinePoints {
 }
 
 /// Return the gap at an integration point. A distance below `rounding`, or below that of the facet's size, counts as zero.
-fn gap_at<const D: usize>(a: &Side<D>, point: &Shared<D>, rounding: f64, gap: &dyn Fn([f64; 3]) -> f64) -> f64 {
+fn gap_at<const D: usize>(
+    a: &Side<D>,
+    point: &IntegrationPoint<D>,
+    rounding: f64,
+    gap: &dyn Fn([f64; 3]) -> f64,
+) -> f64 {
     let at = a.facets.point(point.facet_a, a.space, &point.at_a);
     let rounding = rounding.max(1e-12 * length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
     let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
@@ -177,7 +190,7 @@ fn gap_at<const D: usize>(a: &Side<D>, point: &Shared<D>, rounding: f64, gap: &d
 }
 
 /// Return the size of the facet of side a under an integration point.
-fn size_under<const D: usize>(a: &Side<D>, point: &Shared<D>) -> f64 {
+fn size_under<const D: usize>(a: &Side<D>, point: &IntegrationPoint<D>) -> f64 {
     let sides = (D - 1) as f64;
     (sides * length(a.area(point.facet_a))).powf(1.0 / sides)
 }
@@ -209,7 +222,7 @@ impl<const D: usize> Projections<D> {
     pub fn new(
         a: &Side<D>,
         b: &Side<D>,
-        common: &Common<D>,
+        common: &Intersection<D>,
         pair: &ContactPair,
         gap: Option<&dyn Fn([f64; 3]) -> f64>,
     ) -> Self {
@@ -238,7 +251,7 @@ impl<const D: usize> Projections<D> {
 /// its node. `position` gives the place of a contact point, measured from the datum of the mesh.
 fn nearest_facets<const D: usize>(
     a: &Side<D>,
-    common: &Common<D>,
+    common: &Intersection<D>,
     pair: &ContactPair,
     position: impl Fn(usize) -> [f64; D],
 ) -> Vec<usize> {
@@ -302,7 +315,7 @@ const INCLINED: f64 = 0.3;
 /// 1/2 <= lambda. The edge is no rim where the surface goes on as its mirror image: on an axis of revolution, and on a plane of symmetry.
 /// A facet lies at a rim if such an edge of side a bounds it. It does, too, if side b ends on it or on a facet beside it, at such an edge
 /// of b: the covered part of that facet may be a sliver.
-fn facets_at_rim<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>, cover: &[Coverage]) -> Vec<bool> {
+fn facets_at_rim<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>, cover: &[Coverage]) -> Vec<bool> {
     let (edges_a, edges_b) = (a.facets.by_edge(), b.facets.by_edge());
     let mut above_rim_of_b = vec![false; a.facets.count()];
     for point in &common.points {

@@ -17,5 +17,5 @@ pub use law::LayerLaw;
 #[cfg(test)]
 pub use law::Response;
 pub use pair::{ContactPair, Fault, Left, LostPieces, add, assemble, moment_in_scene};
-pub use review::{Chords, End};
-pub use side::{Faces, ROUNDING, Side};
+pub use review::{Chords, UncoveredPoint};
+pub use side::{ROUNDING, Side, SmoothFaces};

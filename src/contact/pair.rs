@@ -1,8 +1,8 @@
 //! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is paired.
 
 use super::basis::{Carriers, PressureBasis};
-use super::law::{LayerLaw, Linear};
-use super::pieces::{Common, Refused, WHOLE};
+use super::law::{LayerLaw, LinearLaw};
+use super::pieces::{Intersection, Refused, WHOLE};
 use super::side::{Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
@@ -76,7 +76,7 @@ fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
 
 /// Return what stands for the law of a pair from another rank until it is made.
 fn no_law() -> Rc<dyn LayerLaw> {
-    Rc::new(Linear { stiffness: 0.0 })
+    Rc::new(LinearLaw { stiffness: 0.0 })
 }
 
 /// The surface of one side around a contact point: means over the nodes of the side, weighted by their shares in the point.
@@ -153,7 +153,7 @@ pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 fn integrate<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
-    common: &Common<D>,
+    common: &Intersection<D>,
 ) -> (BTreeMap<u32, Accumulator>, Vec<Coverage>) {
     let mut points: BTreeMap<u32, Accumulator> = BTreeMap::new();
     let mut carriers = vec![None; a.facets.count()];
@@ -193,7 +193,7 @@ pub fn assemble<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
     bodies: [usize; 2],
-    common: &Common<D>,
+    common: &Intersection<D>,
     gap: &dyn Fn([f64; 3]) -> f64,
     law: &LawMaker,
 ) -> Result<ContactPair, Fault> {
@@ -398,7 +398,7 @@ pub enum Left {
 
 impl Coverage {
     /// Return the coverage of each facet, from the common pieces and the nodes that carry points.
-    fn of<const D: usize>(a: &Side<D>, common: &Common<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
+    fn of<const D: usize>(a: &Side<D>, common: &Intersection<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = element::rule(D, if a.facets.order == Order::P2 { 5 } else { 2 });

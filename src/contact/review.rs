@@ -2,7 +2,7 @@
 //! because its surfaces are farther apart than its largest distance.
 
 use super::pair::ContactPair;
-use super::pieces::Common;
+use super::pieces::Intersection;
 use super::side::Side;
 use crate::fem::{element, minus};
 use crate::linalg::{dot, range};
@@ -36,7 +36,7 @@ impl Chords {
     ///
     /// Surfaces that touch at a point or along a line overlap as well where their facets do not match, within one facet from there. They are no
     /// fit: on more than half of a fit what facets add is the whole distance, 2 s at most, as that of two facets.
-    pub fn of<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Common<D>, pair: &ContactPair) -> Option<Self> {
+    pub fn of<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>, pair: &ContactPair) -> Option<Self> {
         let [least, most] = range(pair.gap.iter().copied());
         let deepest = -least;
         if deepest <= 0.0 || most - least <= UNIFORM * deepest {
@@ -87,7 +87,7 @@ fn largest_sagitta<const D: usize>(side: &Side<D>, facets: &HashSet<usize>) -> f
 
 /// A contact point on a facet, or beside one, that has no partner or only a part of one, because what lies before it is too far away.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct End {
+pub struct UncoveredPoint {
     /// Index of the contact point.
     pub point: usize,
     /// Compression of the layer from which the contact probably goes on where the pair has ended.
@@ -103,12 +103,12 @@ pub struct End {
 /// found with largest distances from 0.004 to 0.016, on elements of both orders (`tests/geometry/ends.rs`).
 const NEARLY: f64 = 0.5;
 
-impl End {
+impl UncoveredPoint {
     /// Return the ends of a pair whose facets may be apart by `distance`. `far` are the nodes of facets of side a that were found to be too far
     /// away before the pair was made. `drawn` gives the distance of the meshes at a contact point; with `None` the surfaces touch at any distance.
     pub fn all<const D: usize>(
         a: &Side<D>,
-        common: &Common<D>,
+        common: &Intersection<D>,
         pair: &ContactPair,
         far: &BTreeSet<u32>,
         distance: f64,

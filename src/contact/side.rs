@@ -1,7 +1,7 @@
 //! One contact surface of a body: facets with averaged nodal normals, its smooth faces, and the order of nodes along it.
 
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
-use crate::linalg::{Joined, bounds, dot};
+use crate::linalg::{DisjointSets, bounds, dot};
 use crate::mesh::datum;
 use std::collections::{HashMap, HashSet};
 
@@ -129,18 +129,18 @@ pub const ROUNDING: f64 = 1e-9;
 /// The smooth faces of a surface. Facets with a common vertex at which they turn by no more than the angle of an edge are of
 /// one face.
 #[derive(Debug, Clone)]
-pub struct Faces {
+pub struct SmoothFaces {
     /// Face of each facet. Faces are numbered in the order of their first facets.
     pub of_facet: Vec<usize>,
     /// Number of faces.
     pub count: usize,
 }
 
-impl Faces {
+impl SmoothFaces {
     /// Find the faces of a surface between edges at which facets turn by more than `edge` degrees.
     pub fn new<const D: usize>(side: &Side<D>, edge: f64) -> Self {
         let least = edge.to_radians().cos() - ROUNDING;
-        let mut joined = Joined::new(side.facets.count());
+        let mut joined = DisjointSets::new(side.facets.count());
         for around in normals_at_vertices(side).values() {
             for (k, (facet, normal)) in around.iter().enumerate() {
                 for (other, other_normal) in &around[..k] {

@@ -1,8 +1,8 @@
 //! The step from numbers in rows to a function of one coordinate or two: points without a height are counted, a trend is subtracted, and
 //! gaps of grids are filled.
 
-use super::grid::{Axis, Grid};
-use super::rule::{DataSpec, Detrend, Fill, Frame, Interpolation, Outside, Rows};
+use super::grid::{Grid, GridAxis};
+use super::rule::{DataSpec, Detrend, Fill, GridFrame, Interpolation, NumberRows, Outside};
 use super::scattered::{Knots, Scattered};
 use crate::error::{Result, shown};
 use crate::linalg::{bounds, range};
@@ -12,7 +12,7 @@ use rstar::primitives::GeomWithData;
 
 /// A function of one coordinate or two, by the places of its points.
 #[derive(Debug, Clone)]
-pub enum Shape {
+pub enum PointLayout {
     /// Points at equal distances.
     Grid(Grid),
     /// Points of one coordinate at any distances.
@@ -25,7 +25,7 @@ pub enum Shape {
 #[derive(Debug, Clone)]
 pub struct Arranged {
     /// The function.
-    pub shape: Shape,
+    pub shape: PointLayout,
     /// Number of points of the file without a height.
     pub missing: usize,
     /// The polynomial that was subtracted, if any.
@@ -41,7 +41,7 @@ const ROUNDED: f64 = 1e-2;
 ///
 /// # Errors
 /// Numbers that give no function, or not one that the scene asks for; points without a height that the scene does not expect.
-pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Arranged> {
+pub fn shape(spec: &DataSpec, rows: NumberRows) -> Result<Arranged> {
     if rows.values.is_empty() {
         return Err(spec.refuse("has no numbers", "write heights in rows"));
     }
@@ -57,7 +57,7 @@ pub fn shape(spec: &DataSpec, rows: Rows) -> Result<Arranged> {
 }
 
 /// Return the function of heights in rows and columns. A single row or column is a profile.
-fn matrix(spec: &DataSpec, rows: Rows) -> Result<(Shape, Option<Trend>)> {
+fn matrix(spec: &DataSpec, rows: NumberRows) -> Result<(PointLayout, Option<Trend>)> {
     let mut counts = [rows.columns, rows.count()];
     if counts[0] == 1 {
         counts.swap(0, 1);
@@ -66,10 +66,10 @@ fn matrix(spec: &DataSpec, rows: Rows) -> Result<(Shape, Option<Trend>)> {
         return Err(spec.refuse("has one number", "two points or more make a function"));
     }
     let mut values: Vec<f64> = rows.values.iter().map(|value| spec.unit * value).collect();
-    let frame = rows.frame.unwrap_or(Frame { origin: [0.0; 2], spacing: [1.0; 2] });
+    let frame = rows.frame.unwrap_or(GridFrame { origin: [0.0; 2], spacing: [1.0; 2] });
     let origin = |d: usize| spec.origin[d] + spec.spacing[d] * frame.origin[d];
     let axes =
-        [0, 1].map(|d| Axis { origin: origin(d), spacing: spec.spacing[d] * frame.spacing[d], count: counts[d] });
+        [0, 1].map(|d| GridAxis { origin: origin(d), spacing: spec.spacing[d] * frame.spacing[d], count: counts[d] });
     let place = |k: usize| {
         let index = [k % counts[0], k / counts[0]];
         [0, 1].map(|d| axes[d].origin + axes[d].spacing * index[d] as f64)
@@ -79,17 +79,17 @@ fn matrix(spec: &DataSpec, rows: Rows) -> Result<(Shape, Option<Trend>)> {
 }
 
 /// Return a regular grid, with the interpolation that the scene asks for. Values that are NaN are gaps.
-fn grid(spec: &DataSpec, axes: [Axis; 2], mut values: Vec<f64>) -> Result<Shape> {
-    let thin = |axis: &Axis| axis.count != 1 && axis.count < 3;
+fn grid(spec: &DataSpec, axes: [GridAxis; 2], mut values: Vec<f64>) -> Result<PointLayout> {
+    let thin = |axis: &GridAxis| axis.count != 1 && axis.count < 3;
     if spec.interpolation == Interpolation::Cubic && axes.iter().any(thin) {
         return Err(spec.refuse("has two points in a direction", "cubic interpolation needs three: take \"linear\""));
     }
     fill_gaps(spec.fill, &axes, &mut values);
-    Ok(Shape::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
+    Ok(PointLayout::Grid(Grid { axes, values, interpolation: spec.interpolation, outside: spec.outside }))
 }
 
 /// Return the function of points in any order: (x, height) or (x, y, height).
-fn points(spec: &DataSpec, rows: &Rows) -> Result<(Shape, Option<Trend>)> {
+fn points(spec: &DataSpec, rows: &NumberRows) -> Result<(PointLayout, Option<Trend>)> {
     let point = |row: &[f64]| match *row {
         [x, y, height] => placed(spec, [x, y], height),
         _ => placed(spec, [row[0], 0.0], row[1]),
@@ -104,14 +104,14 @@ fn points(spec: &DataSpec, rows: &Rows) -> Result<(Shape, Option<Trend>)> {
 }
 
 /// Return the function of points of a profile, (x, 0, height). Points without a height are gaps of a grid, and are left out elsewhere.
-fn profile(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
+fn profile(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<PointLayout> {
     if points.len() < 2 {
         return Err(spec.refuse("has one point", "two points or more make a function"));
     }
     if let Some(axis) = regular(points.iter().map(|point| point[0])).filter(|axis| axis.count == points.len()) {
         let mut values = vec![0.0; axis.count];
         points.iter().for_each(|point| values[nearest(&axis, point[0])] = point[2]);
-        return grid(spec, [axis, Axis { origin: 0.0, spacing: 1.0, count: 1 }], values);
+        return grid(spec, [axis, GridAxis { origin: 0.0, spacing: 1.0, count: 1 }], values);
     }
     only_linear(spec)?;
     points.retain(|point| !point[2].is_nan());
@@ -120,11 +120,11 @@ fn profile(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
     }
     let mut knots: Vec<[f64; 2]> = points.iter().map(|&[x, _, height]| [x, height]).collect();
     knots.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    Ok(Shape::Knots(Knots(knots)))
+    Ok(PointLayout::Knots(Knots(knots)))
 }
 
 /// Return the function of points (x, y, height). Points without a height are gaps of a grid, and are left out elsewhere.
-fn surface(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
+fn surface(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<PointLayout> {
     let axes = [0, 1].map(|d| regular(points.iter().map(|point| point[d])));
     if let [Some(across), Some(down)] = axes
         && across.count.checked_mul(down.count) == Some(points.len())
@@ -142,7 +142,7 @@ fn surface(spec: &DataSpec, mut points: Vec<[f64; 3]>) -> Result<Shape> {
     points.retain(|point| !point[2].is_nan());
     let range = [0, 1].map(|d| range(points.iter().map(|point| point[d])));
     match Scattered::new(&points) {
-        Some(scattered) => Ok(Shape::Scattered(scattered, range)),
+        Some(scattered) => Ok(PointLayout::Scattered(scattered, range)),
         None => Err(spec.refuse("has points on one line alone", "a surface needs three points that make a triangle")),
     }
 }
@@ -172,7 +172,7 @@ fn only_linear(spec: &DataSpec) -> Result<()> {
 const TWINS: f64 = 3.0;
 
 /// Refuse two points at one place: the function would have two heights there.
-fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &Rows) -> Result<()> {
+fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &NumberRows) -> Result<()> {
     let largest = |d: usize| points.iter().fold(spec.origin[d].abs(), |most, point| most.max(point[d].abs()));
     let near = [0, 1].map(|d| TWINS * f64::EPSILON * largest(d));
     let mut order: Vec<usize> = (0..points.len()).collect();
@@ -196,20 +196,20 @@ fn refuse_twins(spec: &DataSpec, points: &[[f64; 3]], rows: &Rows) -> Result<()>
 }
 
 /// Return the regular axis on which coordinates lie; none if there is no such axis. Several coordinates may lie on one point.
-fn regular(coordinates: impl Iterator<Item = f64>) -> Option<Axis> {
+fn regular(coordinates: impl Iterator<Item = f64>) -> Option<GridAxis> {
     let mut sorted: Vec<f64> = coordinates.collect();
     sorted.sort_by(f64::total_cmp);
     let (first, last) = (*sorted.first()?, *sorted.last()?);
     // sorted coordinates differ by about a spacing between points of the axis, and by roundoff within one point
     let widest = sorted.windows(2).map(|two| two[1] - two[0]).fold(0.0, f64::max);
     let steps = sorted.windows(2).filter(|two| two[1] - two[0] > 0.5 * widest).count();
-    let axis = Axis { origin: first, spacing: (last - first) / steps as f64, count: steps + 1 };
+    let axis = GridAxis { origin: first, spacing: (last - first) / steps as f64, count: steps + 1 };
     let is_on = |&x: &f64| (x - axis.origin - axis.spacing * nearest(&axis, x) as f64).abs() <= ROUNDED * axis.spacing;
     (axis.spacing > 0.0 && axis.spacing.is_finite() && sorted.iter().all(is_on)).then_some(axis)
 }
 
 /// Return the index of the point of an axis that is nearest to a coordinate.
-fn nearest(axis: &Axis, x: f64) -> usize {
+fn nearest(axis: &GridAxis, x: f64) -> usize {
     ((x - axis.origin) / axis.spacing).round().clamp(0.0, (axis.count - 1) as f64) as usize
 }
 
@@ -218,7 +218,7 @@ fn nearest(axis: &Axis, x: f64) -> usize {
 /// # Errors
 /// Points without a height, if the scene does not say how to fill them; a suspicious height, if the scene does not name what stands for
 /// points without one.
-fn count_missing(spec: &DataSpec, rows: &Rows) -> Result<usize> {
+fn count_missing(spec: &DataSpec, rows: &NumberRows) -> Result<usize> {
     let total = heights(spec, rows).count();
     let missing = heights(spec, rows).filter(|height| height.is_nan()).count();
     if missing > 0 && missing == total {
@@ -245,13 +245,13 @@ fn count_missing(spec: &DataSpec, rows: &Rows) -> Result<usize> {
 }
 
 /// Return all heights in the order of the file.
-fn heights<'a>(spec: &DataSpec, rows: &'a Rows) -> impl Iterator<Item = f64> + use<'a> {
+fn heights<'a>(spec: &DataSpec, rows: &'a NumberRows) -> impl Iterator<Item = f64> + use<'a> {
     let first = rows.first_height(spec.points);
     rows.values.chunks(rows.columns.max(1)).flat_map(move |row| row[first..].iter().copied())
 }
 
 /// Return, as a text, where in the file the first such height is.
-fn place(spec: &DataSpec, rows: &Rows, is_such: impl Fn(f64) -> bool) -> String {
+fn place(spec: &DataSpec, rows: &NumberRows, is_such: impl Fn(f64) -> bool) -> String {
     let wide = rows.columns.max(1) - rows.first_height(spec.points);
     let at = heights(spec, rows).position(is_such).unwrap_or(0);
     format!("in {}, column {} (from 0)", rows.line(at / wide), rows.first_height(spec.points) + at % wide)
@@ -355,7 +355,7 @@ fn subtract(detrend: Detrend, places: impl Fn(usize) -> [f64; 2], heights: &mut 
 ///
 /// Only the points beside a gap are used. The nearest point of any place in the gap is among them, because one step further into the gap
 /// there is a point that is still nearer.
-fn fill_gaps(fill: Fill, axes: &[Axis; 2], values: &mut [f64]) {
+fn fill_gaps(fill: Fill, axes: &[GridAxis; 2], values: &mut [f64]) {
     let gaps: Vec<usize> = (0..values.len()).filter(|&k| values[k].is_nan()).collect();
     if gaps.is_empty() {
         return;
@@ -393,7 +393,7 @@ fn between(fill: Fill, is_profile: bool, points: &[[f64; 3]]) -> Box<dyn Fn([f64
 }
 
 /// Return the points around a point of a grid: eight inside, fewer at the border.
-fn around(axes: &[Axis; 2], k: usize) -> Vec<usize> {
+fn around(axes: &[GridAxis; 2], k: usize) -> Vec<usize> {
     let [columns, rows] = [axes[0].count, axes[1].count];
     let near = |at: usize, count: usize| at.saturating_sub(1)..=(at + 1).min(count - 1);
     let row = |j: usize| near(k % columns, columns).map(move |i| i + columns * j);
@@ -456,8 +456,8 @@ mod tests {
         assert_eq!(subtract(Detrend::None, along, &mut line), None);
     }
 
-    fn axes(counts: [usize; 2]) -> [Axis; 2] {
-        let axis = |origin, spacing, count| Axis { origin, spacing, count };
+    fn axes(counts: [usize; 2]) -> [GridAxis; 2] {
+        let axis = |origin, spacing, count| GridAxis { origin, spacing, count };
         [axis(5.0, 0.5, counts[0]), axis(-1.0, 2.0, counts[1])]
     }
 

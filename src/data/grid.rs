@@ -5,7 +5,7 @@ use super::rule::{Interpolation, Outside, Sample};
 
 /// A direction of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis {
+pub struct GridAxis {
     /// Place of the first point.
     pub origin: f64,
     /// Distance of neighbours, greater than 0.
@@ -14,7 +14,7 @@ pub struct Axis {
     pub count: usize,
 }
 
-impl Axis {
+impl GridAxis {
     /// Return the first and the last place with a value. They are half a spacing beyond the points, since a measured height is the mean over a
     /// cell around its point.
     pub fn range(&self) -> [f64; 2] {
@@ -26,7 +26,7 @@ impl Axis {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// The axis along a row, and the axis from row to row.
-    pub axes: [Axis; 2],
+    pub axes: [GridAxis; 2],
     /// Values at the points, row by row.
     pub values: Vec<f64>,
     /// Interpolation between the points.
@@ -71,7 +71,7 @@ impl Grid {
 
     /// Return the stencil of a coordinate on an axis; none where there are no values.
     fn stencil(&self, axis: usize, x: f64) -> Option<Stencil> {
-        let Axis { origin, spacing, count } = self.axes[axis];
+        let GridAxis { origin, spacing, count } = self.axes[axis];
         if count == 1 {
             return Some(Stencil { weight: [1.0, 0.0, 0.0, 0.0], ..Stencil::default() });
         }

@@ -2,7 +2,7 @@
 //!
 //! Origin and spacing of the header are in the lengths of the file. Those of the scene place and scale them, as they do with points.
 
-use super::rule::{DataSpec, Frame, Rows};
+use super::rule::{DataSpec, GridFrame, NumberRows};
 use crate::error::{Error, Result};
 use std::io::Read;
 use std::path::Path;
@@ -16,19 +16,19 @@ const BINARY_HEADER: usize = 4 + 2 * 2 + 6 * 8;
 
 /// Kinds of grids by their first letters.
 #[derive(Clone, Copy, PartialEq)]
-enum Kind {
+enum RasterFormat {
     Esri,
     SurferText,
     SurferBinary,
 }
 
 /// Return the kind of a file by its first bytes; none if it is no grid with a header.
-fn kind(bytes: &[u8]) -> Option<Kind> {
+fn kind(bytes: &[u8]) -> Option<RasterFormat> {
     let starts = |word: &[u8]| bytes.get(..word.len()).is_some_and(|start| start.eq_ignore_ascii_case(word));
     match () {
-        () if starts(b"DSAA") => Some(Kind::SurferText),
-        () if starts(b"DSBB") => Some(Kind::SurferBinary),
-        () if starts(b"ncols") || starts(b"nrows") => Some(Kind::Esri),
+        () if starts(b"DSAA") => Some(RasterFormat::SurferText),
+        () if starts(b"DSBB") => Some(RasterFormat::SurferBinary),
+        () if starts(b"ncols") || starts(b"nrows") => Some(RasterFormat::Esri),
         () => None,
     }
 }
@@ -71,13 +71,13 @@ pub fn refuse_other_kinds(spec: &DataSpec, bytes: &[u8]) -> Result<()> {
 ///
 /// # Errors
 /// A header that is not complete, a text that is no number, or too few or too many heights.
-pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
+pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     if spec.points {
         return Err(spec.refuse("has a header of a grid", "leave out `points`: its numbers are heights"));
     }
     match kind(bytes) {
-        Some(Kind::SurferBinary) => surfer_binary(spec, bytes),
-        Some(Kind::SurferText) => surfer_text(spec, Words::new(spec, bytes)?),
+        Some(RasterFormat::SurferBinary) => surfer_binary(spec, bytes),
+        Some(RasterFormat::SurferText) => surfer_text(spec, Words::new(spec, bytes)?),
         _ => esri(spec, Words::new(spec, bytes)?),
     }
 }
@@ -86,16 +86,16 @@ pub fn rows(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
 struct Header {
     columns: usize,
     count: usize,
-    frame: Frame,
+    frame: GridFrame,
 }
 
 impl Header {
     /// Return a header after a check of its numbers.
-    fn new(spec: &DataSpec, counts: [f64; 2], frame: Frame) -> Result<Self> {
+    fn new(spec: &DataSpec, counts: [f64; 2], frame: GridFrame) -> Result<Self> {
         let is_count = |n: f64| n >= 1.0 && n.fract() == 0.0 && n <= f64::from(u32::MAX);
         let is_good = |d: usize| frame.origin[d].is_finite() && frame.spacing[d] > 0.0 && frame.spacing[d].is_finite();
         if !(counts.iter().all(|&n| is_count(n)) && is_good(0) && is_good(1)) {
-            let Frame { origin: [x, y], spacing: [dx, dy] } = frame;
+            let GridFrame { origin: [x, y], spacing: [dx, dy] } = frame;
             let [columns, rows] = counts;
             let what =
                 format!("has a header of {columns} x {rows} heights from ({x}, {y}) with distances of {dx} and {dy}");
@@ -108,7 +108,7 @@ impl Header {
     fn between(spec: &DataSpec, counts: [f64; 2], ranges: [[f64; 2]; 2]) -> Result<Self> {
         // a single row has no distance
         let spacing = |d: usize| if counts[d] == 1.0 { 1.0 } else { (ranges[d][1] - ranges[d][0]) / (counts[d] - 1.0) };
-        let frame = Frame { origin: ranges.map(|range| range[0]), spacing: [0, 1].map(spacing) };
+        let frame = GridFrame { origin: ranges.map(|range| range[0]), spacing: [0, 1].map(spacing) };
         Self::new(spec, counts, frame)
     }
 
@@ -120,7 +120,7 @@ impl Header {
 }
 
 /// Read an ASCII grid of ESRI, whose first row is the uppermost one.
-fn esri(spec: &DataSpec, mut words: Words) -> Result<Rows> {
+fn esri(spec: &DataSpec, mut words: Words) -> Result<NumberRows> {
     let mut table = Vec::new();
     while let Some(key) = words.next_unless_number() {
         table.push((key, words.number()?));
@@ -137,21 +137,21 @@ fn esri(spec: &DataSpec, mut words: Words) -> Result<Rows> {
         None => need(&[corner]).map(|place| place + 0.5 * spacing[d]),
     };
     let origin = [start("xllcenter", "xllcorner", 0)?, start("yllcenter", "yllcorner", 1)?];
-    let header = Header::new(spec, [need(&["ncols"])?, need(&["nrows"])?], Frame { origin, spacing })?;
+    let header = Header::new(spec, [need(&["ncols"])?, need(&["nrows"])?], GridFrame { origin, spacing })?;
     let nodata = find(&["nodata_value"]).unwrap_or(NODATA);
     let rows = words.rows(&header, |height| height == nodata)?;
     Ok(upwards(rows))
 }
 
 /// Return rows in the opposite order.
-fn upwards(rows: Rows) -> Rows {
+fn upwards(rows: NumberRows) -> NumberRows {
     let values = rows.values.chunks(rows.columns).rev().flatten().copied().collect();
     let lines = rows.lines.iter().rev().copied().collect();
-    Rows { values, lines, ..rows }
+    NumberRows { values, lines, ..rows }
 }
 
 /// Read a text grid of Surfer, whose first row is the lowest one.
-fn surfer_text(spec: &DataSpec, mut words: Words) -> Result<Rows> {
+fn surfer_text(spec: &DataSpec, mut words: Words) -> Result<NumberRows> {
     words.skip();
     let mut pair = || -> Result<[f64; 2]> { Ok([words.number()?, words.number()?]) };
     let [counts, x, y, _heights] = [pair()?, pair()?, pair()?, pair()?];
@@ -159,7 +159,7 @@ fn surfer_text(spec: &DataSpec, mut words: Words) -> Result<Rows> {
 }
 
 /// Read a binary grid of Surfer 6: 32-bit floats after the header.
-fn surfer_binary(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
+fn surfer_binary(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     let Some((head, heights)) = bytes.split_at_checked(BINARY_HEADER) else {
         return Err(spec.refuse("ends within its header", "it was cut short: copy it once more"));
     };
@@ -176,7 +176,7 @@ fn surfer_binary(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     // the limit is rounded to the digits of the file
     let height = |bytes: &[u8; 4]| Some(f64::from(f32::from_le_bytes(*bytes))).filter(|&height| height < 0.999 * BLANK);
     let values = floats.iter().map(|bytes| height(bytes).unwrap_or(f64::NAN)).collect();
-    Ok(Rows { columns: header.columns, values, lines: Vec::new(), frame: Some(header.frame) })
+    Ok(NumberRows { columns: header.columns, values, lines: Vec::new(), frame: Some(header.frame) })
 }
 
 /// The words of a text with their lines.
@@ -213,7 +213,7 @@ impl<'a> Words<'a> {
     }
 
     /// Return all other numbers in rows; those for which `is_missing` holds become NaN.
-    fn rows(self, header: &Header, is_missing: impl Fn(f64) -> bool) -> Result<Rows> {
+    fn rows(self, header: &Header, is_missing: impl Fn(f64) -> bool) -> Result<NumberRows> {
         let named = self.spec.missing.clone().unwrap_or_default();
         let (mut values, mut lines) = (Vec::new(), Vec::new());
         for (line, word) in self.words {
@@ -230,7 +230,7 @@ impl<'a> Words<'a> {
         if values.len() != header.count {
             return Err(header.refuse_count(self.spec, values.len()));
         }
-        Ok(Rows { columns: header.columns, values, lines, frame: Some(header.frame) })
+        Ok(NumberRows { columns: header.columns, values, lines, frame: Some(header.frame) })
     }
 }
 

@@ -5,7 +5,7 @@
 //! with `#`, and lines before the first number, are skipped.
 
 use super::raster;
-use super::rule::{DataSpec, Missing, Rows};
+use super::rule::{DataSpec, NoData, NumberRows};
 use crate::error::{Error, Result};
 use crate::file::other_encoding;
 use npyz::{DType, Deserialize, NpyFile, NpyHeader, Order, TypeChar};
@@ -15,7 +15,7 @@ use std::cmp::Ordering;
 ///
 /// # Errors
 /// A file that cannot be read, that is damaged, or that has coordinates that are not finite.
-pub fn rows(spec: &DataSpec) -> Result<Rows> {
+pub fn rows(spec: &DataSpec) -> Result<NumberRows> {
     let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.place))?;
     raster::refuse_other_kinds(spec, &bytes)?;
     let mut rows = match () {
@@ -41,7 +41,7 @@ pub fn rows(spec: &DataSpec) -> Result<Rows> {
 ///
 /// # Errors
 /// Bytes that are no text, a field that is no number, rows of different lengths.
-fn of_text(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
+fn of_text(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     if let Some(other) = other_encoding(bytes) {
         let what = format!("is neither text nor a file of NumPy: it {other}");
@@ -54,7 +54,7 @@ fn of_text(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
     let first = || bytes.split(is_end).map(<[u8]>::trim_ascii).find(is_row).unwrap_or_default();
     let separator = separator(last).or_else(|| separator(first())).unwrap_or(b' ');
     let named = spec.missing.clone().unwrap_or_default();
-    let (mut rows, mut skipped) = (Rows::default(), None);
+    let (mut rows, mut skipped) = (NumberRows::default(), None);
     let lines = bytes.split(is_end).map(<[u8]>::trim_ascii).zip(1..);
     for (text, line) in lines.filter(|(text, _)| is_row(text)) {
         let fields = || fields(text, separator, &named);
@@ -87,7 +87,7 @@ fn fields_of(text: &[u8], separator: u8) -> impl Iterator<Item = &[u8]> {
 }
 
 /// Return the fields of a line. A separator at its end is ignored, unless an empty field stands for no height.
-fn fields<'a>(text: &'a [u8], separator: u8, named: &Missing) -> impl Iterator<Item = &'a [u8]> + use<'a> {
+fn fields<'a>(text: &'a [u8], separator: u8, named: &NoData) -> impl Iterator<Item = &'a [u8]> + use<'a> {
     let text = if named.has_word("") { text } else { text.strip_suffix(&[separator]).unwrap_or(text) };
     fields_of(text, separator)
 }
@@ -139,7 +139,7 @@ fn separator(line: &[u8]) -> Option<u8> {
 }
 
 /// Return the height in a field, NaN if it has the word for no height; none if it is neither.
-fn height(field: &[u8], separator: u8, named: &Missing) -> Option<f64> {
+fn height(field: &[u8], separator: u8, named: &NoData) -> Option<f64> {
     let is_named = || std::str::from_utf8(field).is_ok_and(|word| named.has_word(word));
     number(field, separator).or_else(|| is_named().then_some(f64::NAN))
 }
@@ -161,7 +161,7 @@ const HELP: &str = "save the heights as they come from NumPy: np.save(\"surface.
 ///
 /// # Errors
 /// A damaged file, or an array of another kind.
-fn of_numpy(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
+fn of_numpy(spec: &DataSpec, bytes: &[u8]) -> Result<NumberRows> {
     let damaged = |cause: std::io::Error| spec.refuse(format_args!("is no file of NumPy: {cause}"), HELP);
     refuse_short_header(spec, bytes)?;
     let mut rest = bytes;
@@ -206,7 +206,7 @@ fn of_numpy(spec: &DataSpec, bytes: &[u8]) -> Result<Rows> {
         Order::C => values,
         Order::Fortran => (0..count * columns).map(|k| values[k / columns + count * (k % columns)]).collect(),
     };
-    Ok(Rows { columns, values, lines: Vec::new(), frame: None })
+    Ok(NumberRows { columns, values, lines: Vec::new(), frame: None })
 }
 
 /// Refuse a header that is longer than the file, before memory is taken for it.

@@ -69,7 +69,8 @@ impl Detrend {
 
 /// What stands in a file for points without a height. NaN always does.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Missing {
+pub struct NoData {
+    /// Numbers.
     pub numbers: Vec<f64>,
     /// Words in the place of a number; the empty word is a field without characters.
     pub words: Vec<String>,
@@ -79,7 +80,7 @@ pub struct Missing {
 /// half a unit of the sixth digit of a number that begins with one.
 const SAME: f64 = 5e-6;
 
-impl Missing {
+impl NoData {
     /// Return whether a number stands for no height.
     pub fn has(&self, number: f64) -> bool {
         !number.is_finite() || self.numbers.iter().any(|&named| (number - named).abs() <= SAME * named.abs())
@@ -109,6 +110,7 @@ impl Sample {
 pub struct DataSpec {
     /// Name of the function.
     pub name: String,
+    /// The file.
     pub file: PathBuf,
     /// The place in the scene where the file is named.
     pub place: Place,
@@ -121,7 +123,7 @@ pub struct DataSpec {
     /// The height in the scene of a height of 1 in the file.
     pub unit: f64,
     /// What stands for points without a height; none if the scene does not say.
-    pub missing: Option<Missing>,
+    pub missing: Option<NoData>,
     /// What to do about points without a height.
     pub fill: Fill,
     /// The shape that is subtracted before gaps are filled.
@@ -142,7 +144,7 @@ impl DataSpec {
 
 /// The place of heights, where the file says it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct GridFrame {
     /// Place of the first height.
     pub origin: [f64; 2],
     /// Distance of heights along a row and from row to row.
@@ -151,17 +153,18 @@ pub struct Frame {
 
 /// Numbers in rows of one length. Once [`read`](super::read) has checked them, coordinates are finite, and a height is finite or NaN.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Rows {
+pub struct NumberRows {
+    /// Number of columns.
     pub columns: usize,
     /// The numbers, row by row.
     pub values: Vec<f64>,
     /// The line of each row if the file is a text; else empty.
     pub lines: Vec<u64>,
     /// The place of the heights, if the file says it.
-    pub frame: Option<Frame>,
+    pub frame: Option<GridFrame>,
 }
 
-impl Rows {
+impl NumberRows {
     /// Return the number of rows.
     pub fn count(&self) -> usize {
         self.values.len() / self.columns.max(1)

@@ -39,7 +39,7 @@ fn smooth([x, y]: [f64; 2]) -> Sample {
 
 fn grid(counts: [usize; 2], interpolation: Interpolation, outside: Outside, value: impl Fn([f64; 2]) -> f64) -> Grid {
     let spacing = [2.0 / (counts[0] - 1) as f64, 3.0 / (counts[1] - 1) as f64];
-    let axis = |d: usize| grid::Axis { origin: [0.5, -1.0][d], spacing: spacing[d], count: counts[d] };
+    let axis = |d: usize| grid::GridAxis { origin: [0.5, -1.0][d], spacing: spacing[d], count: counts[d] };
     let axes = [0, 1].map(axis);
     let place = |k: usize| {
         let index = [k % counts[0], k / counts[0]];
@@ -282,7 +282,7 @@ fn files_of_numpy_are_as_long_as_they_say() {
 fn roughness_of_waves_is_known() {
     let (a, n, period) = (0.3, 64, 2.0);
     let (spacing, k) = (period / n as f64, 2.0 * std::f64::consts::PI / period);
-    let axis = |_| grid::Axis { origin: 0.0, spacing, count: 2 * n };
+    let axis = |_| grid::GridAxis { origin: 0.0, spacing, count: 2 * n };
     let wave =
         |at: usize| a * ((k * spacing * (at % (2 * n)) as f64).cos() + (k * spacing * (at / (2 * n)) as f64).cos());
     let values = (0..4 * n * n).map(wave).collect();
@@ -304,7 +304,7 @@ fn roughness_of_waves_is_known() {
     assert_eq!(Grid { outside: Outside::Clamp, ..surface.clone() }.summits().expect("summits").heights.len(), 1);
     let count = 2 * n;
     let profile = Grid {
-        axes: [surface.axes[0], grid::Axis { count: 1, ..surface.axes[1] }],
+        axes: [surface.axes[0], grid::GridAxis { count: 1, ..surface.axes[1] }],
         values: surface.values[..count].to_vec(),
         ..surface
     };
@@ -323,7 +323,7 @@ fn grids_with_a_header_are_read() {
     let grid = data.grid().unwrap();
     assert_eq!(grid.values, [1.0, 2.0, 2.0, 4.0, 5.0, 6.0]);
     // heights are in the middle of cells, half a cell from the corner; the scene has lengths of 2
-    let axis = |origin, count| grid::Axis { origin, spacing: 1.0, count };
+    let axis = |origin, count| grid::GridAxis { origin, spacing: 1.0, count };
     assert_eq!(grid.axes, [axis(5.5, 3), axis(-9.5, 2)]);
     assert_eq!(data.missing(), 1);
     let centre = "NROWS 1\nNCOLS 2\nXLLCENTER 1,5\nYLLCENTER 0\nDX 2\nDY 1\n7 8\n";
@@ -335,7 +335,7 @@ fn grids_with_a_header_are_read() {
     let binary: Vec<u8> = b"DSBB\x03\0\x02\0".iter().copied().chain(numbers).chain(heights).collect();
     let read = load(&binary, |spec| spec.fill = Fill::Nearest).unwrap();
     assert_eq!(read.grid().unwrap().values, grid.values);
-    assert_eq!(read.grid().unwrap().axes[1], grid::Axis { origin: -20.0, spacing: 2.0, count: 2 });
+    assert_eq!(read.grid().unwrap().axes[1], grid::GridAxis { origin: -20.0, spacing: 2.0, count: 2 });
     let refused = |bytes: &[u8]| load(bytes, |_| ()).expect_err("a bad file").message().to_owned();
     for length in 4..binary.len() {
         let words = refused(&binary[..length]);
@@ -363,9 +363,9 @@ fn grids_with_a_header_are_read() {
 fn points_without_a_height_are_named_and_filled() {
     let missing = |numbers: &[f64], words: &[&str]| {
         let words = words.iter().map(|word| word.to_string()).collect();
-        Some(Missing { numbers: numbers.to_vec(), words })
+        Some(NoData { numbers: numbers.to_vec(), words })
     };
-    let values = |text: &str, named: Option<Missing>| {
+    let values = |text: &str, named: Option<NoData>| {
         let data = load(text, |spec| (spec.missing, spec.fill) = (named, Fill::Linear)).unwrap();
         (data.grid().expect("a grid").values.clone(), data.missing())
     };

@@ -19,7 +19,7 @@ use crate::contact::LayerLaw;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::layer::{Layer, in_series, meeting_slopes, surface_slopes};
-use crate::model::linear::Solution;
+use crate::model::linear::LinearSolution;
 use crate::model::rigid::PART;
 
 /// The distance of layer states from the laws at the compressions of the bodies.
@@ -106,7 +106,7 @@ impl Reached {
         model: &Model,
         scale: &Scale,
         strain: f64,
-        step: &Solution,
+        step: &LinearSolution,
         state: &Equilibrium,
         places: &Layer,
     ) -> Self {
@@ -168,7 +168,7 @@ impl Reached {
     pub(super) fn add_rounding(
         &mut self,
         (scale, strain): (&Scale, f64),
-        more: &Solution,
+        more: &LinearSolution,
         before: &Layer,
         places: &Layer,
     ) -> f64 {
@@ -326,8 +326,8 @@ mod tests {
         assert!((x - y).abs() <= 1e-12 * y.abs(), "{x} {y}");
     }
 
-    fn step(trace: Vec<f64>, energy: f64, error: f64) -> Solution {
-        Solution { field: Field { states: Vec::new(), trace }, energy, error, is_exact: error == 0.0 }
+    fn step(trace: Vec<f64>, energy: f64, error: f64) -> LinearSolution {
+        LinearSolution { field: Field { states: Vec::new(), trace }, energy, error, is_exact: error == 0.0 }
     }
 
     fn state<'a>(compression: &'a [f64], pressure: &'a [f64], rho: &'a [f64]) -> Equilibrium<'a> {

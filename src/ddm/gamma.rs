@@ -1,9 +1,9 @@
 //! The paper's iteration u <- u + gamma z, and its relaxation rules: gamma of (42), from the sweeps so far.
 
-use super::robin::{Acceleration, Iterate, Step, best_factor, best_gamma, relaxed_factor};
+use super::robin::{Acceleration, Iterate, RobinStep, best_factor, best_gamma, relaxed_factor};
 use crate::error::Result;
 use crate::linalg::dot;
-use crate::model::field::{Line, Unbounded};
+use crate::model::field::{LineEnergy, Unbounded};
 use crate::problem::Own;
 use crate::problem::method::Gamma;
 use crate::robin::Ritz;
@@ -91,7 +91,7 @@ impl Acceleration for Relaxed {
         "robin"
     }
 
-    fn step(&mut self, here: &mut Iterate) -> Result<Step> {
+    fn step(&mut self, here: &mut Iterate) -> Result<RobinStep> {
         let size = here.decrement().sqrt();
         // with a fixed gamma the slowest mode remains, and the corrections decrease by its factor 1 - gamma lambda_min
         if let Some((before, gamma)) = self.last {
@@ -105,9 +105,9 @@ impl Acceleration for Relaxed {
         Ok(match self.rule.gamma(here, &mut self.ritz) {
             Ok(gamma) => {
                 self.last = Some((size, gamma));
-                Step::Sweep(gamma)
+                RobinStep::Sweep(gamma)
             }
-            Err(_) => Step::Unbounded,
+            Err(_) => RobinStep::Unbounded,
         })
     }
 
@@ -135,7 +135,7 @@ pub struct LineSearch;
 
 impl GammaRule for LineSearch {
     fn gamma(&mut self, here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
-        Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction).minimize(1e-6)
+        LineEnergy::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction).minimize(1e-6)
     }
 
     fn factor(&self, spectrum: (f64, f64)) -> Option<f64> {
@@ -182,14 +182,14 @@ const WINDOW: usize = 10;
 /// Lampariello and Lucidi, 1986, as Raydan uses it, 1997). A step that goes further is replaced by the exact line search.
 #[derive(Debug, Default)]
 pub struct BarzilaiBorwein {
-    last: Option<Last>,
+    last: Option<LastIterate>,
     /// F1 of the last iterates minus F1 of the present one.
     recent: VecDeque<f64>,
 }
 
 /// The last iterate.
 #[derive(Debug)]
-struct Last {
+struct LastIterate {
     gamma: f64,
     /// r'z.
     decrement: f64,
@@ -209,7 +209,7 @@ impl GammaRule for BarzilaiBorwein {
             last.gamma * last.decrement / (last.gamma * last.curvature + dot(&stiffer, &last.closing))
         });
         let decrement = here.decrement();
-        let line = Line::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction);
+        let line = LineEnergy::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction);
         let worst = self.recent.iter().copied().fold(0.0, f64::max);
         let gamma = match quotient {
             Some(gamma) if gamma > 0.0 && gamma.is_finite() && line.change(gamma) <= worst => gamma,
@@ -222,7 +222,7 @@ impl GammaRule for BarzilaiBorwein {
         self.recent.push_back(0.0);
         self.recent.iter_mut().for_each(|above| *above -= change);
         let (curvature, closing) = (line.curvature(), here.sweep.correction.closing());
-        self.last = Some(Last { gamma, decrement, curvature, closing, force: here.layer.force.clone() });
+        self.last = Some(LastIterate { gamma, decrement, curvature, closing, force: here.layer.force.clone() });
         Ok(gamma)
     }
 

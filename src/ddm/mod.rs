@@ -17,5 +17,5 @@ mod stop;
 pub use bound::Reached;
 pub use newton::{resisting, respond};
 pub use run::{Observer, Row, Silent};
-pub use solve::{Method, Outcome, Settings, Start, State, first_springs, solve};
+pub use solve::{InitialGuess, Method, Outcome, Settings, State, first_springs, solve};
 pub use stop::{Discretisation, Inaccuracy, SHARE, Status, Whose};

@@ -13,14 +13,14 @@
 
 use super::bound::{Reached, Scale, compression_roundoff, contact_energy, surface_energy};
 use super::progress::Equilibrium;
-use super::run::{Candidate, End, Measured, Run};
+use super::run::{FallbackIterate, LoopEnd, Measured, Run};
 use super::start;
 use super::stop::{Stagnation, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, meeting_slopes, surface_slopes};
-use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
+use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, System, Trial};
 use crate::model::rigid::Motions;
 use std::collections::VecDeque;
 
@@ -31,7 +31,7 @@ const HALF: f64 = 0.5;
 const UNSEEN: f64 = 0.01;
 
 /// Iterate from displacements and layer states until a rule ends the run.
-pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, states: Layer) -> Result<End> {
+pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, states: Layer) -> Result<LoopEnd> {
     let (unit, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
     let mut newton = Newton { run, linear, unit, tolerance, u, states, correction: None, best: None };
     loop {
@@ -66,11 +66,11 @@ struct Newton<'n, 'r> {
     /// more. It watches what corrections gain.
     correction: Option<Stagnation>,
     /// The best iterate whose errors include those of its equilibrium. If roundoff ends the run, this one is the result.
-    best: Option<Candidate>,
+    best: Option<FallbackIterate>,
 }
 
 /// The part of a linear step that is taken.
-struct Part {
+struct PartialStep {
     /// 1 for a whole step.
     length: f64,
     /// Pressures at the end of the whole step, n.
@@ -78,9 +78,9 @@ struct Part {
 }
 
 /// The result of a step: displacements and pressures in equilibrium, and the states on the laws that belong to them.
-struct Iterate {
+struct StepResult {
     /// The part of the linear step that was taken.
-    step: Solution,
+    step: LinearSolution,
     length: f64,
     /// c, n.
     compression: Vec<f64>,
@@ -94,7 +94,7 @@ struct Iterate {
     resolved: Layer,
 }
 
-impl Iterate {
+impl StepResult {
     fn equilibrium(&self) -> Equilibrium<'_> {
         let Self { compression, roundoff, pressure, rho, .. } = self;
         Equilibrium { compression, roundoff, pressure, rho }
@@ -113,7 +113,7 @@ struct Measures {
 
 impl Newton<'_, '_> {
     /// Solve the linear step from the states. A correction is solved to half of its size only.
-    fn linear_step(&mut self) -> Result<Solved> {
+    fn linear_step(&mut self) -> Result<LinearResult> {
         let (model, states) = (&mut *self.run.model, &self.states);
         let springs = resisting(model, states.springs(model));
         let compression = model.compression(&self.u.trace);
@@ -130,22 +130,22 @@ impl Newton<'_, '_> {
     }
 
     /// Return the part of a step that does not lead away from the laws; all of a correction.
-    fn step_length(&mut self, step: &Solution) -> Part {
+    fn step_length(&mut self, step: &LinearSolution) -> PartialStep {
         let (model, progress) = (&*self.run.model, &mut self.run.memory.progress);
         let before = model.compression(&self.u.trace);
         let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
         let whole_pressure = self.states.linear(&whole);
         if self.correction.is_some() {
-            return Part { length: 1.0, whole_pressure };
+            return PartialStep { length: 1.0, whole_pressure };
         }
         let roundoff = compression_roundoff(model, &self.u.trace);
         let ends = [[&before[..], &roundoff], [&whole, &whole_pressure]];
         let length = progress.step_length(model, &self.unit, &self.states, ends);
-        Part { length, whole_pressure }
+        PartialStep { length, whole_pressure }
     }
 
     /// Take this part of a step, and resolve the laws at its end.
-    fn advance(&mut self, mut step: Solution, Part { length, whole_pressure }: Part) -> Iterate {
+    fn advance(&mut self, mut step: LinearSolution, PartialStep { length, whole_pressure }: PartialStep) -> StepResult {
         let (model, progress) = (&*self.run.model, &mut self.run.memory.progress);
         step.field.scale(length);
         self.u.add(1.0, &step.field);
@@ -159,13 +159,13 @@ impl Newton<'_, '_> {
         let compression = model.compression(&self.u.trace);
         let roundoff = compression_roundoff(model, &self.u.trace);
         let resolved = Layer::resolve(model, &compression, &pressure, &rho, &[]);
-        Iterate { step, length, compression, roundoff, pressure, rho, resolved }
+        StepResult { step, length, compression, roundoff, pressure, rho, resolved }
     }
 
     /// Measure the errors of an iterate. If it seems good enough or at the roundoff level, measure its equilibrium, too; if that is what makes it
     /// too inexact, the next step is a correction.
-    fn measure(&mut self, iterate: &Iterate) -> Result<Measures> {
-        let Iterate { step, resolved, .. } = iterate;
+    fn measure(&mut self, iterate: &StepResult) -> Result<Measures> {
+        let StepResult { step, resolved, .. } = iterate;
         let run = &mut *self.run;
         let (rest, energy) = residual(run.model, &self.u, &run.model.forces(&iterate.pressure));
         let measured = run.measure(energy, &Layer::new(run.model, iterate.compression.clone()), self.linear);
@@ -210,7 +210,7 @@ impl Newton<'_, '_> {
     }
 
     /// Show the row of an iterate and keep it. Return the status if the run ends with this iterate.
-    fn check_termination(&mut self, iterate: &Iterate, measures: &Measures) -> Result<Option<Status>> {
+    fn check_termination(&mut self, iterate: &StepResult, measures: &Measures) -> Result<Option<Status>> {
         let (run, resolved) = (&mut *self.run, &iterate.resolved);
         let step = (&self.u, &iterate.step.field, iterate.length);
         let at = run.after_step(step, measures.measured, &measures.reached, resolved, self.linear);
@@ -218,7 +218,7 @@ impl Newton<'_, '_> {
         if let Some(row) = run.rows.last().filter(|_| measures.is_complete)
             && self.best.as_ref().is_none_or(|best| row.residual <= best.row.residual)
         {
-            self.best = Some(Candidate { row: row.clone(), u: self.u.clone(), layer: resolved.clone() });
+            self.best = Some(FallbackIterate { row: row.clone(), u: self.u.clone(), layer: resolved.clone() });
         }
         // errors of states on smoothed laws fall with mu, and show no roundoff
         let is_smoothed = !self.states.smoothing.is_empty();
@@ -227,7 +227,7 @@ impl Newton<'_, '_> {
     }
 
     /// Set the states of the next step, unless that is a correction of this one.
-    fn update_states(&mut self, iterate: &Iterate) {
+    fn update_states(&mut self, iterate: &StepResult) {
         if self.correction.is_some() {
             return;
         }
@@ -251,7 +251,7 @@ impl Newton<'_, '_> {
     }
 
     /// End the run at the last iterate, or at the best one if roundoff ends it.
-    fn end(&mut self, status: Status, resolved: Option<Layer>) -> End {
+    fn end(&mut self, status: Status, resolved: Option<Layer>) -> LoopEnd {
         let (mut u, mut states) = (std::mem::take(&mut self.u), resolved.unwrap_or_else(|| self.states.clone()));
         if let (Status::RoundoffLimited, Some(best)) = (&status, self.best.take()) {
             (u, states) = self.run.go_back(best);

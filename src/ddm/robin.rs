@@ -9,12 +9,12 @@
 //!
 //! An [`Acceleration`] makes the next iterate from the sweep at the present one. All minimise the same F1 with the same sweep.
 
-use super::run::{End, Last, Row, Run};
+use super::run::{LastSweep, LoopEnd, Row, Run};
 use super::stop::Status;
 use crate::error::Result;
 use crate::linalg::portable::{log, pow};
 use crate::model::Model;
-use crate::model::field::{Field, Line, local_dot};
+use crate::model::field::{Field, LineEnergy, local_dot};
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
 use crate::robin::sweep::{Coefficient, Sweeper, underconstrained};
@@ -30,10 +30,10 @@ pub(super) fn iterate(
     coefficient: &mut Coefficient,
     linear: &mut dyn LinearStep,
     mut u: Field,
-) -> Result<End> {
+) -> Result<LoopEnd> {
     let end = |status, u, layer, weight, run: &Run| {
         let Sweeper { sweeps, solves_skipped: skipped } = run.memory.sweeper;
-        Ok(End { status, iterate: u, layer, weight, sweeps, skipped })
+        Ok(LoopEnd { status, iterate: u, layer, weight, sweeps, skipped })
     };
     for k in run.rows.len().saturating_sub(1).. {
         let layer = Layer::at(run.model, &u.trace);
@@ -67,16 +67,16 @@ pub(super) fn iterate(
         let residual = run.rows[k].residual;
         let mut here = Iterate { model: run.model, k, layer: &layer, weight: &weight, sweep: &sweep, residual };
         let (direction, length, relaxed) = match acceleration.step(&mut here)? {
-            Step::Unbounded => {
+            RobinStep::Unbounded => {
                 return end(Status::Unbounded { moving: Vec::new() }, u, layer, weight, run);
             }
-            Step::Sweep(gamma) => (None, gamma, Some(gamma)),
-            Step::Along(direction, length) => (Some(direction), length, None),
+            RobinStep::Sweep(gamma) => (None, gamma, Some(gamma)),
+            RobinStep::Along(direction, length) => (Some(direction), length, None),
         };
         let direction = direction.as_ref().unwrap_or(&sweep.correction);
         u.add(length, direction);
         let moved = direction.trace.iter().map(|t| length * t).collect();
-        run.memory.last = Some(Last { sweep, relaxed, length, moved });
+        run.memory.last = Some(LastSweep { sweep, relaxed, length, moved });
     }
     unreachable!("the limit of iterations ends the loop")
 }
@@ -105,7 +105,7 @@ impl Iterate<'_> {
 }
 
 /// A step from an iterate.
-pub enum Step {
+pub enum RobinStep {
     /// Along the correction z of the sweep, by this gamma (42).
     Sweep(f64),
     /// Along another direction, by this length.
@@ -120,7 +120,7 @@ pub trait Acceleration {
     fn name(&self) -> &'static str;
 
     /// Return the next step.
-    fn step(&mut self, here: &mut Iterate) -> Result<Step>;
+    fn step(&mut self, here: &mut Iterate) -> Result<RobinStep>;
 
     /// Return the Ritz values on the span of its directions, which estimate the spectrum of G^-1 F1''.
     fn ritz(&mut self) -> &mut Ritz;
@@ -154,7 +154,7 @@ pub trait Acceleration {
 pub struct Anderson {
     depth: usize,
     /// Earlier steps, oldest first.
-    history: VecDeque<Earlier>,
+    history: VecDeque<PastStep>,
     last: Option<Mixed>,
     /// Whether each point was closed at the last iterate.
     closed: Vec<bool>,
@@ -162,7 +162,7 @@ pub struct Anderson {
 }
 
 /// An earlier step.
-struct Earlier {
+struct PastStep {
     step: Field,
     /// Change of the correction by the step.
     change: Field,
@@ -195,7 +195,7 @@ impl Anderson {
         let scaled = DMatrix::from_fn(z.trace.len(), n, |i, j| changes[(i, j)] / norms[j]);
         let right = DVector::from_column_slice(&z.trace);
         if let Ok(weights) = scaled.svd(true, true).solve(&right, 1e-10) {
-            for (j, Earlier { step, change }) in self.history.iter().enumerate() {
+            for (j, PastStep { step, change }) in self.history.iter().enumerate() {
                 mixed.add(-weights[j] / norms[j], step);
                 mixed.add(-weights[j] / norms[j], change);
             }
@@ -209,7 +209,7 @@ impl Acceleration for Anderson {
         "anderson"
     }
 
-    fn step(&mut self, here: &mut Iterate) -> Result<Step> {
+    fn step(&mut self, here: &mut Iterate) -> Result<RobinStep> {
         let closed: Vec<bool> = here.layer.compression.iter().map(|&c| c > 0.0).collect();
         let z = &here.sweep.correction;
         if closed != self.closed {
@@ -223,24 +223,24 @@ impl Acceleration for Anderson {
             if self.history.len() == self.depth {
                 self.history.pop_front();
             }
-            self.history.push_back(Earlier { step, change });
+            self.history.push_back(PastStep { step, change });
         }
         let mut direction = self.mixture(z);
-        let mut line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
+        let mut line = LineEnergy::new(here.model, here.layer, &here.sweep.residual, &direction);
         if line.derivative(0.0) >= 0.0 {
             // F1 does not fall along the mixture, but it does along the correction of the sweep
             self.history.clear();
             direction = z.clone();
-            line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
+            line = LineEnergy::new(here.model, here.layer, &here.sweep.residual, &direction);
         }
-        let Ok(length) = line.minimize(1e-4) else { return Ok(Step::Unbounded) };
+        let Ok(length) = line.minimize(1e-4) else { return Ok(RobinStep::Unbounded) };
         // the mixture is the best estimate of the error, so it contains the slow modes
         self.ritz.observe(here.model, &direction);
         self.ritz.bounds(here.model, here.layer, here.weight);
         let mut step = direction.clone();
         step.add(length - 1.0, &direction);
         self.last = Some(Mixed { correction: z.clone(), step });
-        Ok(Step::Along(direction, length))
+        Ok(RobinStep::Along(direction, length))
     }
 
     fn ritz(&mut self) -> &mut Ritz {
@@ -275,7 +275,7 @@ impl Acceleration for Conjugate {
         "ncg"
     }
 
-    fn step(&mut self, here: &mut Iterate) -> Result<Step> {
+    fn step(&mut self, here: &mut Iterate) -> Result<RobinStep> {
         let closed: Vec<bool> = here.layer.compression.iter().map(|&c| c > 0.0).collect();
         let z = &here.sweep.correction;
         let mut direction = z.clone();
@@ -290,13 +290,13 @@ impl Acceleration for Conjugate {
                 direction.add_to(beta, z);
             }
         }
-        let line = Line::new(here.model, here.layer, &here.sweep.residual, &direction);
-        let Ok(length) = line.minimize(1e-8) else { return Ok(Step::Unbounded) };
+        let line = LineEnergy::new(here.model, here.layer, &here.sweep.residual, &direction);
+        let Ok(length) = line.minimize(1e-8) else { return Ok(RobinStep::Unbounded) };
         self.ritz.observe(here.model, &direction);
         self.ritz.bounds(here.model, here.layer, here.weight);
         let residual = here.sweep.residual.clone();
         self.last = Some(Conjugated { direction: direction.clone(), residual, decrement: here.decrement(), closed });
-        Ok(Step::Along(direction, length))
+        Ok(RobinStep::Along(direction, length))
     }
 
     fn ritz(&mut self) -> &mut Ritz {

@@ -2,7 +2,7 @@
 
 use super::bound::{ROUNDING, Reached, Scale, compression_roundoff};
 use super::progress::Progress;
-use super::stop::{Balance, Cycle, Stagnation, Status, Steady, relative_increment};
+use super::stop::{BalanceRule, Cycle, Stagnation, Status, Steady, relative_increment};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -10,7 +10,7 @@ use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::linear::LinearStep;
-use crate::model::rigid::Origin;
+use crate::model::rigid::DisplacementOrigin;
 use crate::problem::method::StopRule;
 use crate::robin::{Sweep, Sweeper};
 use serde::{Deserialize, Serialize};
@@ -20,12 +20,12 @@ use std::time::Instant;
 pub(super) struct Run<'a> {
     pub model: &'a mut Model,
     pub stop: &'a StopRule,
-    pub balance: Option<Balance>,
+    pub balance: Option<BalanceRule>,
     pub observer: &'a mut dyn Observer,
     pub began: Instant,
     /// Seconds that the run took before a pause.
     pub earlier: f64,
-    pub origin: Option<Origin>,
+    pub origin: Option<DisplacementOrigin>,
     pub scale: Scale,
     /// Energy of bodies and layers at the last iterate, u'Ku + sum omega p c.
     pub energy: f64,
@@ -40,7 +40,7 @@ pub(super) struct Run<'a> {
 const SUMS: usize = 4;
 
 /// How a loop ended.
-pub(super) struct End {
+pub(super) struct LoopEnd {
     pub status: Status,
     /// The last iterate.
     pub iterate: Field,
@@ -54,7 +54,7 @@ pub(super) struct End {
 }
 
 /// An iterate of Newton's method that a run can go back to.
-pub(super) struct Candidate {
+pub(super) struct FallbackIterate {
     pub row: Row,
     pub u: Field,
     pub layer: Layer,
@@ -98,8 +98,8 @@ impl Run<'_> {
     }
 
     /// Return the end of Newton's method at an iterate with its layers.
-    pub fn end(&self, status: Status, iterate: Field, layer: Layer, linear: &dyn LinearStep) -> End {
-        End { status, iterate, layer, weight: Vec::new(), sweeps: self.sweeps(linear), skipped: 0 }
+    pub fn end(&self, status: Status, iterate: Field, layer: Layer, linear: &dyn LinearStep) -> LoopEnd {
+        LoopEnd { status, iterate, layer, weight: Vec::new(), sweeps: self.sweeps(linear), skipped: 0 }
     }
 
     /// Count the sweeps that the linear steps of this run have made.
@@ -123,7 +123,7 @@ impl Run<'_> {
     }
 
     /// Show the row of an iterate and keep it. Return the status if the run ends there.
-    pub fn check_termination(&mut self, at: &Iterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
+    pub fn check_termination(&mut self, at: &MeasuredIterate, linear: &mut dyn LinearStep) -> Result<Option<Status>> {
         let row = self.row(at);
         let increment = row.increment;
         self.observer.row(&row);
@@ -153,7 +153,7 @@ impl Run<'_> {
     }
 
     /// Go back to an iterate. Unless it is the last one, the history gets one more row, of a step of length zero.
-    pub fn go_back(&mut self, Candidate { row, u, layer }: Candidate) -> (Field, Layer) {
+    pub fn go_back(&mut self, FallbackIterate { row, u, layer }: FallbackIterate) -> (Field, Layer) {
         if let Some(last) = self.rows.last().filter(|last| last.iteration != row.iteration) {
             let Row { iteration, factorizations, inner_iterations, sweeps, seconds, .. } = *last;
             let row = Row { iteration, gamma: 0.0, factorizations, inner_iterations, sweeps, seconds, ..row };
@@ -164,7 +164,7 @@ impl Run<'_> {
     }
 
     /// Return the row of an iterate. Traces and energies in it refer to the undeformed bodies, not to the origin.
-    fn row(&self, at: &Iterate) -> Row {
+    fn row(&self, at: &MeasuredIterate) -> Row {
         let mut trace = at.u.trace.clone();
         if let Some(origin) = &self.origin {
             crate::linalg::axpy(1.0, origin.trace(), &mut trace);
@@ -202,13 +202,13 @@ impl Run<'_> {
         reached: &Reached,
         places: &'a Layer,
         linear: &dyn LinearStep,
-    ) -> Iterate<'a> {
+    ) -> MeasuredIterate<'a> {
         let residual = reached.worst();
         (self.energy, self.strain) = (measured.strain + places.work, measured.strain);
         let closed = places.compression.iter().map(|&c| c > 0.0);
         // no F1: it goes up and down in Newton's method
         let period = self.memory.cycle.period(&u.trace, closed, residual, 0.0);
-        Iterate {
+        MeasuredIterate {
             k: self.rows.len() + 1,
             u,
             layer: places,
@@ -237,7 +237,7 @@ impl Run<'_> {
         sweep: &'a Sweep,
         (moved, length): (Option<&'a [f64]>, f64),
         amplification: f64,
-    ) -> Iterate<'a> {
+    ) -> MeasuredIterate<'a> {
         let strain: f64 = sweep.energy.iter().map(|energy| energy.strain).sum();
         let potential: f64 = sweep.energy.iter().map(|energy| energy.potential).sum();
         let missed = sweep.decrement.iter().sum();
@@ -247,7 +247,7 @@ impl Run<'_> {
         let is_still = self.is_still(layer, residual);
         self.memory.steady.note(residual, &layer.pressure);
         let closed = layer.compression.iter().map(|&c| c > 0.0);
-        Iterate {
+        MeasuredIterate {
             k: self.rows.len(),
             u,
             layer,
@@ -284,7 +284,7 @@ impl Run<'_> {
 }
 
 /// An iterate of either loop.
-pub(super) struct Iterate<'a> {
+pub(super) struct MeasuredIterate<'a> {
     /// Its number.
     pub k: usize,
     pub u: &'a Field,
@@ -388,7 +388,7 @@ impl Observer for Silent {
 
 /// The step that led to an iterate of sweeps.
 #[derive(Debug, Clone)]
-pub(super) struct Last {
+pub(super) struct LastSweep {
     /// The sweep before the step.
     pub sweep: Sweep,
     /// gamma, if the step was taken along the sweep's correction.
@@ -416,7 +416,7 @@ pub struct Memory {
     /// Counters of sweeps.
     pub(super) sweeper: Sweeper,
     /// The last step of sweeps.
-    pub(super) last: Option<Last>,
+    pub(super) last: Option<LastSweep>,
     /// The sweep at the last iterate, if the run paused.
     pub(super) sweep: Option<Sweep>,
     /// Sweeps of this run that another process made.

@@ -3,9 +3,9 @@
 use super::bound::{OffLaws, ROUNDING, Reached, Scale, compression_roundoff, pressure_roundoff, roundoff_safety};
 use super::newton::resisting;
 use super::robin::{Acceleration, Forecast};
-use super::run::{End, Memory, Observer, Row, Run, rounding};
+use super::run::{LoopEnd, Memory, Observer, Row, Run, rounding};
 use super::start::{self, RigidStart};
-use super::stop::{Balance, Discretisation, Stagnation, Status};
+use super::stop::{BalanceRule, Discretisation, Stagnation, Status};
 use super::{newton, robin};
 use crate::error::Result;
 use crate::model::Model;
@@ -13,7 +13,7 @@ use crate::model::body::{Body, BodyCounts};
 use crate::model::field::Field;
 use crate::model::layer::{Layer, meeting_slopes, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::Origin;
+use crate::model::rigid::DisplacementOrigin;
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::{Interval, interval};
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
@@ -63,7 +63,8 @@ pub struct Settings {
     pub interval: bool,
     /// The estimator of the discretisation error, if the run is to stop where more iterations would change nothing.
     pub balance: Option<Box<dyn Discretisation>>,
-    pub start: Start,
+    /// The start.
+    pub start: InitialGuess,
 }
 
 /// The result of a run: its last valid iterate, with its errors and history.
@@ -115,7 +116,7 @@ pub fn solve(
 ) -> Result<Outcome> {
     let began = Instant::now();
     let found = match &settings.start {
-        Start::Found(rigid) => Ok((**rigid).clone()),
+        InitialGuess::Found(rigid) => Ok((**rigid).clone()),
         _ => find_start(model),
     };
     let (begin, balance) = (std::mem::take(&mut settings.start), settings.balance.take());
@@ -124,7 +125,7 @@ pub fn solve(
     let mut run = Run {
         model,
         stop: &settings.stop,
-        balance: balance.map(Balance::new),
+        balance: balance.map(BalanceRule::new),
         observer,
         began,
         earlier: 0.0,
@@ -148,10 +149,10 @@ pub fn solve(
 
 impl Run<'_> {
     /// Iterate from a start.
-    fn iterate(&mut self, method: &mut Method, begin: Start, rigid: RigidStart) -> Result<End> {
+    fn iterate(&mut self, method: &mut Method, begin: InitialGuess, rigid: RigidStart) -> Result<LoopEnd> {
         let mut trace = match &begin {
-            Start::Trace(given) => given.clone(),
-            Start::Continue(state) => state.field.trace.clone(),
+            InitialGuess::Trace(given) => given.clone(),
+            InitialGuess::Continue(state) => state.field.trace.clone(),
             _ => rigid.trace.clone(),
         };
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
@@ -159,12 +160,12 @@ impl Run<'_> {
         let is_free = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
         // an estimate of the discretisation's error needs whole displacements, not their difference from an origin
         if is_free && self.balance.is_none() {
-            self.origin = Origin::take(self.model, &rigid.amounts);
+            self.origin = DisplacementOrigin::take(self.model, &rigid.amounts);
         }
         let resumed = self.resume(begin);
         match method {
             Method::Newton(linear) => {
-                let start = |origin: &mut Origin| std::mem::take(&mut origin.rest);
+                let start = |origin: &mut DisplacementOrigin| std::mem::take(&mut origin.rest);
                 let u = resumed.or_else(|| self.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(self.model));
                 newton::iterate(self, &mut **linear, u, states)
             }
@@ -184,10 +185,10 @@ impl Run<'_> {
 
     /// Take over what a run left that is to go on: its history, its memory, and its displacements, which are returned relative to the origin.
     /// Return none if the start has no displacements, or others than those that the bodies work with.
-    fn resume(&mut self, begin: Start) -> Option<Field> {
+    fn resume(&mut self, begin: InitialGuess) -> Option<Field> {
         let mut field = match begin {
-            Start::Resume(field) => field,
-            Start::Continue(state) => {
+            InitialGuess::Resume(field) => field,
+            InitialGuess::Continue(state) => {
                 let State { field, rows, memory, .. } = *state;
                 let is_whole = memory.is_some() || fits(self.model, &field);
                 let (seconds, sweeps) = rows.last().map_or((0.0, 0), |row| (row.seconds, row.sweeps));
@@ -259,7 +260,7 @@ struct Findings {
 
 impl Run<'_> {
     /// Return the result of a run whose loop has ended.
-    fn conclude(mut self, mut end: End, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
+    fn conclude(mut self, mut end: LoopEnd, method: &mut Method, wants_interval: bool) -> Result<Outcome> {
         if end.status.is_solved() && self.scale.is_out_of_range(self.energy, end.layer.peak()) {
             end.status = Status::OutOfRange { energy: self.energy };
         }
@@ -306,7 +307,7 @@ impl Run<'_> {
     }
 
     /// Ask the method what it knows at the end of a run. Collective.
-    fn findings(&mut self, end: &End, method: &mut Method, wants_interval: bool) -> Result<Findings> {
+    fn findings(&mut self, end: &LoopEnd, method: &mut Method, wants_interval: bool) -> Result<Findings> {
         let (model, rows) = (&mut *self.model, &self.rows[..]);
         let acceleration = match method {
             Method::Newton(linear) => {
@@ -327,7 +328,7 @@ impl Run<'_> {
     }
 
     /// Return the largest error of a pressure of the result by rounding of gaps and displacements, relative to the scale of pressures.
-    fn roundoff_of_pressures(&self, end: &End, is_sweeps: bool) -> f64 {
+    fn roundoff_of_pressures(&self, end: &LoopEnd, is_sweeps: bool) -> f64 {
         let (model, layer) = (&*self.model, &end.layer);
         let answer = match is_sweeps {
             true => vec![f64::INFINITY; model.points()],
@@ -349,7 +350,7 @@ impl Run<'_> {
 
 /// The start of a run.
 #[derive(Debug, Clone, Default)]
-pub enum Start {
+pub enum InitialGuess {
     /// Rigid bodies on their own surfaces.
     #[default]
     Automatic,
@@ -380,20 +381,20 @@ pub struct State {
     pub memory: Option<Memory>,
 }
 
-impl From<Option<Vec<f64>>> for Start {
+impl From<Option<Vec<f64>>> for InitialGuess {
     /// Start from a trace, or automatically.
     fn from(trace: Option<Vec<f64>>) -> Self {
-        trace.map_or(Start::Automatic, Start::Trace)
+        trace.map_or(InitialGuess::Automatic, InitialGuess::Trace)
     }
 }
 
 /// Return the springs omega kappa (n) of the first linear step of Newton's method; none if there is no solution. An automatic start is replaced by
 /// the one that is found.
-pub fn first_springs(model: &Model, begin: &mut Start) -> Option<Vec<f64>> {
+pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>> {
     let rigid = find_start(model).ok()?;
     let springs = resisting(model, first_states(model, begin, &rigid).springs(model));
-    if let Start::Automatic = begin {
-        *begin = Start::Found(Box::new(rigid));
+    if let InitialGuess::Automatic = begin {
+        *begin = InitialGuess::Found(Box::new(rigid));
     }
     Some(springs)
 }
@@ -411,19 +412,19 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
 }
 
 /// Return the layer states from which Newton's method begins.
-fn first_states(model: &Model, begin: &Start, rigid: &RigidStart) -> Layer {
+fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> Layer {
     match begin {
-        Start::Automatic | Start::Found(_) => rigid.places.clone(),
-        Start::Trace(trace) => match start::find(model, Some(trace)) {
+        InitialGuess::Automatic | InitialGuess::Found(_) => rigid.places.clone(),
+        InitialGuess::Trace(trace) => match start::find(model, Some(trace)) {
             Ok(rigid) => rigid.places,
             Err(_) => start::at(model, trace),
         },
-        Start::Resume(field) => Layer::at(model, &field.trace),
-        Start::Continue(state) => {
+        InitialGuess::Resume(field) => Layer::at(model, &field.trace),
+        InitialGuess::Continue(state) => {
             let paused = state.memory.as_ref().and_then(|memory| memory.states.clone());
             paused.unwrap_or_else(|| Layer::smoothed(model, state.compression.clone(), &state.smoothing))
         }
-        Start::Pressure(pressure) => {
+        InitialGuess::Pressure(pressure) => {
             let mut compression = Vec::with_capacity(pressure.len());
             for (i, pair) in model.pairs.iter().enumerate() {
                 compression.extend(model.range(i).map(|q| pair.law.compression(q - model.offset[i], pressure[q])));

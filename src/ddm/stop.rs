@@ -225,12 +225,12 @@ const FALLEN: f64 = 0.1;
 /// changes by 1 - s of its earlier error. So s/(1 - s) of that change is left as its error.
 #[derive(Debug, Default, Clone)]
 pub struct Steady {
-    past: Vec<Earlier>,
+    past: Vec<PastIterate>,
 }
 
 /// An earlier iterate.
 #[derive(Debug, Clone)]
-struct Earlier {
+struct PastIterate {
     residual: f64,
     /// n.
     pressure: Vec<f64>,
@@ -253,7 +253,7 @@ impl Steady {
     pub fn note(&mut self, residual: f64, pressure: &[f64]) {
         self.past.retain(|earlier| earlier.residual > residual);
         if self.past.last().is_none_or(|earlier| residual <= FALLEN * earlier.residual) {
-            self.past.push(Earlier { residual, pressure: pressure.to_vec() });
+            self.past.push(PastIterate { residual, pressure: pressure.to_vec() });
         }
     }
 }
@@ -273,13 +273,13 @@ pub trait Discretisation {
 pub const SHARE: f64 = 0.1;
 
 /// The stop rule. It asks for few estimates, because one costs about as much as a Newton step.
-pub(super) struct Balance {
+pub(super) struct BalanceRule {
     estimator: Box<dyn Discretisation>,
     /// The last estimate; before the first one, a relative error of one.
     last: f64,
 }
 
-impl Balance {
+impl BalanceRule {
     pub fn new(estimator: Box<dyn Discretisation>) -> Self {
         Self { estimator, last: 1.0 }
     }
@@ -451,7 +451,7 @@ mod tests {
     #[test]
     fn it_asks_first_when_worth_it_and_again_to_confirm() {
         let asked = Rc::new(Cell::new(0));
-        let mut balance = Balance::new(Box::new(Fixed(asked.clone(), vec![0.1, 0.02, 0.02])));
+        let mut balance = BalanceRule::new(Box::new(Fixed(asked.clone(), vec![0.1, 0.02, 0.02])));
         let mut model = Model::new(Vec::new(), Vec::new(), std::rc::Rc::new(Serial));
         let layer = Layer::default();
         let mut linear = Sweeps::carried();

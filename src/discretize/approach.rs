@@ -1,10 +1,10 @@
 //! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
 
-use super::roster::{find_group, load_dimensions};
+use super::patterns::{find_group, load_dimensions};
 use super::supports::axis_vector;
 use crate::contact::add;
 use crate::error::Result;
-use crate::fem::{Facets, NodalForces, Parts, Space, assemble, length, pad, place, surface};
+use crate::fem::{Facets, NodalForces, Space, Subdivision, assemble, length, pad, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
@@ -16,14 +16,14 @@ const ALONG: f64 = 0.5;
 
 /// Weights of nodes in a mean.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-struct Weights {
+struct NodeWeights {
     /// Weights of the nodes of this rank.
     of_nodes: Vec<(u32, f64)>,
     /// Sum of the weights of all nodes.
     total: f64,
 }
 
-impl Weights {
+impl NodeWeights {
     /// Make the weights from those of all nodes.
     fn new(of_nodes: Vec<(u32, f64)>) -> Self {
         Self { total: of_nodes.iter().map(|entry| entry.1).sum(), of_nodes }
@@ -38,23 +38,23 @@ impl Weights {
 
 /// A surface or a set of nodes on which the body is loaded or constrained.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-struct Place {
+struct BoundarySet {
     /// Unit vectors: the direction of the force, or the constrained directions.
     directions: Vec<[f64; 3]>,
     /// Integrals of the shape functions of nodes over the surface; 1 for each node if there is no surface.
-    weights: Weights,
+    weights: NodeWeights,
     /// Whether this is a surface.
     has_area: bool,
 }
 
-impl Place {
+impl BoundarySet {
     /// Collect the nodes of a group.
     fn new<const D: usize>(space: &Space<D>, group: &crate::mesh::Group, directions: Vec<[f64; 3]>) -> Self {
         let facets = if group.dimension + 1 == D { Some(space.facets(group)) } else { None };
         let areas = facets.map_or(Vec::new(), |facets| areas(space, &facets));
         let has_area = !areas.is_empty();
         let nodes = || space.nodes_on(group).into_iter().map(|node| (node, 1.0)).collect();
-        Self { directions, weights: Weights::new(if has_area { areas } else { nodes() }), has_area }
+        Self { directions, weights: NodeWeights::new(if has_area { areas } else { nodes() }), has_area }
     }
 
     fn on(&self, nodes: &[u32]) -> Self {
@@ -69,10 +69,10 @@ impl Place {
 /// The places where a body is loaded, and where it is constrained.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outer {
-    loaded: Vec<Place>,
-    held: Vec<Place>,
+    loaded: Vec<BoundarySet>,
+    held: Vec<BoundarySet>,
     /// Integrals of the shape functions over the body, if it has no loads, supports or springs.
-    whole: Weights,
+    whole: NodeWeights,
     nodes: usize,
 }
 
@@ -95,13 +95,13 @@ impl Outer {
                 LoadKind::Force { total, .. } | LoadKind::Turning { force: total, .. } => total,
                 _ => resultant(load)?,
             };
-            outer.loaded.push(Place::new(space, group, normalized(force).into_iter().collect()));
+            outer.loaded.push(BoundarySet::new(space, group, normalized(force).into_iter().collect()));
         }
         for fix in &spec.fix {
             let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
             let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axis_vector);
             let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
-            outer.held.push(Place::new(space, group, components.chain(normal).collect()));
+            outer.held.push(BoundarySet::new(space, group, components.chain(normal).collect()));
         }
         for spring in &spec.spring {
             let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
@@ -109,17 +109,17 @@ impl Outer {
                 SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axis_vector).collect(),
                 SpringKind::Normal(_) => normal(space, group).into_iter().collect(),
             };
-            outer.held.push(Place::new(space, group, directions));
+            outer.held.push(BoundarySet::new(space, group, directions));
         }
         if spec.load.is_empty() && spec.fix.is_empty() && spec.spring.is_empty() {
-            outer.whole = Weights::new(volumes(space));
+            outer.whole = NodeWeights::new(volumes(space));
         }
         Ok(outer)
     }
 
     /// Restrict the places to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     pub fn on(&self, nodes: &[u32]) -> Self {
-        let on = |places: &[Place]| places.iter().map(|place| place.on(nodes)).collect();
+        let on = |places: &[BoundarySet]| places.iter().map(|place| place.on(nodes)).collect();
         Self { loaded: on(&self.loaded), held: on(&self.held), whole: self.whole.on(nodes), nodes: self.nodes }
     }
 
@@ -127,7 +127,7 @@ impl Outer {
     /// mean is over all surfaces with loads along `direction`. Without them it is over supports and springs that constrain this
     /// direction, and without these over the whole body.
     pub fn mean<const D: usize>(&self, u: &[f64], own: &[bool], direction: [f64; 3]) -> [f64; 3] {
-        let chosen = |places: &[Place]| {
+        let chosen = |places: &[BoundarySet]| {
             let along = || places.iter().filter(|place| place.acts_along(direction));
             let surfaces = along().any(|place| place.has_area);
             let chosen = along().filter(|place| place.has_area || !surfaces);
@@ -135,7 +135,7 @@ impl Outer {
         };
         let of_nodes = || {
             let own = (0..).zip(own).filter(|(_, own)| **own).map(|(node, _)| (node, 1.0));
-            Weights { of_nodes: own.collect(), total: self.nodes as f64 }
+            NodeWeights { of_nodes: own.collect(), total: self.nodes as f64 }
         };
         let whole = || {
             let whole = Some(self.whole.clone()).filter(|whole| whole.total > 0.0);
@@ -146,9 +146,9 @@ impl Outer {
 }
 
 /// Return the contribution of owned nodes to a mean of nodal displacements, or `None` without nodes.
-fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &'a Weights>) -> Option<[f64; 3]> {
+fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &'a NodeWeights>) -> Option<[f64; 3]> {
     let (mut sum, mut total) = ([0.0; 3], 0.0);
-    for Weights { of_nodes, total: of_all } in all {
+    for NodeWeights { of_nodes, total: of_all } in all {
         for &(node, weight) in of_nodes.iter().filter(|(node, _)| own[*node as usize]) {
             add(&mut sum, pad(std::array::from_fn::<f64, D, _>(|c| weight * u[D * node as usize + c])));
         }
@@ -159,12 +159,12 @@ fn mean<'a, const D: usize>(u: &[f64], own: &[bool], all: impl Iterator<Item = &
 
 /// Return the integrals of the shape functions over a surface.
 fn areas<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> Vec<(u32, f64)> {
-    first_components(&surface::surface_load(space, facets, Parts::Whole, &|_, _| axis_vector(0)))
+    first_components(&surface::surface_load(space, facets, Subdivision::Whole, &|_, _| axis_vector(0)))
 }
 
 /// Return the integrals of the shape functions over the body.
 fn volumes<const D: usize>(space: &Space<D>) -> Vec<(u32, f64)> {
-    first_components(&assemble::body_force(space, Parts::Whole, &|_| axis_vector(0)))
+    first_components(&assemble::body_force(space, Subdivision::Whole, &|_| axis_vector(0)))
 }
 
 fn first_components<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {

@@ -2,15 +2,15 @@
 
 use super::distribute::Share;
 use super::local::{BodyInfo, LocalBody, SharedBody};
-use super::meshes::Shape;
-use super::part::{Part, elasticity_of};
+use super::meshes::FemBody;
+use super::part::{SceneBody, elasticity_of};
 use super::post::{OnPart, Post};
 use super::supports::Constraints;
 use super::unassembled::{Supported, Unconstrained};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::{self, AtDofs};
-use crate::fem::{ElasticBody, Interpolation, NodalForces, NodeGraph, RigidMotion, Space};
+use crate::fem::{ElasticBody, NodalForces, NodeGraph, Prolongation, RigidMotion, Space};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
 use crate::model::{BodySlot, Distribution, FreeMotion, Loads, Local};
@@ -31,7 +31,7 @@ pub struct Assembler<'a, const D: usize, F> {
     /// Number of matrices reused from an earlier scene.
     pub avoided: usize,
     /// Meshes of the bodies that this rank has.
-    pub shapes: Vec<Shape<D>>,
+    pub shapes: Vec<FemBody<D>>,
 }
 
 /// What only the ranks with a part of a body have of it, until [`Discrete::share`](super::Discrete::share).
@@ -61,7 +61,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if let Some(local) = local {
             let elasticity = Rc::new(elasticity_of(spec, local.regions, D, self.plane)?);
             let LocalBody { space, held, springs, facts, share, load, .. } = local;
-            let part = Part { spec, space, held, springs, elasticity: elasticity.clone(), facts };
+            let part = SceneBody { spec, space, held, springs, elasticity: elasticity.clone(), facts };
             let (space, held) = match local.is_owned {
                 false => (Rc::new(part.space), Rc::new(part.held)),
                 true => {
@@ -87,7 +87,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
                 }
             };
             let (unloaded, motions) = (local.unloaded, unsupported);
-            self.shapes.push(Shape { space, held, elasticity, unloaded, motions });
+            self.shapes.push(FemBody { space, held, elasticity, unloaded, motions });
         }
         let Made { local, carried, scale, row_stiffness } = made;
         let name = info.name.clone();
@@ -98,7 +98,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// Assemble the matrix of a body on its rows, or on those of this rank, and make its solver.
     fn assemble(
         &mut self,
-        part: &Part<D>,
+        part: &SceneBody<D>,
         rows: Csr,
         graph: Option<NodeGraph>,
         share: Option<Share>,
@@ -142,7 +142,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 /// Return the loads of a body on the dofs of this rank, and the motions that supports leave. If this rank has only some of the
 /// loads, `works` holds the work of all loads on these motions.
 fn loads<const D: usize>(
-    part: &Part<D>,
+    part: &SceneBody<D>,
     load: &NodalForces<D>,
     Supported { carried, prescribed }: Supported<D>,
     left: Vec<RigidMotion<D>>,
@@ -163,7 +163,7 @@ fn loads<const D: usize>(
 /// belong to this rank. Return the space and the supports of the body.
 fn evaluate<const D: usize>(
     info: &mut BodyInfo,
-    part: Part<D>,
+    part: SceneBody<D>,
     rows: Csr,
     load: &NodalForces<D>,
     own: Vec<bool>,
@@ -228,19 +228,19 @@ pub struct Outline<'a> {
 /// A maker of the inner solvers of bodies.
 pub trait Factory {
     /// The choice of solvers of all bodies.
-    type Plan: Plain;
+    type SolverPlan: Plain;
 
     /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
     ///
     /// # Errors
     /// PETSc refuses an option.
-    fn plan(&mut self, outlines: &[Outline]) -> Result<Self::Plan>;
+    fn plan(&mut self, outlines: &[Outline]) -> Result<Self::SolverPlan>;
 
     /// Follow the plan of the first rank on another rank.
     ///
     /// # Errors
     /// PETSc refuses an option.
-    fn adopt(&mut self, plan: Self::Plan) -> Result<()>;
+    fn adopt(&mut self, plan: Self::SolverPlan) -> Result<()>;
 
     /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
     /// are in increasing order. Bodies that stay whole are in no set.
@@ -279,5 +279,5 @@ pub struct Assembled<'a> {
     pub left: Vec<FreeMotion>,
     /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The columns belong
     /// to this body alone, or to all bodies of the matrix if the dofs are distributed.
-    pub interpolation: Option<Interpolation>,
+    pub interpolation: Option<Prolongation>,
 }

@@ -1,10 +1,10 @@
 //! Pairs of smooth faces: surfaces are split where one of them has an edge, and boundary facets of different bodies that face each other
 //! within a distance are found by rules of the scene.
 
-use super::part::Part;
-use super::roster::{pattern, tie};
-use crate::contact::pieces::{Cut, Reach, Search};
-use crate::contact::{Faces, Side};
+use super::part::SceneBody;
+use super::patterns::{pattern, tie};
+use crate::contact::pieces::{BoxTree, Cut, Reach};
+use crate::contact::{Side, SmoothFaces};
 use crate::error::{Error, Place, Result, few};
 use crate::fem::{Facets, unit};
 use crate::problem::contact::AutoContact;
@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 /// A table of the scene.
 #[derive(Clone, Copy, Serialize, Deserialize)]
-pub enum Entry {
+pub enum ContactEntry {
     /// Index of a contact that names its surfaces.
     Named(usize),
     /// Index of the rule by which the pair was found.
@@ -22,15 +22,15 @@ pub enum Entry {
 }
 
 /// Two surfaces that form pairs.
-pub struct Found<'a, const D: usize> {
+pub struct SurfacePair<'a, const D: usize> {
     /// The table of the scene.
-    pub entry: Entry,
+    pub entry: ContactEntry,
     /// Indices of the bodies.
     pub bodies: [usize; 2],
     /// Names of the surfaces; those of the bodies if the pair was found.
     pub names: [&'a str; 2],
     /// The pairs: one, or several where surfaces have edges.
-    pub pieces: Vec<Piece<D>>,
+    pub pieces: Vec<PairPart<D>>,
 }
 
 /// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
@@ -44,9 +44,9 @@ pub struct Found<'a, const D: usize> {
 pub fn find<'a, const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
-    parts: &'a [Part<D>],
+    parts: &'a [SceneBody<D>],
     named: &HashSet<[usize; 2]>,
-) -> Result<Vec<Found<'a, D>>> {
+) -> Result<Vec<SurfacePair<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
     }
@@ -83,14 +83,14 @@ struct Possible<const D: usize> {
 
 fn possible<const D: usize>(
     rules: &[AutoContact],
-    parts: &[Part<D>],
+    parts: &[SceneBody<D>],
     whole: &[Side<D>],
     named: &HashSet<[usize; 2]>,
 ) -> Result<Vec<Possible<D>>> {
     let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
     let farthest = rules.iter().map(distance).fold(0.0, f64::max);
-    let searches: Vec<Search<D>> = whole.iter().map(Search::new).collect();
-    let bodies = Search::of_boxes(whole.iter().map(Side::extent));
+    let searches: Vec<BoxTree<D>> = whole.iter().map(BoxTree::new).collect();
+    let bodies = BoxTree::of_boxes(whole.iter().map(Side::extent));
     let mut all = Vec::new();
     for a in 0..parts.len() {
         let mut others: Vec<usize> = bodies.near_box(whole[a].extent(), farthest).collect();
@@ -115,26 +115,26 @@ fn meeting<'a, const D: usize>(
     cut: Cut<D>,
     whole: &[Side<'a, D>],
     possible: &Possible<D>,
-) -> Found<'a, D> {
+) -> SurfacePair<'a, D> {
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
         Side::new(name, space, possible.near[k].clone(), prescribed, frame)
     };
     let (spec, a, b) = (&rules[possible.rule].contact, near(0), near(1));
     let reach = Reach::between(&a, &b, spec.angle, spec.distance);
-    let mut pieces = Split::new([&a, &b], spec.edge, cut, &reach).into_pieces();
+    let mut pieces = FaceSplit::new([&a, &b], spec.edge, cut, &reach).into_pieces();
     pieces.sort_by_key(|piece| piece.face);
     let names = possible.bodies.map(|body| whole[body].name);
-    Found { entry: Entry::Found(possible.rule), bodies: possible.bodies, names, pieces }
+    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, pieces }
 }
 
 /// Check that every rule found a pair.
 ///
 /// # Errors
 /// A rule found no pair; the first such rule is reported.
-fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[Found<D>]) -> Result<()> {
+fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[SurfacePair<D>]) -> Result<()> {
     let is_fruitless =
-        |rule: &usize| found.iter().all(|found| !matches!(found.entry, Entry::Found(other) if other == *rule));
+        |rule: &usize| found.iter().all(|found| !matches!(found.entry, ContactEntry::Found(other) if other == *rule));
     let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };
     let (bodies, place) = title(&rules[rule]);
     let message = format!("no facets of {bodies} face each other within {}", distance(&rules[rule]));
@@ -152,7 +152,7 @@ struct Matches {
 }
 
 impl Matches {
-    fn new<const D: usize>(rule: &AutoContact, parts: &[Part<D>]) -> Result<Self> {
+    fn new<const D: usize>(rule: &AutoContact, parts: &[SceneBody<D>]) -> Result<Self> {
         let Some(of) = &rule.of else { return Ok(Self { of: None, rank: Rank::default() }) };
         let patterns = [pattern(&of[0])?, pattern(&of[1])?];
         let names = || parts.iter().map(|part| part.spec.name.value.as_str());
@@ -192,7 +192,7 @@ fn distance(rule: &AutoContact) -> f64 {
 }
 
 /// Return the facets of two bodies with opposed normals and with boxes within the distance.
-fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &Search<D>, reach: &Reach) -> [Facets<D>; 2] {
+fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &BoxTree<D>, reach: &Reach) -> [Facets<D>; 2] {
     let mut keep = [vec![false; a.facets.count()], vec![false; b.facets.count()]];
     for i in 0..a.facets.count() {
         let normal = unit(a.area(i));
@@ -207,7 +207,7 @@ fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &Search<D>, reac
 }
 
 /// A part of two surfaces that becomes one pair.
-pub struct Piece<const D: usize> {
+pub struct PairPart<const D: usize> {
     /// Facets of both surfaces.
     pub facets: [Facets<D>; 2],
     /// Number of the face of each surface, from 1; `None` if no other face of the surface is in a pair.
@@ -218,7 +218,7 @@ pub struct Piece<const D: usize> {
     pub far: [BTreeSet<u32>; 2],
 }
 
-impl<const D: usize> Piece<D> {
+impl<const D: usize> PairPart<D> {
     /// Exchange the two surfaces.
     pub fn swap(&mut self) {
         self.facets.swap(0, 1);
@@ -232,26 +232,26 @@ impl<const D: usize> Piece<D> {
 type Used = [Vec<bool>; 2];
 
 /// Faces of two surfaces that become one pair.
-struct Group {
+struct FaceGroup {
     faces: [BTreeSet<usize>; 2],
     used: Used,
 }
 
 /// Two surfaces with their faces, and the facets with common pieces for each two faces that have some.
-pub struct Split<'a, const D: usize> {
+pub struct FaceSplit<'a, const D: usize> {
     sides: [&'a Side<'a, D>; 2],
-    faces: [Faces; 2],
+    faces: [SmoothFaces; 2],
     met: BTreeMap<[usize; 2], Used>,
     /// Nodes of the facets of both surfaces that face each other, but are too far apart.
     far: [BTreeSet<u32>; 2],
 }
 
-impl<'a, const D: usize> Split<'a, D> {
+impl<'a, const D: usize> FaceSplit<'a, D> {
     /// Find the faces of two surfaces between edges of more than `edge` degrees, and the facets of each two faces that have common
     /// pieces. The normals of a face are those of its own facets, while all facets of the other surface take part, so that the
     /// nearest one is the partner.
     pub fn new(sides: [&'a Side<'a, D>; 2], edge: f64, cut: Cut<D>, reach: &Reach) -> Self {
-        let faces = sides.map(|side| Faces::new(side, edge));
+        let faces = sides.map(|side| SmoothFaces::new(side, edge));
         let mut met: BTreeMap<[usize; 2], Used> = BTreeMap::new();
         let mut far = [BTreeSet::new(), BTreeSet::new()];
         for face in 0..faces[0].count {
@@ -273,16 +273,16 @@ impl<'a, const D: usize> Split<'a, D> {
     }
 
     /// Return the pairs with the facets that have common pieces, and no others. The list is empty if nothing has common pieces.
-    pub fn into_pieces(self) -> Vec<Piece<D>> {
+    pub fn into_pieces(self) -> Vec<PairPart<D>> {
         let groups = self.groups();
         groups.iter().map(|group| self.piece(group, groups.len() > 1)).collect()
     }
 
     /// Return the same pairs with all facets of their faces. A facet without a partner belongs to the first pair of its face.
-    pub fn into_whole_pieces(self) -> Vec<Piece<D>> {
+    pub fn into_whole_pieces(self) -> Vec<PairPart<D>> {
         let mut groups = self.groups();
         let mut taken = self.all_used();
-        for Group { faces, used } in &mut groups {
+        for FaceGroup { faces, used } in &mut groups {
             for side in 0..2 {
                 let of_facet = &self.faces[side].of_facet;
                 for i in (0..of_facet.len()).filter(|&i| faces[side].contains(&of_facet[i])) {
@@ -291,7 +291,7 @@ impl<'a, const D: usize> Split<'a, D> {
                 }
             }
         }
-        let mut pieces: Vec<Piece<D>> = groups.iter().map(|group| self.piece(group, groups.len() > 1)).collect();
+        let mut pieces: Vec<PairPart<D>> = groups.iter().map(|group| self.piece(group, groups.len() > 1)).collect();
         if let Some(first) = pieces.first_mut() {
             first.idle = taken.map(|taken| taken.iter().filter(|taken| !**taken).count());
         }
@@ -299,18 +299,18 @@ impl<'a, const D: usize> Split<'a, D> {
     }
 
     /// Return one group of all faces that meet, or one of each two faces if faces of a surface have an edge between them.
-    fn groups(&self) -> Vec<Group> {
+    fn groups(&self) -> Vec<FaceGroup> {
         let all = self.all_used();
         let has_edge = |side: usize| self.faces[side].meet(self.sides[side], &all[side]);
         if has_edge(0) || has_edge(1) {
-            let of_two = |(faces, used): (&[usize; 2], &Used)| Group {
+            let of_two = |(faces, used): (&[usize; 2], &Used)| FaceGroup {
                 faces: faces.map(|face| BTreeSet::from([face])),
                 used: used.clone(),
             };
             return self.met.iter().map(of_two).collect();
         }
         let faces = [0, 1].map(|side| self.met.keys().map(|faces| faces[side]).collect());
-        if self.met.is_empty() { Vec::new() } else { vec![Group { faces, used: all }] }
+        if self.met.is_empty() { Vec::new() } else { vec![FaceGroup { faces, used: all }] }
     }
 
     /// Return the facets of both surfaces that have common pieces.
@@ -322,13 +322,13 @@ impl<'a, const D: usize> Split<'a, D> {
         [of_side(0), of_side(1)]
     }
 
-    fn piece(&self, group: &Group, is_one_of_several: bool) -> Piece<D> {
+    fn piece(&self, group: &FaceGroup, is_one_of_several: bool) -> PairPart<D> {
         let facets = [0, 1].map(|side| self.sides[side].facets.only(&group.used[side]));
         let number = |side: usize| {
             let face = *group.faces[side].first().filter(|_| is_one_of_several)?;
             self.number(side, face)
         };
-        Piece { facets, face: [number(0), number(1)], idle: [0, 0], far: self.far.clone() }
+        PairPart { facets, face: [number(0), number(1)], idle: [0, 0], far: self.far.clone() }
     }
 
     /// Return the number of a face among the faces of its surface that are in pairs, from 1; `None` if it is the only one. Faces are

@@ -1,11 +1,11 @@
 //! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a number in that
 //! matrix. The coupling of the nodes determines the work and the memory of each.
 
-use super::part::Part;
+use super::part::SceneBody;
 use super::unassembled::Unassembled;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
-use crate::fem::{Couplings, ElasticBody, Interpolation, Space};
+use crate::fem::{Couplings, ElasticBody, Prolongation, Space};
 use crate::linalg::Csr;
 use crate::mesh::bisect;
 use crate::model::Distribution;
@@ -120,8 +120,8 @@ impl Partition {
     /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
     /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
     /// their master.
-    pub fn cells<const D: usize>(&self, number: usize, part: &Part<D>, rank: usize) -> Vec<usize> {
-        let Part { space, held, .. } = part;
+    pub fn cells<const D: usize>(&self, number: usize, part: &SceneBody<D>, rank: usize) -> Vec<usize> {
+        let SceneBody { space, held, .. } = part;
         let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
         let cells = || space.cells.chunks_exact(space.stride);
         let mut is_near = vec![false; space.nodes.len()];
@@ -141,7 +141,7 @@ impl Partition {
         cells: &[usize],
         rank: usize,
     ) -> Vec<u32> {
-        let Part { space, held, .. } = &body.part;
+        let SceneBody { space, held, .. } = &body.part;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
         let of_cells = space.corners(cells).into_iter();
         let of_rows = [&body.rows, &body.nodal_rows].into_iter().flat_map(|rows| &rows.col);
@@ -193,7 +193,7 @@ impl Partition {
         let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
         Share {
             distribution,
-            coarse: Coarse {
+            coarse: CoarseNodes {
                 nodes: of_coarse,
                 number: coarse,
                 all: self.coarse.sum(0..self.ranks),
@@ -215,12 +215,12 @@ pub struct Share {
     /// Number of each of these nodes in the matrix with the rows of the body.
     number: Vec<u32>,
     /// Coarse nodes; empty if no interpolation is requested.
-    coarse: Coarse,
+    coarse: CoarseNodes,
 }
 
 /// The coarse nodes of a body on one rank.
 #[derive(Serialize, Deserialize)]
-struct Coarse {
+struct CoarseNodes {
     /// Local indices of the coarse nodes among the nodes of this rank.
     nodes: Vec<u32>,
     /// Numbers of these nodes among the coarse nodes of the bodies in one matrix.
@@ -234,15 +234,15 @@ struct Coarse {
 impl Share {
     /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
     /// bodies in one matrix.
-    pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Interpolation) -> Interpolation {
-        let Coarse { nodes, number, all, own } = &self.coarse;
+    pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
+        let CoarseNodes { nodes, number, all, own } = &self.coarse;
         let whole = whole(nodes);
         let mut rows = Csr::new(D * all);
         for &dof in &self.distribution.places {
             let number = |j: usize| D * number[j / D] as usize + j % D;
             rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
         }
-        Interpolation { rows, own: D * own }
+        Prolongation { rows, own: D * own }
     }
 
     /// Return whether this rank owns a node, given by its local index.

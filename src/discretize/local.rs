@@ -4,12 +4,12 @@ use super::distribute::{Partition, Share};
 use super::part::BodyFacts;
 use super::post::Post;
 use super::supports::{Constraints, axis_vector};
-use super::unassembled::{Gauged, NO_WORK, Supported, Unassembled, Unconstrained};
+use super::unassembled::{NO_WORK, RemovedModes, Supported, Unassembled, Unconstrained};
 use crate::contact::{self, ContactPair};
 use crate::exchange::Plain;
 use crate::fem::{self, NodalBlock, NodalForces, NodeGraph, Space, place};
 use crate::linalg::{Csr, dot};
-use crate::mesh::Checked;
+use crate::mesh::BodyCheck;
 use crate::model::Segment;
 use crate::problem::Plane;
 use nalgebra::DMatrix;
@@ -20,14 +20,14 @@ use serde::{Deserialize, Serialize};
 pub struct BodyInfo {
     /// Name in the scene.
     pub name: String,
-    /// Point of the scene about which the [`Balance`](super::Balance) of the body has moments.
+    /// Point of the scene about which the [`ForceBalance`](super::ForceBalance) of the body has moments.
     pub datum: [f64; 3],
     pub nodes: usize,
     /// Point of the mesh for each node of the cells that this rank writes.
     pub points: Vec<u32>,
     pub cells: usize,
     /// Counts from the check of the mesh.
-    pub facets: Checked,
+    pub facets: BodyCheck,
     /// Number of degrees of freedom, constrained ones included.
     pub dofs: usize,
     /// Number of constrained degrees of freedom.
@@ -37,7 +37,7 @@ pub struct BodyInfo {
     /// Names of the rigid motions that no contact row can resist either.
     pub left_by_all: Vec<String>,
     /// Rigid motions that only the mesh resists.
-    pub gauged: Gauged,
+    pub gauged: RemovedModes,
     /// Warning for the user about the elasticity.
     pub warning: Option<String>,
     /// Stiffness of the body against a uniform contact pressure, per area. It is the modulus over the depth, which is the area
@@ -191,7 +191,7 @@ impl<const D: usize> LocalBody<D> {
 
 impl<const D: usize> Unassembled<'_, D> {
     /// Return what all ranks have of the body. `checked` is the result of the check of its mesh.
-    pub fn shared(&self, pairs: &[ContactPair], checked: &Checked, plane: Plane) -> SharedBody<D> {
+    pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> SharedBody<D> {
         let of_body = || self.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
         let modulus = dot(&self.part.facts.moduli, &along_axes(of_body()));
@@ -207,7 +207,7 @@ impl<const D: usize> Unassembled<'_, D> {
         }
     }
 
-    fn info(&self, checked: &Checked, plane: Plane, modulus: f64, depth: f64) -> BodyInfo {
+    fn info(&self, checked: &BodyCheck, plane: Plane, modulus: f64, depth: f64) -> BodyInfo {
         let Self { part, unconstrained, .. } = self;
         let spec = part.spec;
         let is_held = unconstrained.motions.len() == unconstrained.unresisted.len() && depth.is_finite();
@@ -224,12 +224,12 @@ impl<const D: usize> Unassembled<'_, D> {
             nodes: part.space.nodes.len(),
             points: Vec::new(),
             cells: part.facts.cells,
-            facets: Checked { points: Vec::new(), ..checked.clone() },
+            facets: BodyCheck { points: Vec::new(), ..checked.clone() },
             dofs: part.space.dofs(),
             supported: part.held.supported(),
             left_by_supports: unconstrained.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: unconstrained.unresisted.iter().map(|(name, _)| name.clone()).collect(),
-            gauged: self.gauged.clone(),
+            gauged: self.removed_modes.clone(),
             warning: part.locking(plane),
             stiffness: if is_held { modulus / depth } else { 0.0 },
             load,

@@ -21,13 +21,13 @@
 //!
 //! Loads that balance on the true surfaces may lack balance on the facets. They are changed where the mesh may miss so much of them.
 
-use super::part::Part;
-use super::roster::find_group;
-use super::unassembled::{Candidate, NO_WORK, Unassembled, Unconstrained};
+use super::part::SceneBody;
+use super::patterns::find_group;
+use super::unassembled::{FixableDof, NO_WORK, Unassembled, Unconstrained};
 use crate::contact::ContactPair;
 use crate::error::few;
-use crate::fem::{Extent, RigidMotion, rigid, surface};
-use crate::linalg::{Blocks, Joined, PART, TOLERANCE, axpy, dot, fit};
+use crate::fem::{PointExtent, RigidMotion, rigid, surface};
+use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::mesh::Mesh;
 use crate::model::{Mechanism, Motion, Motions, Segment};
 use nalgebra::{DMatrix, DVector};
@@ -61,7 +61,7 @@ pub struct Fixed {
 /// Fix the motions that nothing resists and on which no load works. First come whole groups of bodies, then each body alone, then
 /// the motions that remain.
 pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair], mesh: &Mesh<D>) -> Fixed {
-    let mut search = Search { bodies, pairs, mesh, found: Vec::new(), balanced: Vec::new() };
+    let mut search = MechanismSearch { bodies, pairs, mesh, found: Vec::new(), balanced: Vec::new() };
     for group in groups(search.bodies.len(), pairs) {
         if group.iter().all(|&body| !search.left(body).is_empty()) {
             let all = search.of_group(&group);
@@ -83,7 +83,7 @@ pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair],
 
 /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies.
 fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
-    let mut joined = Joined::new(bodies);
+    let mut joined = DisjointSets::new(bodies);
     pairs.iter().map(|pair| pair.bodies.map(|body| body as u32)).for_each(|[a, b]| joined.join(a, b));
     let (count, group) = joined.classes();
     let mut members = vec![Vec::new(); count];
@@ -93,14 +93,14 @@ fn groups(bodies: usize, pairs: &[ContactPair]) -> Vec<Vec<usize>> {
 }
 
 /// The contact rows of some bodies. Pairs are numbered among those that touch these bodies.
-struct Rows {
+struct ContactRows {
     segments: Vec<Vec<Segment>>,
     points: Vec<usize>,
     /// Share of each point in the area of its pair, so that motions have equal weight wherever they are resisted.
     weight: Vec<f64>,
 }
 
-impl Rows {
+impl ContactRows {
     /// Collect the rows of bodies.
     fn new<'d, const D: usize>(bodies: impl Iterator<Item = &'d Unassembled<'d, D>>, pairs: &[ContactPair]) -> Self {
         let mut rows = Self { segments: Vec::new(), points: Vec::new(), weight: Vec::new() };
@@ -127,7 +127,7 @@ impl Rows {
     }
 }
 
-struct Search<'p, 's, const D: usize> {
+struct MechanismSearch<'p, 's, const D: usize> {
     bodies: &'p mut [Unassembled<'s, D>],
     pairs: &'p [ContactPair],
     mesh: &'p Mesh<D>,
@@ -135,24 +135,24 @@ struct Search<'p, 's, const D: usize> {
     balanced: Vec<Balanced>,
 }
 
-impl<const D: usize> Search<'_, '_, D> {
+impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions that supports and springs leave to a body at present.
     fn left(&self, body: usize) -> &[RigidMotion<D>] {
         &self.bodies[body].unconstrained.left
     }
 
-    fn extent(&self, body: usize) -> &Extent {
+    fn extent(&self, body: usize) -> &PointExtent {
         &self.bodies[body].part.facts.extent
     }
 
     /// Return the contact rows of some bodies.
-    fn rows(&self, bodies: &[usize]) -> Rows {
-        Rows::new(bodies.iter().map(|&body| &self.bodies[body]), self.pairs)
+    fn rows(&self, bodies: &[usize]) -> ContactRows {
+        ContactRows::new(bodies.iter().map(|&body| &self.bodies[body]), self.pairs)
     }
 
     /// Return the rigid motions of some bodies as one.
     fn as_one(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
-        let extent = bodies.iter().fold(Extent::default(), |all, &body| all.join(self.extent(body)));
+        let extent = bodies.iter().fold(PointExtent::default(), |all, &body| all.join(self.extent(body)));
         rigid::of(&extent, bodies.iter().any(|&body| self.bodies[body].part.space.axisymmetric))
     }
 
@@ -263,7 +263,7 @@ impl<const D: usize> Search<'_, '_, D> {
         while let Some(moving) = self.of_one(body).into_iter().find(|moving| self.work(moving) == 0.0)
             && self.pin(&moving).is_some()
         {
-            self.bodies[body].gauged.fixed.extend(moving.motions.into_iter().map(|motion| motion.name));
+            self.bodies[body].removed_modes.fixed.extend(moving.motions.into_iter().map(|motion| motion.name));
         }
     }
 
@@ -272,7 +272,7 @@ impl<const D: usize> Search<'_, '_, D> {
         if self.left(body).is_empty() || !self.bodies[body].unconstrained.unresisted.is_empty() {
             return;
         }
-        let points = Points::of(&self.bodies[body], self.pairs);
+        let points = SurfacePoints::of(&self.bodies[body], self.pairs);
         loop {
             let round = points.along_surface(self.left(body));
             // The centre of a load is no more accurate than that of the meshed body.
@@ -285,10 +285,10 @@ impl<const D: usize> Search<'_, '_, D> {
             let (idle, worked): (Vec<_>, Vec<_>) =
                 round.into_iter().map(moving).partition(|moving| self.work(moving) == 0.0);
             if idle.first().and_then(|moving| self.pin(moving)).is_none() {
-                self.bodies[body].gauged.spinning = worked.into_iter().map(|moving| moving.name).collect();
+                self.bodies[body].removed_modes.spinning = worked.into_iter().map(|moving| moving.name).collect();
                 return;
             }
-            self.bodies[body].gauged.fixed.push(idle[0].name.clone());
+            self.bodies[body].removed_modes.fixed.push(idle[0].name.clone());
         }
     }
 
@@ -399,7 +399,7 @@ impl<const D: usize> Search<'_, '_, D> {
     /// not small.
     fn pin(&mut self, moving: &Moving<D>) -> Option<usize> {
         let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| Some((body, self.bodies[body].candidate(motion)?));
-        let mut all: Vec<(usize, Candidate)> =
+        let mut all: Vec<(usize, FixableDof)> =
             moving.bodies.iter().zip(&moving.motions).filter_map(candidate).collect();
         let most = all.iter().map(|(_, found)| found.size).fold(0.0, f64::max);
         all.retain(|(_, found)| found.size > NEAR * most);
@@ -515,7 +515,7 @@ fn missed_by_facets<const D: usize>(body: &Unassembled<D>, pairs: &[ContactPair]
 }
 
 /// Return a bound of the work on a motion of the nodal forces that the quadrature of surface loads misses.
-fn missed_by_quadrature<const D: usize>(part: &Part<D>, motion: &RigidMotion<D>, mesh: &Mesh<D>) -> f64 {
+fn missed_by_quadrature<const D: usize>(part: &SceneBody<D>, motion: &RigidMotion<D>, mesh: &Mesh<D>) -> f64 {
     let missed = part.missed_load(mesh).unwrap_or_default();
     let [_, largest] = missed.works(|node| motion.at(&part.space.nodes[node as usize]));
     HALVES * largest
@@ -526,7 +526,7 @@ fn missed_by_quadrature<const D: usize>(part: &Part<D>, motion: &RigidMotion<D>,
 const UNSURE: f64 = 2.0;
 
 /// A contact point on the own surface of a body.
-struct Point<const D: usize> {
+struct SurfacePoint<const D: usize> {
     /// Position, measured from the datum.
     at: [f64; D],
     normal: [f64; D],
@@ -537,9 +537,9 @@ struct Point<const D: usize> {
 }
 
 /// The surface of a body at its contact points.
-struct Points<const D: usize>(Vec<Point<D>>);
+struct SurfacePoints<const D: usize>(Vec<SurfacePoint<D>>);
 
-impl<const D: usize> Points<D> {
+impl<const D: usize> SurfacePoints<D> {
     /// Collect the points of all pairs of a body.
     fn of(body: &Unassembled<D>, pairs: &[ContactPair]) -> Self {
         let weights = |segment: &Segment| pairs[segment.pair].weight.iter();
@@ -548,7 +548,7 @@ impl<const D: usize> Points<D> {
         let mut points = Vec::new();
         for segment in &body.segments {
             let surface = pairs[segment.pair].surface[segment.side].iter();
-            points.extend(surface.zip(weights(segment)).map(|(point, weight)| Point {
+            points.extend(surface.zip(weights(segment)).map(|(point, weight)| SurfacePoint {
                 at: first(point.at),
                 normal: first(point.normal),
                 spread: point.spread,
@@ -566,7 +566,7 @@ impl<const D: usize> Points<D> {
             point.root * motions[j].at(&point.at)[row % D]
         });
         let closing = DMatrix::from_fn(self.0.len(), motions.len(), |q, j| {
-            let Point { at, normal, spread, root } = &self.0[q];
+            let SurfacePoint { at, normal, spread, root } = &self.0[q];
             root * dot(&motions[j].at(at), normal) / spread
         });
         let mut round = lowest(&closing, &(moved.transpose() * &moved), UNSURE);

@@ -15,7 +15,7 @@ pub trait Meshes {
     fn forces(&self, body: usize, load: &mut [f64]);
 
     /// Recover smoother fields from the displacements `u` of all nodes of a body.
-    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a>;
+    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a>;
 
     /// Return the nodal forces of a body that the quadrature of its loads misses. The slice is empty if there are none.
     fn unloaded(&self, body: usize) -> &[f64];
@@ -30,14 +30,14 @@ pub trait Meshes {
     fn points(&self, pair: usize) -> &FinePoints;
 
     /// Return the cells of a body.
-    fn cells(&self, body: usize) -> Cells;
+    fn cells(&self, body: usize) -> BodyCells;
 
     /// Return the order of convergence of the energy error of a body, which is the degree of its elements.
     fn degree(&self, body: usize) -> usize;
 }
 
 /// The cells of a body by their corners.
-pub struct Cells {
+pub struct BodyCells {
     /// Coordinates of the nodes in the scene.
     pub nodes: Vec<[f64; 3]>,
     /// Number of corners of a cell.
@@ -52,7 +52,7 @@ pub struct Cells {
 }
 
 /// A displacement of a body with the fields recovered from it.
-pub trait Recovered {
+pub trait RecoveredFields {
     /// Return the errors of the body, see [`Recovery::errors`].
     fn errors(&self, work_on_missed: f64) -> Errors;
 
@@ -74,7 +74,7 @@ pub trait Recovered {
 }
 
 /// A body's space, elasticity and supports.
-pub struct Shape<const D: usize> {
+pub struct FemBody<const D: usize> {
     /// Space of the body.
     pub space: Rc<Space<D>>,
     /// Elasticity of the body.
@@ -90,7 +90,7 @@ pub struct Shape<const D: usize> {
 /// The implementation of [`Meshes`] in `D` dimensions.
 pub struct Kept<const D: usize> {
     /// Bodies in the order of the scene.
-    pub shapes: Vec<Shape<D>>,
+    pub shapes: Vec<FemBody<D>>,
     /// Integration points of each pair.
     pub fine: Vec<Fine<D>>,
 }
@@ -104,7 +104,7 @@ impl<const D: usize> Meshes for Kept<D> {
         self.shapes[body].held.frame.forces(load);
     }
 
-    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn Recovered + 'a> {
+    fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a> {
         let shape = &self.shapes[body];
         Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, &shape.elasticity, u) })
     }
@@ -114,7 +114,7 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
-        let Shape { space, motions, .. } = &self.shapes[body];
+        let FemBody { space, motions, .. } = &self.shapes[body];
         let mut moved = vec![0.0; space.dofs()];
         for (motion, amount) in motions.iter().zip(amounts) {
             axpy(*amount, &motion.nodal(space.nodes.iter().copied()), &mut moved);
@@ -130,7 +130,7 @@ impl<const D: usize> Meshes for Kept<D> {
         &self.fine[pair].points
     }
 
-    fn cells(&self, body: usize) -> Cells {
+    fn cells(&self, body: usize) -> BodyCells {
         let space = &self.shapes[body].space;
         // This is the measure of the regular simplex with edges of length one.
         let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
@@ -138,7 +138,7 @@ impl<const D: usize> Meshes for Kept<D> {
         let boundary = space.boundary();
         let facets = (0..boundary.count()).map(|i| &boundary.facet(i)[..D]);
         let facets = facets.filter(|facet| !facet.iter().all(|&node| space.on_axis(node))).flatten().copied();
-        Cells {
+        BodyCells {
             nodes: space.nodes.iter().map(|&x| space.in_scene(x)).collect(),
             stride: D + 1,
             corners: space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]).copied().collect(),
@@ -154,7 +154,7 @@ impl<const D: usize> Meshes for Kept<D> {
 
 struct OnBody<'a, const D: usize> {
     kept: &'a Kept<D>,
-    shape: &'a Shape<D>,
+    shape: &'a FemBody<D>,
     u: &'a [f64],
     recovery: Recovery<'a, D>,
 }
@@ -183,7 +183,7 @@ impl<const D: usize> OnBody<'_, D> {
     }
 }
 
-impl<const D: usize> Recovered for OnBody<'_, D> {
+impl<const D: usize> RecoveredFields for OnBody<'_, D> {
     fn errors(&self, work_on_missed: f64) -> Errors {
         self.recovery.errors(work_on_missed)
     }

@@ -1,13 +1,13 @@
 //! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two surfaces do not face
 //! each other.
 
-use super::auto::{self, Entry, Found, Piece, Split};
-use super::part::Part;
-use super::roster::{Owners, find_group, point};
+use super::auto::{self, ContactEntry, FaceSplit, PairPart, SurfacePair};
+use super::part::SceneBody;
+use super::patterns::{Owners, find_group, point};
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
-use crate::contact::pieces::{Common, Cut, Reach};
-use crate::contact::{self, Chords, ContactPair, End, Faces, Fault, Fine, ROUNDING, Side};
+use crate::contact::pieces::{Cut, Intersection, Reach};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, SmoothFaces, UncoveredPoint};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, unit};
 use crate::linalg::dot;
@@ -30,11 +30,11 @@ pub struct Contact<const D: usize> {
 /// What all ranks have of the origin of a pair; see [`ContactInfo`].
 #[derive(Serialize, Deserialize)]
 pub struct ContactFacts {
-    origin: Origin,
+    origin: PairOrigin,
     swapped: bool,
     idle: usize,
     chords: Option<Chords>,
-    ends: Vec<End>,
+    ends: Vec<UncoveredPoint>,
     surface: ContactSurface,
 }
 
@@ -57,7 +57,7 @@ pub struct ContactInfo {
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
-    pub ends: Vec<End>,
+    pub ends: Vec<UncoveredPoint>,
     /// Whether side a, which carries the points, is the second of `spec.between`.
     pub swapped: bool,
     /// Mesh of side a, for output.
@@ -66,8 +66,8 @@ pub struct ContactInfo {
 
 /// The entry of the scene that a pair comes from.
 #[derive(Serialize, Deserialize)]
-struct Origin {
-    entry: Entry,
+struct PairOrigin {
+    entry: ContactEntry,
     /// Names of the two surfaces, which are those of the bodies if the pair was found. A face of a split surface has its number behind
     /// the name.
     names: [String; 2],
@@ -75,9 +75,9 @@ struct Origin {
     is_split: bool,
 }
 
-impl Origin {
+impl PairOrigin {
     /// Describe a pair of faces of two surfaces with these names.
-    fn new(entry: Entry, names: [&str; 2], face: [Option<usize>; 2]) -> Self {
+    fn new(entry: ContactEntry, names: [&str; 2], face: [Option<usize>; 2]) -> Self {
         let name = |side: usize| match face[side] {
             Some(number) => format!("{}.{number}", names[side]),
             None => names[side].to_owned(),
@@ -88,8 +88,8 @@ impl Origin {
     /// Return the scene's description of the pair. `between` has the names of the pair.
     fn spec(&self, scene: &Scene) -> ContactSpec {
         let mut spec = match self.entry {
-            Entry::Named(number) => scene.contacts[number].clone(),
-            Entry::Found(rule) => scene.auto[rule].contact.clone(),
+            ContactEntry::Named(number) => scene.contacts[number].clone(),
+            ContactEntry::Found(rule) => scene.auto[rule].contact.clone(),
         };
         spec.between.iter_mut().zip(&self.names).for_each(|(name, own)| name.value.clone_from(own));
         spec
@@ -105,7 +105,7 @@ pub fn all<const D: usize>(
     scene: &Scene,
     mesh: &Mesh<D>,
     cut: Cut<D>,
-    parts: &[Part<D>],
+    parts: &[SceneBody<D>],
     fine: bool,
 ) -> Result<Vec<Contact<D>>> {
     let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
@@ -117,7 +117,7 @@ pub fn all<const D: usize>(
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
     let mut opposite = Vec::new();
-    for Found { entry, bodies, names, pieces } in found {
+    for SurfacePair { entry, bodies, names, pieces } in found {
         opposite.extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece)));
     }
     opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
@@ -132,8 +132,8 @@ fn named<'a, const D: usize>(
     mesh: &Mesh<D>,
     cut: Cut<D>,
     owners: &Owners,
-    parts: &[Part<D>],
-) -> Result<Found<'a, D>> {
+    parts: &[SceneBody<D>],
+) -> Result<SurfacePair<'a, D>> {
     let surface = |k: usize| {
         let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
         bounded(&spec.between[k], group, owners, parts)
@@ -148,7 +148,7 @@ fn named<'a, const D: usize>(
     let sides = [parts[first].side(names[0], on_first), parts[second].side(names[1], on_second)];
     let is_smooth = |side: &Side<D>| {
         let all = vec![true; side.facets.count()];
-        !Faces::new(side, spec.edge).meet(side, &all)
+        !SmoothFaces::new(side, spec.edge).meet(side, &all)
     };
     let mut pieces = Vec::new();
     if !sides.iter().all(is_smooth) {
@@ -156,18 +156,18 @@ fn named<'a, const D: usize>(
         let swapped = second_carries([&sides[0], &sides[1]]);
         let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
         let reach = Reach::between(a, b, spec.angle, spec.distance);
-        pieces = Split::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
+        pieces = FaceSplit::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
         if swapped {
-            pieces.iter_mut().for_each(Piece::swap);
+            pieces.iter_mut().for_each(PairPart::swap);
         }
         pieces.sort_by_key(|piece| piece.face);
     }
     // Surfaces without edges stay as they are, and so do those that do not face each other, which are refused later.
     if pieces.is_empty() {
         let facets = sides.map(|side| side.facets);
-        pieces.push(Piece { facets, face: [None; 2], idle: [0; 2], far: Default::default() });
+        pieces.push(PairPart { facets, face: [None; 2], idle: [0; 2], far: Default::default() });
     }
-    Ok(Found { entry: Entry::Named(number), bodies: [first, second], names, pieces })
+    Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], names, pieces })
 }
 
 /// Return whether the second of two surfaces carries the contact points of their pair: the finer one does, whatever the order in the
@@ -180,7 +180,7 @@ fn second_carries<const D: usize>([first, second]: [&Side<D>; 2]) -> bool {
 
 /// Two surfaces that are to be a pair.
 struct Opposite<'a, const D: usize> {
-    origin: Origin,
+    origin: PairOrigin,
     spec: ContactSpec,
     bodies: [usize; 2],
     a: Side<'a, D>,
@@ -197,16 +197,16 @@ struct Opposite<'a, const D: usize> {
 impl<'a, const D: usize> Opposite<'a, D> {
     /// Make the sides of a pair from a piece of two surfaces with these bodies and names.
     fn new(
-        entry: Entry,
+        entry: ContactEntry,
         scene: &Scene,
-        parts: &'a [Part<D>],
+        parts: &'a [SceneBody<D>],
         bodies: [usize; 2],
         names: [&'a str; 2],
-        piece: Piece<D>,
+        piece: PairPart<D>,
     ) -> Self {
-        let origin = Origin::new(entry, names, piece.face);
+        let origin = PairOrigin::new(entry, names, piece.face);
         let spec = origin.spec(scene);
-        let Piece { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
+        let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
         let first = parts[bodies[0]].side(names[0], on_first);
         let second = parts[bodies[1]].side(names[1], on_second);
         let swapped = second_carries([&first, &second]);
@@ -249,7 +249,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
-        let ends = spec.distance.map_or(Vec::new(), |distance| End::all(&a, &common, &pair, &far, distance, drawn));
+        let ends =
+            spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
         Ok(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } })
     }
 }
@@ -287,7 +288,7 @@ fn bounded<const D: usize>(
     name: &Located<String>,
     group: &Group,
     owners: &Owners,
-    parts: &[Part<D>],
+    parts: &[SceneBody<D>],
 ) -> Result<(usize, Facets<D>)> {
     let touching: BTreeSet<usize> = group.connectivity.iter().flat_map(|&point| owners.of(point)).collect();
     let mut found: Vec<(usize, Facets<D>)> = touching
@@ -367,7 +368,7 @@ struct Nearest {
 
 impl Nearest {
     /// Return the nearest of common points, those in front first; `None` if there are none.
-    fn of<const D: usize>(a: &Side<D>, common: &Common<D>) -> Option<Self> {
+    fn of<const D: usize>(a: &Side<D>, common: &Intersection<D>) -> Option<Self> {
         let key = |gap: f64| (gap < 0.0, gap.abs());
         let less = |p: f64, q: f64| {
             let ((behind, p), (other, q)) = (key(p), key(q));

@@ -1,7 +1,7 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
 use super::approach::Outer;
-use super::roster::{Values, find_group, load_dimensions, not_on_body, of_body, point, without_area};
+use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::{self, Side};
@@ -10,8 +10,8 @@ use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Extent, Facets, Interpolation, NodalBlock, NodalForces, NodeGraph, Parts, RigidMotion,
-    Space, assemble, rigid, support, surface,
+    ElasticBody, Elasticity, Facets, NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space,
+    Subdivision, assemble, rigid, support, surface,
 };
 use crate::linalg::{Total, axpy, countable, dot};
 use crate::mesh::{self, Group, Mesh};
@@ -27,7 +27,7 @@ const LOCKING: f64 = 0.49;
 
 /// A body of the scene with its space, supports and springs.
 #[derive(Clone)]
-pub struct Part<'a, const D: usize> {
+pub struct SceneBody<'a, const D: usize> {
     /// Description in the scene.
     pub spec: &'a BodySpec,
     /// Finite element space.
@@ -42,7 +42,7 @@ pub struct Part<'a, const D: usize> {
     pub facts: BodyFacts,
 }
 
-impl<'a, const D: usize> Part<'a, D> {
+impl<'a, const D: usize> SceneBody<'a, D> {
     /// Return the displacements of all dofs in a rigid motion.
     pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
         self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
@@ -135,14 +135,15 @@ impl<'a, const D: usize> Part<'a, D> {
     /// # Errors
     /// A load is not finite somewhere, or a surface is not on the body or has no area.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let load = body_force(self.spec, &self.space, Parts::Whole)?.and(self.on_surfaces(mesh, Parts::Whole)?);
+        let load =
+            body_force(self.spec, &self.space, Subdivision::Whole)?.and(self.on_surfaces(mesh, Subdivision::Whole)?);
         if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) }
     }
 
     /// Return the nodal forces of all loads that the quadrature misses. The result is empty if all loads are constant.
     ///
     /// # Errors
-    /// See [`Part::load`].
+    /// See [`SceneBody::load`].
     pub fn unloaded(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
         let is_constant = |load: &Load| match &load.kind {
             LoadKind::Pressure(pressure) => pressure.is_constant(),
@@ -153,11 +154,11 @@ impl<'a, const D: usize> Part<'a, D> {
         if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
             return Ok(Vec::new());
         }
-        let all = |parts: Parts| {
+        let all = |parts: Subdivision| {
             let load = body_force(self.spec, &self.space, parts)?.and(self.on_surfaces(mesh, parts)?);
             Ok(load.all(self.space.nodes.len()))
         };
-        let (mut missed, load) = (all(Parts::Halves)?, all(Parts::Whole)?);
+        let (mut missed, load) = (all(Subdivision::Halves)?, all(Subdivision::Whole)?);
         axpy(-1.0, &load, &mut missed);
         Ok(missed)
     }
@@ -165,15 +166,15 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Return the nodal forces of loads on surfaces that the quadrature misses.
     ///
     /// # Errors
-    /// See [`Part::load`].
+    /// See [`SceneBody::load`].
     pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let whole: NodalForces<D> =
-            self.on_surfaces(mesh, Parts::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
-        Ok(self.on_surfaces(mesh, Parts::Halves)?.and(whole))
+            self.on_surfaces(mesh, Subdivision::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
+        Ok(self.on_surfaces(mesh, Subdivision::Halves)?.and(whole))
     }
 
     /// Return the nodal forces of all loads on surfaces that are not rigid.
-    fn on_surfaces(&self, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
+    fn on_surfaces(&self, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
         let mut load = NodalForces::default();
         for spec in &self.spec.load {
             load = load.and(self.on_surface(spec, spec.factor, mesh, parts)?);
@@ -182,7 +183,7 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
-    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Parts) -> Result<NodalForces<D>> {
+    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
         let group = find_group(mesh, &spec.on, load_dimensions::<D>(&spec.kind), "load")?;
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
@@ -200,7 +201,7 @@ impl<'a, const D: usize> Part<'a, D> {
             let load = moment_load(&self.space, &facets, parts, moment.map(|component| factor * component));
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
-        let values = Values::of("this load", &name.value);
+        let values = FieldValues::of("this load", &name.value);
         let load = surface::surface_load(&self.space, &facets, parts, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
                 let pressure = factor * values.at(field, self.space.in_scene(x));
@@ -234,10 +235,10 @@ impl<'a, const D: usize> Part<'a, D> {
     /// Return the sum of the nodal forces of a load of the scene at its full value. It is zero if the surface is rigid.
     ///
     /// # Errors
-    /// See [`Part::load`].
+    /// See [`SceneBody::load`].
     pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
         let mut sum = [0.0; 3];
-        for (_, force) in self.on_surface(spec, 1.0, mesh, Parts::Whole)?.iter() {
+        for (_, force) in self.on_surface(spec, 1.0, mesh, Subdivision::Whole)?.iter() {
             contact::add(&mut sum, self.space.net_force(force));
         }
         Ok(sum)
@@ -260,7 +261,7 @@ impl<'a, const D: usize> Part<'a, D> {
         })
     }
 
-    /// Return the nodal forces of [`Part::load`] and those on rigid surfaces as forces at dofs.
+    /// Return the nodal forces of [`SceneBody::load`] and those on rigid surfaces as forces at dofs.
     pub fn load_on_dofs(&self, load: &NodalForces<D>) -> NodalForces<D> {
         load.iter().chain(self.rigid_forces()).flat_map(|(node, force)| self.held.frame.force(node, force)).collect()
     }
@@ -298,13 +299,13 @@ impl<'a, const D: usize> Part<'a, D> {
     ///
     /// # Errors
     /// Supports and springs leave more. The error names the place of a free part.
-    fn check_held(&self, parts: &mesh::Parts, mesh: &Mesh<D>) -> Result<()> {
+    fn check_held(&self, parts: &mesh::Components, mesh: &Mesh<D>) -> Result<()> {
         if parts.count == 1 {
             return Ok(());
         }
         let space = &self.space;
         let part_of = |node: u32| parts.of_node[node as usize] as usize;
-        let mut extents = vec![Extent::default(); parts.count];
+        let mut extents = vec![PointExtent::default(); parts.count];
         let mut first: Vec<Option<[f64; D]>> = vec![None; parts.count];
         for (node, x) in (0..).zip(&space.nodes) {
             extents[part_of(node)].add(*x);
@@ -347,7 +348,7 @@ impl<'a, const D: usize> Part<'a, D> {
     }
 
     /// Return the interpolation of the dofs from those at these nodes.
-    pub fn interpolation(&self, coarse: &[u32]) -> Interpolation {
+    pub fn interpolation(&self, coarse: &[u32]) -> Prolongation {
         from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
@@ -390,9 +391,9 @@ impl<'a, const D: usize> Part<'a, D> {
 ///
 /// # Errors
 /// The force is not finite somewhere, or beyond the range of numbers.
-fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Parts) -> Result<NodalForces<D>> {
+fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Subdivision) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
-    let values = Values::of("this body force", &name.value);
+    let values = FieldValues::of("this body force", &name.value);
     let density = |x: [f64; D]| {
         let x = space.in_scene(x);
         std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x))
@@ -418,7 +419,8 @@ pub struct BodyFacts {
     /// Point of the mesh of each node.
     pub points: Vec<u32>,
     /// Number of nodes of the body and their extent.
-    pub extent: Extent,
+    pub extent: PointExtent,
+    /// Number of cells.
     pub cells: usize,
     /// Area (volume) of the body; in a body of revolution the volume of the rings.
     pub volume: f64,
@@ -447,7 +449,7 @@ pub fn parts<'a, const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
     bodies: &'a [BodySpec],
-) -> Result<Vec<Part<'a, D>>> {
+) -> Result<Vec<SceneBody<'a, D>>> {
     let Verified { mesh, checked, .. } = verified;
     let mut parts = Vec::new();
     for (index, spec) in bodies.iter().enumerate() {
@@ -458,7 +460,7 @@ pub fn parts<'a, const D: usize>(
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        let mut part = Part { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
+        let mut part = SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
         let resultant = |load: &_| part.resultant(load, mesh);
         part.facts.outer = Outer::new(spec, &part.space, mesh, &resultant)?;
         part.check_held(&checked.parts, mesh)?;
@@ -492,7 +494,7 @@ fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elastic
         true => elasticity.moduli(0, [0.0; 3]).unwrap_or_default(),
         false => moduli(space, elasticity, 0..cells).map(|sum| sum / volume),
     };
-    let extent = Extent::of(space.nodes.iter().copied());
+    let extent = PointExtent::of(space.nodes.iter().copied());
     BodyFacts { points, extent, cells, volume, moduli, outer: Outer::default() }
 }
 

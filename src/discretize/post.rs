@@ -2,13 +2,13 @@
 //! them, errors against a known solution. Each rank evaluates its part.
 
 use super::approach::Outer;
-use super::roster::point;
+use super::patterns::point;
 use super::supports::Constraints;
 use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::fem::displacement::{self, Internal, Strained};
-use crate::fem::{Elasticity, Extent, Frame, NodalBlock, NodeGraph, Space, assemble, pad};
+use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, PointExtent, Space, assemble, pad};
 use crate::linalg::{Csr, dot};
 use crate::output::{BodyField, CellKind};
 use std::rc::Rc;
@@ -23,7 +23,7 @@ pub trait Post {
     fn strain(&self, bent: &[f64]) -> Strained;
 
     /// Return the forces on the owned nodes under the forces omega p of the contact rows of the body.
-    fn balance(&self, v: &[f64], force: &[f64]) -> Balance;
+    fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance;
 
     /// Return the unbalanced forces on the owned nodes under the forces omega p of the contact rows. `bent` is as in
     /// [`Post::field`]. `springs` are the stiffnesses omega kappa of these rows.
@@ -86,7 +86,7 @@ pub struct OnPart<const D: usize> {
     /// Contact rows with displacements of nodes as columns.
     pub rows: Csr,
     /// Extent of the whole body.
-    pub extent: Extent,
+    pub extent: PointExtent,
     /// Number of nodes of the whole body.
     pub nodes: usize,
 }
@@ -176,7 +176,7 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
-    fn balance(&self, v: &[f64], force: &[f64]) -> Balance {
+    fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance {
         let u = self.nodal(v);
         let mut contact = vec![0.0; u.len()];
         self.rows.add_transpose(-1.0, force, &mut contact);
@@ -209,7 +209,7 @@ impl<const D: usize> Post for OnPart<D> {
                 }
             }
         }
-        Balance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
+        ForceBalance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
     }
 
     fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
@@ -361,7 +361,7 @@ impl Resultant {
 
 /// All external forces on a body. In equilibrium their sum is zero.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Balance {
+pub struct ForceBalance {
     /// Loads without those on rigid surfaces; contacts; then each support, each spring, each rigid surface.
     pub parts: Vec<Resultant>,
     /// Sum of the magnitudes of all nodal forces, and of these times their distances from the datum. They are the scale of the
@@ -423,26 +423,26 @@ const HATS: usize = 5000;
 const NODES: usize = 4;
 
 /// Return grids over a body, each twice as fine as the one before.
-fn grids<const D: usize>(extent: &Extent, nodes: usize) -> Vec<Grid<D>> {
+fn grids<const D: usize>(extent: &PointExtent, nodes: usize) -> Vec<HatGrid<D>> {
     let corners: Vec<[f64; D]> = extent.corners().collect();
     let (low, high) = (corners[0], corners[corners.len() - 1]);
     let of_level = |level: u32| {
         let step = extent.size() / f64::from(1u32 << level);
         let count = std::array::from_fn(|c| 1 + (((high[c] - low[c]) / step).ceil() as usize).max(1));
-        Grid { low, step, count }
+        HatGrid { low, step, count }
     };
-    let fits = |grid: &Grid<D>| grid.len() == 1 << D || grid.len() <= HATS.min(nodes / NODES);
+    let fits = |grid: &HatGrid<D>| grid.len() == 1 << D || grid.len() <= HATS.min(nodes / NODES);
     (0..20).map(of_level).take_while(fits).collect()
 }
 
 /// A grid of cubes with multilinear hat functions.
-struct Grid<const D: usize> {
+struct HatGrid<const D: usize> {
     low: [f64; D],
     step: f64,
     count: [usize; D],
 }
 
-impl<const D: usize> Grid<D> {
+impl<const D: usize> HatGrid<D> {
     fn len(&self) -> usize {
         self.count.iter().product()
     }

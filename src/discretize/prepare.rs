@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 /// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, P: Plain")]
-pub struct Shared<const D: usize, P> {
+pub struct ReplicatedProblem<const D: usize, P> {
     /// Bodies in the order of the scene.
     pub bodies: Vec<SharedBody<D>>,
     /// Arrays on which the method works.
@@ -84,7 +84,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     keep: bool,
     ranks: usize,
     factory: &mut F,
-) -> Result<(Shared<D, F::Plan>, Whole<'a, D>)> {
+) -> Result<(ReplicatedProblem<D, F::SolverPlan>, Whole<'a, D>)> {
     let mesh = &verified.mesh;
     let parts = parts(scene, verified, specs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
@@ -108,7 +108,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = Shared { bodies: shared, pairs, contacts, mechanisms, balanced, fine, plan };
+    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, balanced, fine, plan };
     Ok((shared, Whole { bodies, partitions, keep }))
 }
 
@@ -116,7 +116,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
 ///
 /// # Errors
 /// See [`Factory::plan`].
-fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) -> Result<F::Plan> {
+fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) -> Result<F::SolverPlan> {
     // Facts of a body are computed when they are requested.
     let graphs: Vec<_> = bodies.iter().map(|body| move || body.graph()).collect();
     let at: Vec<_> =

@@ -1,11 +1,11 @@
 //! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on surfaces are here, too,
 //! since rigid surfaces turn about the same centre.
 
-use super::roster::{Values, earlier, find_group, not_on_body, of_body, point, without_area};
+use super::patterns::{FieldValues, earlier, find_group, not_on_body, of_body, point, without_area};
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
-use crate::fem::{Facets, Frame, Levers, NodalBlock, NodalForces, Parts, Space, cross, place, surface};
+use crate::fem::{Facets, Frame, Levers, NodalBlock, NodalForces, Space, Subdivision, cross, place, surface};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec};
@@ -157,7 +157,7 @@ impl<const D: usize> Constraints<D> {
         if surface::measure(space, facets) == 0.0 {
             return Err(without_area(&load.on, spec));
         }
-        let centre = centre(space, facets, Parts::Whole);
+        let centre = centre(space, facets, Subdivision::Whole);
         let levers = Levers::new(nodes, |node| space.nodes[node as usize], std::array::from_fn(|c| centre[c]));
         for component in 0..if D == 2 { 1 } else { D } {
             self.prescribed.remove(&(D * levers.pole as usize + component));
@@ -342,7 +342,7 @@ pub fn spring_blocks<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Vec<NodalBlock<D>>> {
     let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
-    let values = Values::of("the stiffness of this spring", &spec.name.value);
+    let values = FieldValues::of("the stiffness of this spring", &spec.name.value);
     let value = |field: &Field, x: [f64; D]| {
         let x = space.in_scene(x);
         values.checked(field, x, |k| {
@@ -382,7 +382,7 @@ pub fn spring_blocks<const D: usize>(
 }
 
 /// Return the centre of a surface: the mean place over its area.
-pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts) -> [f64; 3] {
+pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Subdivision) -> [f64; 3] {
     let sum =
         |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
     let area = sum(&|_| axis_vector(0))[0];
@@ -398,7 +398,7 @@ pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts
 pub fn moment_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
-    parts: Parts,
+    parts: Subdivision,
     moment: [f64; 3],
 ) -> NodalForces<D> {
     let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| traction(x));

@@ -4,7 +4,7 @@
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::expression::Field;
 use crate::fem::{element, length, minus};
-use crate::output::fields::{CellKind, Grid};
+use crate::output::fields::{CellKind, UnstructuredGrid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -92,7 +92,7 @@ impl ContactSurface {
     /// Return the mesh with arrays of values at the contact points; each array has a name, a number of components per point, and
     /// its values. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
     /// come, so that a pressure is never negative nor above its peak.
-    pub fn grid(&self, name: String, arrays: &[(&str, usize, Vec<f64>)]) -> Grid {
+    pub fn grid(&self, name: String, arrays: &[(&str, usize, Vec<f64>)]) -> UnstructuredGrid {
         let spread = |components: usize, values: &[f64]| {
             let at = |sources: &Vec<(usize, f64)>, c: usize| {
                 let of = |q: usize| values[components * q + c];
@@ -107,7 +107,7 @@ impl ContactSurface {
                 .flat_map(|sources| (0..components).map(|c| at(sources, c)).collect::<Vec<_>>())
                 .collect()
         };
-        Grid {
+        UnstructuredGrid {
             title: name,
             points: self.points.clone(),
             cell: self.cell,
@@ -146,7 +146,7 @@ const MISSED: f64 = 0.1;
 /// Return how well a surface follows a gap that has no detail below the length `detail`.
 pub fn resolution(surface: &ContactSurface, gap: &Field, detail: f64) -> Resolution {
     let (cell, facets) = surface.facets();
-    let facets: Vec<Facet> = facets.map(|(nodes, carriers)| Facet { nodes, carriers, gap }).collect();
+    let facets: Vec<GapFacet> = facets.map(|(nodes, carriers)| GapFacet { nodes, carriers, gap }).collect();
     let (corners, order) = match cell {
         CellKind::Line => (2, Order::P1),
         CellKind::QuadraticLine => (2, Order::P2),
@@ -155,7 +155,7 @@ pub fn resolution(surface: &ContactSurface, gap: &Field, detail: f64) -> Resolut
     };
     let each = (MOST / facets.len().max(1)) as f64;
     let most = if corners == 2 { each } else { each.sqrt() };
-    let look = |facet: &Facet| {
+    let look = |facet: &GapFacet| {
         let cuts = ((facet.side(corners) / detail).ceil().min(most) as usize).max(LEAST);
         let misses = if corners == 2 { facet.along(order, cuts) } else { facet.across(order, cuts) };
         (facet.measure(corners), misses)
@@ -174,7 +174,7 @@ pub fn resolution(surface: &ContactSurface, gap: &Field, detail: f64) -> Resolut
 }
 
 /// A facet in front of a gap.
-struct Facet<'a> {
+struct GapFacet<'a> {
     nodes: Vec<[f64; 3]>,
     carriers: Carriers,
     gap: &'a Field,
@@ -188,7 +188,7 @@ struct Misses {
     miss: f64,
 }
 
-impl Facet<'_> {
+impl GapFacet<'_> {
     /// Return the means over a facet in the plane, cut into equal intervals.
     fn along(&self, order: Order, cuts: usize) -> Misses {
         let places = (0..cuts).map(|k| (k as f64 + 0.5) / cuts as f64);

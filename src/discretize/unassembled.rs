@@ -1,7 +1,7 @@
 //! A body before its matrix is assembled, on the first rank: its contact rows, its loads, the rigid motions that supports leave, and that by
 //! which they move it.
 
-use super::part::Part;
+use super::part::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::exchange::Plain;
@@ -21,7 +21,7 @@ pub const NO_WORK: f64 = 1e-9;
 #[derive(Clone)]
 pub struct Unassembled<'a, const D: usize> {
     /// Space, supports and springs.
-    pub part: Part<'a, D>,
+    pub part: SceneBody<'a, D>,
     /// Contact rows of the body, pair by pair.
     pub segments: Vec<Segment>,
     /// These rows with dofs as columns.
@@ -37,7 +37,7 @@ pub struct Unassembled<'a, const D: usize> {
     /// Rigid motions that supports and springs leave at present.
     pub unconstrained: Unconstrained<D>,
     /// Rigid motions that only the mesh resists.
-    pub gauged: Gauged,
+    pub removed_modes: RemovedModes,
     /// Displacements that the supports prescribe.
     pub supported: Supported<D>,
     /// Coupling of nodes by K, once it was requested.
@@ -70,7 +70,7 @@ pub struct Unconstrained<const D: usize> {
 
 /// Names of the rigid motions of a body that neither supports nor smooth surfaces resist.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct Gauged {
+pub struct RemovedModes {
     /// Motions without work of the loads, which are fixed at one node each.
     pub fixed: Vec<String>,
     /// Motions on which loads work. Only the facets of the mesh resist them.
@@ -97,7 +97,7 @@ pub struct OnDofs {
 }
 
 /// A dof that can be fixed against a motion.
-pub struct Candidate {
+pub struct FixableDof {
     dof: usize,
     /// Magnitude of the motion there.
     pub size: f64,
@@ -107,8 +107,8 @@ impl<'a, const D: usize> Unassembled<'a, D> {
     /// Collect the contact rows and loads of all bodies.
     ///
     /// # Errors
-    /// See [`Part::load`].
-    pub fn all(parts: Vec<Part<'a, D>>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Self>> {
+    /// See [`SceneBody::load`].
+    pub fn all(parts: Vec<SceneBody<'a, D>>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Self>> {
         let mut segments = vec![Vec::new(); parts.len()];
         for (pair, sides) in pairs.iter().enumerate() {
             (0..2).for_each(|side| segments[sides.bodies[side]].push(Segment { pair, side }));
@@ -116,7 +116,7 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         parts.into_iter().zip(segments).map(|(part, segments)| Self::new(part, segments, pairs, mesh)).collect()
     }
 
-    fn new(part: Part<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
+    fn new(part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
         let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
             let mut all = Csr::new(part.space.dofs());
             for &Segment { pair, side } in &segments {
@@ -134,7 +134,7 @@ impl<'a, const D: usize> Unassembled<'a, D> {
             part,
             segments,
             unconstrained: Unconstrained::default(),
-            gauged: Gauged::default(),
+            removed_modes: RemovedModes::default(),
             supported: Supported::default(),
             graph: OnceCell::new(),
             owner: 0,
@@ -148,7 +148,7 @@ impl<'a, const D: usize> Unassembled<'a, D> {
 
     /// Return the coupling of the nodes by K, which is computed when it is first requested.
     pub fn graph(&self) -> &NodeGraph {
-        let Part { space, held, .. } = &self.part;
+        let SceneBody { space, held, .. } = &self.part;
         self.graph.get_or_init(|| NodeGraph::with_rows(space, &self.rows, &held.frame))
     }
 
@@ -200,16 +200,16 @@ impl<'a, const D: usize> Unassembled<'a, D> {
 
     /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the
     /// contact rows so that these do not change. The result is `None` if that displacement is small.
-    pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<Candidate> {
+    pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<FixableDof> {
         let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
         let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.held.prescribed.contains_key(dof);
         let all = (0..self.part.space.dofs()).filter(is_free);
-        let sizes = all.map(|dof| Candidate { dof, size: self.part.dof_of(motion, dof).abs() });
+        let sizes = all.map(|dof| FixableDof { dof, size: self.part.dof_of(motion, dof).abs() });
         sizes.max_by(|a, b| a.size.total_cmp(&b.size)).filter(|found| found.size > 1e-3)
     }
 
     /// Fix a dof.
-    pub fn fix(&mut self, found: &Candidate) {
+    pub fn fix(&mut self, found: &FixableDof) {
         self.part.held.prescribed.insert(found.dof, 0.0);
         self.find_motions();
     }
@@ -276,13 +276,13 @@ fn carried(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::Extent;
+    use crate::fem::PointExtent;
     use crate::fem::rigid::modes;
 
     #[test]
     fn supports_carry_a_body_or_deform_it() {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
-        let all = modes(&Extent::of(nodes.into_iter()));
+        let all = modes(&PointExtent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
         // The upper edge moves down by 0.3, and one node is constrained along x.
         let (weights, rest) = carried(3, &value, &[(0, 0.0), (5, -0.3), (7, -0.3)]).expect("a translation");

@@ -1,11 +1,11 @@
 //! Checks of the mesh against the scene before anything is assembled. Surfaces that a scene names by sets of nodes, as meshes of other
 //! programs have them, become groups of facets first.
 
-use super::roster::{self, Lying, earlier};
+use super::patterns::{self, Lying, earlier};
 use crate::error::{Error, Located, Result, few};
 use crate::exchange::{Exchange, broadcast};
-use crate::fem::Extent;
-use crate::mesh::{Asked, Checked, Duty, EDGES, Groups, LENGTHS, Mesh};
+use crate::fem::PointExtent;
+use crate::mesh::{Asked, BodyCheck, Duty, EDGES, Groups, LENGTHS, Mesh};
 use crate::problem::body::{BodySpec, LoadKind, SpringKind, plain, plain_pattern};
 use crate::problem::pattern::{BODY, Pattern};
 use crate::problem::{Order, Plane};
@@ -24,14 +24,14 @@ pub struct Verified<const D: usize> {
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
     /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
-    pub checked: Rc<[Checked]>,
+    pub checked: Rc<[BodyCheck]>,
     /// What is to be said of surfaces that are sets of nodes, on the first rank.
     pub notes: Vec<String>,
 }
 
 /// What all ranks have of a mesh.
 #[derive(Serialize, Deserialize)]
-struct Head {
+struct MeshHeader {
     path: PathBuf,
     order: Order,
     /// Groups without elements.
@@ -42,7 +42,7 @@ struct Head {
     lying: Lying,
 }
 
-/// Find the bodies of a scene and check its mesh once, see `roster::bodies` and [`Mesh::check`]. The first rank reads and
+/// Find the bodies of a scene and check its mesh once, see `patterns::bodies` and [`Mesh::check`]. The first rank reads and
 /// checks the mesh. Collective.
 ///
 /// # Errors
@@ -56,7 +56,7 @@ pub fn verify<const D: usize>(
     let mut verified = None;
     let head = broadcast(exchange, || {
         let (found, lying) = check(scene, read()?)?;
-        let head = Head::of(&found, lying);
+        let head = MeshHeader::of(&found, lying);
         verified = Some(found);
         Ok(head)
     })?;
@@ -72,10 +72,10 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     mesh.sort_cells();
     // The radius of a body of revolution is measured from its axis.
     mesh.measure_nearby(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
-    roster::split(scene, &mut mesh)?;
+    patterns::split(scene, &mut mesh)?;
     let notes = to_surfaces(scene, &mut mesh)?;
-    let lying = roster::lying(scene, &mesh)?;
-    let bodies = roster::bodies(scene, &mesh, &lying)?;
+    let lying = patterns::lying(scene, &mesh)?;
+    let bodies = patterns::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
@@ -105,7 +105,7 @@ impl<const D: usize> Verified<D> {
     }
 }
 
-impl Head {
+impl MeshHeader {
     fn of<const D: usize>(verified: &Verified<D>, lying: Lying) -> Self {
         let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
         Self {
@@ -123,7 +123,7 @@ impl Head {
     fn into_verified<const D: usize>(self, scene: &Scene) -> Result<Verified<D>> {
         let Self { path, order, groups, split, straightened, points, lying } = self;
         let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
-        let bodies = roster::bodies(scene, &mesh, &lying)?;
+        let bodies = patterns::bodies(scene, &mesh, &lying)?;
         Ok(Verified { mesh, points, bodies, checked: Rc::new([]), notes: Vec::new() })
     }
 }
@@ -133,7 +133,7 @@ impl Head {
 /// # Errors
 /// The mesh is too small or too large.
 fn size<const D: usize>(mesh: &Mesh<D>) -> Result<()> {
-    let mut extent = Extent::default();
+    let mut extent = PointExtent::default();
     mesh.points.iter().for_each(|x| extent.add(*x));
     let [least, most] = LENGTHS;
     let largest = extent.size();
@@ -248,7 +248,7 @@ fn of_contacts(scene: &Scene) -> impl Iterator<Item = Use<'_>> {
 /// Return the facets of the boundaries of all bodies with all their nodes among `points`: nodes per facet, and nodes.
 fn facets<const D: usize>(scene: &Scene, mesh: &Mesh<D>, points: &HashSet<u32>) -> Result<(usize, Vec<u32>)> {
     let (mut stride, mut all) = (D, Vec::new());
-    for name in roster::members(scene, mesh)?.concat() {
+    for name in patterns::members(scene, mesh)?.concat() {
         let Some(cells) = mesh.group(name).filter(|group| group.dimension == D) else { continue };
         // Facets with the number of cells that have them; those of the boundary have one.
         let mut found: HashMap<Vec<u32>, (usize, Vec<u32>)> = HashMap::new();

@@ -220,7 +220,7 @@ impl LayerError {
                 if is_whole { curve } else { curve.min(largest()) }
             };
             let met = |state: f64| {
-                let c = pair.law.meet(nearest, state, 1.0 / compliance);
+                let c = pair.law.resolvent(nearest, state, 1.0 / compliance);
                 (c, pair.law.response(nearest, c).pressure)
             };
             let (c_h, p_h) = met(between(&|q| compression[q] + compliance * pressure[q]));

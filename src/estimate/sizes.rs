@@ -10,7 +10,7 @@
 //! partly outside these cells. A field gives no size where it has no cell.
 
 use super::Estimate;
-use crate::discretize::meshes::{Cells, Meshes};
+use crate::discretize::meshes::{BodyCells, Meshes};
 use crate::fem::{cross, length, minus, unit};
 use crate::linalg::dot;
 use crate::model::Model;
@@ -171,7 +171,7 @@ const EDGE: f64 = std::f64::consts::FRAC_PI_3;
 const GROWTH: f64 = 0.5;
 
 /// Limit the sizes at the nodes of a body, one for each node, and grade them.
-fn smooth(cells: &Cells, sizes: &mut [f64]) {
+fn smooth(cells: &BodyCells, sizes: &mut [f64]) {
     for (node, limit) in limits(cells) {
         sizes[node as usize] = sizes[node as usize].min(limit);
     }
@@ -179,13 +179,13 @@ fn smooth(cells: &Cells, sizes: &mut [f64]) {
 }
 
 /// Return the corners and sizes of the simplices of the field, which are the cells and the layer outside.
-fn simplices(cells: &Cells, sizes: &[f64]) -> (Vec<[f64; 3]>, Vec<f64>) {
+fn simplices(cells: &BodyCells, sizes: &[f64]) -> (Vec<[f64; 3]>, Vec<f64>) {
     let own = cells.corners.iter().map(|&node| (cells.nodes[node as usize], sizes[node as usize]));
     own.chain(layer(cells, sizes)).unzip()
 }
 
 /// Two facets of the boundary with a common edge, in the plane with a common node.
-struct Pair {
+struct FacetPair {
     facets: [usize; 2],
     /// Angle between the normals, in radians.
     turn: f64,
@@ -196,7 +196,7 @@ struct Pair {
 }
 
 /// Return all pairs of neighbouring facets, and the outer unit normals of all facets.
-fn pairs(cells: &Cells) -> (Vec<Pair>, Vec<[f64; 3]>) {
+fn pairs(cells: &BodyCells) -> (Vec<FacetPair>, Vec<[f64; 3]>) {
     let dimension = cells.stride - 1;
     let normals: Vec<[f64; 3]> = cells.facets.chunks_exact(dimension).map(|facet| normal(cells, facet)).collect();
     let mut first: HashMap<Vec<u32>, usize> = HashMap::new();
@@ -214,7 +214,7 @@ fn pairs(cells: &Cells) -> (Vec<Pair>, Vec<[f64; 3]>) {
             let height = 0.5 * heights.sum::<f64>();
             let turn = dot(&normals[index], &normals[other]).clamp(-1.0, 1.0).acos();
             let along = if dimension == 3 { distance(cells, edge[0], edge[1]) } else { 1.0 };
-            pairs.push(Pair { facets: [index, other], turn, curvature: turn / height, weight: along * height });
+            pairs.push(FacetPair { facets: [index, other], turn, curvature: turn / height, weight: along * height });
         }
     }
     (pairs, normals)
@@ -224,7 +224,7 @@ fn pairs(cells: &Cells) -> (Vec<Pair>, Vec<[f64; 3]>) {
 ///
 /// The mean square of the curvatures across the edges of a facet is 3/8 of the squared curvature of a cylinder, and all of that
 /// of a sphere. With twice the mean square, both curvatures are met within a fifth.
-fn limits(cells: &Cells) -> Vec<(u32, f64)> {
+fn limits(cells: &BodyCells) -> Vec<(u32, f64)> {
     let dimension = cells.stride - 1;
     let mut sums = vec![[0.0; 2]; cells.facets.len() / dimension];
     for pair in pairs(cells).0.iter().filter(|pair| pair.turn < EDGE && pair.weight > 0.0) {
@@ -247,7 +247,7 @@ fn limits(cells: &Cells) -> Vec<(u32, f64)> {
 
 /// Reduce the sizes to the largest ones whose differences along edges are at most [`GROWTH`] times the length. This is Dijkstra's
 /// algorithm from the smallest size.
-fn grade(cells: &Cells, sizes: &mut [f64]) {
+fn grade(cells: &BodyCells, sizes: &mut [f64]) {
     let mut beside: Vec<Vec<u32>> = vec![Vec::new(); cells.nodes.len()];
     for cell in cells.corners.chunks_exact(cells.stride) {
         for &node in cell {
@@ -278,7 +278,7 @@ fn grade(cells: &Cells, sizes: &mut [f64]) {
 /// Let h be the length of a chord, t the angle by which neighbouring facets turn, and R the radius of a sphere. A chord lies h
 /// t/8 below the boundary. The centre of a triangle with edges h on the sphere lies h^2/(6 R) = 0.29 h t below it, where t =
 /// h/(sqrt(3) R). The layer is h t/2 thick, since nodes beside an edge of the part move out at 45 degrees.
-fn layer(cells: &Cells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
+fn layer(cells: &BodyCells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
     let dimension = cells.stride - 1;
     let (pairs, normals) = pairs(cells);
     let mut turn = vec![0.0f64; normals.len()];
@@ -322,7 +322,7 @@ fn layer(cells: &Cells, sizes: &[f64]) -> Vec<([f64; 3], f64)> {
 const FLAT: f64 = 1e-6;
 
 /// Return the outer unit normal of a facet from its corners, whose order gives the orientation.
-fn normal(cells: &Cells, facet: &[u32]) -> [f64; 3] {
+fn normal(cells: &BodyCells, facet: &[u32]) -> [f64; 3] {
     let arm = |k: usize| -> [f64; 3] { difference(cells, facet[k], facet[0]) };
     let across = match facet.len() {
         2 => {
@@ -335,7 +335,7 @@ fn normal(cells: &Cells, facet: &[u32]) -> [f64; 3] {
 }
 
 /// Return the height of a node above the line of an edge, in the plane its distance from the node.
-fn height(cells: &Cells, edge: &[u32], node: u32) -> f64 {
+fn height(cells: &BodyCells, edge: &[u32], node: u32) -> f64 {
     let from = difference(cells, node, edge[0]);
     if edge.len() == 1 {
         return length(from);
@@ -345,11 +345,11 @@ fn height(cells: &Cells, edge: &[u32], node: u32) -> f64 {
     (dot(&area, &area) / dot(&along, &along)).sqrt()
 }
 
-fn difference(cells: &Cells, a: u32, b: u32) -> [f64; 3] {
+fn difference(cells: &BodyCells, a: u32, b: u32) -> [f64; 3] {
     minus(cells.nodes[a as usize], cells.nodes[b as usize])
 }
 
-fn distance(cells: &Cells, a: u32, b: u32) -> f64 {
+fn distance(cells: &BodyCells, a: u32, b: u32) -> f64 {
     length(difference(cells, a, b))
 }
 
@@ -358,18 +358,18 @@ mod tests {
     use super::*;
 
     /// Return triangles of size one from the centre to the chords of a circle of radius 2.
-    fn disc(chords: u32) -> Cells {
+    fn disc(chords: u32) -> BodyCells {
         let angle = |k: u32| std::f64::consts::TAU * f64::from(k) / f64::from(chords);
         let mut nodes = vec![[0.0; 3]];
         nodes.extend((0..chords).map(|k| [2.0 * angle(k).cos(), 2.0 * angle(k).sin(), 0.0]));
         let chord = |k: u32| [1 + k, 1 + (k + 1) % chords];
         let corners = (0..chords).flat_map(|k| [0, chord(k)[0], chord(k)[1]]).collect();
         let facets = (0..chords).flat_map(chord).collect();
-        Cells { nodes, stride: 3, corners, facets, sizes: vec![1.0; chords as usize] }
+        BodyCells { nodes, stride: 3, corners, facets, sizes: vec![1.0; chords as usize] }
     }
 
     /// Return the faces of an octahedron, each in 16 parts, moved onto the sphere of radius 2, with cells to the centre.
-    fn ball() -> Cells {
+    fn ball() -> BodyCells {
         let (mut nodes, mut facets) = (vec![[0.0; 3]], Vec::new());
         let mut number = HashMap::new();
         for octant in 0..8u32 {
@@ -400,7 +400,7 @@ mod tests {
         }
         let corners: Vec<u32> = facets.chunks_exact(3).flat_map(|facet| [&[0], facet].concat()).collect();
         let sizes = vec![1.0; facets.len() / 3];
-        Cells { nodes, stride: 4, corners, facets, sizes }
+        BodyCells { nodes, stride: 4, corners, facets, sizes }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //!
 //! Steps are written in postfix order while the tokens are read, so that the cost is proportional to the length of the text.
 
-use super::program::{self, BINARY, Binary, COMPARISON, INFIX, Number, POWER, SIGN, SIGNS, Step, UNARY, Unary};
+use super::program::{self, BINARY, Binary, COMPARISON, INFIX, Number, Operation, POWER, SIGN, SIGNS, UNARY, Unary};
 use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result, nearest};
 use std::ops::{Range, RangeInclusive};
@@ -14,7 +14,7 @@ const DEEPEST: usize = 60;
 ///
 /// # Errors
 /// Texts that are no expression, and data that cannot be read.
-pub(super) fn parse(text: Text, scope: Scope) -> Result<Vec<Step>> {
+pub(super) fn parse(text: Text, scope: KnownNames) -> Result<Vec<Operation>> {
     let (token, span) = next(&text, 0)?;
     if token == Token::End {
         return Err(text.refuse(0..text.text.len(), "the expression is empty"));
@@ -33,13 +33,13 @@ pub(super) fn parse(text: Text, scope: Scope) -> Result<Vec<Step>> {
 
 struct Parser<'a> {
     text: Text<'a>,
-    scope: Scope<'a>,
+    scope: KnownNames<'a>,
     token: Token<'a>,
     /// The bytes of the next token in the text.
     span: Range<usize>,
     depth: usize,
     /// The steps so far.
-    code: Vec<Step>,
+    code: Vec<Operation>,
 }
 
 impl<'a> Parser<'a> {
@@ -77,7 +77,7 @@ impl<'a> Parser<'a> {
         let (token, span) = self.step()?;
         match token {
             Token::Number(value) => {
-                self.code.push(Step::Number(value));
+                self.code.push(Operation::Number(value));
                 Ok(())
             }
             Token::Name(name) if self.token == Token::Symbol("(") => self.call(name, span),
@@ -142,7 +142,7 @@ impl<'a> Parser<'a> {
         }
         match (unary, data) {
             (Some(function), _) => self.apply_one(function),
-            (None, Some(data)) if binary.is_none() => self.code.push(Step::Data(data)),
+            (None, Some(data)) if binary.is_none() => self.code.push(Operation::Data(data)),
             _ => {}
         }
         Ok(())
@@ -151,30 +151,30 @@ impl<'a> Parser<'a> {
     /// Apply an operator to the last value. A number is replaced by the result at once.
     fn apply_one(&mut self, function: &'static Unary) {
         match self.code.last_mut() {
-            Some(Step::Number(value)) => *value = value.one(function),
-            _ => self.code.push(Step::Unary(function)),
+            Some(Operation::Number(value)) => *value = value.one(function),
+            _ => self.code.push(Operation::Unary(function)),
         }
     }
 
     /// Apply an operator to the last two values. Two numbers are replaced by the result at once.
     fn apply_two(&mut self, function: &'static Binary) {
         match self.code[..] {
-            [.., Step::Number(left), Step::Number(right)] => {
+            [.., Operation::Number(left), Operation::Number(right)] => {
                 self.code.truncate(self.code.len() - 2);
-                self.code.push(Step::Number(left.two(right, function)));
+                self.code.push(Operation::Number(left.two(right, function)));
             }
-            _ => self.code.push(Step::Binary(function)),
+            _ => self.code.push(Operation::Binary(function)),
         }
     }
 
     /// Parse a variable, or `pi`.
     fn variable(&mut self, name: &str, span: Range<usize>) -> Result<()> {
         if name == "pi" {
-            self.code.push(Step::Number(std::f64::consts::PI));
+            self.code.push(Operation::Number(std::f64::consts::PI));
             return Ok(());
         }
         if let Some(place) = self.scope.variables.iter().position(|known| *known == name) {
-            self.code.push(Step::Variable(place));
+            self.code.push(Operation::Variable(place));
             return Ok(());
         }
         if self.functions().any(|known| known == name) {
@@ -358,14 +358,14 @@ impl Text<'_> {
 
 /// The names that an expression can use besides the common functions and `pi`.
 #[derive(Clone, Copy)]
-pub struct Scope<'a> {
+pub struct KnownNames<'a> {
     /// Names of the variables, at most four.
     pub variables: &'a [&'static str],
     /// Functions from files.
     pub data: &'a Library,
 }
 
-impl<'a> Scope<'a> {
+impl<'a> KnownNames<'a> {
     /// Return a scope of variables alone.
     pub fn of(variables: &'a [&'static str]) -> Self {
         static NONE: Library = Library::new();

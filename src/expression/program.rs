@@ -15,7 +15,7 @@ pub(super) type Values<T> = [T; MOST_VARIABLES];
 
 /// A step of an expression in postfix order.
 #[derive(Debug, Clone)]
-pub(super) enum Step {
+pub(super) enum Operation {
     Number(f64),
     /// A variable, by its index among the values.
     Variable(usize),
@@ -60,7 +60,7 @@ impl Number for f64 {
 
 /// An expression as a sequence of steps.
 pub(super) struct Program {
-    steps: Vec<Step>,
+    steps: Vec<Operation>,
     /// Largest number of values on the stack.
     depth: usize,
 }
@@ -70,14 +70,14 @@ const SHALLOW: usize = 16;
 
 impl Program {
     /// Return the program of some steps. Every step must find its arguments on the stack.
-    pub(super) fn new(steps: Vec<Step>) -> Self {
+    pub(super) fn new(steps: Vec<Operation>) -> Self {
         let (mut held, mut depth) = (0, 0);
         for step in &steps {
             held = match step {
-                Step::Number(_) | Step::Variable(_) => held + 1,
-                Step::Unary(_) => held,
-                Step::Binary(_) => held - 1,
-                Step::Data(data) => held + 1 - data.arguments(),
+                Operation::Number(_) | Operation::Variable(_) => held + 1,
+                Operation::Unary(_) => held,
+                Operation::Binary(_) => held - 1,
+                Operation::Data(data) => held + 1 - data.arguments(),
             };
             depth = depth.max(held);
         }
@@ -101,20 +101,20 @@ impl Program {
         let mut top = 0;
         for step in &self.steps {
             match step {
-                Step::Number(value) => {
+                Operation::Number(value) => {
                     stack[top] = T::constant(*value);
                     top += 1;
                 }
-                Step::Variable(place) => {
+                Operation::Variable(place) => {
                     stack[top] = variables[*place];
                     top += 1;
                 }
-                Step::Unary(function) => stack[top - 1] = stack[top - 1].one(function),
-                Step::Binary(function) => {
+                Operation::Unary(function) => stack[top - 1] = stack[top - 1].one(function),
+                Operation::Binary(function) => {
                     top -= 1;
                     stack[top - 1] = stack[top - 1].two(stack[top], function);
                 }
-                Step::Data(data) => {
+                Operation::Data(data) => {
                     let first = top - data.arguments();
                     watch(data, &stack[first..top]);
                     stack[first] = T::data(data, &stack[first..top]);
@@ -139,7 +139,7 @@ impl Program {
     /// Return all data that it uses.
     pub(super) fn data(&self) -> impl Iterator<Item = &Arc<Data>> {
         self.steps.iter().filter_map(|step| match step {
-            Step::Data(data) => Some(data),
+            Operation::Data(data) => Some(data),
             _ => None,
         })
     }
@@ -147,7 +147,7 @@ impl Program {
     /// Return the indices of the variables that it uses.
     pub(super) fn variables(&self) -> impl Iterator<Item = usize> {
         self.steps.iter().filter_map(|step| match step {
-            Step::Variable(variable) => Some(*variable),
+            Operation::Variable(variable) => Some(*variable),
             _ => None,
         })
     }

@@ -11,7 +11,7 @@ fn place(text: &str) -> Place {
 }
 
 fn parse(text: &str) -> Result<Expression> {
-    Expression::parse(text, &place(text), Scope::of(VARIABLES))
+    Expression::parse(text, &place(text), KnownNames::of(VARIABLES))
 }
 
 fn value(text: &str, values: [f64; 4]) -> f64 {
@@ -137,7 +137,7 @@ fn nan_is_not_hidden() {
 fn variables_take_their_own_values() {
     assert_eq!(value("k + 10*z", [1.0, 2.0, 3.0, 4.0]), 34.0);
     let text = "100*c + a";
-    let expression = Expression::parse(text, &place(text), Scope::of(&["c", "a"])).unwrap();
+    let expression = Expression::parse(text, &place(text), KnownNames::of(&["c", "a"])).unwrap();
     assert_eq!(expression.eval(&[3.0, 5.0]), 305.0);
     let zone = "x > 1 && k < 5";
     let field = Field::parse(zone, &place(zone), 2, true, &Library::new()).unwrap();
@@ -227,7 +227,7 @@ fn fields_without_variables_are_constants() {
 
 /// A law of c and x.
 fn law(text: &str) -> Expression {
-    Expression::parse(text, &place(text), Scope::of(&["c", "x"])).unwrap_or_else(|error| panic!("{error}"))
+    Expression::parse(text, &place(text), KnownNames::of(&["c", "x"])).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -282,7 +282,7 @@ fn derivatives_of_data_agree_with_differences() {
     };
     let library = Library::from([("f".to_owned(), Arc::new(Data::new(spec)))]);
     let text = "f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)";
-    let law = Expression::parse(text, &place, Scope { variables: &["c", "x"], data: &library }).unwrap();
+    let law = Expression::parse(text, &place, KnownNames { variables: &["c", "x"], data: &library }).unwrap();
     for values in [[0.7, 1.1], [1.2, 0.3]] {
         for variable in 0..2 {
             let (value, slope) = law.eval_by(variable, &values);

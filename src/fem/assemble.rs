@@ -4,9 +4,9 @@
 //! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
 use super::elasticity::{Elasticity, Flaw, Material};
-use super::element::{self, Parts, Rule};
+use super::element::{self, Rule, Subdivision};
 use super::frame::{Frame, Movers, Rotation, place};
-use super::space::{Point, Space};
+use super::space::{CellPoint, Space};
 use super::{length, pad};
 use crate::exchange::Plain;
 use crate::linalg::{Csr, Total, dot};
@@ -253,7 +253,7 @@ pub fn visit<const D: usize>(
     elasticity: &Elasticity,
     rules: &Rules,
     cell: usize,
-    mut each: impl FnMut(&Point<D>, &Material),
+    mut each: impl FnMut(&CellPoint<D>, &Material),
 ) -> Result<(), Defect> {
     for point in space.points(cell, rules.of(space, elasticity, cell)) {
         let point = point.ok_or(Defect::Inverted(cell))?;
@@ -406,14 +406,14 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
 pub fn body_force<const D: usize>(
     space: &Space<D>,
-    parts: Parts,
+    parts: Subdivision,
     density: &dyn Fn([f64; D]) -> [f64; D],
 ) -> NodalForces<D> {
     let (space, nodes) = space.part(0..space.cell_count());
     let mut load = vec![0.0; space.dofs()];
     let low = space.order == Order::P1 && !space.axisymmetric;
     let mut rule = element::rule(D + 1, if low { 2 } else { 5 });
-    if parts == Parts::Halves {
+    if parts == Subdivision::Halves {
         rule = rule.on_parts();
     }
     for index in 0..space.cell_count() {

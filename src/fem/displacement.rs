@@ -1,7 +1,7 @@
 //! What follows from the displacement of a body: stresses, strains, internal forces and energies, and its error against a known one.
 
 use super::elasticity::{Elasticity, Material};
-use super::space::{Point, Slope, Space};
+use super::space::{CellPoint, Slope, Space};
 use super::{assemble, element};
 use crate::linalg::dot;
 use crate::problem::order::Order;
@@ -199,7 +199,7 @@ fn visit<const D: usize>(
     space: &Space<D>,
     elasticity: &Elasticity,
     cells: impl Iterator<Item = usize>,
-    mut each: impl FnMut(&Point<D>, &Material),
+    mut each: impl FnMut(&CellPoint<D>, &Material),
 ) {
     let rules = assemble::Rules::new::<D>(space.order);
     for index in cells {
@@ -235,7 +235,7 @@ pub fn internal_forces<const D: usize>(
 
 impl Internal {
     /// Add the forces and bounds of an integration point; `rounding` is still without the factor of eps and the lengths of sums.
-    fn add<const D: usize>(&mut self, space: &Space<D>, point: &Point<D>, material: &Material, u: &[f64]) {
+    fn add<const D: usize>(&mut self, space: &Space<D>, point: &CellPoint<D>, material: &Material, u: &[f64]) {
         let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
         let stress = material.stress(&point.slope(u).strain());
         let stiffness = point.weight * material.norm();

@@ -12,14 +12,14 @@ use nalgebra::{Matrix3, Matrix6};
 pub struct Elasticity {
     dimension: usize,
     plane: Plane,
-    regions: Vec<Region>,
+    regions: Vec<MaterialRegion>,
     /// Region of each cell; empty if all cells have the first one.
     of_cell: Vec<usize>,
 }
 
 /// The elastic constants of one region of a body.
 #[derive(Debug, Clone)]
-struct Region {
+struct MaterialRegion {
     spec: ElasticitySpec,
     /// Hooke's law and moduli if they do not depend on the point.
     constant: Option<(Material, [f64; 3])>,
@@ -38,7 +38,7 @@ pub enum Flaw {
     Twists,
 }
 
-impl Region {
+impl MaterialRegion {
     fn new(spec: &ElasticitySpec, dimension: usize, plane: Plane) -> Result<Self, Flaw> {
         let mut region = Self { spec: spec.clone(), constant: None };
         if spec.is_constant() {
@@ -63,7 +63,7 @@ impl Elasticity {
         plane: Plane,
     ) -> Result<Self, (usize, Flaw)> {
         let region = |(index, spec): (usize, &&ElasticitySpec)| {
-            Region::new(spec, dimension, plane).map_err(|flaw| (index, flaw))
+            MaterialRegion::new(spec, dimension, plane).map_err(|flaw| (index, flaw))
         };
         Ok(Self { regions: specs.iter().enumerate().map(region).collect::<Result<_, _>>()?, of_cell, dimension, plane })
     }

@@ -202,7 +202,7 @@ impl Rule {
 
 /// The fineness of the integration of loads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Parts {
+pub enum Subdivision {
     /// One rule on each element.
     Whole,
     /// The same rule on each part of an element. The difference of both results is nearly the whole error of the first.

@@ -8,14 +8,14 @@ use crate::problem::order::Order;
 
 /// An interpolation from a coarse space to a fine one.
 #[derive(Debug, Clone)]
-pub struct Interpolation {
+pub struct Prolongation {
     /// Matrix with one row a dof of the fine space and one column a dof of the coarse space.
     pub rows: Csr,
     /// Number of dofs of the coarse space on this rank.
     pub own: usize,
 }
 
-impl Interpolation {
+impl Prolongation {
     /// Append the rows of the next body, whose columns begin at `first`.
     pub fn append(&mut self, next: &Self, first: usize) {
         self.own += next.own;
@@ -46,7 +46,7 @@ pub fn from_vertices<const D: usize>(
     frame: &Frame<D>,
     is_prescribed: impl Fn(usize) -> bool,
     coarse: &[u32],
-) -> Interpolation {
+) -> Prolongation {
     let own = D * coarse.len();
     let mut rows = Csr::new(own);
     for (node, ends) in edge_ends(space).into_iter().enumerate() {
@@ -64,7 +64,7 @@ pub fn from_vertices<const D: usize>(
             });
         }
     }
-    Interpolation { rows, own }
+    Prolongation { rows, own }
 }
 
 /// Return the vertices at the ends of the edge of each node in the middle of an edge; `None` for other nodes.
@@ -132,7 +132,7 @@ mod tests {
             (0..125).find(|node| coarse.binary_search(node).is_err()).expect("a node in the middle of an edge");
         let frame = Frame { axes: [(coarse[3], turned), (middle, turned)].into(), ..Frame::default() };
         let (all, few) = both(&space, &frame, |x| [1.0 + x[0] - 2.0 * x[1], 3.0 * x[2], x[0] + x[1] - 0.5]);
-        let Interpolation { rows, own } = from_vertices(&space, &frame, |_| false, &coarse);
+        let Prolongation { rows, own } = from_vertices(&space, &frame, |_| false, &coarse);
         assert_eq!((rows.rows(), own), (375, 81));
         let mut values = vec![0.0; 375];
         rows.multiply(&few, &mut values);

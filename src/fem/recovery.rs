@@ -16,7 +16,7 @@ mod strip;
 
 use super::elasticity::Elasticity;
 use super::element::{self, EDGES};
-use super::space::{Point, Slope, Space};
+use super::space::{CellPoint, Slope, Space};
 use crate::linalg::{axpy, dot};
 use crate::problem::order::Order;
 use patch::{Monomials, Patch, Rings};
@@ -163,7 +163,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
             return (0..self.space.cell_count()).map(|index| self.energy_error_of_linear(index, &rule)).collect();
         }
         let of_cell = |index: usize| {
-            let of_point = |point: Point<D>| {
+            let of_point = |point: CellPoint<D>| {
                 let mut difference = self.recovered_slope(point.cell, point.l, &point.at);
                 difference.add(-1.0, &point.slope(self.displacement));
                 let strain = difference.strain();
@@ -262,7 +262,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     }
 
     /// Return the gradient of b at a point of a cell.
-    fn missed_slope(&self, point: &Point<D>) -> Slope<D> {
+    fn missed_slope(&self, point: &CellPoint<D>) -> Slope<D> {
         let hats = hats(point);
         let mut slope = Slope::ZERO;
         for (k, &vertex) in point.cell[..=D].iter().enumerate() {
@@ -307,7 +307,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
 }
 
 /// Add `weight sigma : grad v` at a point for the shape functions v of its cell to `sum`, one entry per dof.
-fn add_stress<const D: usize>(point: &Point<D>, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
+fn add_stress<const D: usize>(point: &CellPoint<D>, weight: f64, stress: &[f64; 6], sum: &mut [f64]) {
     for (a, &node) in point.cell.iter().enumerate() {
         let force = point.force(stress, a);
         (0..D).for_each(|c| sum[D * node as usize + c] += weight * force[c]);
@@ -316,7 +316,7 @@ fn add_stress<const D: usize>(point: &Point<D>, weight: f64, stress: &[f64; 6], 
 
 /// Return the gradients of the barycentric coordinates at a point, also in curved cells. The coordinate l_k is one at vertex k, and a
 /// half in the middle of each edge at this vertex.
-fn hats<const D: usize>(point: &Point<D>) -> [[f64; D]; 4] {
+fn hats<const D: usize>(point: &CellPoint<D>) -> [[f64; D]; 4] {
     let mut hats = [[0.0; D]; 4];
     hats[..=D].copy_from_slice(&point.gradient[..=D]);
     for (middle, &(i, j)) in point.gradient[D + 1..point.cell.len()].iter().zip(&EDGES) {
@@ -453,7 +453,7 @@ mod tests {
             let recovery = Recovery::new(&space, &steel, &u);
             let rule = element::rule(4, 2);
             let energy = |index: usize| -> f64 {
-                let of_point = |point: Point<3>| {
+                let of_point = |point: CellPoint<3>| {
                     let strain = point.slope(&u).strain();
                     point.weight * dot(&recovery.stress(index, point.at, &strain), &strain)
                 };

@@ -56,7 +56,7 @@ impl AtDofs<'_> {
 }
 
 /// Return the rigid motions of a body. A body of revolution has only the translation along its axis.
-pub fn of<const D: usize>(extent: &Extent, axisymmetric: bool) -> Vec<RigidMotion<D>> {
+pub fn of<const D: usize>(extent: &PointExtent, axisymmetric: bool) -> Vec<RigidMotion<D>> {
     let mut all = modes(extent);
     if axisymmetric {
         all = vec![all.swap_remove(1)];
@@ -66,7 +66,7 @@ pub fn of<const D: usize>(extent: &Extent, axisymmetric: bool) -> Vec<RigidMotio
 
 /// Return the 3 (2D) or 6 (3D) rigid motions about the mean of some points: translations, then rotations, scaled to
 /// displacements of about one. Gmsh and PETSc call them rigid body modes.
-pub fn modes<const D: usize>(extent: &Extent) -> Vec<RigidMotion<D>> {
+pub fn modes<const D: usize>(extent: &PointExtent) -> Vec<RigidMotion<D>> {
     let (centre, size) = (extent.mean(), extent.farthest::<D>());
     let translations = (0..D).map(|c| (c, format!("translation along {}", ["x", "y", "z"][c])));
     let rotations = (0..3).filter(|&k| D == 3 || k == 2);
@@ -134,20 +134,20 @@ pub fn sum<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -
 
 /// The number, the sum and the box of a set of points, on which the rigid motions of the points depend.
 #[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub struct Extent {
+pub struct PointExtent {
     count: usize,
     sum: [Total; 3],
     /// Corners of the box around the points, with the least and the largest coordinates.
     bounds: [[f64; 3]; 2],
 }
 
-impl Default for Extent {
+impl Default for PointExtent {
     fn default() -> Self {
         Self { count: 0, sum: [Total::default(); 3], bounds: bounds([]) }
     }
 }
 
-impl Extent {
+impl PointExtent {
     /// Summarise these points.
     pub fn of<const D: usize>(points: impl Iterator<Item = [f64; D]>) -> Self {
         let mut all = Self::default();
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn supports_leave_what_they_do_not_hold() {
         let nodes = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
-        let all = modes(&Extent::of(nodes.into_iter()));
+        let all = modes(&PointExtent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
         let remaining = |dofs: &[usize]| {
             let prescribed: Vec<_> = dofs.iter().map(|&dof| (dof, 0.0)).collect();
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn rotations_turn_their_planes() {
         let nodes = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]];
-        let all = modes(&Extent::of(nodes.into_iter()));
+        let all = modes(&PointExtent::of(nodes.into_iter()));
         let at = |name: &str| all.iter().find(|motion| motion.name == name).map(|motion| motion.at(&nodes[1]));
         assert_eq!(at("rotation about z"), Some([-1.0, 1.0, 0.0]));
         assert_eq!(at("rotation about x"), Some([0.0, -1.0, 1.0]));

@@ -181,16 +181,16 @@ impl<const D: usize> Space<D> {
     /// Return the point with barycentric coordinates `l` in cell `i`, whose nodes have the coordinates `x`. Its `weight` in an integral
     /// over the body is that of a quadrature point with this `weight`. The result is `None` if the map of the cell is singular or
     /// inverted there.
-    pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<Point<'a, D>> {
+    pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<CellPoint<'a, D>> {
         let (gradient, measure) = element::gradients(self.order, x, l)?;
         let phi = element::values(self.order, l);
         let at = element::interpolate(x, &phi);
         let weight = weight * measure * self.circle(&at);
-        Some(Point { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })
+        Some(CellPoint { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })
     }
 
     /// Return the points of a quadrature rule in cell `i`; `None` for those where the map of the cell is singular or inverted.
-    pub fn points<'a>(&'a self, i: usize, rule: &'a Rule) -> impl Iterator<Item = Option<Point<'a, D>>> {
+    pub fn points<'a>(&'a self, i: usize, rule: &'a Rule) -> impl Iterator<Item = Option<CellPoint<'a, D>>> {
         let x = self.cell_nodes(i);
         rule.iter().map(move |(l, weight)| self.point(i, &x, l, weight))
     }
@@ -250,7 +250,7 @@ impl<const D: usize> Space<D> {
 }
 
 /// A point of a cell, with the shape functions of the cell there.
-pub struct Point<'a, const D: usize> {
+pub struct CellPoint<'a, const D: usize> {
     space: &'a Space<D>,
     /// Nodes of the cell.
     pub cell: &'a [u32],
@@ -268,7 +268,7 @@ pub struct Point<'a, const D: usize> {
     pub weight: f64,
 }
 
-impl<const D: usize> Point<'_, D> {
+impl<const D: usize> CellPoint<'_, D> {
     /// Return the gradient here of a displacement `u`, one entry a dof.
     pub fn slope(&self, u: &[f64]) -> Slope<D> {
         let mut h = [[0.0; D]; D];

@@ -1,7 +1,7 @@
 //! Integrals over surfaces (loads, foundations and areas), and what a load misses where facets approximate a smooth surface.
 
 use super::assemble::{NodalBlock, NodalForces};
-use super::element::{self, Parts};
+use super::element::{self, Subdivision};
 use super::facets::{Facets, area_vector};
 use super::frame::place;
 use super::space::Space;
@@ -14,12 +14,12 @@ use std::collections::HashMap;
 pub fn surface_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
-    parts: Parts,
+    parts: Subdivision,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
 ) -> NodalForces<D> {
     let surface_nodes = facets.distinct_nodes();
     let mut load = vec![0.0; D * surface_nodes.len()];
-    visit(space, facets, parts, |Point { nodes, phi, weight, x, normal }| {
+    visit(space, facets, parts, |FacetPoint { nodes, phi, weight, x, normal }| {
         let force = traction(x, normal);
         for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&surface_nodes, node)?))) {
             for c in 0..D {
@@ -31,7 +31,7 @@ pub fn surface_load<const D: usize>(
 }
 
 /// An integration point of a surface.
-struct Point<'a, const D: usize> {
+struct FacetPoint<'a, const D: usize> {
     /// Nodes of the facet.
     nodes: &'a [u32],
     /// Values of the shape functions.
@@ -44,9 +44,14 @@ struct Point<'a, const D: usize> {
 }
 
 /// Visit the integration points of a surface.
-fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, mut each: impl FnMut(Point<D>)) {
+fn visit<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    parts: Subdivision,
+    mut each: impl FnMut(FacetPoint<D>),
+) {
     let mut rule = element::rule(D, if space.order == Order::P1 { 3 } else { 5 });
-    if parts == Parts::Halves {
+    if parts == Subdivision::Halves {
         rule = rule.on_parts();
     }
     for index in 0..facets.count() {
@@ -58,7 +63,7 @@ fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Parts, mut
             let phi = element::values(space.order, l);
             let at = element::interpolate(&x, &phi);
             let weight = weight * measure * space.circle(&at);
-            each(Point { nodes: facets.facet(index), phi, weight, x: at, normal });
+            each(FacetPoint { nodes: facets.facet(index), phi, weight, x: at, normal });
         }
     }
 }
@@ -71,7 +76,7 @@ pub fn foundation<const D: usize>(
     stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
 ) -> Vec<NodalBlock<D>> {
     let mut blocks = Vec::new();
-    visit(space, facets, Parts::Whole, |Point { nodes, phi, weight, x, normal }| {
+    visit(space, facets, Subdivision::Whole, |FacetPoint { nodes, phi, weight, x, normal }| {
         let density = stiffness(x, normal);
         for (a, &first) in nodes.iter().enumerate() {
             for (b, &second) in nodes.iter().enumerate() {
@@ -86,7 +91,7 @@ pub fn foundation<const D: usize>(
 /// Return the length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
 pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let mut sum = 0.0;
-    visit(space, facets, Parts::Whole, |point| sum += point.weight);
+    visit(space, facets, Subdivision::Whole, |point| sum += point.weight);
     sum
 }
 

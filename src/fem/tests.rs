@@ -1,7 +1,7 @@
 //! Tests of rigid surfaces that turn: dofs, matrices and forces together.
 
 use super::space::sample::block;
-use super::{Elasticity, Extent, Frame, Levers, NodeGraph, RigidMotion, Space, assemble, rigid};
+use super::{Elasticity, Frame, Levers, NodeGraph, PointExtent, RigidMotion, Space, assemble, rigid};
 use crate::linalg::dot;
 use crate::problem::{BodySpec, Order, Plane};
 
@@ -70,7 +70,7 @@ fn work<const D: usize>(moment: [f64; 3]) {
             (0..D).for_each(|c| at_dofs[D * node as usize + c] += force[c]);
         }
     }
-    let motions: Vec<RigidMotion<D>> = rigid::modes(&Extent::of(space.nodes.iter().copied()));
+    let motions: Vec<RigidMotion<D>> = rigid::modes(&PointExtent::of(space.nodes.iter().copied()));
     for motion in &motions {
         let u = motion.nodal(space.nodes.iter().copied());
         let v = frame.dofs(&u);

@@ -40,7 +40,7 @@ pub struct Factor {
     /// 1/root of the diagonal; zero for unknowns that nothing resists.
     scale: Vec<f64>,
     /// Columns of L, in the order of elimination.
-    columns: Vec<Column>,
+    columns: Vec<BlockColumn>,
     /// Kernel vectors as entries (unknown, value), largest value one.
     kernel: Vec<Vec<(usize, f64)>>,
     /// The unknown that was left out for each kernel vector.
@@ -49,7 +49,7 @@ pub struct Factor {
 
 /// The columns of L of one body.
 #[derive(Debug, Clone)]
-struct Column {
+struct BlockColumn {
     /// Unknowns of the body.
     own: Range<usize>,
     /// Bodies connected to it that are eliminated later: number of their column, their unknowns.
@@ -64,7 +64,7 @@ struct Column {
     order: Vec<usize>,
 }
 
-impl Column {
+impl BlockColumn {
     /// Return the column of L of unknown p of the body.
     fn column(&self, p: usize) -> &[f64] {
         &self.panel[p * self.height..(p + 1) * self.height]
@@ -111,7 +111,7 @@ impl Factor {
             let (k, l) = (step[i], step[j]);
             entries[k.min(l)].push((k.max(l), if k <= l { block.transpose() } else { block.clone() }));
         }
-        let mut work = Work { x: vec![0.0; factor.count], row: vec![0; factor.columns.len()], runs: Vec::new() };
+        let mut work = WorkArrays { x: vec![0.0; factor.count], row: vec![0; factor.columns.len()], runs: Vec::new() };
         for (k, entries) in entries.iter().enumerate() {
             factor.assemble(k, entries, &mut work);
             for &(j, position) in &earlier[k] {
@@ -123,7 +123,7 @@ impl Factor {
     }
 
     /// Write the scaled matrix into column k, from its blocks (column, transpose of the block above).
-    fn assemble(&mut self, k: usize, entries: &[(usize, DMatrix<f64>)], work: &mut Work) {
+    fn assemble(&mut self, k: usize, entries: &[(usize, DMatrix<f64>)], work: &mut WorkArrays) {
         let mut height = self.columns[k].own.len();
         for (column, range) in &self.columns[k].below {
             work.row[*column] = height;
@@ -144,7 +144,7 @@ impl Factor {
     }
 
     /// Subtract from column k the change by the elimination of column j < k, in which k is at `position` of the columns below.
-    fn update(&mut self, k: usize, j: usize, position: usize, work: &mut Work) {
+    fn update(&mut self, k: usize, j: usize, position: usize, work: &mut WorkArrays) {
         let (before, rest) = self.columns.split_at_mut(k);
         let (source, target) = (&before[j], &mut rest[0]);
         let touched = &source.below[position..];
@@ -157,7 +157,7 @@ impl Factor {
             let to = work.row[*column];
             match work.runs.last_mut() {
                 Some(run) if run.from + run.length == from && run.to + run.length == to => run.length += range.len(),
-                _ => work.runs.push(Run { from, to, length: range.len() }),
+                _ => work.runs.push(RowBlock { from, to, length: range.len() }),
             }
             from += range.len();
         }
@@ -166,7 +166,7 @@ impl Factor {
             let panel = &mut target.panel[p * target.height..(p + 1) * target.height];
             // three unknowns at once, as bodies have three or six: each row is then read and written less often
             for some in source.order.chunks(3) {
-                for &Run { from, to, length } in &work.runs {
+                for &RowBlock { from, to, length } in &work.runs {
                     let rows = &mut panel[to..to + length];
                     let of = |q: usize| &source.column(q)[from..from + length];
                     match *some {
@@ -183,7 +183,7 @@ impl Factor {
     }
 
     /// Eliminate the unknowns of column k.
-    fn eliminate(&mut self, k: usize, earlier: &[Vec<(usize, usize)>], tolerance: f64, work: &mut Work) {
+    fn eliminate(&mut self, k: usize, earlier: &[Vec<(usize, usize)>], tolerance: f64, work: &mut WorkArrays) {
         let size = self.columns[k].own.len();
         let height = self.columns[k].height;
         let mut open: Vec<usize> = (0..size).collect();
@@ -235,7 +235,13 @@ impl Factor {
 
     /// Return the vector e of a pivot of the scaled matrix: one at unknown p of column k, zero at the unknowns that are not eliminated yet, and with
     /// the least e'Ae. Its entries are (unknown, value).
-    fn candidate(&self, k: usize, p: usize, earlier: &[Vec<(usize, usize)>], work: &mut Work) -> Vec<(usize, f64)> {
+    fn candidate(
+        &self,
+        k: usize,
+        p: usize,
+        earlier: &[Vec<(usize, usize)>],
+        work: &mut WorkArrays,
+    ) -> Vec<(usize, f64)> {
         let x = &mut work.x;
         x[self.columns[k].own.start + p] = 1.0;
         let mut open = BTreeSet::from([k]);
@@ -325,16 +331,16 @@ impl Blocks {
 }
 
 /// Work arrays of the factorisation.
-struct Work {
+struct WorkArrays {
     /// A vector over all unknowns, zero between uses.
     x: Vec<f64>,
     /// First row of each column's unknowns in the panel of the present column.
     row: Vec<usize>,
-    runs: Vec<Run>,
+    runs: Vec<RowBlock>,
 }
 
 /// Consecutive rows of one panel that are consecutive in another: the first row in each, and how many they are.
-struct Run {
+struct RowBlock {
     from: usize,
     to: usize,
     length: usize,
@@ -352,7 +358,7 @@ fn unit_diagonal(matrix: &Blocks) -> Vec<f64> {
 }
 
 /// Return the columns of the factor in the order of their elimination, without values.
-fn structure(matrix: &Blocks) -> Vec<Column> {
+fn structure(matrix: &Blocks) -> Vec<BlockColumn> {
     let bodies: Vec<usize> = (0..matrix.rows()).filter(|&i| !matrix.range(i).is_empty()).collect();
     let mut vertex = vec![0; matrix.rows()];
     bodies.iter().enumerate().for_each(|(v, &i)| vertex[i] = v);
@@ -371,13 +377,13 @@ fn structure(matrix: &Blocks) -> Vec<Column> {
         let own = matrix.range(bodies[*v]);
         let height = own.len() + below.iter().map(|(_, range)| range.len()).sum::<usize>();
         let pivot = vec![0.0; own.len()];
-        Column { own, below, height, panel: Vec::new(), pivot, order: Vec::new() }
+        BlockColumn { own, below, height, panel: Vec::new(), pivot, order: Vec::new() }
     };
     order.iter().map(column).collect()
 }
 
 /// Return the column of each row of blocks; for rows without unknowns the value has no meaning.
-fn steps(matrix: &Blocks, columns: &[Column]) -> Vec<usize> {
+fn steps(matrix: &Blocks, columns: &[BlockColumn]) -> Vec<usize> {
     let mut of_first = vec![0; matrix.unknowns()];
     columns.iter().enumerate().for_each(|(k, column)| of_first[column.own.start] = k);
     (0..matrix.rows()).map(|i| of_first.get(matrix.range(i).start).copied().unwrap_or(0)).collect()
@@ -459,16 +465,16 @@ impl Blocks {
 }
 
 /// The vertices in the order of their elimination, each with its neighbours at that time.
-pub type Order = Rc<Vec<(usize, Vec<usize>)>>;
+pub type EliminationOrder = Rc<Vec<(usize, Vec<usize>)>>;
 
 thread_local! {
     /// The last graph with its order.
-    static LAST: RefCell<(Vec<Vec<usize>>, Order)> = RefCell::default();
+    static LAST: RefCell<(Vec<Vec<usize>>, EliminationOrder)> = RefCell::default();
 }
 
 /// Return [`order`] of a graph; it is kept for the next call with the same graph. A run factors the springs between its bodies some ten times,
 /// and the order takes a third as long as the factor.
-pub fn order_again(graph: Vec<Vec<usize>>) -> Order {
+pub fn order_again(graph: Vec<Vec<usize>>) -> EliminationOrder {
     // a single vertex does not replace the graph that is kept
     if graph.len() < 2 {
         return order(graph).into();

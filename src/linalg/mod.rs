@@ -261,9 +261,9 @@ impl FromIterator<f64> for Total {
 }
 
 /// Disjoint sets of things that are joined directly or through others.
-pub struct Joined(Vec<u32>);
+pub struct DisjointSets(Vec<u32>);
 
-impl Joined {
+impl DisjointSets {
     /// Start with `count` things, each in a set of its own.
     pub fn new(count: usize) -> Self {
         Self((0..count as u32).collect())

@@ -10,7 +10,7 @@ pub struct Cursor<'a> {
     /// The file that the user knows, for messages.
     pub path: &'a Path,
     /// The file, or its bytes.
-    source: RefCell<Box<dyn Source + 'a>>,
+    source: RefCell<Box<dyn ReadSeek + 'a>>,
     /// Size of the whole file in bytes.
     length: usize,
     /// The part of the file that is in memory.
@@ -32,9 +32,9 @@ pub struct Cursor<'a> {
 }
 
 /// A file, or bytes that are read like a file.
-pub trait Source: Read + Seek {}
+pub trait ReadSeek: Read + Seek {}
 
-impl<T: Read + Seek> Source for T {}
+impl<T: Read + Seek> ReadSeek for T {}
 
 /// Bytes of a window. From 2^12 to 2^24, two cubes of 48^3 are read and checked in 1.41 to 1.43 s. With 2^28 it takes 1.47 s
 /// and 13 MB more.
@@ -46,7 +46,7 @@ const LONGEST: usize = 1024;
 
 impl<'a> Cursor<'a> {
     /// Make a cursor at the start of a file. `made` tells whether the bytes were made from the file at `path`.
-    pub fn new(path: &'a Path, mut source: Box<dyn Source + 'a>, made: bool) -> Self {
+    pub fn new(path: &'a Path, mut source: Box<dyn ReadSeek + 'a>, made: bool) -> Self {
         let (length, failed) = match source.seek(SeekFrom::End(0)) {
             Ok(length) => (length as usize, None),
             Err(cause) => (0, Some(cause)),

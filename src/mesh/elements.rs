@@ -6,7 +6,7 @@
 use super::cursor::Cursor;
 use super::groups::{Group, Numbering};
 use super::physical::Physical;
-use super::simplex::{self, EDGES, Kind, THINGS};
+use super::simplex::{self, EDGES, ElementType, THINGS};
 use super::split::Middles;
 use crate::error::{Error, Result};
 use crate::problem::order::Order;
@@ -37,7 +37,7 @@ pub fn read<const D: usize>(
     let (mut orders, mut in_parts, mut known) = (Orders::default(), 0, HashMap::new());
     let (mut heads, mut again) = (HashSet::new(), None);
     for _ in 0..blocks {
-        let Head { position, dimension, tag, kind, count } = Head::read(cursor)?;
+        let BlockHeader { position, dimension, tag, kind, count } = BlockHeader::read(cursor)?;
         seen = seen.saturating_add(count);
         let Some(members) = physical.members(dimension, tag) else {
             let message = format!("elements of {} {tag}, which $Entities does not list", thing(dimension));
@@ -52,7 +52,7 @@ pub fn read<const D: usize>(
         };
         let name = physical.groups[*first].name.clone();
         if !kind.is_known() {
-            let Kind { shape, nodes, number } = kind;
+            let ElementType { shape, nodes, number } = kind;
             let message = format!("group `{name}` has {} elements of {nodes} nodes (Gmsh's type {number})", shape.name);
             return Err(cursor.error_at(position, message).help(ORDERS));
         }
@@ -99,17 +99,17 @@ fn refuse_another_number(
 }
 
 /// The head of a block of elements.
-struct Head {
+struct BlockHeader {
     position: usize,
     dimension: usize,
     /// Number of the entity.
     tag: i32,
     /// Type of the elements.
-    kind: Kind,
+    kind: ElementType,
     count: usize,
 }
 
-impl Head {
+impl BlockHeader {
     fn read(cursor: &mut Cursor) -> Result<Self> {
         cursor.begin();
         let position = cursor.position();
@@ -117,7 +117,7 @@ impl Head {
         let Some(dimension) = usize::try_from(dimension).ok().filter(|dimension| *dimension <= 3) else {
             return Err(cursor.error_at(position, format!("a block of elements of dimension {dimension}")));
         };
-        let Some(kind) = Kind::of(number) else {
+        let Some(kind) = ElementType::of(number) else {
             let message = format!("elements of Gmsh's type {number} cannot be used");
             return Err(cursor.error_at(position, message).help(ORDERS));
         };
@@ -143,7 +143,7 @@ const ORDERS: &str = "use elements of order 1 or 2: `gmsh -order 2`";
 
 /// Elements of one entity, all of one type.
 struct Slice<'a> {
-    kind: Kind,
+    kind: ElementType,
     count: usize,
     /// Name of a group with the block, for messages.
     name: &'a str,

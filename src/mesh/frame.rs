@@ -46,18 +46,18 @@ fn sin(degrees: f64) -> f64 {
 
 /// Local axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
+pub struct LocalAxes {
     origin: Vector3<f64>,
     axes: Matrix3<f64>,
 }
 
-impl Default for Frame {
+impl Default for LocalAxes {
     fn default() -> Self {
         Self { origin: Vector3::zeros(), axes: Matrix3::identity() }
     }
 }
 
-impl Frame {
+impl LocalAxes {
     /// Return the global axes at another origin.
     pub fn at(origin: [f64; 3]) -> Self {
         Self { origin: origin.into(), ..Self::default() }
@@ -109,11 +109,11 @@ mod tests {
         assert_eq!(Coordinates::Spherical.rectangular([2.0, 90.0, 180.0]), [-2.0, 0.0, 0.0]);
         assert_eq!(Coordinates::Spherical.rectangular([2.0, 0.0, 45.0]), [0.0, 0.0, 2.0]);
         // The third axis is x, and the first one y, so that the second one is z.
-        let frame = Frame::by_third_axis([1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.0, 2.0, 1.0]).unwrap();
+        let frame = LocalAxes::by_third_axis([1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.0, 2.0, 1.0]).unwrap();
         assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
-        let frame = Frame::by_first_axis([1.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 0.0, 5.0]).unwrap();
+        let frame = LocalAxes::by_first_axis([1.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 0.0, 5.0]).unwrap();
         assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
-        assert_eq!(Frame::by_third_axis([0.0; 3], [1.0; 3], [2.0; 3]), None);
+        assert_eq!(LocalAxes::by_third_axis([0.0; 3], [1.0; 3], [2.0; 3]), None);
     }
 
     #[test]

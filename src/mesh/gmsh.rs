@@ -19,7 +19,8 @@ pub struct Gmsh {
 }
 
 /// A script for Gmsh to mesh, with the settings of the run.
-pub struct Task<'a> {
+pub struct MeshingTask<'a> {
+    /// The script.
     pub script: &'a Path,
     /// The script that the user wrote.
     pub shown: &'a Path,
@@ -69,7 +70,7 @@ impl Gmsh {
     /// # Errors
     /// Gmsh fails; its own messages are the causes. It exceeds its limit of time or memory. A signal, or a limit on the size of
     /// files, ends it.
-    pub fn run(&self, task: &Task, output: &Path, home: &Path) -> Result<()> {
+    pub fn run(&self, task: &MeshingTask, output: &Path, home: &Path) -> Result<()> {
         let bytes = bytes(task.guard);
         let said = home.join("said");
         let mut command = self.command(task, output, home, bytes)?;
@@ -80,25 +81,28 @@ impl Gmsh {
             .map_err(|cause| Error::file(&self.program, "run", &cause))?;
         let refuse = |message: String| Error::mesh(task.shown, None, message);
         match end {
-            End::TimedOut => Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds))
-                .help("a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`")),
-            End::Talked => {
+            ProcessEnd::TimedOut => {
+                Err(refuse(format!("Gmsh has not finished this script after {} s", task.guard.seconds)).help(
+                    "a number in it may be far too large, or not a number; to wait longer set `timeout` in `mesh`",
+                ))
+            }
+            ProcessEnd::Talked => {
                 let repeated = "Gmsh repeats its errors about this script without end".to_owned();
                 let help = "end each file that it merges with a line break, without which Gmsh reads beyond the end";
                 Err(because(refuse(repeated), &complaints(&words(&said))).help(help))
             }
-            End::Asked(signal) => Err(interrupt::ended(signal)),
-            End::Itself(status) if status.signal() == Some(SIGXFSZ) => {
+            ProcessEnd::Asked(signal) => Err(interrupt::ended(signal)),
+            ProcessEnd::Itself(status) if status.signal() == Some(SIGXFSZ) => {
                 Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
                     .help("there is a limit on the size of files (ulimit -f)"))
             }
-            End::Itself(status) if status.success() && output.is_file() => Ok(()),
-            End::Itself(status) => Err(failure(task, status, &words(&said), bytes)),
+            ProcessEnd::Itself(status) if status.success() && output.is_file() => Ok(()),
+            ProcessEnd::Itself(status) => Err(failure(task, status, &words(&said), bytes)),
         }
     }
 
     /// Return the command that meshes a script with at most `bytes` of memory.
-    fn command(&self, task: &Task, output: &Path, home: &Path, bytes: Option<u64>) -> Result<Command> {
+    fn command(&self, task: &MeshingTask, output: &Path, home: &Path, bytes: Option<u64>) -> Result<Command> {
         let mut command = command(&self.program, bytes);
         let order = if task.order == Order::P1 { "1" } else { "2" };
         match task.is_mesh {
@@ -129,7 +133,7 @@ impl Gmsh {
 
 /// Return the error of a Gmsh that ended by itself without a mesh. `said` is its output, and `bytes` the memory that it was
 /// allowed.
-fn failure(task: &Task, status: ExitStatus, said: &str, bytes: Option<u64>) -> Error {
+fn failure(task: &MeshingTask, status: ExitStatus, said: &str, bytes: Option<u64>) -> Error {
     let refuse = |message: String| Error::mesh(task.shown, None, message);
     if is_out_of_memory(status, said) {
         let most = bytes.map_or(String::new(), |bytes| format!(" of {:.1} GB", bytes as f64 / 1e9));
@@ -188,7 +192,7 @@ fn complaints(said: &str) -> Vec<String> {
 }
 
 /// The way in which a guarded program ended.
-pub enum End {
+pub enum ProcessEnd {
     /// It ended by itself.
     Itself(ExitStatus),
     /// It exceeded the limit of time.
@@ -248,17 +252,17 @@ const MOST_SAID: u64 = 1 << 25;
 ///
 /// # Errors
 /// The program cannot be started.
-pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt) -> io::Result<End> {
+pub fn run(command: &mut Command, limit: f64, said: &Path, interrupt: &Interrupt) -> io::Result<ProcessEnd> {
     let began = Instant::now();
     let mut child = command.spawn()?;
     let end = loop {
         if let Some(status) = child.try_wait()? {
-            break End::Itself(status);
+            break ProcessEnd::Itself(status);
         }
         let elapsed = began.elapsed();
-        let asked = interrupt.asked().map(End::Asked);
-        let talked = || std::fs::metadata(said).is_ok_and(|data| data.len() > MOST_SAID).then_some(End::Talked);
-        let late = || (elapsed.as_secs_f64() > limit).then_some(End::TimedOut);
+        let asked = interrupt.asked().map(ProcessEnd::Asked);
+        let talked = || std::fs::metadata(said).is_ok_and(|data| data.len() > MOST_SAID).then_some(ProcessEnd::Talked);
+        let late = || (elapsed.as_secs_f64() > limit).then_some(ProcessEnd::TimedOut);
         if let Some(end) = asked.or_else(talked).or_else(late) {
             child.kill()?;
             child.wait()?;
@@ -295,6 +299,6 @@ mod tests {
         let said = tempfile::NamedTempFile::new().expect("a file");
         let mut yes = command(Path::new("/usr/bin/yes"), None);
         yes.stdout(said.reopen().expect("a file"));
-        assert!(matches!(run(&mut yes, 60.0, said.path(), &Interrupt::default()), Ok(End::Talked)));
+        assert!(matches!(run(&mut yes, 60.0, said.path(), &Interrupt::default()), Ok(ProcessEnd::Talked)));
     }
 }

@@ -1,8 +1,8 @@
 //! The way from the scene's mesh source to a mesh: by Gmsh, from the cache, from a file, or from arrays.
 
 use super::cache::{self, Workshop, file_name, folders, write};
-use super::gmsh::{Gmsh, Task};
-use super::msh::{self, Maker};
+use super::gmsh::{Gmsh, MeshingTask};
+use super::msh::{self, MeshProducer};
 use super::script::{Script, quoted};
 use super::{Group, Mesh, abaqus, foreign, groups, simplex};
 use crate::error::{Error, Located, Place, Result};
@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 pub struct Loaded<const D: usize> {
     pub mesh: Mesh<D>,
     /// Where the mesh came from.
-    pub origin: Origin,
+    pub origin: MeshOrigin,
     /// The `.msh` file that was read: the user's own, or the one in the cache. It is empty for arrays.
     pub file: PathBuf,
     /// SHA-256 of the contents of the file; empty for arrays.
@@ -31,14 +31,14 @@ pub struct Loaded<const D: usize> {
 }
 
 impl<const D: usize> Loaded<D> {
-    fn new(mesh: Mesh<D>, origin: Origin, file: PathBuf, digest: String) -> Self {
+    fn new(mesh: Mesh<D>, origin: MeshOrigin, file: PathBuf, digest: String) -> Self {
         Self { mesh, origin, file, digest, unkept: None, notes: Vec::new() }
     }
 }
 
 /// The origin of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Origin {
+pub enum MeshOrigin {
     /// The `.msh` file that the scene names, or arrays.
     File,
     /// The cache: Gmsh meshed the same script with the same numbers before.
@@ -67,7 +67,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => {
             let mesh = of_arrays(arrays, order)?;
-            Ok(Loaded::new(mesh, Origin::File, PathBuf::new(), String::new()))
+            Ok(Loaded::new(mesh, MeshOrigin::File, PathBuf::new(), String::new()))
         }
     }?;
     loaded.mesh.straighten();
@@ -95,8 +95,8 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
         }
         false => {
             let mut source = Digested::new(source);
-            let mesh = msh::read(path, Box::new(&mut source), Maker::User)?;
-            Loaded::new(mesh, Origin::File, path.clone(), source.digest())
+            let mesh = msh::read(path, Box::new(&mut source), MeshProducer::User)?;
+            Loaded::new(mesh, MeshOrigin::File, path.clone(), source.digest())
         }
     };
     loaded.mesh = match (loaded.mesh.order, order) {
@@ -131,7 +131,7 @@ fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
     let abaqus::Converted { mesh: bytes, notes } = abaqus::convert(path, bytes, D)?;
     let name = file_name(("input file", digest_of_bytes(&bytes)), path);
     let loaded = made_anew((path, &name), None, &folders(), |_, made| write(made, &bytes))?;
-    Ok(Loaded { origin: Origin::File, notes, ..loaded })
+    Ok(Loaded { origin: MeshOrigin::File, notes, ..loaded })
 }
 
 /// Return a mesh of another program, or of Gmsh's format 4.0, as Gmsh converts it.
@@ -142,8 +142,16 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
     let guard = &Guard::default();
     let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
         let script = &foreign::mesh(file, bytes, work)?;
-        let task =
-            Task { script, shown: path, set: &[], is_mesh: true, dimension: D, order: Order::P1, guard, interrupt };
+        let task = MeshingTask {
+            script,
+            shown: path,
+            set: &[],
+            is_mesh: true,
+            dimension: D,
+            order: Order::P1,
+            guard,
+            interrupt,
+        };
         gmsh.run(&task, made, work)
     };
     kept((path, &name), None, None, &folders(), make).map_err(|error| error.at(&file.place))
@@ -153,7 +161,7 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
 /// requested `order`; that of another program has none.
 fn read_made<const D: usize>(path: &Path, order: Option<Order>, file: File) -> Result<(Mesh<D>, String)> {
     let mut source = Digested::new(file);
-    let maker = if order.is_some() { Maker::Script } else { Maker::Other };
+    let maker = if order.is_some() { MeshProducer::Script } else { MeshProducer::Other };
     let mesh: Mesh<D> = msh::read(path, Box::new(&mut source), maker).map_err(|error| match error.advice() {
         // Advice for scripts does not help with a file of another program.
         advice if order.is_none() && advice.is_none_or(|advice| advice.contains("Physical")) => {
@@ -187,7 +195,7 @@ fn kept<const D: usize>(
     // A file of the cache that cannot be read or is damaged counts as absent.
     for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
         if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| read_made(path, order, file).ok()) {
-            return Ok(Loaded::new(mesh, Origin::Cache, cached, digest));
+            return Ok(Loaded::new(mesh, MeshOrigin::Cache, cached, digest));
         }
     }
     let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
@@ -210,7 +218,7 @@ fn made_anew<const D: usize>(
     // A file that is cut short because the disk is full is not the script's fault.
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
     let file = workshop.publish(&made, name)?;
-    Ok(Loaded::new(mesh, Origin::Gmsh, file, digest))
+    Ok(Loaded::new(mesh, MeshOrigin::Gmsh, file, digest))
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
@@ -294,7 +302,11 @@ pub(super) fn meshed<const D: usize>(
             None => ended(&own, &script, work)?,
         };
         let script = sized.as_deref().unwrap_or(&own);
-        gmsh.run(&Task { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt }, made, work)
+        gmsh.run(
+            &MeshingTask { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt },
+            made,
+            work,
+        )
     };
     kept((path, &name), Some(order), unkept, folders, make)
 }

@@ -27,13 +27,13 @@ mod split;
 mod tests;
 mod trust;
 
-pub use check::{Asked, Checked, Duty, Parts};
+pub use check::{Asked, BodyCheck, Components, Duty};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
-pub use load::{Loaded, Origin, keep_final, load, made_from, recall_final};
+pub use load::{Loaded, MeshOrigin, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
 #[cfg(feature = "internals")]
-pub use msh::{Maker, parse};
+pub use msh::{MeshProducer, parse};
 #[cfg(feature = "internals")]
 pub use script::unstructured;
 pub use script::view;

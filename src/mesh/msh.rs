@@ -1,6 +1,6 @@
 //! A reader of Gmsh's `.msh` 4.1, text and binary, that makes a [`Mesh`]. Formats 1 and 2 are rewritten as 4.1 first.
 
-use super::cursor::{Cursor, Source};
+use super::cursor::{Cursor, ReadSeek};
 use super::elements::{self, Nodes};
 use super::physical::Physical;
 use super::simplex::THINGS;
@@ -15,7 +15,7 @@ const START: u64 = 100;
 
 /// The maker of the bytes of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Maker {
+pub enum MeshProducer {
     /// The user. Line numbers are meaningful in messages, and groups have names.
     User,
     /// Gmsh, from a script.
@@ -29,7 +29,7 @@ pub enum Maker {
 /// # Errors
 /// The input is not a mesh. The error names the file and the line.
 #[cfg(feature = "internals")]
-pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<Mesh<D>> {
+pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: MeshProducer) -> Result<Mesh<D>> {
     read(path, Box::new(std::io::Cursor::new(bytes)), maker)
 }
 
@@ -38,18 +38,18 @@ pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: Maker) -> Result<
 /// # Errors
 /// The file cannot be read, or it is not a mesh of named simplices in `D` dimensions. The latter is a
 /// [`Kind::Mesh`](crate::error::Kind) error with the line or byte and a way out.
-pub fn read<const D: usize>(path: &Path, mut source: Box<dyn Source + '_>, maker: Maker) -> Result<Mesh<D>> {
+pub fn read<const D: usize>(path: &Path, mut source: Box<dyn ReadSeek + '_>, maker: MeshProducer) -> Result<Mesh<D>> {
     const { assert!(D == 2 || D == 3) };
     let mut start = Vec::new();
     // The cursor reports a source that cannot be read.
     let _ = source.seek(SeekFrom::Start(0)).and_then(|_| source.by_ref().take(START).read_to_end(&mut start));
     if old::is_old(&start) {
-        let bytes = old::convert(path, source, maker != Maker::User)?;
-        return read(path, Box::new(std::io::Cursor::new(bytes)), Maker::Other);
+        let bytes = old::convert(path, source, maker != MeshProducer::User)?;
+        return read(path, Box::new(std::io::Cursor::new(bytes)), MeshProducer::Other);
     }
-    let cursor = &mut Cursor::new(path, source, maker != Maker::User);
+    let cursor = &mut Cursor::new(path, source, maker != MeshProducer::User);
     read_format(cursor)?;
-    let mut physical = Physical::new(maker == Maker::Other);
+    let mut physical = Physical::new(maker == MeshProducer::Other);
     let mut nodes: Option<Nodes> = None;
     let (mut order, mut split) = (None, 0);
     let needed = ["PhysicalNames", "Entities", "PartitionedEntities", "Nodes", "Elements"];

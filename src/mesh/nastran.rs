@@ -3,7 +3,7 @@
 //! Gmsh knows the basic system of coordinates alone. It takes a CHEXA or CPENTA for a linear one if its continuation fields are blank,
 //! or if its fields are 16 characters wide. It knows no CPYRAM with mid-edge nodes. Blank fields move the ones behind them.
 
-use super::frame::{Coordinates, Frame, real};
+use super::frame::{Coordinates, LocalAxes, real};
 use crate::error::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
@@ -199,7 +199,7 @@ fn written(card: &Card, name: &str, vertices: usize, all: usize) -> Result<Strin
 /// A point is in a system that is not there or not known, or that depends on itself.
 fn to_basic(cards: &[Card], made: &mut [String]) -> Result<()> {
     let default = cards.iter().find(|card| card.name == "GRDSET").map_or(Ok(None), |card| card.tag(1))?.unwrap_or(0);
-    let mut model = Model::default();
+    let mut model = NastranModel::default();
     cards.iter().try_for_each(|card| model.read(card, default))?;
     let local: Vec<(u64, &Card)> =
         model.grids.iter().filter(|(_, grid)| grid.system != 0).map(|(tag, grid)| (*tag, grid.card)).collect();
@@ -222,7 +222,7 @@ fn sixteen(x: f64) -> String {
 }
 
 #[derive(Clone, Copy)]
-struct System<'a> {
+struct CoordinateSystem<'a> {
     kind: Coordinates,
     definition: Definition,
     card: &'a Card<'a>,
@@ -240,7 +240,7 @@ enum Definition {
 
 /// A grid point: its system, and its coordinates there.
 #[derive(Clone, Copy)]
-struct Grid<'a> {
+struct GridPoint<'a> {
     system: u64,
     x: [f64; 3],
     card: &'a Card<'a>,
@@ -248,15 +248,15 @@ struct Grid<'a> {
 
 /// The points and systems of a file.
 #[derive(Default)]
-struct Model<'a> {
-    grids: BTreeMap<u64, Grid<'a>>,
-    systems: HashMap<u64, System<'a>>,
-    frames: HashMap<u64, (Coordinates, Frame)>,
+struct NastranModel<'a> {
+    grids: BTreeMap<u64, GridPoint<'a>>,
+    systems: HashMap<u64, CoordinateSystem<'a>>,
+    frames: HashMap<u64, (Coordinates, LocalAxes)>,
     /// Systems whose axes are being found.
     open: BTreeSet<u64>,
 }
 
-impl<'a> Model<'a> {
+impl<'a> NastranModel<'a> {
     /// Read an entry. Points without a system are in `default`.
     fn read(&mut self, card: &'a Card, default: u64) -> Result<()> {
         let kind = match card.name.chars().last() {
@@ -266,7 +266,7 @@ impl<'a> Model<'a> {
         };
         let mut add =
             |tag: Option<u64>, definition: Definition| {
-                let other = tag.and_then(|tag| self.systems.insert(tag, System { kind, definition, card }));
+                let other = tag.and_then(|tag| self.systems.insert(tag, CoordinateSystem { kind, definition, card }));
                 match (tag, other) {
                     (Some(tag), Some(other)) => Err(card
                         .refuse(format!("the system {tag} stands twice, also in line {}", other.card.lines.start + 1))),
@@ -277,7 +277,7 @@ impl<'a> Model<'a> {
             "GRID" => {
                 let tag = card.tag(0)?.ok_or_else(|| card.refuse("a GRID has no number"))?;
                 let system = card.tag(1)?.unwrap_or(default);
-                self.grids.insert(tag, Grid { system, x: card.point(2)?, card });
+                self.grids.insert(tag, GridPoint { system, x: card.point(2)?, card });
             }
             "CORD1R" | "CORD1C" | "CORD1S" => {
                 for from in [0, 4].into_iter().filter(|from| !card.field(*from).is_empty()) {
@@ -303,21 +303,21 @@ impl<'a> Model<'a> {
     /// Return the basic coordinates of a grid point to which the entry `by` refers.
     fn place(&mut self, tag: u64, by: &Card) -> Result<[f64; 3]> {
         let missing = || by.refuse(format!("the grid point {tag} is not there"));
-        let Grid { system, x, .. } = *self.grids.get(&tag).ok_or_else(missing)?;
+        let GridPoint { system, x, .. } = *self.grids.get(&tag).ok_or_else(missing)?;
         let (kind, frame) = self.frame(system, by)?;
         Ok(frame.place(kind.rectangular(x)))
     }
 
     /// Return the kind and the axes of a system to which the entry `by` refers.
-    fn frame(&mut self, tag: u64, by: &Card) -> Result<(Coordinates, Frame)> {
+    fn frame(&mut self, tag: u64, by: &Card) -> Result<(Coordinates, LocalAxes)> {
         if tag == 0 {
-            return Ok((Coordinates::Rectangular, Frame::default()));
+            return Ok((Coordinates::Rectangular, LocalAxes::default()));
         }
         if let Some(known) = self.frames.get(&tag) {
             return Ok(*known);
         }
         let missing = || by.refuse(format!("the system of coordinates {tag} is not there"));
-        let System { kind, definition, card } = *self.systems.get(&tag).ok_or_else(missing)?;
+        let CoordinateSystem { kind, definition, card } = *self.systems.get(&tag).ok_or_else(missing)?;
         if !self.open.insert(tag) {
             return Err(card.refuse(format!("the system of coordinates {tag} depends on itself")));
         }
@@ -340,7 +340,7 @@ impl<'a> Model<'a> {
             }
         }
         let [origin, axis, plane] = points;
-        let frame = Frame::by_third_axis(origin, axis, plane);
+        let frame = LocalAxes::by_third_axis(origin, axis, plane);
         let frame = frame.ok_or_else(|| card.refuse(format!("the points of the system {tag} lie on a line")))?;
         self.open.remove(&tag);
         self.frames.insert(tag, (kind, frame));

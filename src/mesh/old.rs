@@ -7,8 +7,8 @@
 //!
 //! Files of other programs are handed to the reader in the same form: [`Contents`] writes the binary form of format 4.1.
 
-use super::cursor::{Cursor, Source};
-use super::simplex::Kind;
+use super::cursor::{Cursor, ReadSeek};
+use super::simplex::ElementType;
 use crate::error::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
@@ -23,7 +23,7 @@ pub fn is_old(start: &[u8]) -> bool {
 ///
 /// # Errors
 /// The file is not one of these formats, or it is cut short. The error names the line or the byte.
-pub fn convert(path: &Path, source: Box<dyn Source + '_>, made: bool) -> Result<Vec<u8>> {
+pub fn convert(path: &Path, source: Box<dyn ReadSeek + '_>, made: bool) -> Result<Vec<u8>> {
     let cursor = &mut Cursor::new(path, source, made);
     let mut file = File::default();
     let needed = ["MeshFormat", "PhysicalNames", "Nodes", "NOD", "ParametricNodes", "Elements", "ELM"];
@@ -200,7 +200,7 @@ impl File {
 
 /// Return the number of nodes of an element type of Gmsh.
 fn stride(cursor: &Cursor, start: usize, kind: i32) -> Result<usize> {
-    let known = Kind::of(kind).map(|kind| kind.nodes);
+    let known = ElementType::of(kind).map(|kind| kind.nodes);
     known.ok_or_else(|| cursor.error_at(start, format!("elements of Gmsh's type {kind} cannot be used")))
 }
 
@@ -243,7 +243,7 @@ impl Contents {
         let mut entities: BTreeMap<Entity, BTreeMap<i32, Vec<&Element>>> = BTreeMap::new();
         for element in &self.elements {
             let number = if element.groups.is_empty() { element.entity } else { 0 };
-            let dimension = Kind::of(element.kind).map_or(0, |kind| kind.shape.dimension);
+            let dimension = ElementType::of(element.kind).map_or(0, |kind| kind.shape.dimension);
             let entity = Entity { dimension, groups: element.groups.clone(), number };
             entities.entry(entity).or_default().entry(element.kind).or_default().push(element);
         }

@@ -6,7 +6,7 @@
 //! on them cannot be cached. Scripts that follow a field of sizes are made here, too.
 
 use super::cache::write;
-use super::trust::{self, READ, Token, runs, tokens};
+use super::trust::{self, READ, ScriptToken, runs, tokens};
 use crate::error::{Error, Kind, Located, Place, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -48,8 +48,9 @@ impl Script {
             // "part.step"` and the like need no list of commands.
             let folder = path.parent().unwrap_or(Path::new(""));
             let text = String::from_utf8_lossy(&bytes);
-            let tokens: Vec<Token> = tokens(&text).into_iter().map(|(_, token)| token).collect();
-            let named = tokens.iter().filter_map(|token| if let Token::Text(name) = token { Some(name) } else { None });
+            let tokens: Vec<ScriptToken> = tokens(&text).into_iter().map(|(_, token)| token).collect();
+            let named =
+                tokens.iter().filter_map(|token| if let ScriptToken::Text(name) = token { Some(name) } else { None });
             let named = named.map(|name| folder.join(name));
             for file in named.chain([options_of(&path)]).filter_map(|file| located(&file)) {
                 if file.is_file() && !found.contains(&file) {
@@ -83,8 +84,8 @@ impl Script {
     }
 
     /// Record the names in a part of the script.
-    fn note(&mut self, tokens: &[Token]) {
-        use Token::{Name, Sign, Text};
+    fn note(&mut self, tokens: &[ScriptToken]) {
+        use ScriptToken::{Name, Sign, Text};
         // The depth counts brackets inside `DefineConstant[ ... ]` and is 0 outside. The constant is the one being defined
         // there.
         let mut depth = 0;
@@ -219,8 +220,8 @@ pub struct Inputs {
 
 impl Inputs {
     /// Add the inputs of a part of the script.
-    pub fn note(&mut self, tokens: &[Token]) {
-        use Token::{Name, Sign, Text};
+    pub fn note(&mut self, tokens: &[ScriptToken]) {
+        use ScriptToken::{Name, Sign, Text};
         for (at, token) in tokens.iter().enumerate() {
             let Name(name) = *token else { continue };
             let after = &tokens[at + 1..];
@@ -286,7 +287,7 @@ pub fn unstructured(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
     let mut from = 0;
     for (span, token) in tokens(text) {
-        let structured = matches!(token, Token::Name("Transfinite" | "TransfQuadTri" | "Recombine"));
+        let structured = matches!(token, ScriptToken::Name("Transfinite" | "TransfQuadTri" | "Recombine"));
         if structured && span.start >= from {
             kept.push_str(&text[from..span.start]);
             from = text[span.end..].find(';').map_or(text.len(), |end| span.end + end + 1);

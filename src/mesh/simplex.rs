@@ -81,7 +81,7 @@ pub const POINTS: i32 = 15;
 
 /// A type of elements of Gmsh.
 #[derive(Debug, Clone, Copy)]
-pub struct Kind {
+pub struct ElementType {
     /// Gmsh's number.
     pub number: i32,
     pub shape: &'static Shape,
@@ -89,9 +89,9 @@ pub struct Kind {
     pub nodes: usize,
 }
 
-impl Kind {
+impl ElementType {
     /// Return the type with this number of Gmsh.
-    pub fn of(number: i32) -> Option<Kind> {
+    pub fn of(number: i32) -> Option<ElementType> {
         let nodes = *NODES.get(usize::try_from(number).ok()?.checked_sub(1)?)?;
         let shape = match number {
             1 | 8 | 26..=28 => &LINE,
@@ -103,12 +103,15 @@ impl Kind {
             7 | 14 | 19 => &PYRAMID,
             _ => &POINT,
         };
-        Some(Kind { number, shape, nodes })
+        Some(ElementType { number, shape, nodes })
     }
 
     /// Return Gmsh's number of the type with this shape and number of nodes.
     pub fn number(shape: &Shape, nodes: usize) -> i32 {
-        (1..).map_while(Kind::of).find(|kind| kind.shape == shape && kind.nodes == nodes).map_or(0, |kind| kind.number)
+        (1..)
+            .map_while(ElementType::of)
+            .find(|kind| kind.shape == shape && kind.nodes == nodes)
+            .map_or(0, |kind| kind.number)
     }
 
     /// Return whether this program computes with it: it is a point, or of order 1 or 2.

@@ -8,7 +8,7 @@
 //! centre of the reference square, and a diagonal through a cell where the map of the cell takes the centre of the reference cube.
 //! The boundary of the simplices is thus interpolated from that of the cells.
 
-use super::simplex::{EDGES, Kind, QUADRANGLE, Shape};
+use super::simplex::{EDGES, ElementType, QUADRANGLE, Shape};
 use crate::problem::order::Order;
 use std::collections::HashMap;
 
@@ -58,7 +58,7 @@ pub struct Middles<'a> {
 
 impl Middles<'_> {
     /// Return the simplices of a cell with the nodes `cell`, with any orientation, each with vertices before mid-edge nodes.
-    pub fn simplices(&mut self, kind: Kind, cell: &[u32]) -> Vec<u32> {
+    pub fn simplices(&mut self, kind: ElementType, cell: &[u32]) -> Vec<u32> {
         let Shape { dimension, .. } = *kind.shape;
         let vertices = divided(kind.shape, cell);
         if kind.order() == Some(Order::P1) {
@@ -195,8 +195,8 @@ mod tests {
         assert!((volume - 3.0).abs() < 1e-12);
     }
 
-    fn hexahedron() -> Kind {
-        Kind::of(17).expect("a kind")
+    fn hexahedron() -> ElementType {
+        ElementType::of(17).expect("a kind")
     }
 
     /// Return the nodes of a hexahedron that a map takes from the unit cube, at the numbers `order`.
@@ -219,14 +219,14 @@ mod tests {
         assert_eq!(cell, middles.simplices(hexahedron(), &order), "a copy in another group");
         assert_eq!(middles.points.len(), 27, "six faces and the cell");
         // The face 0 3 2 1 has the mid-edge nodes 9 13 11 8.
-        let facet = middles.simplices(Kind::of(16).expect("a kind"), &[0, 3, 2, 1, 9, 13, 11, 8]);
+        let facet = middles.simplices(ElementType::of(16).expect("a kind"), &[0, 3, 2, 1, 9, 13, 11, 8]);
         let node = middles.known[&[0, 1, 2, 3]];
         assert_eq!(facet.iter().filter(|number| **number == node).count(), 2);
         let [x, y, z] = middles.points[node as usize];
         assert!((x - 0.5).abs() + (y - 0.5).abs() + (z - 0.05).abs() < 1e-15);
-        let full = middles.simplices(Kind::of(10).expect("a kind"), &[2, 3, 7, 6, 13, 15, 19, 14, 99]);
+        let full = middles.simplices(ElementType::of(10).expect("a kind"), &[2, 3, 7, 6, 13, 15, 19, 14, 99]);
         assert!(!full.contains(&99), "the node that the hexahedron has made");
-        let full = middles.simplices(Kind::of(10).expect("a kind"), &[30, 31, 32, 33, 34, 35, 36, 37, 38]);
+        let full = middles.simplices(ElementType::of(10).expect("a kind"), &[30, 31, 32, 33, 34, 35, 36, 37, 38]);
         assert_eq!(full.iter().filter(|number| **number == 38).count(), 2);
     }
 
@@ -238,8 +238,8 @@ mod tests {
         // The vertices 3 and 7 are 2 and 6 here. With them go the mid-edge nodes of 0 3, 2 3, 3 7, 4 7 and 6 7.
         let hexahedron =
             middles.simplices(hexahedron(), &[0, 1, 2, 2, 4, 5, 6, 6, 8, 9, 10, 11, 12, 2, 14, 14, 16, 17, 18, 6]);
-        let prism =
-            middles.simplices(Kind::of(18).expect("a kind"), &[0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 12, 14, 16, 17, 18]);
+        let prism = middles
+            .simplices(ElementType::of(18).expect("a kind"), &[0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 12, 14, 16, 17, 18]);
         let sorted = |simplices: &[u32]| {
             let mut all: Vec<Vec<u32>> = simplices.chunks_exact(10).map(<[u32]>::to_vec).collect();
             all.iter_mut().for_each(|simplex| simplex.sort_unstable());

@@ -3,7 +3,7 @@
 mod mutations;
 
 use super::load::{load, made_from, meshed as from_script};
-use super::{Group, Loaded, Mesh, Origin, msh, simplex, view};
+use super::{Group, Loaded, Mesh, MeshOrigin, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::MeshSource;
@@ -70,7 +70,7 @@ fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
 }
 
 fn parse<const D: usize>(bytes: &[u8]) -> Result<Mesh<D>> {
-    msh::parse(Path::new("a.msh"), bytes, msh::Maker::User)
+    msh::parse(Path::new("a.msh"), bytes, msh::MeshProducer::User)
 }
 
 /// Return the sum of the measures of a group, times the factorial of its dimension.
@@ -264,28 +264,28 @@ fn scripts_are_meshed_once_for_each_key() {
     let run = |n: f64, order| meshed::<2>(&geo, &[("n".into(), n)], order, &cache).unwrap();
 
     let first = run(4.0, Order::P1);
-    assert_eq!(first.origin, Origin::Gmsh);
+    assert_eq!(first.origin, MeshOrigin::Gmsh);
     assert_eq!(first.mesh.group("left").unwrap().len(), 4);
     assert_eq!(first.mesh.path, geo);
     let again = run(4.0, Order::P1);
-    assert_eq!((again.origin, &again.file), (Origin::Cache, &first.file));
+    assert_eq!((again.origin, &again.file), (MeshOrigin::Cache, &first.file));
     assert_eq!((again.mesh.points, &again.mesh.groups), (first.mesh.points, &first.mesh.groups));
-    assert_eq!(run(3.0, Order::P1).origin, Origin::Gmsh);
+    assert_eq!(run(3.0, Order::P1).origin, MeshOrigin::Gmsh);
     let quadratic = run(4.0, Order::P2);
-    assert_eq!((quadratic.origin, quadratic.mesh.order), (Origin::Gmsh, Order::P2));
+    assert_eq!((quadratic.origin, quadratic.mesh.order), (MeshOrigin::Gmsh, Order::P2));
 
     // A damaged file is made anew.
     let whole = std::fs::read(&first.file).unwrap();
     std::fs::write(&first.file, &whole[..whole.len() / 2]).unwrap();
-    assert_eq!(run(4.0, Order::P1).origin, Origin::Gmsh);
-    assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
+    assert_eq!(run(4.0, Order::P1).origin, MeshOrigin::Gmsh);
+    assert_eq!(run(4.0, Order::P1).origin, MeshOrigin::Cache);
     // A change of an included file is seen, and its reversal is remembered.
     std::fs::write(&part, SQUARE.replace("1/4", "1/2")).unwrap();
     let moved = run(4.0, Order::P1);
-    assert_eq!(moved.origin, Origin::Gmsh);
+    assert_eq!(moved.origin, MeshOrigin::Gmsh);
     assert!((extent(&moved.mesh, moved.mesh.group("steel").unwrap()) - 1.0).abs() < 1e-9);
     std::fs::write(&part, SQUARE).unwrap();
-    assert_eq!(run(4.0, Order::P1).origin, Origin::Cache);
+    assert_eq!(run(4.0, Order::P1).origin, MeshOrigin::Cache);
     // Only meshes are left: n = 4, n = 3, order 2, and the one of the changed file.
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
 }
@@ -340,7 +340,7 @@ fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     }
     let load = |name: &str, order| load::<2>(&source(name), order, &Interrupt::default());
     let loaded = load("2", Order::P1).unwrap();
-    assert_eq!((loaded.origin, loaded.mesh.order, loaded.mesh.points.len()), (Origin::File, Order::P1, 15));
+    assert_eq!((loaded.origin, loaded.mesh.order, loaded.mesh.points.len()), (MeshOrigin::File, Order::P1, 15));
     assert_eq!(load("2", Order::P2).unwrap().mesh.order, Order::P2);
     let message = load("1", Order::P2).unwrap_err().to_string();
     assert!(message.contains("the mesh is of order 1") && message.contains("scene.toml"), "{message}");
@@ -375,7 +375,7 @@ fn loads_at_the_same_time_do_not_meet() {
         }
     });
     assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 1);
-    assert_eq!(load().origin, Origin::Cache);
+    assert_eq!(load().origin, MeshOrigin::Cache);
 }
 
 /// Gmsh's parallel algorithm makes another mesh of the same cube. This mesh has its own file in the cache, and it does not
@@ -395,9 +395,9 @@ fn free_meshes_in_space_by_threads() {
         (loaded.origin, loaded.mesh.points)
     };
     let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
-    assert_eq!(origin, Origin::Gmsh);
+    assert_eq!(origin, MeshOrigin::Gmsh);
     // The numbers of points may be equal, but the points differ.
     let counts = [&usual, &parallel].map(Vec::len);
     assert!(usual != parallel && counts[0].abs_diff(counts[1]) < counts[0] / 4, "{counts:?}");
-    assert_eq!((run(Some(2)), run(None)), ((Origin::Cache, parallel), (Origin::Cache, usual)));
+    assert_eq!((run(Some(2)), run(None)), ((MeshOrigin::Cache, parallel), (MeshOrigin::Cache, usual)));
 }

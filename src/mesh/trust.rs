@@ -55,24 +55,24 @@ pub fn breach(path: &Path, bytes: &[u8], home: &Path) -> Option<Breach> {
     for (index, (span, token)) in all.iter().enumerate() {
         let next = all.get(index + 1).map(|(_, token)| *token);
         let what = match *token {
-            Token::Text(text) if text.len() > LONGEST => Some("has a text that is too long for Gmsh".to_owned()),
-            Token::Name(name) if chooses_file(name, &all[..index]) => {
+            ScriptToken::Text(text) if text.len() > LONGEST => Some("has a text that is too long for Gmsh".to_owned()),
+            ScriptToken::Name(name) if chooses_file(name, &all[..index]) => {
                 Some(format!("chooses files that Gmsh writes: `General.{name}`"))
             }
             // A variable of this name is not a command.
-            Token::Name(_) if matches!(next, Some(Token::Sign('='))) => None,
-            Token::Name(name) if runs(name) => Some(format!("runs other programs or made-up text: `{name}`")),
-            Token::Name(name) if WRITE.contains(&name) && next != Some(Token::Sign('.')) => {
+            ScriptToken::Name(_) if matches!(next, Some(ScriptToken::Sign('='))) => None,
+            ScriptToken::Name(name) if runs(name) => Some(format!("runs other programs or made-up text: `{name}`")),
+            ScriptToken::Name(name) if WRITE.contains(&name) && next != Some(ScriptToken::Sign('.')) => {
                 Some(format!("writes files: `{name}`"))
             }
-            Token::Name(name @ ("Printf" | "Error" | "Warning")) if redirects(&all[index + 1..]) => {
+            ScriptToken::Name(name @ ("Printf" | "Error" | "Warning")) if redirects(&all[index + 1..]) => {
                 Some(format!("writes files: `{name}(...) > ...`"))
             }
             // This includes the form `Solver[0].Executable0`.
-            Token::Name("Solver") if matches!(next, Some(Token::Sign('.' | '['))) => {
+            ScriptToken::Name("Solver") if matches!(next, Some(ScriptToken::Sign('.' | '['))) => {
                 Some("sets programs: `Solver`".to_owned())
             }
-            Token::Name(name) if READ.contains(&name) => reads(name, &all[index + 1..], path, home),
+            ScriptToken::Name(name) if READ.contains(&name) => reads(name, &all[index + 1..], path, home),
             _ => None,
         };
         if let Some(what) = what {
@@ -87,13 +87,13 @@ pub fn is_script(path: &Path, bytes: &[u8]) -> bool {
     !is_kind(path, &DATA) && !bytes.starts_with(b"$MeshFormat")
 }
 
-type Spot<'a> = (std::ops::Range<usize>, Token<'a>);
+type Spot<'a> = (std::ops::Range<usize>, ScriptToken<'a>);
 
 /// Return whether a name is an option of Gmsh that names a file to write. The name of its category may be computed or have an
 /// index. Fields and views have a `FileName`, too, which is only read.
 fn chooses_file(name: &str, before: &[Spot]) -> bool {
-    let is_general = matches!(before, [.., (_, Token::Name("General")), (_, Token::Sign('.'))]);
-    let is_option = matches!(before, [.., (_, Token::Sign('.'))]);
+    let is_general = matches!(before, [.., (_, ScriptToken::Name("General")), (_, ScriptToken::Sign('.'))]);
+    let is_option = matches!(before, [.., (_, ScriptToken::Sign('.'))]);
     name.ends_with("FileName") && is_option && (is_general || name != "FileName")
 }
 
@@ -102,12 +102,12 @@ fn redirects(after: &[Spot]) -> bool {
     let mut depth = 0;
     for (at, (_, token)) in after.iter().enumerate() {
         match token {
-            Token::Sign('(' | '[') => depth += 1,
-            Token::Sign(')' | ']') => depth -= 1,
+            ScriptToken::Sign('(' | '[') => depth += 1,
+            ScriptToken::Sign(')' | ']') => depth -= 1,
             _ => {}
         }
         if depth == 0 {
-            return matches!(after.get(at + 1), Some((_, Token::Sign('>'))));
+            return matches!(after.get(at + 1), Some((_, ScriptToken::Sign('>'))));
         }
     }
     false
@@ -116,7 +116,7 @@ fn redirects(after: &[Spot]) -> bool {
 /// Return what is wrong with the file that a command reads. The script must write out its name, its kind must be known, and it
 /// must lie below `home`.
 fn reads(command: &str, after: &[Spot], path: &Path, home: &Path) -> Option<String> {
-    let [(_, Token::Text(name)), (_, Token::Sign(';')), ..] = after else {
+    let [(_, ScriptToken::Text(name)), (_, ScriptToken::Sign(';')), ..] = after else {
         return Some(format!("reads a file whose name it makes up: `{command}`"));
     };
     let file = path.parent().unwrap_or(Path::new("")).join(name);
@@ -138,7 +138,7 @@ pub fn is_kind(path: &Path, kinds: &[&str]) -> bool {
 
 /// A word of a script, or a sign.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Token<'a> {
+pub enum ScriptToken<'a> {
     /// A name or a command.
     Name(&'a str),
     /// A quoted text, without its quotes.
@@ -149,7 +149,7 @@ pub enum Token<'a> {
 
 /// Return the names, quoted texts and other signs of a script, with the range of bytes where each stands. Comments and numbers
 /// are omitted.
-pub fn tokens(text: &str) -> Vec<(Range<usize>, Token<'_>)> {
+pub fn tokens(text: &str) -> Vec<(Range<usize>, ScriptToken<'_>)> {
     let mut tokens = Vec::new();
     let mut at = 0;
     while let Some(first) = text[at..].chars().next() {
@@ -165,16 +165,16 @@ pub fn tokens(text: &str) -> Vec<(Range<usize>, Token<'_>)> {
         } else if first == '"' || first == '\'' {
             let body = &rest[1..];
             let end = body.find(first).unwrap_or(body.len());
-            push(rest.len().min(end + 2), Token::Text(&body[..end]))
+            push(rest.len().min(end + 2), ScriptToken::Text(&body[..end]))
         } else if first.is_ascii_alphabetic() || first == '_' {
             let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len());
-            push(end, Token::Name(&rest[..end]))
+            push(end, ScriptToken::Name(&rest[..end]))
         } else if first.is_ascii_digit() {
             number(rest)
         } else if first.is_whitespace() {
             first.len_utf8()
         } else {
-            push(first.len_utf8(), Token::Sign(first))
+            push(first.len_utf8(), ScriptToken::Sign(first))
         };
     }
     tokens
@@ -269,7 +269,7 @@ mod tests {
 
     #[test]
     fn words_end_where_gmsh_ends_them() {
-        use Token::{Name, Sign, Text};
+        use ScriptToken::{Name, Sign, Text};
         let of = |text: &'static str| tokens(text).into_iter().map(|(_, token)| token).collect::<Vec<_>>();
         assert_eq!(of("a1 = 3Save 'x\"y'; // Print\n"), [Name("a1"), Sign('='), Name("Save"), Text("x\"y"), Sign(';')]);
         assert_eq!(of("1e-3 2.5E+7e 4..e /* \" */ \"open"), [Name("e"), Sign('.'), Name("e"), Text("open")]);

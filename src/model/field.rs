@@ -132,7 +132,7 @@ pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
 }
 
 /// F1(u + t v) as a function of t: linear and quadratic terms of the bodies, and the laws of the layers at every point.
-pub struct Line<'a> {
+pub struct LineEnergy<'a> {
     model: &'a Model,
     /// Compression at u, n.
     compression: &'a [f64],
@@ -148,7 +148,7 @@ pub struct Line<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unbounded;
 
-impl<'a> Line<'a> {
+impl<'a> LineEnergy<'a> {
     /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`. One message.
     pub fn new(model: &'a mut Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field) -> Self {
         let kv = apply_stiffness(model, v);
@@ -209,13 +209,13 @@ const LONGEST: f64 = 1e150;
 
 /// A point (t, f(t)) of a function f, and the value that the secant rule uses in place of f(t).
 #[derive(Clone, Copy)]
-struct Point {
+struct SearchPoint {
     t: f64,
     value: f64,
     weight: f64,
 }
 
-impl Point {
+impl SearchPoint {
     fn new(t: f64, value: f64) -> Self {
         Self { t, value, weight: value }
     }
@@ -230,13 +230,13 @@ pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64
         return Ok(0.0);
     }
     let target = accuracy * start.abs();
-    let (mut low, mut high) = (Point::new(0.0, start), Point::new(1.0, value(1.0)));
+    let (mut low, mut high) = (SearchPoint::new(0.0, start), SearchPoint::new(1.0, value(1.0)));
     while high.value < -target {
         if high.t > LONGEST {
             return Err(Unbounded);
         }
         low = high;
-        high = Point::new(4.0 * high.t, value(4.0 * high.t));
+        high = SearchPoint::new(4.0 * high.t, value(4.0 * high.t));
     }
     // Illinois variant of the secant rule, with bisection where a law is too steep for it
     for _ in 0..200 {
@@ -247,7 +247,7 @@ pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64
         let middle = 0.5 * (low.t + high.t);
         let is_steep = !high.value.is_finite() || high.value > 1e3 * low.value.abs();
         let t = if is_steep || !(secant > low.t && secant < high.t) { middle } else { secant };
-        let next = Point::new(t, value(t));
+        let next = SearchPoint::new(t, value(t));
         if next.value.abs() <= target || high.t - low.t <= 1e-15 * high.t {
             return Ok(t);
         }

@@ -69,7 +69,7 @@ impl Layer {
     pub fn resolve(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64], smoothing: &[f64]) -> Self {
         let sum = |q: usize| compression[q] + pressure[q] / rho[q];
         if smoothing.is_empty() {
-            let at = |(i, q): (usize, usize)| model.pairs[i].law.meet(q - model.offset[i], sum(q), rho[q]);
+            let at = |(i, q): (usize, usize)| model.pairs[i].law.resolvent(q - model.offset[i], sum(q), rho[q]);
             let points = (0..model.pairs.len()).flat_map(|i| model.range(i).map(move |q| (i, q)));
             return Self::new(model, points.map(at).collect());
         }

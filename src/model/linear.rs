@@ -21,11 +21,11 @@ pub struct System<'a> {
     /// r, one state for each local body.
     pub residual: &'a [Vec<f64>],
     /// The stopping test of an iterative solver.
-    pub enough: &'a mut Enough<'a>,
+    pub enough: &'a mut StoppingTest<'a>,
 }
 
 /// A stopping test of iterative solvers: it is called after each iteration, with the same numbers on all ranks, and returns whether the solver may stop.
-pub type Enough<'a> = dyn FnMut(&Model, &Trial) -> bool + 'a;
+pub type StoppingTest<'a> = dyn FnMut(&Model, &Trial) -> bool + 'a;
 
 /// The iterate x of an iterative solver.
 #[derive(Debug)]
@@ -46,7 +46,7 @@ impl Trial<'_> {
 }
 
 /// A solution of a [`System`].
-pub struct Solution {
+pub struct LinearSolution {
     /// x, with its traces.
     pub field: Field,
     /// x'r, the squared energy norm of x.
@@ -67,7 +67,7 @@ pub struct Failure {
 }
 
 /// The outcome of solving a system.
-pub type Solved = std::result::Result<Solution, Failure>;
+pub type LinearResult = std::result::Result<LinearSolution, Failure>;
 
 /// A solver of the linear step.
 pub trait LinearStep {
@@ -86,8 +86,8 @@ pub trait LinearStep {
     /// Solve a system. Collective.
     ///
     /// # Errors
-    /// Failures of the solver library. A solver that does not reach its tolerance is reported in [`Solved`].
-    fn solve(&mut self, system: System) -> Result<Solved>;
+    /// Failures of the solver library. A solver that does not reach its tolerance is reported in [`LinearResult`].
+    fn solve(&mut self, system: System) -> Result<LinearResult>;
 
     /// Return the largest relative error with which a step is taken. Newton's method converges with any relative error below one, but more slowly the
     /// larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).

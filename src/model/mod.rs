@@ -265,7 +265,7 @@ fn free_gap(pair: &ContactPair, q: usize, factor: f64) -> f64 {
 #[cfg(test)]
 pub(crate) mod sample {
     use super::*;
-    use crate::contact::law::Linear;
+    use crate::contact::law::LinearLaw;
     use crate::contact::{LayerLaw, Response};
     use crate::linalg::Csr;
 
@@ -285,7 +285,7 @@ pub(crate) mod sample {
 
     /// Return two bodies with two pairs of two points each. The law is p = 4 c in the first pair and p = c^2 in the second.
     pub fn two_pairs() -> Model {
-        let laws: [Rc<dyn LayerLaw>; 2] = [Rc::new(Linear { stiffness: 4.0 }), Rc::new(Square([1.0; 2]))];
+        let laws: [Rc<dyn LayerLaw>; 2] = [Rc::new(LinearLaw { stiffness: 4.0 }), Rc::new(Square([1.0; 2]))];
         let pair = |(i, law): (usize, Rc<dyn LayerLaw>)| ContactPair {
             surfaces: ["a".to_owned(), "b".to_owned()],
             bodies: [0, 1],

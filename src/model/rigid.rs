@@ -24,11 +24,11 @@ pub struct Motions<'a> {
 struct Pair<'a> {
     /// Numbers of its points.
     points: Range<usize>,
-    sides: Vec<Side<'a>>,
+    sides: Vec<PairSide<'a>>,
 }
 
 /// A body at one side of a pair.
-struct Side<'a> {
+struct PairSide<'a> {
     body: usize,
     /// The trace of each of its motions there; `None` if the motion only slides along the surface.
     traces: Vec<Option<&'a [f64]>>,
@@ -60,7 +60,7 @@ impl<'a> Motions<'a> {
                 // sliding along a surface closes points by rounding errors, whose squares must not count as stiffness
                 let closes = |trace: &&[f64]| trace.iter().any(|t| t * t > TOLERANCE);
                 let traces = motions.iter().map(|motion| Some(&motion.trace[rows.clone()]).filter(closes)).collect();
-                pair.sides.push(Side { body, traces });
+                pair.sides.push(PairSide { body, traces });
             }
             first.push(first[body] + motions.len());
             all.push(motions);
@@ -223,18 +223,18 @@ pub fn combined<'n>(names: impl Iterator<Item = &'n str>, amounts: impl Iterator
 /// body to its neighbours. So H is solved exactly in the space of all free rigid motions, which are the columns of Z (balancing: Mandel,
 /// Comm. Numer. Meth. Engng 9, 1993). Since K Z = 0, HZ = B'D BZ takes only sums over contact points. Z'HZ has one block for each body
 /// and one for each two bodies in contact. Motions that no spring resists are left out.
-pub struct Space {
+pub struct CoarseSpace {
     /// Contact rows and motions of each body.
     bodies: Vec<(Vec<Segment>, Vec<Motion>)>,
     /// Number of points of each pair.
     points: Vec<usize>,
     /// The columns of Z for the local bodies.
-    columns: Vec<Column>,
+    columns: Vec<MotionColumn>,
     exchange: Rc<dyn Exchange>,
 }
 
 /// A column of Z: the entries of one rigid motion in one vector.
-struct Column {
+struct MotionColumn {
     /// Number of the motion among those of all bodies.
     motion: usize,
     /// Number of the vector.
@@ -244,7 +244,7 @@ struct Column {
     values: Vec<f64>,
 }
 
-impl Space {
+impl CoarseSpace {
     /// Return the space for the bodies of a model. Without an `offset`, there is one vector for each body: its state, whose last entries are rigid motions.
     /// With one, there is a single vector, in which motions are displacements of nodes; `offset` is the first entry of each body, and the length.
     pub fn of(model: &Model, offset: Option<&[usize]>) -> Self {
@@ -256,11 +256,11 @@ impl Space {
             for (motion, Motion { trace, .. }) in numbers.zip(&slot.motions) {
                 let amounts = fit(&states.traces, trace);
                 columns.push(match offset {
-                    None => Column { motion, vector: body, first: states.dofs, values: amounts },
+                    None => MotionColumn { motion, vector: body, first: states.dofs, values: amounts },
                     Some(offset) => {
                         let mut values = vec![0.0; offset[body + 1] - offset[body]];
                         amounts.iter().zip(&states.motions).for_each(|(a, shape)| axpy(*a, shape, &mut values));
-                        Column { motion, vector: 0, first: offset[body], values }
+                        MotionColumn { motion, vector: 0, first: offset[body], values }
                     }
                 });
             }
@@ -277,15 +277,15 @@ impl Space {
 }
 
 /// The coarse space for one set of springs D.
-pub struct Coarse {
-    space: Rc<Space>,
+pub struct CoarseOperator {
+    space: Rc<CoarseSpace>,
     springs: Vec<f64>,
     factor: Factor,
 }
 
-impl Coarse {
+impl CoarseOperator {
     /// Factor Z'HZ for `springs`, the diagonal of D, one entry a contact point.
-    pub fn new(space: Rc<Space>, springs: &[f64]) -> Self {
+    pub fn new(space: Rc<CoarseSpace>, springs: &[f64]) -> Self {
         let factor = space.motions().springs(springs).factor();
         Self { space, springs: springs.to_vec(), factor }
     }
@@ -303,7 +303,7 @@ impl Coarse {
     fn local_work(&self, r: &[impl AsRef<[f64]>]) -> DVector<f64> {
         let motions = self.space.bodies.iter().map(|(_, motions)| motions.len()).sum();
         let mut work = DVector::zeros(motions);
-        for Column { motion, vector, first, values } in &self.space.columns {
+        for MotionColumn { motion, vector, first, values } in &self.space.columns {
             work[*motion] += dot(values, &r[*vector].as_ref()[*first..]);
         }
         work
@@ -335,7 +335,7 @@ impl Coarse {
 
     /// Add s Z y to x.
     pub fn add(&self, s: f64, y: &DVector<f64>, x: &mut [impl AsMut<[f64]>]) {
-        for Column { motion, vector, first, values } in &self.space.columns {
+        for MotionColumn { motion, vector, first, values } in &self.space.columns {
             axpy(s * y[*motion], values, &mut x[*vector].as_mut()[*first..]);
         }
     }
@@ -350,7 +350,7 @@ const DIGITS: u32 = 24;
 /// traces, less the gap, is rounded anew, and the pressures of a stiff layer vary with these rounding errors. So the motions of the
 /// start are subtracted from the gaps once, and the iteration works on displacements relative to them. The motions come from the scene
 /// alone, not from a method or its start, and have few digits. So every method sees the same gaps.
-pub struct Origin {
+pub struct DisplacementOrigin {
     motion: Field,
     /// The gaps without the motions, n.
     gap: Vec<f64>,
@@ -360,7 +360,7 @@ pub struct Origin {
     pub rest: Field,
 }
 
-impl Origin {
+impl DisplacementOrigin {
     /// Subtract the motions of a start from the gaps of `model`. `amounts` has one entry for each motion of [`Motions::with_springs`]. Return `None` if all
     /// are zero. Collective.
     pub fn take(model: &mut Model, amounts: &DVector<f64>) -> Option<Self> {

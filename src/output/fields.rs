@@ -105,11 +105,11 @@ impl BodyField {
     }
 
     /// Return the field as a grid with the arrays that [`Self::write`] names.
-    pub fn into_grid(self) -> Grid {
+    pub fn into_grid(self) -> UnstructuredGrid {
         let (displacement, stress) = (self.displacement.into_flattened(), self.stress.into_flattened());
         let values = [displacement, stress, self.von_mises, self.principal.into_flattened()];
         let arrays = Self::ARRAYS.into_iter().zip(values);
-        Grid {
+        UnstructuredGrid {
             title: self.name,
             points: self.points,
             cell: self.cell,
@@ -140,7 +140,7 @@ impl BodyField {
 }
 
 /// A grid of cells of one kind with values at points and cells.
-pub struct Grid {
+pub struct UnstructuredGrid {
     /// Title in the file.
     pub title: String,
     /// Points.
@@ -155,7 +155,7 @@ pub struct Grid {
     pub at_cells: Vec<(String, u32, Vec<f64>)>,
 }
 
-impl Grid {
+impl UnstructuredGrid {
     /// Write VTK's XML format with binary (base64) data. Arrays must fit the points and cells.
     pub fn write(self, encoding: Encoding, out: &mut dyn Write) -> io::Result<()> {
         let numbers = |data: Vec<f64>| -> IOBuffer {
@@ -199,7 +199,7 @@ impl Grid {
 }
 
 /// An entry of a collection: the file of a body or a contact surface at a time.
-pub struct Entry<'a> {
+pub struct CollectionEntry<'a> {
     /// Time.
     pub time: f64,
     /// Number of the body or surface.
@@ -211,11 +211,11 @@ pub struct Entry<'a> {
 }
 
 /// Write the collection that opens the `.vtu` files of all bodies and contact surfaces at once, over time.
-pub fn write_pvd(entries: &[Entry], out: &mut dyn Write) -> io::Result<()> {
+pub fn write_pvd(entries: &[CollectionEntry], out: &mut dyn Write) -> io::Result<()> {
     writeln!(out, r#"<?xml version="1.0"?>"#)?;
     writeln!(out, r#"<VTKFile type="Collection" version="1.0">"#)?;
     writeln!(out, "  <Collection>")?;
-    for Entry { time, part, name, file } in entries {
+    for CollectionEntry { time, part, name, file } in entries {
         let (file, name) = (escape(file), escape(name));
         writeln!(out, r#"    <DataSet timestep="{time}" group="" part="{part}" name="{name}" file="{file}"/>"#)?;
     }
@@ -321,7 +321,7 @@ pub struct Tags {
     pub cells: usize,
 }
 
-impl Grid {
+impl UnstructuredGrid {
     /// Write the grid as `.msh`. Its cells are a physical group with the title as name, and each array at its points becomes a
     /// view `title: name`. Symmetric tensors become full ones. Nodes with a NaN are left out of a view.
     pub fn write_msh(&self, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
@@ -500,7 +500,7 @@ mod tests {
     fn long_arrays_read_back_whatever_their_encoding() {
         for points in [4096, 5000, 8192] {
             let value = |i: usize| (i as f64).sin();
-            let grid = || Grid {
+            let grid = || UnstructuredGrid {
                 title: String::new(),
                 points: (0..points).map(|i| [value(i), value(i + 1), 0.0]).collect(),
                 cell: CellKind::Line,
@@ -563,8 +563,12 @@ mod tests {
     #[test]
     fn the_collection_names_every_body() {
         let mut bytes = Vec::new();
-        let piece =
-            |(part, name, file): (usize, &'static str, &str)| Entry { time: 0.5, part, name, file: file.into() };
+        let piece = |(part, name, file): (usize, &'static str, &str)| CollectionEntry {
+            time: 0.5,
+            part,
+            name,
+            file: file.into(),
+        };
         let entries: Vec<_> = [(0, "upper", "upper.vtu"), (1, "a<b", "a_b.vtu")].into_iter().map(piece).collect();
         write_pvd(&entries, &mut bytes).unwrap();
         let text = String::from_utf8(bytes).unwrap();

@@ -12,10 +12,10 @@ pub mod tables;
 #[cfg(feature = "cli")]
 pub mod terminal;
 
-pub use fields::{BodyField, CellKind, Encoding, Grid};
+pub use fields::{BodyField, CellKind, Encoding, UnstructuredGrid};
 pub use folder::{Checksums, Folder, make_folder, safe_name, write_whole};
 #[cfg(feature = "cli")]
-pub use plot::{Axis, Color, ConvergenceSeries, Plot, Series, Style};
+pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
     LookReport, PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, busiest, warning_lines,

@@ -18,16 +18,16 @@ pub struct Plot {
     /// Heading; empty for none.
     pub title: String,
     /// Horizontal axis.
-    pub x: Axis,
+    pub x: PlotAxis,
     /// Vertical axis.
-    pub y: Axis,
+    pub y: PlotAxis,
     /// Curves, drawn in this order.
     pub series: Vec<Series>,
 }
 
 /// An axis; its range and ticks follow the data.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Axis {
+pub struct PlotAxis {
     /// Title of the axis, with the unit.
     pub label: String,
     /// Logarithmic, with ticks at powers of ten.
@@ -83,7 +83,7 @@ impl Series {
     }
 }
 
-impl Axis {
+impl PlotAxis {
     /// Return an axis with even steps.
     pub fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: false }
@@ -127,7 +127,7 @@ impl Plot {
             }
         }
         let y = if has_increments { "relative residual, increment" } else { "relative residual" };
-        Self { title: title.into(), x: Axis::linear("iteration"), y: Axis::log(y), series }
+        Self { title: title.into(), x: PlotAxis::linear("iteration"), y: PlotAxis::log(y), series }
     }
 
     /// Return the plot of the contact force of pairs over their approach, step by step, with the labels `[x, y]`. A single curve
@@ -139,7 +139,7 @@ impl Plot {
     ) -> Self {
         let one = pairs.len() == 1;
         let curve = |(name, points)| Series::new(if one { "" } else { name }, points, Style::LineMarkers);
-        Self { title: title.into(), x: Axis::linear(x), y: Axis::linear(y), series: pairs.map(curve).collect() }
+        Self { title: title.into(), x: PlotAxis::linear(x), y: PlotAxis::linear(y), series: pairs.map(curve).collect() }
     }
 
     /// Return the plot of the contact pressure along a surface from points (coordinate, pressure) in any order. Dashed reference
@@ -147,7 +147,7 @@ impl Plot {
     pub fn pressure(title: &str, x: &str, y: &str, mut series: Vec<Series>) -> Self {
         series.iter_mut().for_each(|series| series.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
         series.sort_by_key(|series| series.style == Style::Dashed);
-        Self { title: title.into(), x: Axis::linear(x), y: Axis::linear(y), series }
+        Self { title: title.into(), x: PlotAxis::linear(x), y: PlotAxis::linear(y), series }
     }
 }
 
@@ -178,10 +178,10 @@ const MARKS: [&[(f64, f64)]; 4] = [
 ];
 
 /// An error of plotters. No failure of drawing to memory is known.
-type Failure = Box<dyn std::error::Error + Send + Sync>;
+type PlotError = Box<dyn std::error::Error + Send + Sync>;
 
 /// A position on the picture in units of plotters.
-type At = (i32, i32);
+type Pixel = (i32, i32);
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
@@ -202,7 +202,7 @@ impl Plot {
         Ok(text.replacen(&format!("width=\"{width}\" height=\"{height}\""), &shown, 1))
     }
 
-    fn draw(&self, area: &Area) -> Result<(), Failure> {
+    fn draw(&self, area: &Area) -> Result<(), PlotError> {
         area.fill(&WHITE)?;
         let pens = pens(&self.series);
         let mut entries: Vec<(String, Pen)> =
@@ -215,9 +215,9 @@ impl Plot {
         let chart = self.draw_axes(&left)?;
         for (series, pen) in self.series.iter().zip(&pens) {
             let position = |point: &(f64, f64)| self.can_show(point).then(|| chart.backend_coord(point));
-            let positions: Vec<Option<At>> = series.points.iter().map(position).collect();
+            let positions: Vec<Option<Pixel>> = series.points.iter().map(position).collect();
             for piece in positions.split(Option::is_none).filter(|piece| !piece.is_empty()) {
-                let piece: Vec<At> = piece.iter().flatten().copied().collect();
+                let piece: Vec<Pixel> = piece.iter().flatten().copied().collect();
                 pen.elements(&piece).iter().try_for_each(|element| area.draw(element))?;
             }
         }
@@ -229,10 +229,10 @@ impl Plot {
     fn draw_axes<'a, 'b>(
         &self,
         area: &'a Area<'b>,
-    ) -> Result<ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>, Failure> {
+    ) -> Result<ChartContext<'a, SVGBackend<'b>, Cartesian2d<AxisScale, AxisScale>>, PlotError> {
         let points = self.series.iter().flat_map(|series| &series.points).filter(|point| self.can_show(point));
         let (xs, ys): (Vec<f64>, Vec<f64>) = points.copied().unzip();
-        let (x, y) = (Scale::new(&xs, self.x.log), Scale::new(&ys, self.y.log));
+        let (x, y) = (AxisScale::new(&xs, self.x.log), AxisScale::new(&ys, self.y.log));
         let labels = [x.labels(&xs), y.labels(&ys)];
         let titles = [x.title(cut(&self.x.label, 70)), y.title(cut(&self.y.label, 60))];
         let mut builder = ChartBuilder::on(area);
@@ -260,7 +260,7 @@ impl Plot {
     }
 }
 
-fn draw_legend(area: &Area, entries: &[(String, Pen)]) -> Result<(), Failure> {
+fn draw_legend(area: &Area, entries: &[(String, Pen)]) -> Result<(), PlotError> {
     // plotters draws a legend only on a chart: this one is empty
     let mut chart = ChartBuilder::on(area).build_cartesian_2d(0.0..1.0, 0.0..1.0)?;
     let nothing = || std::iter::empty::<PathElement<(f64, f64)>>();
@@ -303,21 +303,21 @@ fn pens(series: &[Series]) -> Vec<Pen> {
 
 impl Pen {
     /// Return the elements of one unbroken piece of a series. A single point becomes a mark.
-    fn elements<'a>(&self, points: &[At]) -> Vec<DynElement<'static, SVGBackend<'a>, At>> {
+    fn elements<'a>(&self, points: &[Pixel]) -> Vec<DynElement<'static, SVGBackend<'a>, Pixel>> {
         let line = |width: f64| ShapeStyle::from(self.color).stroke_width(fine(width) as u32);
         let mut elements = match self.style {
             Style::Line | Style::LineMarkers => vec![PathElement::new(points, line(1.9)).into_dyn()],
             Style::Dashed => vec![DashedPathElement::new(points.to_vec(), fine(6.4), fine(4.2), line(1.6)).into_dyn()],
         };
         for &(x, y) in points.iter().filter(|_| self.style == Style::LineMarkers || points.len() == 1) {
-            let corners: Vec<At> = self.mark.iter().map(|(u, v)| (x + fine(*u), y + fine(*v))).collect();
+            let corners: Vec<Pixel> = self.mark.iter().map(|(u, v)| (x + fine(*u), y + fine(*v))).collect();
             elements.push(Polygon::new(corners, self.color.filled()).into_dyn());
         }
         elements
     }
 
     /// Return a sample for the legend as one polygon: a line to the right with its mark in the middle.
-    fn sample<'a>(&self, (x, y): At) -> DynElement<'static, SVGBackend<'a>, At> {
+    fn sample<'a>(&self, (x, y): Pixel) -> DynElement<'static, SVGBackend<'a>, Pixel> {
         if self.style == Style::Dashed {
             let style = ShapeStyle::from(self.color).stroke_width(fine(1.6) as u32);
             return DashedPathElement::new(vec![(x, y), (x + fine(30.0), y)], fine(6.4), fine(4.2), style).into_dyn();
@@ -326,7 +326,7 @@ impl Pen {
         let marked = self.style != Style::Line;
         let mark = self.mark.iter().chain(self.mark.first()).filter(|_| marked).map(|(u, v)| (15.0 + u, *v));
         let corners = line.into_iter().chain(mark).map(|(u, v)| (x + fine(u), y + fine(v)));
-        Polygon::new(corners.collect::<Vec<At>>(), self.color.filled()).into_dyn()
+        Polygon::new(corners.collect::<Vec<Pixel>>(), self.color.filled()).into_dyn()
     }
 }
 
@@ -362,13 +362,13 @@ fn is_drawable(value: f64, log: bool) -> bool {
     if log { (1e-150..1e150).contains(&value) } else { value.abs() < 1e290 }
 }
 
-enum Scale {
+enum AxisScale {
     /// An even scale; plotters sees values in units of this power of ten.
     Linear(RangedCoordf64, i32),
     Log(LogCoord<f64>),
 }
 
-impl Scale {
+impl AxisScale {
     /// Return a scale that shows all these values.
     pub fn new(values: &[f64], log: bool) -> Self {
         let low = values.iter().copied().reduce(f64::min);
@@ -446,7 +446,7 @@ fn multiples(range: &Range<f64>) -> Vec<f64> {
     all.filter(|value| range.contains(value)).collect()
 }
 
-impl Ranged for Scale {
+impl Ranged for AxisScale {
     type FormatOption = NoDefaultFormatting;
     type ValueType = f64;
 
@@ -481,7 +481,7 @@ impl Ranged for Scale {
     }
 }
 
-impl ValueFormatter<f64> for Scale {
+impl ValueFormatter<f64> for AxisScale {
     fn format_ext(&self, value: &f64) -> String {
         match self {
             Self::Linear(axis, power) => {
@@ -540,8 +540,8 @@ mod tests {
     fn plot(points: Vec<(f64, f64)>, log: bool) -> Plot {
         Plot {
             title: String::new(),
-            x: Axis::default(),
-            y: Axis { label: String::new(), log },
+            x: PlotAxis::default(),
+            y: PlotAxis { label: String::new(), log },
             series: vec![Series::new("", points, Style::Line)],
         }
     }
@@ -572,7 +572,7 @@ mod tests {
     }
 
     /// Numbers of points of the curves of a picture.
-    fn curves(plot: &Plot) -> Vec<Vec<At>> {
+    fn curves(plot: &Plot) -> Vec<Vec<Pixel>> {
         let svg = plot.svg().unwrap();
         let lines = svg.split("<polyline").filter(|line| line.contains("#0072B2"));
         let points = lines.filter_map(|line| line.split("points=\"").nth(1)?.split('"').next().map(str::to_owned));
@@ -622,7 +622,7 @@ mod tests {
         for (a, b) in [(1.0, 1.0), (0.0, 5e-324), (-3.0, -1e-3), (1e-12, 1e12), (5.0, 5.1), (1e-280, 1e280)] {
             for log in [false, true] {
                 let values: Vec<f64> = [a, b].into_iter().filter(|&value| is_drawable(value, log)).collect();
-                let scale = Scale::new(&values, log);
+                let scale = AxisScale::new(&values, log);
                 let range = scale.range();
                 assert!(values.iter().all(|value| range.contains(value)), "{a} {b} {log} {range:?}");
                 let ticks = scale.key_points(TICKS).into_iter().filter(|tick| range.contains(tick)).count();

@@ -161,9 +161,9 @@ const TICK: Duration = Duration::from_millis(200);
 const SHORT: Duration = Duration::from_secs(1);
 
 /// The progress line of one phase of a run, which disappears when it is dropped.
-pub struct Line(ProgressBar);
+pub struct ProgressLine(ProgressBar);
 
-impl Line {
+impl ProgressLine {
     /// Return a line with the name `what` of the phase and the elapsed time, shown after a second. If the duration in seconds
     /// has an `estimate`, the line shows the remaining time, too.
     pub fn new(what: &str, estimate: Option<f64>) -> Self {
@@ -181,7 +181,7 @@ impl Line {
     }
 }
 
-impl Drop for Line {
+impl Drop for ProgressLine {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }

@@ -39,7 +39,7 @@ pub(super) fn name() -> String {
 }
 
 // Fortran passes the length of a text after all arguments.
-type Factor = unsafe extern "C" fn(*const c_char, *const c_int, *mut f64, *const c_int, *mut c_int, usize);
+type Potrf = unsafe extern "C" fn(*const c_char, *const c_int, *mut f64, *const c_int, *mut c_int, usize);
 type Solve = unsafe extern "C" fn(
     *const c_char,
     *const c_int,
@@ -97,7 +97,7 @@ pub fn cholesky(matrix: &mut [f64], n: usize) -> Result<bool> {
     let address = lapack(c"dpotrf_")?;
     // SAFETY: LAPACK's dpotrf, with a matrix of n x n numbers.
     unsafe {
-        let factor: Factor = std::mem::transmute(address);
+        let factor: Potrf = std::mem::transmute(address);
         factor(UPPER.as_ptr(), &n, matrix.as_mut_ptr(), &n, &mut info, 1);
     }
     Ok(info == 0)

@@ -22,14 +22,14 @@ const MOST_FILES: usize = 100;
 
 /// The files that PETSc is to read by itself, and those it is not.
 #[derive(Debug, Default)]
-pub(super) struct Files {
+pub(super) struct OptionFiles {
     /// The file of the home folder, if it exists and is to be read.
     pub home: Option<PathBuf>,
     /// The files of the current folder that are not read.
     pub left_out: Vec<String>,
 }
 
-impl Files {
+impl OptionFiles {
     /// Check all files of options that PETSc reads with these `words` of the command line.
     ///
     /// # Errors

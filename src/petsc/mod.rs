@@ -54,7 +54,7 @@ pub use options::{Entry, Options, begins_options, is_family, is_global, is_of_fa
 pub use printed::printed;
 pub use session::{CROWDED, Session, Stage, UNBOUND, launcher};
 pub use subspace::Subspace;
-pub use until::{Enough, Iterate};
+pub use until::{ConvergenceTest, KspIterate};
 pub use vector::Scope;
 
 /// Whether PETSc has hypre.

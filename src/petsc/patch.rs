@@ -16,7 +16,7 @@ use super::{Ksp, Matrix, ffi};
 use crate::error::Result;
 
 /// The space of the dofs P, with the columns P of A and the factor of P'AP.
-struct Patch {
+struct PatchSpace {
     /// Local indices of the dofs P that this process owns.
     inside: Vec<usize>,
     /// Local indices of the owned rows that have entries in the columns P.
@@ -71,14 +71,14 @@ impl Ksp {
     /// ```
     pub fn patch(&mut self, matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<bool> {
         self.recover()?;
-        let Some(patch) = Patch::new(matrix, dofs, layers)? else { return Ok(false) };
+        let Some(patch) = PatchSpace::new(matrix, dofs, layers)? else { return Ok(false) };
         let name = c"exact solve on some dofs around the preconditioner";
         self.wrap(matrix, name, Box::new(patch))?;
         Ok(true)
     }
 }
 
-impl Patch {
+impl PatchSpace {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
         let (session, scope, owned) = (matrix.session(), matrix.scope(), matrix.own());
         let header = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
@@ -119,7 +119,7 @@ fn factor(matrix: &Matrix, inside: &Indices, count: usize) -> Result<Ksp> {
     solver
 }
 
-impl Subspace for Patch {
+impl Subspace for PatchSpace {
     fn correct(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let part: Vec<f64> = self.touched.iter().map(|&i| z[i]).collect();
         let (mut rest, mut y) = (vec![0.0; self.inside.len()], vec![0.0; self.inside.len()]);
@@ -133,7 +133,7 @@ impl Subspace for Patch {
     }
 }
 
-impl Drop for Patch {
+impl Drop for PatchSpace {
     fn drop(&mut self) {
         // SAFETY: the one reference of this type.
         let _ = unsafe { petsc!(MatDestroy(&mut self.columns)) };

@@ -1,7 +1,7 @@
 //! Start and end of MPI and PETSc in this process, the launchers of MPI, and stages of PETSc's log, which `-log_view` lists separately.
 
 use super::blas;
-use super::files::Files;
+use super::files::OptionFiles;
 use super::library::{self, petsc, text};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
@@ -108,8 +108,8 @@ impl Session {
     /// When PETSc refuses an option; other ranks may then wait for this one inside PETSc. When a file of options is not a text file or leads
     /// back to itself; only rank 0 prints that error.
     pub fn start_petsc(&self, words: &[String]) -> Result<()> {
-        let checked = if self.rank() == 0 { Files::check(words) } else { Ok(Files::default()) };
-        let Files { home, left_out } = broadcast_home(self.world(), checked)?;
+        let checked = if self.rank() == 0 { OptionFiles::check(words) } else { Ok(OptionFiles::default()) };
+        let OptionFiles { home, left_out } = broadcast_home(self.world(), checked)?;
         let may_wait = self.size() == 1 && library::may_wait(words, home.as_deref());
         // it was not set before, since PETSc starts once
         let _ = self.0.left_out.set(left_out);
@@ -208,7 +208,7 @@ fn mpi_name() -> String {
 }
 
 /// Return on all ranks the file of the home folder that rank 0 found, or an error if rank 0 has one. Collective.
-fn broadcast_home(world: &SimpleCommunicator, checked: Result<Files>) -> Result<Files> {
+fn broadcast_home(world: &SimpleCommunicator, checked: Result<OptionFiles>) -> Result<OptionFiles> {
     if world.size() == 1 {
         return checked;
     }
@@ -227,7 +227,7 @@ fn broadcast_home(world: &SimpleCommunicator, checked: Result<Files>) -> Result<
         // MPI refuses an empty message
         root.broadcast_into(&mut bytes[..]);
     }
-    Ok(Files { home: (length > 0).then(|| PathBuf::from(OsStr::from_bytes(&bytes))), ..files })
+    Ok(OptionFiles { home: (length > 0).then(|| PathBuf::from(OsStr::from_bytes(&bytes))), ..files })
 }
 
 /// Let a panic on one rank end the others, too, which would wait for it for ever.

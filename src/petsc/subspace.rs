@@ -23,13 +23,13 @@ pub trait Subspace {
 }
 
 /// The preconditioner M inside a wrapper, and the matrix A.
-struct Inner {
+struct InnerPc {
     pc: ffi::PC,
     /// PETSc's headers of an argument and a result.
     vectors: [Vector; 2],
 }
 
-impl Inner {
+impl InnerPc {
     /// Compute z = M r.
     fn apply(&self, r: &[f64], z: &mut [f64]) -> Result<()> {
         // SAFETY: the preconditioner reads one and writes to the other.
@@ -55,12 +55,12 @@ pub(super) struct Wrapper {
     /// PETSc's handle of the PCSHELL.
     pub pc: ffi::PC,
     /// The data of the callbacks. `pc` has the same pointer.
-    context: *mut Context,
+    context: *mut CallbackData,
 }
 
 /// The data of the callbacks.
-struct Context {
-    inner: Inner,
+struct CallbackData {
+    inner: InnerPc,
     subspace: Box<dyn Subspace>,
     /// Whether all residuals have Q r = 0 up to rounding, because the solve was started in the space.
     is_started: Cell<bool>,
@@ -68,7 +68,7 @@ struct Context {
     failure: RefCell<Option<Error>>,
 }
 
-impl Context {
+impl CallbackData {
     /// Compute z from r. If Q r = 0 up to rounding, then z is Q r + (I - Q A) M r (Tang, Nabben, Vuik, Erlangga, J. Sci. Comput. 39, 2009, "A-DEF2").
     /// The term Q r takes what rounding leaves of residuals in the space out again. Without it, conjugate gradients do not reduce that part, and
     /// r'z becomes negative when little else is left of r.
@@ -90,8 +90,8 @@ impl Wrapper {
         // SAFETY: a reference of our own keeps the inner one when its solver takes another.
         unsafe { petsc!(PetscObjectReference(inner.cast())) }?;
         let new = || Vector::new(matrix.session(), matrix.scope(), matrix.rows(), matrix.block_size());
-        let inner = Inner { pc: inner, vectors: [new()?, new()?] };
-        let context = Context { inner, subspace, is_started: Cell::new(false), failure: RefCell::default() };
+        let inner = InnerPc { pc: inner, vectors: [new()?, new()?] };
+        let context = CallbackData { inner, subspace, is_started: Cell::new(false), failure: RefCell::default() };
         let context = Box::into_raw(Box::new(context));
         let mut wrapper = Self { pc: null_mut(), context };
         // SAFETY: a new preconditioner, whose context lives as long as our reference to it.
@@ -107,7 +107,7 @@ impl Wrapper {
         Ok(wrapper)
     }
 
-    fn context(&self) -> &Context {
+    fn context(&self) -> &CallbackData {
         // SAFETY: the context lives as long as `self`, and is shared only.
         unsafe { &*self.context }
     }
@@ -160,7 +160,7 @@ unsafe extern "C" fn apply(pc: ffi::PC, r: ffi::Vec, z: ffi::Vec) -> ffi::PetscE
     // nobody else until they are given back.
     let done: Result<_> = (|| unsafe {
         petsc!(PCShellGetContext(pc, (&raw mut context).cast()))?;
-        let context = &*context.cast::<Context>();
+        let context = &*context.cast::<CallbackData>();
         petsc!(VecGetLocalSize(r, &mut rows))?;
         petsc!(VecGetArrayRead(r, &mut from))?;
         petsc!(VecGetArray(z, &mut to))?;
@@ -184,7 +184,7 @@ unsafe extern "C" fn view(pc: ffi::PC, viewer: ffi::PetscViewer) -> ffi::PetscEr
     // SAFETY: as in `apply`.
     let done: Result<_> = (|| unsafe {
         petsc!(PCShellGetContext(pc, (&raw mut context).cast()))?;
-        petsc!(PCView((*context.cast::<Context>()).inner.pc, viewer))
+        petsc!(PCView((*context.cast::<CallbackData>()).inner.pc, viewer))
     })();
     done.map_or(ERROR, |()| 0)
 }

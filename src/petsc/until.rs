@@ -11,7 +11,7 @@ use std::ptr::{null, null_mut};
 
 /// An iterate of a linear solver.
 #[derive(Debug)]
-pub struct Iterate<'a> {
+pub struct KspIterate<'a> {
     /// The solution so far; one entry for each row of this process.
     pub x: &'a [f64],
     /// The norm of its residual, as the solver measures it (its `-ksp_norm_type`).
@@ -23,7 +23,7 @@ pub struct Iterate<'a> {
 }
 
 /// A stopping test, called after each iteration. It returns whether the iterate is accurate enough.
-pub type Enough<'a> = dyn FnMut(&Iterate) -> bool + 'a;
+pub type ConvergenceTest<'a> = dyn FnMut(&KspIterate) -> bool + 'a;
 
 /// A convergence test of PETSc.
 type PetscTest =
@@ -31,7 +31,7 @@ type PetscTest =
 
 /// The context of [`is_enough`] during a solve.
 struct Test<'a, 'b> {
-    enough: &'a mut Enough<'b>,
+    enough: &'a mut ConvergenceTest<'b>,
     /// The norm of the first residual.
     first: f64,
     /// The test that the solver had before.
@@ -72,16 +72,16 @@ impl Ksp {
     ///
     /// # Errors
     /// Those of [`solve`](Self::solve).
-    pub fn solve_until(&self, b: &[f64], x: &mut [f64], enough: &mut Enough) -> Result<Solved> {
+    pub fn solve_until(&self, b: &[f64], x: &mut [f64], enough: &mut ConvergenceTest) -> Result<Solved> {
         let (mut rest, mut start) = (b.to_vec(), vec![0.0; b.len()]);
         let started = self.start(&mut rest, &mut start)?;
         let mut whole = vec![0.0; b.len()];
         // PETSc iterates on what is left after the exact solve in the subspace
-        let mut of_whole = |iterate: &Iterate| {
+        let mut of_whole = |iterate: &KspIterate| {
             whole.iter_mut().zip(&start).zip(iterate.x).for_each(|((whole, start), x)| *whole = start + x);
-            enough(&Iterate { x: &whole, ..*iterate })
+            enough(&KspIterate { x: &whole, ..*iterate })
         };
-        let enough: &mut Enough = if started.is_some() { &mut of_whole } else { enough };
+        let enough: &mut ConvergenceTest = if started.is_some() { &mut of_whole } else { enough };
         let (mut own, mut own_context, mut destroy) = (None, null_mut(), None);
         // SAFETY: the solver's own test is taken out with its context, and put back below whatever the outcome of the solve.
         unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut own, &mut own_context, &mut destroy)) }?;
@@ -132,7 +132,7 @@ unsafe extern "C" fn is_enough(
     // SAFETY: PETSc's array has that many entries here, and nobody writes to it before it is given back.
     let x = unsafe { slice(array, rows as usize) };
     let least = least_eigenvalue(ksp).filter(|least| *least > 0.0);
-    if (test.enough)(&Iterate { x, residual: norm, first: test.first, least }) {
+    if (test.enough)(&KspIterate { x, residual: norm, first: test.first, least }) {
         *reason = ffi::KSPConvergedReason_KSP_CONVERGED_RTOL;
     }
     // SAFETY: gives back what was read above.

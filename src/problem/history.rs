@@ -24,7 +24,7 @@ pub struct History {
     /// Names of the factors.
     pub names: Vec<String>,
     /// The steps. Without steps there is one run under the full loads.
-    pub steps: Vec<Step>,
+    pub steps: Vec<LoadStep>,
     /// The file of the table of factors, if there is one.
     pub table: Option<Located<PathBuf>>,
     /// Whether some loads have no factor and stay constant.
@@ -35,7 +35,7 @@ pub struct History {
 
 /// A step of a history.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub struct LoadStep {
     /// Time; it increases from step to step.
     pub time: f64,
     /// One factor for each name of the history.
@@ -45,7 +45,7 @@ pub struct Step {
 impl History {
     /// Return a history in which all loads have the same factors `shares`, at times 1, 2, ...
     pub fn of_shares(shares: Vec<f64>) -> Self {
-        let step = |(number, share): (usize, f64)| Step { time: (number + 1) as f64, factors: vec![share] };
+        let step = |(number, share): (usize, f64)| LoadStep { time: (number + 1) as f64, factors: vec![share] };
         let steps = shares.into_iter().enumerate().map(step).collect();
         Self { names: vec![COMMON.to_owned()], steps, ..Self::default() }
     }
@@ -75,7 +75,7 @@ impl History {
 
     /// Return a history of one step: the first one with the largest sum of absolute factors.
     pub fn heaviest(&self) -> Self {
-        let size = |step: &&Step| step.factors.iter().map(|factor| factor.abs()).sum::<f64>();
+        let size = |step: &&LoadStep| step.factors.iter().map(|factor| factor.abs()).sum::<f64>();
         let step = self.steps.iter().rev().max_by(|a, b| size(a).total_cmp(&size(b)));
         Self { steps: step.into_iter().cloned().collect(), ..self.clone() }
     }
@@ -307,12 +307,12 @@ fn check_names(names: &[String], line: &Place) -> Result<()> {
 }
 
 /// Return the step of one line of the table. `before` is the step of the line before it.
-fn step(names: &[String], record: &csv::StringRecord, line: &Place, before: Option<&Step>) -> Result<Step> {
+fn step(names: &[String], record: &csv::StringRecord, line: &Place, before: Option<&LoadStep>) -> Result<LoadStep> {
     if record.len() != names.len() {
         let message = format!("a step has {} numbers here, not {}", names.len(), record.len());
         return Err(Error::scene(line, message).label(format!("the columns are {}", names.join(", "))));
     }
-    let mut step = Step { time: before.map_or(1.0, |before| before.time + 1.0), factors: Vec::new() };
+    let mut step = LoadStep { time: before.map_or(1.0, |before| before.time + 1.0), factors: Vec::new() };
     for (name, word) in names.iter().zip(record) {
         let Some(number) = word.parse().ok().filter(|number: &f64| number.is_finite()) else {
             return Err(Error::scene(line, format!("`{name}` is `{word}`")).label("not a finite number"));
@@ -333,7 +333,7 @@ mod tests {
     use super::*;
 
     fn history(rows: &[[f64; 2]], constant: bool) -> History {
-        let step = |(number, row): (usize, &[f64; 2])| Step { time: number as f64, factors: row.to_vec() };
+        let step = |(number, row): (usize, &[f64; 2])| LoadStep { time: number as f64, factors: row.to_vec() };
         let steps = rows.iter().enumerate().map(step).collect();
         History { names: vec!["a".into(), "b".into()], steps, constant, ..History::default() }
     }

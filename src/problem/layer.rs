@@ -2,7 +2,7 @@
 
 use crate::data::{Grid, Summits};
 use crate::error::{Error, Result};
-use crate::expression::{Expression, Field, Scope};
+use crate::expression::{Expression, Field, KnownNames};
 use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, ValueKind};
 use serde_json::{Value as Json, json};
 use std::sync::Arc;
@@ -234,7 +234,7 @@ impl Setting for LayerSpec {
             return asperities(summits, context);
         }
         if let Some(law) = keys.get("pressure") {
-            let scope = Scope { variables: &["c", "x", "y", "z"][..=context.dimension], data: &context.data };
+            let scope = KnownNames { variables: &["c", "x", "y", "z"][..=context.dimension], data: &context.data };
             let law = Expression::parse(law.string()?, &law.place, scope)?;
             return Ok(LayerSpec::Pressure { law, up_to: keys.read("up_to", Node::number)? });
         }

@@ -17,15 +17,15 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A row of a table: values by the names of their columns.
-pub type Row = HashMap<String, String>;
+pub type TableRow = HashMap<String, String>;
 
 /// A folder of results.
-pub struct Files {
+pub struct ResultFolder {
     folder: PathBuf,
     sums: Option<Checksums>,
 }
 
-impl Files {
+impl ResultFolder {
     /// Open a folder.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(folder::SUMS);
@@ -50,7 +50,7 @@ impl Files {
     }
 
     /// Return the rows of a table, none if there is no such file.
-    pub fn rows(&self, name: &str) -> Result<Vec<Row>> {
+    pub fn rows(&self, name: &str) -> Result<Vec<TableRow>> {
         if !self.path(name).exists() {
             return Ok(Vec::new());
         }
@@ -63,12 +63,12 @@ impl Files {
 }
 
 /// Return a number of a row, NaN if the column has none.
-pub fn value(row: &Row, column: &str) -> f64 {
+pub fn value(row: &TableRow, column: &str) -> f64 {
     row.get(column).and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
 }
 
 /// A body or a contact surface as triangles.
-pub struct Part {
+pub struct TriangleMesh {
     pub name: String,
     /// Points before deformation.
     pub points: Vec<[f64; 3]>,
@@ -96,24 +96,24 @@ const QUADRATIC: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 /// Faces of a tetrahedron, oriented as seen from outside, with the mid-edges of a quadratic one.
 const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]];
 
-impl Part {
+impl TriangleMesh {
     /// Read a `.vtu` file with the array `value` at its points, as float32 or float64, compressed or not, or all files that a
     /// `.pvtu` file joins.
     ///
     /// # Errors
     /// [`Kind::File`] when a file is not there, is damaged, is no VTU file or lacks the array.
-    pub fn read(files: &Files, file: &str, name: &str, value: &str) -> Result<Self> {
+    pub fn read(files: &ResultFolder, file: &str, name: &str, value: &str) -> Result<Self> {
         let refuse = |file: &str, cause: String| {
             Error::new(Kind::File, format!("{} cannot be read as VTU", files.path(file).display()))
                 .because(cause)
                 .help("solve the scene again with --vtu")
         };
         let open = |file: &str| document(&files.read(file)?).map_err(|cause| refuse(file, cause));
-        let mut points = Points::default();
+        let mut points = BodyPoints::default();
         let mut add =
             |file: &str, document: &Document| points.add(document, value).map_err(|cause| refuse(file, cause));
         let whole = open(file)?;
-        for Source { file } in &whole.joined.pieces {
+        for PieceSource { file } in &whole.joined.pieces {
             // the parts are in the same folder
             let part = Path::new(file).file_name().unwrap_or_default().to_string_lossy();
             add(&part, &open(&part)?)?;
@@ -159,7 +159,7 @@ type Cell = (u8, Vec<usize>);
 
 /// The points and cells of a body, joined from the files of its ranks.
 #[derive(Default)]
-struct Points {
+struct BodyPoints {
     points: Vec<[f64; 3]>,
     displacement: Vec<[f64; 3]>,
     value: Vec<f64>,
@@ -168,7 +168,7 @@ struct Points {
     numbers: HashMap<[u64; 3], usize>,
 }
 
-impl Points {
+impl BodyPoints {
     /// Add the pieces of a file, with the array `name` at their points.
     fn add(&mut self, document: &Document, name: &str) -> Parsed<()> {
         let encoding = document.encoding()?;
@@ -179,7 +179,7 @@ impl Points {
     }
 
     /// Add the piece of a rank. A point with the coordinates of one in an earlier piece is the same point.
-    fn add_piece(&mut self, piece: &Piece, encoding: Encoding, name: &str) -> Parsed<()> {
+    fn add_piece(&mut self, piece: &VtuPiece, encoding: ArrayEncoding, name: &str) -> Parsed<()> {
         let points = piece.coordinates(encoding)?;
         let mut arrays = piece.at_points(encoding)?;
         let mut array = |name: &str, components: usize| {
@@ -213,7 +213,7 @@ impl Points {
         Ok(())
     }
 
-    fn part(self, name: &str) -> Part {
+    fn part(self, name: &str) -> TriangleMesh {
         let Self { points, displacement, value, cells, .. } = self;
         let is_solid = cells.iter().any(|(kind, _)| matches!(*kind, TETRA | QUADRATIC_TETRA));
         let mut triangles: Vec<[usize; 3]> = Vec::new();
@@ -225,7 +225,7 @@ impl Points {
             }
         }
         outer_faces(&cells).iter().for_each(|face| add_triangles(face, &mut triangles));
-        let part = Part { name: name.to_owned(), points, triangles: Vec::new(), displacement, value, is_solid };
+        let part = TriangleMesh { name: name.to_owned(), points, triangles: Vec::new(), displacement, value, is_solid };
         part.restricted(&triangles)
     }
 }
@@ -264,10 +264,10 @@ fn outer_faces(cells: &[Cell]) -> Vec<Vec<usize>> {
 /// displacement is longer than a twentieth of the diagonal of all bodies. It is 1 at least.
 ///
 /// With such a factor motions are visible, and the bodies still look like themselves.
-pub fn magnification(parts: &[Part]) -> f64 {
+pub fn magnification(parts: &[TriangleMesh]) -> f64 {
     let [low, high] = bounds(parts.iter().flat_map(|part| &part.points).copied());
     let size = (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt();
-    let most = parts.iter().flat_map(Part::travel).fold(0.0, f64::max);
+    let most = parts.iter().flat_map(TriangleMesh::travel).fold(0.0, f64::max);
     let wish = 0.05 * size / most;
     if !wish.is_finite() || wish <= 1.0 {
         return 1.0;
@@ -290,9 +290,9 @@ struct Document {
     #[serde(rename = "@byte_order", default)]
     byte_order: String,
     #[serde(rename = "UnstructuredGrid", default)]
-    grid: Pieces<Piece>,
+    grid: Pieces<VtuPiece>,
     #[serde(rename = "PUnstructuredGrid", default)]
-    joined: Pieces<Source>,
+    joined: Pieces<PieceSource>,
 }
 
 #[derive(Deserialize)]
@@ -308,13 +308,13 @@ impl<T> Default for Pieces<T> {
 }
 
 #[derive(Deserialize)]
-struct Source {
+struct PieceSource {
     #[serde(rename = "@Source")]
     file: String,
 }
 
 #[derive(Deserialize)]
-struct Piece {
+struct VtuPiece {
     #[serde(rename = "@NumberOfPoints")]
     points: usize,
     #[serde(rename = "@NumberOfCells")]
@@ -347,7 +347,7 @@ struct Array {
 
 /// The encoding of the arrays of a file.
 #[derive(Clone, Copy)]
-struct Encoding {
+struct ArrayEncoding {
     is_big: bool,
     is_compressed: bool,
 }
@@ -359,7 +359,7 @@ fn document(bytes: &[u8]) -> Parsed<Document> {
 }
 
 impl Document {
-    fn encoding(&self) -> Parsed<Encoding> {
+    fn encoding(&self) -> Parsed<ArrayEncoding> {
         if !matches!(self.size_type.as_str(), "UInt64" | "") {
             return Err(format!("sizes are of the type `{}`", self.size_type));
         }
@@ -373,13 +373,13 @@ impl Document {
             "BigEndian" => true,
             other => return Err(format!("its order of bytes is `{other}`")),
         };
-        Ok(Encoding { is_big, is_compressed })
+        Ok(ArrayEncoding { is_big, is_compressed })
     }
 }
 
-impl Piece {
+impl VtuPiece {
     /// Return the points, as many as the piece says.
-    fn coordinates(&self, encoding: Encoding) -> Parsed<Vec<[f64; 3]>> {
+    fn coordinates(&self, encoding: ArrayEncoding) -> Parsed<Vec<[f64; 3]>> {
         let all = self.coordinates.arrays.first().map_or(Ok(Vec::new()), |array| array.reals(encoding))?;
         if Some(all.len()) != self.points.checked_mul(3) {
             return Err(format!("it has not the {} points that it says", self.points));
@@ -391,7 +391,7 @@ impl Piece {
     }
 
     /// Return the values of all arrays at the points, by name; all components of a point stand together.
-    fn at_points(&self, encoding: Encoding) -> Parsed<HashMap<&str, Vec<f64>>> {
+    fn at_points(&self, encoding: ArrayEncoding) -> Parsed<HashMap<&str, Vec<f64>>> {
         let (mut found, count) = (HashMap::new(), self.points);
         for array in &self.at_points.arrays {
             let (name, values) = (array.name.as_str(), array.reals(encoding)?);
@@ -407,7 +407,7 @@ impl Piece {
     }
 
     /// Return the cells, as many as the piece says.
-    fn cells(&self, encoding: Encoding) -> Parsed<Vec<Cell>> {
+    fn cells(&self, encoding: ArrayEncoding) -> Parsed<Vec<Cell>> {
         let list = |name: &str| {
             let array = self.lists.arrays.iter().find(|array| array.name == name);
             array.ok_or_else(|| format!("it has no {name} of cells"))?.wholes(encoding)
@@ -432,7 +432,7 @@ impl Piece {
 
 impl Array {
     /// Return the numbers of an array of floating-point numbers.
-    fn reals(&self, encoding: Encoding) -> Parsed<Vec<f64>> {
+    fn reals(&self, encoding: ArrayEncoding) -> Parsed<Vec<f64>> {
         let numbers = |size: usize| self.numbers(size, encoding);
         match self.kind.as_str() {
             "Float64" => Ok(numbers(8)?.into_iter().map(f64::from_bits).collect()),
@@ -442,7 +442,7 @@ impl Array {
     }
 
     /// Return the numbers of an array of whole numbers.
-    fn wholes(&self, encoding: Encoding) -> Parsed<Vec<u64>> {
+    fn wholes(&self, encoding: ArrayEncoding) -> Parsed<Vec<u64>> {
         match self.kind.as_str() {
             "UInt8" => self.numbers(1, encoding),
             "UInt64" => self.numbers(SIZE, encoding),
@@ -451,7 +451,7 @@ impl Array {
     }
 
     /// Return the bits of all numbers, which have `size` bytes each.
-    fn numbers(&self, size: usize, encoding: Encoding) -> Parsed<Vec<u64>> {
+    fn numbers(&self, size: usize, encoding: ArrayEncoding) -> Parsed<Vec<u64>> {
         if self.format != "binary" {
             return Err(self.wrong(format!("its format is `{}`, not `binary`", self.format)));
         }
@@ -466,7 +466,7 @@ impl Array {
 }
 
 /// Split bytes into numbers of `size` bytes each.
-fn split(bytes: &[u8], size: usize, encoding: Encoding) -> Parsed<Vec<u64>> {
+fn split(bytes: &[u8], size: usize, encoding: ArrayEncoding) -> Parsed<Vec<u64>> {
     if !bytes.len().is_multiple_of(size) {
         return Err("it ends within a number".to_owned());
     }
@@ -481,7 +481,7 @@ fn split(bytes: &[u8], size: usize, encoding: Encoding) -> Parsed<Vec<u64>> {
 const SIZE: usize = 8;
 
 /// Decode the bytes of an array, which follow their sizes.
-fn bytes(data: &[u8], encoding: Encoding) -> Parsed<Vec<u8>> {
+fn bytes(data: &[u8], encoding: ArrayEncoding) -> Parsed<Vec<u8>> {
     let decode = |text: &[u8]| STANDARD.decode(text).map_err(|cause| format!("no base64: {cause}"));
     let short = || "it is shorter than it says".to_owned();
     if !encoding.is_compressed {

@@ -7,11 +7,11 @@ mod picture;
 
 use crate::error::{Error, Kind, Result};
 use crate::linalg::bounds;
-use crate::output::{Axis, Color, ConvergenceSeries, Folder, LISTED, Plot, Series, Style, safe_name, write_whole};
+use crate::output::{Color, ConvergenceSeries, Folder, LISTED, Plot, PlotAxis, Series, Style, safe_name, write_whole};
 use crate::problem::units::{Units, force_labels, label};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use files::{Files, Part, magnification, value};
+use files::{ResultFolder, TriangleMesh, magnification, value};
 use minijinja::{UndefinedBehavior, context};
 use picture::{Levels, Picture, View, colors, hex, range};
 use serde::Serialize;
@@ -50,7 +50,7 @@ pub fn save(folder: &Path, out: Option<&Path>) -> Result<PathBuf> {
 }
 
 struct Results {
-    files: Files,
+    files: ResultFolder,
     report: Value,
     /// Units of the scene, if it names them.
     units: Option<Units>,
@@ -72,7 +72,7 @@ impl Results {
                 .because(cause)
                 .help("solve the scene again")
         };
-        let files = Files::open(folder)?;
+        let files = ResultFolder::open(folder)?;
         let report: Value =
             serde_json::from_slice(&files.read("report.json")?).map_err(|cause| refuse(cause.to_string()))?;
         for key in ["status", "bodies", "pairs", "settings", "files", "times", "inner_times"] {
@@ -92,21 +92,21 @@ impl Results {
     }
 
     /// Return the bodies, if the run wrote their fields.
-    fn bodies(&self) -> Result<Vec<Part>> {
+    fn bodies(&self) -> Result<Vec<TriangleMesh>> {
         let names = self.names("bodies", |body| body["name"].as_str().map(str::to_owned));
         let parts = names.iter().filter_map(|name| Some((name, self.file(&[&safe_name(name), name])?)));
-        parts.map(|(name, file)| Part::read(&self.files, &file, name, "von_mises")).collect()
+        parts.map(|(name, file)| TriangleMesh::read(&self.files, &file, name, "von_mises")).collect()
     }
 
     /// Return the contact surfaces in space, if the run wrote them. In the plane they are lines, which have plots.
-    fn surfaces(&self) -> Result<Vec<Part>> {
+    fn surfaces(&self) -> Result<Vec<TriangleMesh>> {
         if !self.is_space() {
             return Ok(Vec::new());
         }
         let files = self.names("files", |file| Some(file.as_str()?.strip_suffix(".vtu")?.to_owned()));
         let surfaces = files.iter().filter(|name| name.starts_with("contact-"));
         let parts = surfaces.filter_map(|name| Some((name, self.file(&[name])?)));
-        parts.map(|(name, file)| Part::read(&self.files, &file, name, "pressure")).collect()
+        parts.map(|(name, file)| TriangleMesh::read(&self.files, &file, name, "pressure")).collect()
     }
 
     /// Return the names in a list of the report.
@@ -166,7 +166,7 @@ impl Results {
         let size = if self.is_area() { "area in contact" } else { "length in contact" };
         let size = label(size, self.size_unit().as_deref());
         let force = self.label("contact force", |units| &units.force);
-        Some(Plot { title: String::new(), x: Axis::linear(force), y: Axis::linear(size), series })
+        Some(Plot { title: String::new(), x: PlotAxis::linear(force), y: PlotAxis::linear(size), series })
     }
 
     /// Return the plot of the contact force over the approach in the same way.
@@ -223,7 +223,7 @@ impl Results {
         let has_facets = self.files.path(&file).is_file();
         let every = if has_facets { 1 } else { points.len().div_ceil(POINTS).max(1) };
         let surface = match has_facets {
-            true => Part::read(&self.files, &file, &title, "pressure")?,
+            true => TriangleMesh::read(&self.files, &file, &title, "pressure")?,
             false => discs(&title, points.iter().zip(&pressures).step_by(every), axes),
         };
         let values: Vec<f64> = surface.value.iter().map(|p| p.max(0.0)).collect();
@@ -236,7 +236,7 @@ impl Results {
     }
 
     /// Return the picture of the stress, or else the displacement, on deformed bodies. Bodies in space show their surfaces.
-    fn field(&self, bodies: &[Part], stress: bool) -> Result<String> {
+    fn field(&self, bodies: &[TriangleMesh], stress: bool) -> Result<String> {
         let values: Vec<Vec<f64>> =
             bodies.iter().map(|part| if stress { part.value.clone() } else { part.travel() }).collect();
         let range = picture::range(values.iter().flatten());
@@ -388,7 +388,7 @@ struct PressurePicture {
 const POINTS: usize = 8000;
 
 /// Return points with pressures as hexagons in the plane of two coordinates, which together cover about their box.
-fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>, axes: [usize; 2]) -> Part {
+fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>, axes: [usize; 2]) -> TriangleMesh {
     let (points, pressures): (Vec<[f64; 3]>, Vec<f64>) = points.unzip();
     let [low, high] = bounds(points.iter().copied());
     let size = axes.map(|k| high[k] - low[k]);
@@ -397,7 +397,7 @@ fn discs<'a>(title: &str, points: impl Iterator<Item = (&'a [f64; 3], &'a f64)>,
     let spacing = (size[0] * size[1] / points.len() as f64).sqrt().clamp(longest / 400.0, longest / 30.0);
     let radius = if longest > 0.0 { 0.62 * spacing } else { 1.0 };
     let (corners, displacement) = (6 * points.len(), [0.0; 3]);
-    let mut disc = Part {
+    let mut disc = TriangleMesh {
         name: title.to_owned(),
         points: Vec::with_capacity(corners),
         triangles: Vec::new(),
@@ -435,12 +435,12 @@ const NONE: u16 = u16::MAX;
 ///
 /// Each part has points relative to the least coordinates and displacements (float32), triangles (uint32), and a value at each
 /// point (uint16). Values are scaled to the range of the parts; 65535 stands for none.
-fn data(bodies: &[Part], surfaces: &[Part], scale: f64, is_space: bool) -> Value {
+fn data(bodies: &[TriangleMesh], surfaces: &[TriangleMesh], scale: f64, is_space: bool) -> Value {
     let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
     json!({
         "bodies": parts(bodies, low),
         "surfaces": parts(surfaces, low),
-        "travel": range(bodies.iter().flat_map(Part::travel).collect::<Vec<_>>().iter()),
+        "travel": range(bodies.iter().flat_map(TriangleMesh::travel).collect::<Vec<_>>().iter()),
         "stress": range(bodies.iter().flat_map(|part| &part.value)),
         "pressure": range(surfaces.iter().flat_map(|part| &part.value)),
         "low": [0.0, 0.0, 0.0],
@@ -457,13 +457,13 @@ fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
 }
 
 /// Return the data of parts, with points relative to `low`.
-fn parts(parts: &[Part], low: [f64; 3]) -> Vec<Value> {
+fn parts(parts: &[TriangleMesh], low: [f64; 3]) -> Vec<Value> {
     let ends = range(parts.iter().flat_map(|part| &part.value));
     parts.iter().map(|part| part_data(part, low, ends)).collect()
 }
 
 /// Return the data of a part; values are scaled to the range.
-fn part_data(part: &Part, low: [f64; 3], [least, most]: [f64; 2]) -> Value {
+fn part_data(part: &TriangleMesh, low: [f64; 3], [least, most]: [f64; 2]) -> Value {
     // float32 has too few digits for a small body far from the origin
     let points: Vec<[f64; 3]> = part.points.iter().map(|x| relative(low, x)).collect();
     let short = |value: &f64| match value.is_finite() {

@@ -1,7 +1,7 @@
 //! The one picture of triangles as SVG: bodies in the plane and in space after deformation, and contact surfaces, in bands of equal value.
 //! The templates of pictures and of the page format values by the filters here.
 
-use super::files::Part;
+use super::files::TriangleMesh;
 use crate::linalg::bounds;
 use crate::output::trimmed;
 use minijinja::value::{Rest, ValueKind};
@@ -73,7 +73,7 @@ struct Region {
 
 /// Regions that belong together.
 #[derive(Serialize)]
-struct Shape {
+struct RegionGroup {
     /// Name, shown under the pointer; empty for none.
     name: String,
     regions: Vec<Region>,
@@ -85,7 +85,7 @@ struct Shape {
 type Corner = [i64; 2];
 
 /// A convex piece of a triangle in one colour.
-struct Facet {
+struct ColoredPolygon {
     /// Three times the distance of the centre of its triangle towards the viewer.
     depth: f64,
     /// Its band and brightness level; none where a contact is open.
@@ -95,10 +95,10 @@ struct Facet {
 
 impl Picture<'_> {
     /// Return the picture of the values at the points of the parts as SVG.
-    pub fn svg(&self, parts: &[Part], values: &[Vec<f64>]) -> Result<String, minijinja::Error> {
+    pub fn svg(&self, parts: &[TriangleMesh], values: &[Vec<f64>]) -> Result<String, minijinja::Error> {
         let View(axes) = &self.view;
         let turned = |&x: &[f64; 3]| axes.map(|axis| axis.dot(&Vector3::from(x)));
-        let moved = |part: &Part| part.moved(self.magnification.unwrap_or(0.0)).iter().map(turned).collect();
+        let moved = |part: &TriangleMesh| part.moved(self.magnification.unwrap_or(0.0)).iter().map(turned).collect();
         let seen: Vec<Vec<[f64; 3]>> = parts.iter().map(moved).collect();
         let [low, high] = bounds(seen.iter().flatten().copied());
         let pixel = ((high[0] - low[0]) / SIZE[0]).max((high[1] - low[1]) / SIZE[1]).max(f64::MIN_POSITIVE);
@@ -114,16 +114,21 @@ impl Picture<'_> {
                 solid.extend(facets);
             } else {
                 let outline = if self.outlines { surface.outline() } else { String::new() };
-                shapes.push(Shape { name: part.name.clone(), regions: regions(facets), outline });
+                shapes.push(RegionGroup { name: part.name.clone(), regions: regions(facets), outline });
             }
         }
-        shapes.push(Shape { name: String::new(), regions: regions(solid), outline: String::new() });
+        shapes.push(RegionGroup { name: String::new(), regions: regions(solid), outline: String::new() });
         let is_open = values.iter().flatten().any(|&value| self.levels.is_open(value));
         self.render(&shapes, is_open, [0, 1].map(|k| (high[k] - low[k]) / pixel))
     }
 
     /// Return shapes with title and legend as SVG.
-    fn render(&self, shapes: &[Shape], is_open: bool, [width, height]: [f64; 2]) -> Result<String, minijinja::Error> {
+    fn render(
+        &self,
+        shapes: &[RegionGroup],
+        is_open: bool,
+        [width, height]: [f64; 2],
+    ) -> Result<String, minijinja::Error> {
         let colors = colors().map(hex).to_vec();
         let Self { title, alone, magnification, .. } = self;
         environment().render_named_str(
@@ -139,7 +144,7 @@ impl Picture<'_> {
 
 /// The surface of a part in a picture.
 struct Surface<'a> {
-    part: &'a Part,
+    part: &'a TriangleMesh,
     /// Points along the directions of the picture.
     seen: &'a [[f64; 3]],
     /// Points in steps of the picture.
@@ -150,7 +155,7 @@ struct Surface<'a> {
 impl Surface<'_> {
     /// Return the triangles, cut by bands; with `overlap` each piece has all higher bands, too, so that no seams are seen. Triangles of a solid
     /// that face away are left out.
-    fn facets(&self, bands: &[(Option<usize>, Band)], overlap: bool) -> Vec<Facet> {
+    fn facets(&self, bands: &[(Option<usize>, Band)], overlap: bool) -> Vec<ColoredPolygon> {
         let mut facets = Vec::new();
         for &nodes in &self.part.triangles {
             let [a, b, c] = nodes.map(|node| Vector3::from(self.seen[node as usize]));
@@ -163,7 +168,11 @@ impl Surface<'_> {
             for &(band, [from, to]) in bands {
                 let corners = self.cut(nodes, [from, if overlap { f64::INFINITY } else { to }]);
                 if !corners.is_empty() {
-                    facets.push(Facet { depth: a.z + b.z + c.z, color: band.map(|band| [band, shade]), corners });
+                    facets.push(ColoredPolygon {
+                        depth: a.z + b.z + c.z,
+                        color: band.map(|band| [band, shade]),
+                        corners,
+                    });
                 }
             }
         }
@@ -204,10 +213,10 @@ impl Surface<'_> {
 }
 
 /// Return facets as regions from back to front. Neighbours in this order with the same colour are one region.
-fn regions(mut facets: Vec<Facet>) -> Vec<Region> {
+fn regions(mut facets: Vec<ColoredPolygon>) -> Vec<Region> {
     facets.sort_by(|a, b| a.depth.total_cmp(&b.depth).then(a.color.cmp(&b.color)));
     let alike = facets.chunk_by(|a, b| a.color == b.color);
-    let region = |alike: &[Facet]| Region {
+    let region = |alike: &[ColoredPolygon]| Region {
         fill: fill(alike[0].color),
         path: path(alike.iter().map(|facet| facet.corners.clone())),
     };
@@ -405,9 +414,9 @@ mod tests {
         twice.abs() / 2.0
     }
 
-    fn part(points: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>, is_solid: bool) -> Part {
+    fn part(points: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>, is_solid: bool) -> TriangleMesh {
         let (displacement, value) = (vec![[0.0; 3]; points.len()], vec![0.0; points.len()]);
-        Part { name: "a".into(), points, triangles, displacement, value, is_solid }
+        TriangleMesh { name: "a".into(), points, triangles, displacement, value, is_solid }
     }
 
     #[test]

@@ -225,12 +225,12 @@ fn pencil(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Option<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::law::{Linear, Power};
+    use crate::contact::law::{LinearLaw, Power};
 
     /// The energy of a linear layer exceeds its minimum by k (c - c0)^2/2.
     #[test]
     fn ranges_of_a_linear_layer() {
-        let law = Linear { stiffness: 4.0 };
+        let law = LinearLaw { stiffness: 4.0 };
         let (low, high) = range(&law, 0, 3.0, 8.0);
         assert!((low - 1.0).abs() < 1e-12 && (high - 5.0).abs() < 1e-12, "{low} {high}");
         assert_eq!(tangents(&law, 0, low, high), (4.0, 4.0));

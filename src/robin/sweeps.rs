@@ -1,7 +1,7 @@
 //! The linear step by conjugate gradients preconditioned by the Robin sweep: every iteration solves each body once, independently.
 //!
 //! One iteration carries information from a body to its neighbours only, so the rigid motions Z that supports leave free are deflated
-//! ([`Coarse`]). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
+//! ([`CoarseOperator`]). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
 //! moved until they are in balance again. Every rank has all contact points, so this needs no message and no solve.
 
 use super::sweep::{Coefficient, Sweep, Sweeper};
@@ -9,8 +9,8 @@ use crate::error::Result;
 use crate::linalg::{axpy, dot};
 use crate::model::Model;
 use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
-use crate::model::linear::{Enough, Failure, LinearStep, Solution, Solved, System, Trial};
-use crate::model::rigid::{Coarse, Motions, Space};
+use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
+use crate::model::rigid::{CoarseOperator, CoarseSpace, Motions};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::rc::Rc;
 
@@ -54,7 +54,7 @@ impl LinearStep for Sweeps {
         "newton-robin"
     }
 
-    fn solve(&mut self, system: System) -> Result<Solved> {
+    fn solve(&mut self, system: System) -> Result<LinearResult> {
         let System { model, places, springs, residual, enough } = system;
         model.precision(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
@@ -69,7 +69,7 @@ impl LinearStep for Sweeps {
         };
         self.spectrum = found.spectrum.or(self.spectrum);
         self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
-        let Solution { energy, error, .. } = found.solution;
+        let LinearSolution { energy, error, .. } = found.solution;
         if self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
             let relative = error / energy.sqrt();
             let reason = format!("{MOST} sweeps leave an error of {relative:.0e} of the linear step");
@@ -93,8 +93,8 @@ impl LinearStep for Sweeps {
 }
 
 /// Result of conjugate gradients.
-pub(super) struct Found {
-    pub solution: Solution,
+pub(super) struct CgResult {
+    pub solution: LinearSolution,
     /// Bounds of the spectrum of G^-1 H from the Lanczos matrix of the iteration.
     pub spectrum: Option<(f64, f64)>,
 }
@@ -107,9 +107,9 @@ pub(super) fn gradients(
     sweeper: &mut Sweeper,
     springs: &[f64],
     residual: &[Vec<f64>],
-    (enough, most): (&mut Enough, usize),
+    (enough, most): (&mut StoppingTest, usize),
     least: f64,
-) -> Result<std::result::Result<Found, Failure>> {
+) -> Result<std::result::Result<CgResult, Failure>> {
     let mut state = Gradients::new(model, springs, residual, least);
     let squared = loop {
         let before = state.previous.as_ref().map_or(&state.r, |previous| &previous.residual);
@@ -132,15 +132,15 @@ pub(super) fn gradients(
         state.previous = Some(Previous { direction, decrement: rz, residual });
     };
     let Gradients { x, lanczos, .. } = state;
-    let solution = Solution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt(), is_exact: false };
-    Ok(Ok(Found { solution, spectrum: lanczos.spectrum() }))
+    let solution = LinearSolution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt(), is_exact: false };
+    Ok(Ok(CgResult { solution, spectrum: lanczos.spectrum() }))
 }
 
 /// Conjugate gradients under way.
 struct Gradients<'a> {
     /// omega kappa, n.
     springs: &'a [f64],
-    coarse: Coarse,
+    coarse: CoarseOperator,
     /// The residual, a state of each body that lives on this rank.
     r: Vec<Vec<f64>>,
     x: Field,
@@ -159,7 +159,7 @@ struct Previous {
 impl<'a> Gradients<'a> {
     /// Start with the solution in the space of rigid motions.
     fn new(model: &Model, springs: &'a [f64], residual: &[Vec<f64>], least: f64) -> Self {
-        let coarse = Coarse::new(Rc::new(Space::of(model, None)), springs);
+        let coarse = CoarseOperator::new(Rc::new(CoarseSpace::of(model, None)), springs);
         let (y, energy) = coarse.solve(residual);
         let (x, r) = (Field::zero(model), residual.to_vec());
         let lanczos = Lanczos { energy, least, ..Lanczos::default() };
@@ -209,7 +209,7 @@ impl<'a> Gradients<'a> {
 }
 
 /// v += s Z y, states and traces.
-fn add_motions(coarse: &Coarse, model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
+fn add_motions(coarse: &CoarseOperator, model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
     coarse.add(s, y, &mut v.states);
     axpy(s, &Motions::of(model).trace(model, y), &mut v.trace);
 }

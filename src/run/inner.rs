@@ -5,7 +5,7 @@
 use super::in_words;
 use crate::discretize::{Assembled, Factory, Outline};
 use crate::error::{Error, Kind, Result};
-use crate::fem::Interpolation;
+use crate::fem::Prolongation;
 use crate::file::available_memory;
 use crate::linalg::Csr;
 use crate::model::{BodySlot, Local};
@@ -13,18 +13,18 @@ use crate::parallel::owners;
 use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Order, Preset};
 use crate::scene::Scene;
-use crate::solver::cost::{self, Candidate, Comparison, Step};
+use crate::solver::cost::{self, BodySize, Comparison, StepSolver};
 use crate::solver::names::WHOLE;
-use crate::solver::options::{Chosen, Typed};
+use crate::solver::options::{Chosen, UserOptions};
 use crate::solver::preset::{self, Size, Smoother};
-use crate::solver::{Krylov, Retained, SparseBody, Uncondensed};
+use crate::solver::{InterfaceDofs, Krylov, SparseBody, Uncondensed};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// A factory that chooses and makes the inner solvers of a scene's bodies.
-pub struct Inner<'a> {
+pub struct SolverFactory<'a> {
     session: &'a Session,
     /// Preset that the scene names.
     asked: Option<Preset>,
@@ -36,11 +36,11 @@ pub struct Inner<'a> {
     /// Solver of linear steps, from the plan on.
     pub linear: Linear,
     /// Options that the user wrote for the solvers.
-    typed: Typed,
+    typed: UserOptions,
     /// Options of the matrix of all bodies.
     pub whole: Chosen,
     /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and multigrid.
-    pub interpolation: Option<Interpolation>,
+    pub interpolation: Option<Prolongation>,
     /// Estimated seconds of set-up and iteration, from the choice of solvers of bodies in space; `None` if nothing was estimated.
     pub seconds: Option<f64>,
     plans: Vec<Plan>,
@@ -52,7 +52,7 @@ pub struct Inner<'a> {
     kept: HashMap<String, BodySlot>,
 }
 
-impl<'a> Inner<'a> {
+impl<'a> SolverFactory<'a> {
     /// Start from the free memory and the options that the user wrote. This scene can reuse the bodies `kept` of an earlier one. Collective.
     pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
         let mine = available_memory() as u64;
@@ -60,7 +60,7 @@ impl<'a> Inner<'a> {
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        let typed = Typed::read(session)?;
+        let typed = UserOptions::read(session)?;
         Ok(Self {
             session,
             asked: scene.solver.preset,
@@ -197,14 +197,14 @@ impl<'a> Inner<'a> {
         let size = if joined { plans.len().max(1) } else { 1 };
         for (plans, outlines) in plans.chunks_mut(size).zip(outlines.chunks(size)) {
             let step = match self.method {
-                _ if joined => Step::Joined,
-                MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => Step::Swept,
-                MethodName::Robin | MethodName::Ncg | MethodName::Anderson => Step::Sweeps,
+                _ if joined => StepSolver::Joined,
+                MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => StepSolver::Swept,
+                MethodName::Robin | MethodName::Ncg | MethodName::Anderson => StepSolver::Sweeps,
             };
             let graphs: Vec<_> = outlines.iter().map(|outline| (outline.graph)()).collect();
             let candidates = plans.iter().zip(&graphs).map(|(plan, graph)| {
                 let retained = plan.retained.as_ref().filter(|_| plan.condensable);
-                Candidate { dofs: plan.dofs, order: plan.order, retained, couplings: graph.col.len() }
+                BodySize { dofs: plan.dofs, order: plan.order, retained, couplings: graph.col.len() }
             });
             let candidates: Vec<_> = candidates.collect();
             // The memory of reused bodies is allocated already.
@@ -282,7 +282,7 @@ impl<'a> Inner<'a> {
     }
 }
 
-impl Inner<'_> {
+impl SolverFactory<'_> {
     /// Set the PETSc options of the plan.
     fn apply(&mut self) {
         let is_quadratic = self.is_quadratic();
@@ -313,8 +313,8 @@ pub struct Decisions {
     bodies: Vec<Plan>,
 }
 
-impl Factory for Inner<'_> {
-    type Plan = Decisions;
+impl Factory for SolverFactory<'_> {
+    type SolverPlan = Decisions;
 
     fn plan(&mut self, outlines: &[Outline]) -> Result<Decisions> {
         preset::check(self.asked, HAS_HYPRE)?;
@@ -322,7 +322,7 @@ impl Factory for Inner<'_> {
         // This marks the bodies for which the program is to choose.
         let mut open = Vec::new();
         for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
-            let (dofs, retained) = (rows.columns, Retained::new(dimension, rows, prescribed, motions));
+            let (dofs, retained) = (rows.columns, InterfaceDofs::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
             // A KSP for all bodies together needs them uncondensed.
             let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());
@@ -370,7 +370,9 @@ impl Factory for Inner<'_> {
         let is_whole = self.plans.iter().any(|plan| plan.preset == Preset::Condensed);
         match self.linear {
             Linear::Sweeps => bodies.filter(|&body| self.distributed[body]).map(|body| vec![body]).collect(),
-            Linear::Direct | Linear::Multigrid if self.session.size() > 1 && !is_whole => vec![bodies.collect()],
+            Linear::Direct | Linear::Multigrid if self.session.size() > 1 && !is_whole => {
+                vec![bodies.collect()]
+            }
             _ => Vec::new(),
         }
     }
@@ -405,7 +407,7 @@ impl Factory for Inner<'_> {
         if self.linear == Linear::Multigrid
             && let Some(next) = levels.take()
         {
-            let empty = || Interpolation { rows: Csr::new(0), own: 0 };
+            let empty = || Prolongation { rows: Csr::new(0), own: 0 };
             let whole = self.interpolation.get_or_insert_with(empty);
             // If dofs are distributed, the columns are those of all bodies.
             let first = if distribution.is_some() { 0 } else { whole.rows.columns };
@@ -453,7 +455,7 @@ pub struct Plan {
     #[serde(skip)]
     pub condensable: bool,
     /// Interface dofs of a condensed body, until it is made.
-    pub retained: Option<Retained>,
+    pub retained: Option<InterfaceDofs>,
 }
 
 impl Plan {
@@ -548,8 +550,8 @@ mod tests {
         let mut rows = Csr::new(30_000);
         (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
         let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
-        let retained = Some(Retained::new(3, &rows, &prescribed, AtDofs::NONE));
-        let chosen = Typed::default().of(name);
+        let retained = Some(InterfaceDofs::new(3, &rows, &prescribed, AtDofs::NONE));
+        let chosen = UserOptions::default().of(name);
         Plan {
             name: name.to_owned(),
             chosen,

@@ -38,7 +38,7 @@ pub fn look(done: &mut Done, recovered: &All) {
         return;
     }
     let began = Instant::now();
-    let energy = Energy::of(done, recovered);
+    let energy = EnergyCheck::of(done, recovered);
     let (reached, pair) = done.outcome.reached(done.model(), energy.strain, energy.unbalanced);
     let whose = pair.map_or(Whose::Body(energy.most), Whose::Pair);
     let reported = done.outcome.rows.last().map_or(0.0, reported_error);
@@ -66,7 +66,7 @@ fn reported_error(row: &Row) -> f64 {
     [row.residual, row.error].into_iter().filter(|error| error.is_finite()).fold(0.0, f64::max)
 }
 
-struct Energy {
+struct EnergyCheck {
     /// u'Ku over all bodies.
     strain: f64,
     /// Lower bound of the energy norm of the unbalanced forces r.
@@ -75,7 +75,7 @@ struct Energy {
     most: usize,
 }
 
-impl Energy {
+impl EnergyCheck {
     /// Measure the result of a run. Collective.
     fn of(done: &Done, recovered: &All) -> Self {
         let model = done.model();

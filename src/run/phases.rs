@@ -1,14 +1,14 @@
 //! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, method,
 //! iteration. All ranks must read the same scene, and a problem takes over what the run of another scene before it has left.
 
-use super::inner::Inner;
+use super::inner::SolverFactory;
 use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
 use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma::{self, Relaxed};
 use crate::ddm::robin::{Acceleration, Anderson, Conjugate};
-use crate::ddm::{self, Method, Outcome, Start, Status, first_springs};
+use crate::ddm::{self, InitialGuess, Method, Outcome, Status, first_springs};
 use crate::discretize::{self, Verified, point};
 use crate::error::{Error, Kind, Result, few};
 use crate::estimate::{self, Estimate};
@@ -97,7 +97,7 @@ where
     clock.phase("mesh");
     drop(stage);
     verified.mesh.forget_tags();
-    let source = Source { session: session.clone(), scene, verified, read, cut };
+    let source = MeshedScene { session: session.clone(), scene, verified, read, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
@@ -115,7 +115,7 @@ struct FileRead {
 }
 
 /// A scene with its mesh, from which discrete problems are built.
-struct Source<const D: usize> {
+struct MeshedScene<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
@@ -124,7 +124,7 @@ struct Source<const D: usize> {
     cut: Cut<D>,
 }
 
-impl<const D: usize> Source<D>
+impl<const D: usize> MeshedScene<D>
 where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
@@ -138,7 +138,7 @@ where
         let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         collectively(session, options::set_of_scene(session, &names, &scene.solver.options))?;
-        let mut inner = Inner::new(session, scene, kept)?;
+        let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
         let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
@@ -185,7 +185,7 @@ where
     }
 }
 
-impl<const D: usize> Legs for Source<D>
+impl<const D: usize> Legs for MeshedScene<D>
 where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
@@ -226,7 +226,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     let mut start = match start {
         Some(start) => start,
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
-        None => Start::Automatic,
+        None => InitialGuess::Automatic,
     };
     let mut full = start.clone();
     let method = collectively(session, make(session, &mut built, &mut full))?;
@@ -381,7 +381,7 @@ fn keys_and_values(mut contents: Value) -> Vec<(String, String)> {
 
 /// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
 /// automatic start, it is stored in `start`.
-fn make(session: &Session, built: &mut Built, start: &mut Start) -> Result<Method> {
+fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
     let (scene, coefficient) = (built.scene.clone(), coefficient_of(&built.scene));
     let acceleration: Box<dyn Acceleration> = match scene.method.name {
         MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
@@ -400,7 +400,7 @@ fn coefficient_of(scene: &Scene) -> Coefficient {
 }
 
 /// Return the solver of the linear steps of Newton's method.
-fn linear_step(session: &Session, built: &mut Built, start: &mut Start) -> Result<Box<dyn LinearStep>> {
+fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Box<dyn LinearStep>> {
     let Built { scene, discrete, linear, options, interpolation, .. } = built;
     let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
     if linear == Linear::Sweeps {

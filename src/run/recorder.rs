@@ -3,7 +3,7 @@
 use super::look;
 use super::results;
 use super::stages::{All, Done, Prepared};
-use crate::ddm::{self, Observer, Row, Settings, Silent, Start, Status};
+use crate::ddm::{self, InitialGuess, Observer, Row, Settings, Silent, Status};
 use crate::error::Result;
 use crate::exchange::ASKS;
 use crate::interrupt::{self, ENDING, Interrupt};
@@ -28,7 +28,7 @@ impl Recorder for Requests {}
 /// Solve through all pauses until a rule or a signal ends the run. `full` is whether this is the full load. There the run may end
 /// at the error of the discretisation, and the interval of gamma is computed if the scene requests it.
 pub fn solve(mut ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
-    if let Start::Continue(state) = &ready.start {
+    if let InitialGuess::Continue(state) = &ready.start {
         state.rows.iter().for_each(|row| keep.row(row));
     }
     loop {
@@ -51,7 +51,7 @@ pub fn solve(mut ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result
         if is_snapshot(asked) {
             keep.results(&mut done);
         }
-        ready = done.go_on(|outcome| Start::Continue(outcome.into_state()));
+        ready = done.go_on(|outcome| InitialGuess::Continue(outcome.into_state()));
     }
 }
 

@@ -11,8 +11,8 @@ use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, Grid, InnerTimes, IntervalReport, LookReport, PairReport, Report,
-    sci,
+    BodyReport, ContactTable, EstimateReport, Extent, InnerTimes, IntervalReport, LookReport, PairReport, Report,
+    UnstructuredGrid, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 /// Return the report of a run. Collective.
 pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
     let (discrete, model, outcome) = (&done.built.discrete, done.model(), &done.outcome);
-    let shared = Shared::gather(discrete);
+    let shared = GatheredCounters::gather(discrete);
     let mut report = headline(session, &done.built, &shared.solvers, clock);
     add_outcome(&mut report, outcome, model);
     add_counters(&mut report, &shared, outcome);
@@ -73,7 +73,7 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 /// Add the counters of the iteration, of the bodies, and of the joint solver of all bodies.
-fn add_counters(report: &mut Report, shared: &Shared, outcome: &Outcome) {
+fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcome) {
     let (counts, joint) = (&shared.counts, &outcome.joint);
     report.iterations = outcome.iterations;
     report.sweeps = outcome.sweeps;
@@ -206,7 +206,7 @@ fn petsc_options(session: &Session) -> Vec<String> {
 
 /// Data that only the owners of the bodies have, gathered on every rank: counters over all bodies, and their inner solvers.
 #[derive(Default, Serialize, Deserialize)]
-pub struct Shared {
+pub struct GatheredCounters {
     /// Counters, summed over all bodies.
     pub counts: BodyCounts,
     assemblies: usize,
@@ -231,7 +231,7 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
     few(kinds.iter().map(in_words)).join(", ")
 }
 
-impl Shared {
+impl GatheredCounters {
     /// Gather the data on every rank. Collective.
     pub fn gather(discrete: &Discrete) -> Self {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
@@ -328,7 +328,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
 }
 
 /// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
-pub fn contact_surface(name: &str, done: &Done, i: usize) -> Grid {
+pub fn contact_surface(name: &str, done: &Done, i: usize) -> UnstructuredGrid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
     done.built.discrete.contacts[i].surface.grid(

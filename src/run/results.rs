@@ -4,7 +4,7 @@
 use super::numbered;
 use super::stages::{All, Built, Done, Recovered};
 use crate::contact::{ContactPair, moment_in_scene};
-use crate::discretize::{Balance, BodyInfo, Discrete};
+use crate::discretize::{BodyInfo, Discrete, ForceBalance};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
@@ -354,7 +354,7 @@ fn add_forces(done: &Done, body: usize, recovered: &Recovered, mine: &mut [f64])
     // bodies expect values at the full load
     let full = |values: &[f64]| values.iter().map(|v| v / done.share).collect::<Vec<_>>();
     let force = model.at_rows(body, &done.outcome.layer.force);
-    let Balance { parts, size } = info.post().balance(&full(&recovered.bent), &full(&force));
+    let ForceBalance { parts, size } = info.post().balance(&full(&recovered.bent), &full(&force));
     let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
     mine.iter_mut().zip(numbers).for_each(|(mine, number)| *mine = done.share * number);
 }
@@ -387,7 +387,7 @@ fn imbalance(vectors: impl Iterator<Item = [f64; 3]> + Clone, size: f64) -> f64 
 
 /// The estimates for a pair.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Coupling {
+pub struct CouplingEstimate {
     /// Mean pressure that the loads give.
     pub pressure: f64,
     /// theta of side a and side b.
@@ -401,7 +401,7 @@ pub struct Coupling {
 const DIGITS: f64 = 18.42;
 
 /// Return the coupling of pair `i`.
-pub fn coupling(built: &Built, i: usize) -> Coupling {
+pub fn coupling(built: &Built, i: usize) -> CouplingEstimate {
     let Built { scene, discrete, .. } = built;
     let pair = &discrete.model.pairs[i];
     let area: f64 = pair.weight.iter().sum();
@@ -422,7 +422,7 @@ pub fn coupling(built: &Built, i: usize) -> Coupling {
     let condition = (1.0 + both) / (1.0 - both);
     let gradients = if both < 1.0 { (0.5 * condition.sqrt() * (DIGITS + 0.7)).max(2.0) } else { f64::INFINITY };
     let sweeps = vec![("robin", relaxed), ("ncg", gradients), ("newton-robin", 1.5 * gradients + 5.0), ("newton", 6.0)];
-    Coupling { pressure, theta, sweeps }
+    CouplingEstimate { pressure, theta, sweeps }
 }
 
 /// Return the part of a load that presses the surface of a pair: along the mean normal where the surface faces one way, and the whole

@@ -1,10 +1,10 @@
 //! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock that measures its phases.
 
-use crate::ddm::{Discretisation, Method, Outcome, Reached, Row, Start, Whose};
+use crate::ddm::{Discretisation, InitialGuess, Method, Outcome, Reached, Row, Whose};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Error, Result};
 use crate::estimate::Nodal;
-use crate::fem::Interpolation;
+use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
 use crate::model::{BodySlot, Model};
 use crate::output::{BodyField, StepReport};
@@ -18,6 +18,7 @@ use std::time::Instant;
 
 /// A scene with its discrete problem. Bodies have their inner solvers, but nothing is factorised yet.
 pub struct Built {
+    /// The scene.
     pub scene: Rc<Scene>,
     /// The discrete problem.
     pub discrete: Discrete,
@@ -28,7 +29,7 @@ pub struct Built {
     /// The solver of linear steps.
     pub linear: Linear,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
-    pub interpolation: Option<Interpolation>,
+    pub interpolation: Option<Prolongation>,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, which another run can reuse.
@@ -51,7 +52,7 @@ pub trait Legs {
 #[derive(Default)]
 pub struct Begin {
     /// The start; none for the start of the scene.
-    pub start: Option<Start>,
+    pub start: Option<InitialGuess>,
     /// Earlier load steps.
     pub steps: Vec<StepReport>,
     /// Iteration rows of the earlier load steps.
@@ -65,7 +66,7 @@ pub struct Prepared {
     /// The method with its solvers, all set up.
     pub method: Method,
     /// The start. Each load step determines its own, except for one that another process has begun.
-    pub start: Start,
+    pub start: InitialGuess,
     /// Earlier load steps.
     pub steps: Vec<StepReport>,
     /// Iteration rows of the earlier load steps.
@@ -114,7 +115,7 @@ impl Built {
 
 impl Done {
     /// Return the same problem and method, prepared for another run that starts from this outcome.
-    pub fn go_on(self, start: impl FnOnce(Outcome) -> Start) -> Prepared {
+    pub fn go_on(self, start: impl FnOnce(Outcome) -> InitialGuess) -> Prepared {
         let Self { built, method, outcome, steps, earlier, warnings, .. } = self;
         Prepared { built, method, start: start(outcome), steps, earlier, warnings }
     }

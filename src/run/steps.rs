@@ -6,13 +6,13 @@
 //! Another leg is another problem on the same mesh, which reuses condensed bodies.
 
 use super::recorder::{self, Recorder};
-use super::report::Shared;
+use super::report::GatheredCounters;
 use super::results;
 use super::stages::{self, All, Begin, Clock, Done, Prepared};
 use super::verdict::{message, status_name};
 use super::warnings;
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{Method, Observer, Outcome, Row, Start, Status};
+use crate::ddm::{InitialGuess, Method, Observer, Outcome, Row, Status};
 use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::model::{BodyCounts, Field, Layer, Model};
@@ -60,7 +60,8 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
             done.recovered = None;
             (done.outcome, done.share) = (of_step, 1.0);
             scale_loads(&mut done.built.discrete.model, &all.laws, factor);
-            ready = done.go_on(|outcome| if usable { Start::Resume(outcome.iterate) } else { Start::Automatic });
+            ready = done
+                .go_on(|outcome| if usable { InitialGuess::Resume(outcome.iterate) } else { InitialGuess::Automatic });
         } else {
             ready = all.end_leg(done, &of_step, usable, clock)?;
         }
@@ -78,21 +79,21 @@ fn scale_loads(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
 
 /// Return the start of a step, from the load factors of the previous step and of this one.
 fn start(
-    start: Start,
+    start: InitialGuess,
     method: &mut Method,
     discrete: &Discrete,
     scene: &Scene,
     [before, factor]: [f64; 2],
-) -> Result<Start> {
+) -> Result<InitialGuess> {
     Ok(match start {
-        Start::Resume(field) => {
+        InitialGuess::Resume(field) => {
             if let Method::Sweeps { acceleration, .. } = method {
                 acceleration.restart();
             }
-            Start::Resume(rescaled(&discrete.model, field, before / factor))
+            InitialGuess::Resume(rescaled(&discrete.model, field, before / factor))
         }
-        paused @ Start::Continue(_) => paused,
-        Start::Pressure(pressure) => Start::Pressure(pressure.into_iter().map(|p| p / factor).collect()),
+        paused @ InitialGuess::Continue(_) => paused,
+        InitialGuess::Pressure(pressure) => InitialGuess::Pressure(pressure.into_iter().map(|p| p / factor).collect()),
         _ => discretize::start(scene, discrete, factor)?.into(),
     })
 }
@@ -177,12 +178,13 @@ impl<'a> Steps<'a> {
     fn end_leg(&mut self, mut done: Done, of_step: &Outcome, usable: bool, clock: &mut Clock) -> Result<Prepared> {
         clock.phase("iterate");
         self.end_step(&mut done, of_step);
-        self.counts += Shared::gather(&done.built.discrete).counts;
+        self.counts += GatheredCounters::gather(&done.built.discrete).counts;
         self.counts += of_step.joint;
         let Discrete { assemblies, assemblies_avoided, .. } = done.built.discrete;
         let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
         // at zero load the ratio p/s is undefined, so there is no warm start
-        let start = (usable && !self.history.is_at_rest(self.step)).then_some(Start::Pressure(outcome.layer.pressure));
+        let start =
+            (usable && !self.history.is_at_rest(self.step)).then_some(InitialGuess::Pressure(outcome.layer.pressure));
         let (legs, mut known) = (built.legs.clone(), built.warnings.clone());
         drop(method);
         let condensed = built.into_condensed();

@@ -5,7 +5,7 @@ use super::in_words;
 use super::results::{coupling, peak};
 use super::stages::{Built, Done};
 use super::verdict::is_solved;
-use crate::contact::{Chords, ContactPair, End, Left, LostPieces};
+use crate::contact::{Chords, ContactPair, Left, LostPieces, UncoveredPoint};
 use crate::discretize::{Balanced, ContactInfo, Discrete, point};
 use crate::error::few;
 use crate::estimate::{Cause, Estimate};
@@ -334,7 +334,7 @@ pub fn note_ends(done: &mut Done) {
 /// Return the number of contact points under pressure from which the contact probably goes on beyond the end of pair `i`.
 fn reached(done: &Done, i: usize) -> usize {
     let (layer, first) = (&done.outcome.layer, done.model().range(i).start);
-    let goes_on = |end: &&End| {
+    let goes_on = |end: &&UncoveredPoint| {
         let q = first + end.point;
         layer.pressure[q] > 0.0 && layer.compression[q] >= end.compression
     };

@@ -23,17 +23,17 @@ pub(super) struct Refusal {
     pub error: Error,
 }
 
-type Checked = Result<(), Refusal>;
+type CheckResult = Result<(), Refusal>;
 
 /// The key whose value is being checked.
-struct At<'a> {
+struct CheckedKey<'a> {
     /// Dotted path of the key.
     key: String,
     /// Place of the nearest name that a Rust program gives.
     near: &'a Place,
 }
 
-impl<'a> At<'a> {
+impl<'a> CheckedKey<'a> {
     fn new(key: impl Into<String>, near: &'a Place) -> Self {
         Self { key: key.into(), near }
     }
@@ -49,13 +49,13 @@ impl<'a> At<'a> {
     }
 
     /// Return a refusal; `label` and `help` may be empty.
-    fn refuse(&self, message: impl Into<String>, label: &str, help: &str) -> Checked {
+    fn refuse(&self, message: impl Into<String>, label: &str, help: &str) -> CheckResult {
         let error = Error::scene(self.near, message).label(label);
         Err(Refusal { key: self.key.clone(), error: if help.is_empty() { error } else { error.help(help) } })
     }
 
     /// Refuse a number that is not finite and > 0.
-    fn positive(&self, what: &str, value: f64) -> Checked {
+    fn positive(&self, what: &str, value: f64) -> CheckResult {
         match value > 0.0 && value.is_finite() {
             true => Ok(()),
             false => self.refuse(format!("{what} is {}", shown(value)), "must be greater than 0", ""),
@@ -63,12 +63,12 @@ impl<'a> At<'a> {
     }
 
     /// Refuse the number of a key below if it is not finite and > 0.
-    fn positive_in(&self, key: &str, what: &str, value: f64) -> Checked {
+    fn positive_in(&self, key: &str, what: &str, value: f64) -> CheckResult {
         self.below(key).positive(what, value)
     }
 
     /// Refuse what cannot be the name of a body, or a pattern of such names.
-    fn name(&self, name: &str) -> Checked {
+    fn name(&self, name: &str) -> CheckResult {
         let fault = match is_pattern(name) {
             true => name.chars().any(|c| !is_in_name(c) && !"*?[]!-".contains(c)).then_some(SPELLING),
             false => fault(name),
@@ -91,8 +91,8 @@ impl Scene {
     }
 
     /// Check the whole scene. A new check stands in the function of its table.
-    pub(super) fn verify(&self) -> Checked {
-        let at = |key: &str| At::new(key, &self.dimension.place);
+    pub(super) fn verify(&self) -> CheckResult {
+        let at = |key: &str| CheckedKey::new(key, &self.dimension.place);
         self.check_dimension(&at("dimension"))?;
         check_mesh(&at("mesh"), &self.mesh)?;
         self.check_bodies(&at("body"))?;
@@ -110,7 +110,7 @@ impl Scene {
         self.dimension.value == 2
     }
 
-    fn check_dimension(&self, at: &At) -> Checked {
+    fn check_dimension(&self, at: &CheckedKey) -> CheckResult {
         let is_known = self.is_plane() || (self.dimension.value == 3 && self.plane == Plane::Strain);
         match is_known {
             true => Ok(()),
@@ -118,13 +118,13 @@ impl Scene {
         }
     }
 
-    fn check_bodies(&self, at: &At) -> Checked {
+    fn check_bodies(&self, at: &CheckedKey) -> CheckResult {
         if self.bodies.is_empty() {
             return at.refuse("the scene has no body", "", "a body starts with the line [[body]]");
         }
         let mut names = HashSet::new();
         for (number, body) in self.bodies.iter().enumerate() {
-            let at = At { near: &body.name.place, ..at.below(number) };
+            let at = CheckedKey { near: &body.name.place, ..at.below(number) };
             let name = &body.name.value;
             if !names.insert(name) {
                 let help = "names of bodies are those of physical groups of cells, one for each";
@@ -137,7 +137,7 @@ impl Scene {
         Ok(())
     }
 
-    fn check_body(&self, at: &At, body: &BodySpec) -> Checked {
+    fn check_body(&self, at: &CheckedKey, body: &BodySpec) -> CheckResult {
         check_elasticity(at, &body.elasticity)?;
         for (number, region) in body.regions.iter().enumerate() {
             check_elasticity(&at.item("region", number, &region.on.place), &region.elasticity)?;
@@ -148,7 +148,7 @@ impl Scene {
         self.check_lines(at, body)
     }
 
-    fn check_adapt(&self, at: &At) -> Checked {
+    fn check_adapt(&self, at: &CheckedKey) -> CheckResult {
         let Some(adapt) = &self.adapt else { return Ok(()) };
         let at = at.below("error");
         at.positive("the error", adapt.error.value)?;
@@ -160,14 +160,14 @@ impl Scene {
     }
 }
 
-fn check_mesh(at: &At, mesh: &MeshSource) -> Checked {
+fn check_mesh(at: &CheckedKey, mesh: &MeshSource) -> CheckResult {
     let MeshSource::Geo { guard, .. } = mesh else { return Ok(()) };
     at.positive_in("timeout", "the timeout", guard.seconds)?;
     guard.gigabytes.map_or(Ok(()), |memory| at.positive_in("memory", "the memory", memory))?;
     guard.size.map_or(Ok(()), |size| at.positive_in("size", "the size", size))
 }
 
-fn check_elasticity(at: &At, elasticity: &ElasticitySpec) -> Checked {
+fn check_elasticity(at: &CheckedKey, elasticity: &ElasticitySpec) -> CheckResult {
     let Constants::Isotropic { young, poisson } = &elasticity.constants else { return Ok(()) };
     if let Field::Constant(young) = young {
         at.positive_in("young", "Young's modulus", *young)?;
@@ -191,19 +191,19 @@ fn check_elasticity(at: &At, elasticity: &ElasticitySpec) -> Checked {
 }
 
 /// Return the key of the table of a contact.
-fn at_contact(contact: &ContactSpec) -> At<'_> {
-    At::new(format!("contact.{}", contact.table), &contact.between[0].place)
+fn at_contact(contact: &ContactSpec) -> CheckedKey<'_> {
+    CheckedKey::new(format!("contact.{}", contact.table), &contact.between[0].place)
 }
 
 /// Check pairs of surfaces that the scene names: two plain names each, and no pair twice.
-fn check_pairs(contacts: &[ContactSpec]) -> Checked {
+fn check_pairs(contacts: &[ContactSpec]) -> CheckResult {
     let mut pairs = HashSet::new();
     for contact in contacts {
         let at = at_contact(contact).below("between");
         let [a, b] = contact.between.each_ref().map(|name| &name.value);
         if a == b {
             let help = "name one surface of each of two bodies";
-            let second = At { near: &contact.between[1].place, ..at.below(1) };
+            let second = CheckedKey { near: &contact.between[1].place, ..at.below(1) };
             return second.refuse(format!("a contact between `{b}` and itself"), "", help);
         }
         if !pairs.insert([a.min(b), a.max(b)]) {
@@ -221,7 +221,7 @@ fn check_pairs(contacts: &[ContactSpec]) -> Checked {
 }
 
 /// Check rules that find pairs: no two are for the same names of bodies.
-fn check_rules(rules: &[AutoContact]) -> Checked {
+fn check_rules(rules: &[AutoContact]) -> CheckResult {
     let mut known = HashSet::new();
     for AutoContact { of, contact } in rules {
         let at = at_contact(contact);
@@ -247,7 +247,7 @@ fn check_rules(rules: &[AutoContact]) -> Checked {
     Ok(())
 }
 
-fn check_contact(at: &At, contact: &ContactSpec) -> Checked {
+fn check_contact(at: &CheckedKey, contact: &ContactSpec) -> CheckResult {
     at.positive_in("angle", "the angle", contact.angle)?;
     if contact.angle > 90.0 {
         let message = format!("the angle is {} degrees", shown(contact.angle));
@@ -264,7 +264,7 @@ fn check_contact(at: &At, contact: &ContactSpec) -> Checked {
     check_layer(&at.below("layer"), &contact.layer)
 }
 
-fn check_layer(at: &At, layer: &LayerSpec) -> Checked {
+fn check_layer(at: &CheckedKey, layer: &LayerSpec) -> CheckResult {
     match layer {
         LayerSpec::Form { form, values } => {
             for (parameter, value) in form.parameters.iter().zip(values) {
@@ -285,7 +285,7 @@ fn check_layer(at: &At, layer: &LayerSpec) -> Checked {
 }
 
 /// Check that compressions and pressures (c, p) increase from (0, 0).
-fn check_table(at: &At, points: &[[f64; 2]]) -> Checked {
+fn check_table(at: &CheckedKey, points: &[[f64; 2]]) -> CheckResult {
     if points.is_empty() {
         return at.refuse("the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]");
     }
@@ -301,7 +301,7 @@ fn check_table(at: &At, points: &[[f64; 2]]) -> Checked {
     Ok(())
 }
 
-fn check_asperities(at: &At, spec: &AsperitySpec) -> Checked {
+fn check_asperities(at: &CheckedKey, spec: &AsperitySpec) -> CheckResult {
     at.positive_in("modulus", "the modulus", spec.modulus)?;
     if let Depths::Normal { deviation, highest } = spec.depths {
         at.positive_in("deviation", "the deviation", deviation)?;
@@ -311,7 +311,7 @@ fn check_asperities(at: &At, spec: &AsperitySpec) -> Checked {
     at.positive_in("radius", "the radius", spec.radius)
 }
 
-fn check_method(at: &At, method: &MethodSpec) -> Checked {
+fn check_method(at: &CheckedKey, method: &MethodSpec) -> CheckResult {
     check_gamma(at, &method.gamma)?;
     if let RobinRule::Floor(floor) = method.robin {
         at.positive_in("robin.floor", "the floor", floor)?;
@@ -332,7 +332,7 @@ fn check_method(at: &At, method: &MethodSpec) -> Checked {
 }
 
 /// Check gamma; `at` is the method.
-fn check_gamma(at: &At, gamma: &Gamma) -> Checked {
+fn check_gamma(at: &CheckedKey, gamma: &Gamma) -> CheckResult {
     match gamma {
         Gamma::Stationary(gamma) => at.positive_in("gamma", "gamma", *gamma),
         Gamma::Schedule(list) if list.is_empty() => {
@@ -347,7 +347,7 @@ fn check_gamma(at: &At, gamma: &Gamma) -> Checked {
     }
 }
 
-fn check_steps(at: &At, method: &MethodSpec) -> Checked {
+fn check_steps(at: &CheckedKey, method: &MethodSpec) -> CheckResult {
     if !method.steps.is_empty() && matches!(method.start, Start::Nested) {
         let help = "each step starts from the one before: leave `start = \"nested\"` away";
         return at.refuse("load steps after a start from a coarser mesh", "", help);
@@ -367,7 +367,7 @@ fn check_steps(at: &At, method: &MethodSpec) -> Checked {
     Ok(())
 }
 
-fn check_stop(at: &At, stop: &StopRule) -> Checked {
+fn check_stop(at: &CheckedKey, stop: &StopRule) -> CheckResult {
     if stop.iterations == 0 || stop.residual.or(stop.increment).is_none() {
         return at.refuse("a stop rule has a tolerance, and at least one iteration", "", "");
     }
@@ -379,7 +379,7 @@ fn check_stop(at: &At, stop: &StopRule) -> Checked {
 
 impl Scene {
     /// Check all lines of a body with supports, springs and loads.
-    fn check_lines(&self, at: &At, body: &BodySpec) -> Checked {
+    fn check_lines(&self, at: &CheckedKey, body: &BodySpec) -> CheckResult {
         for (number, support) in body.fix.iter().enumerate() {
             self.check_support(&at.item("fix", number, &support.on.place), support)?;
         }
@@ -392,7 +392,7 @@ impl Scene {
         Ok(())
     }
 
-    fn check_support(&self, at: &At, support: &Support) -> Checked {
+    fn check_support(&self, at: &CheckedKey, support: &Support) -> CheckResult {
         let components = support.value.iter().flatten().count();
         if components > 0 && support.normal.is_some() {
             return at.refuse("a support holds some components, or the normal alone", "", "");
@@ -409,7 +409,7 @@ impl Scene {
         Ok(())
     }
 
-    fn check_load(&self, at: &At, load: &Load) -> Checked {
+    fn check_load(&self, at: &CheckedKey, load: &Load) -> CheckResult {
         let acts_along_z = match &load.kind {
             LoadKind::Pressure(_) | LoadKind::Moment(_) => false,
             LoadKind::Traction(traction) => !traction[2].is_zero(),
@@ -435,7 +435,7 @@ impl Scene {
         Ok(())
     }
 
-    fn check_moment(&self, at: &At, moment: [f64; 3]) -> Checked {
+    fn check_moment(&self, at: &CheckedKey, moment: [f64; 3]) -> CheckResult {
         if moment.iter().any(|component| !component.is_finite()) {
             return at.refuse(format!("the moment is {moment:?}"), "", "");
         }
@@ -450,7 +450,7 @@ impl Scene {
     }
 }
 
-fn check_spring(at: &At, spring: &SpringSpec) -> Checked {
+fn check_spring(at: &CheckedKey, spring: &SpringSpec) -> CheckResult {
     // expressions are checked where they are evaluated; here they count as > 0
     let constant = |field: &Field| if let Field::Constant(value) = field { *value } else { f64::MIN_POSITIVE };
     match &spring.kind {

@@ -2,13 +2,13 @@
 //! the whole scene, of mesh, data and the inner solver are here.
 
 use super::Scene;
-use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, Missing, Outside, has_header};
+use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, NoData, Outside, has_header};
 use crate::error::{Error, Located, Place, Result};
 use crate::expression::names;
 use crate::mesh::is_shape;
 use crate::problem::{Guard, MeshSource, Preset, SolverSpec, contact, name_of};
 use crate::setting::{
-    Context, Entries, Entry, Keys, Node, Setting, TableShape, Value, ValueKind, choose, entries, file, word,
+    Context, Entries, Keys, Node, Setting, TableEntry, TableShape, Value, ValueKind, choose, entries, file, word,
 };
 use crate::solver::options;
 use serde_json::{Map, Value as Json, json};
@@ -162,7 +162,7 @@ fn mesh_file(keys: &Keys, msh: &Node, context: &Context) -> Result<MeshSource> {
     let of_gmsh = Guard::shape();
     match ["set"].into_iter().chain(of_gmsh.keys.iter().map(|key| key.name)).find_map(|key| keys.entry(key)) {
         None => Ok(MeshSource::Msh { file }),
-        Some(Entry { key, key_place, .. }) => Err(Error::scene(key_place, format!("`{key}` for a finished mesh"))
+        Some(TableEntry { key, key_place, .. }) => Err(Error::scene(key_place, format!("`{key}` for a finished mesh"))
             .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
     }
 }
@@ -190,7 +190,7 @@ fn numbers(node: &Node) -> Result<Vec<NamedNumber>> {
         return Err(node.expected("a table", ""));
     };
     let mut numbers = Vec::new();
-    for Entry { key, key_place, node } in entries {
+    for TableEntry { key, key_place, node } in entries {
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
         if !key.chars().all(is_word) || !key.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
             return Err(Error::scene(key_place, format!("`{key}` is no name of a Gmsh number")));
@@ -229,8 +229,8 @@ fn library(node: Option<&Node>, folder: &Path) -> Result<Library> {
     const EXAMPLE: &str = "write [data.rough] and below it file = \"surface.csv\"";
     let Some(node) = node else { return Ok(Library::new()) };
     let Value::Table(entries) = &node.value else { return Err(node.expected("a table", EXAMPLE)) };
-    let is_table = |entry: &&Entry| matches!(entry.node.value, Value::Table(_));
-    if let Some(Entry { key, key_place, .. }) = entries.iter().find(|entry| !is_table(entry)) {
+    let is_table = |entry: &&TableEntry| matches!(entry.node.value, Value::Table(_));
+    if let Some(TableEntry { key, key_place, .. }) = entries.iter().find(|entry| !is_table(entry)) {
         return Err(Error::scene(key_place, format!("`{key}` in data without a name")).help(EXAMPLE));
     }
     entries.iter().map(|entry| Ok((entry.key.clone(), Arc::new(Data::new(spec(entry, folder)?))))).collect()
@@ -250,8 +250,8 @@ fn check_name(name: &str, place: &Place) -> Result<()> {
     Ok(())
 }
 
-fn spec(entry: &Entry, folder: &Path) -> Result<DataSpec> {
-    let Entry { key: name, key_place, node } = entry;
+fn spec(entry: &TableEntry, folder: &Path) -> Result<DataSpec> {
+    let TableEntry { key: name, key_place, node } = entry;
     check_name(name, key_place)?;
     let keys = Keys::open(node, &data_shape(format!("[data.{name}]")))?;
     let path = file(folder, keys.require("file")?)?;
@@ -294,7 +294,7 @@ fn of_spec(spec: &DataSpec) -> Json {
     let DataSpec {
         name: _, file, place: _, points, origin, spacing, unit, missing, fill, detrend, interpolation, outside,
     } = spec;
-    let missing = missing.as_ref().map(|Missing { numbers, words }| {
+    let missing = missing.as_ref().map(|NoData { numbers, words }| {
         numbers.iter().map(|number| json!(number)).chain(words.iter().map(|word| json!(word))).collect::<Json>()
     });
     entries([
@@ -320,13 +320,13 @@ fn unit(node: &Node) -> Result<f64> {
 }
 
 /// Return what stands for points without a height: a number, a word, or a list of these.
-fn missing(node: &Node) -> Result<Missing> {
+fn missing(node: &Node) -> Result<NoData> {
     let one = [node];
     let items: Vec<&Node> = match &node.value {
         Value::List(items) => items.iter().collect(),
         _ => one.to_vec(),
     };
-    let mut missing = Missing::default();
+    let mut missing = NoData::default();
     for item in items {
         match &item.value {
             Value::String(word) => missing.words.push(word.clone()),

@@ -17,7 +17,7 @@ pub use decode::schema;
 pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Scene};
 
 use crate::error::{Error, Kind, Place, Result, Source, few};
-use crate::setting::{Entry, Node, Value, document, value as toml_value};
+use crate::setting::{Node, TableEntry, Value, document, value as toml_value};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -116,7 +116,7 @@ fn apply(tree: &mut Node, text: &str) -> Result<()> {
 fn put(tree: &mut Node, path: &str, place: &Place, new: Node) -> Result<()> {
     let mut node = tree;
     for name in path.split('.') {
-        node = child(node, &Step { name, place: place.clone(), parent: "", before_number: false })?;
+        node = child(node, &KeySegment { name, place: place.clone(), parent: "", before_number: false })?;
     }
     *node = new;
     Ok(())
@@ -145,13 +145,13 @@ fn set(tree: &mut Node, source: &Arc<Source>, start: usize) -> Result<()> {
     for (depth, span) in path.iter().enumerate() {
         let parent = text[start..span.start].trim_end().trim_end_matches('.').trim_end();
         let before_number = path.get(depth + 1).is_some_and(|next| is_number(&text[next.clone()]));
-        node = child(node, &Step { name: &text[span.clone()], place: at(span.clone()), parent, before_number })?;
+        node = child(node, &KeySegment { name: &text[span.clone()], place: at(span.clone()), parent, before_number })?;
     }
     *node = new;
     Ok(())
 }
 
-struct Step<'a> {
+struct KeySegment<'a> {
     /// The key: a name, or the number of an item.
     name: &'a str,
     /// Place of the key in the option.
@@ -190,7 +190,7 @@ fn value(source: &Arc<Source>, offset: usize) -> Result<Node> {
 
 /// Return the child of a node to which a step leads. A value that has no children becomes an empty table, and a key that its table does
 /// not have is added.
-fn child<'a>(node: &'a mut Node, step: &Step<'_>) -> Result<&'a mut Node> {
+fn child<'a>(node: &'a mut Node, step: &KeySegment<'_>) -> Result<&'a mut Node> {
     let new = || Node { place: step.place.clone(), value: Value::Table(Vec::new()) };
     if !matches!(node.value, Value::List(_) | Value::Table(_)) {
         *node = new();
@@ -207,7 +207,7 @@ fn child<'a>(node: &'a mut Node, step: &Step<'_>) -> Result<&'a mut Node> {
                     return Err(Error::scene(&step.place, format!("`{}` has no items to choose from", step.name))
                         .help("the scene has no such list"));
                 }
-                entries.push(Entry { key: step.name.to_owned(), key_place: step.place.clone(), node: new() });
+                entries.push(TableEntry { key: step.name.to_owned(), key_place: step.place.clone(), node: new() });
             }
             Ok(&mut entries[index].node)
         }
@@ -216,8 +216,8 @@ fn child<'a>(node: &'a mut Node, step: &Step<'_>) -> Result<&'a mut Node> {
 }
 
 /// Return the index of the item that a step names by its number, or by the name of its table.
-fn item_index(items: &[Node], step: &Step<'_>) -> Result<usize> {
-    let Step { name, place, parent, .. } = step;
+fn item_index(items: &[Node], step: &KeySegment<'_>) -> Result<usize> {
+    let KeySegment { name, place, parent, .. } = step;
     let count = match items.len() {
         1 => "1 item".to_owned(),
         count => format!("{count} items"),

@@ -6,11 +6,11 @@
 
 mod tree;
 
-pub use tree::{Entry, Keys, Node, TableShape, Value, ValueKind, document, value, word};
+pub use tree::{Keys, Node, TableEntry, TableShape, Value, ValueKind, document, value, word};
 
 use crate::data::Library;
 use crate::error::{Error, Located, Result};
-use crate::expression::{Expression, Field, Scope};
+use crate::expression::{Expression, Field, KnownNames};
 use serde_json::{Map, Value as Json, json};
 use std::path::{Path, PathBuf};
 
@@ -203,7 +203,7 @@ impl Setting for Vec<Expression> {
     }
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
-        let scope = Scope { variables: &["x", "y", "z"][..context.dimension], data: &context.data };
+        let scope = KnownNames { variables: &["x", "y", "z"][..context.dimension], data: &context.data };
         let component = |item: &Node| match &item.value {
             Value::Integer(_) | Value::Float(_) => Expression::parse(&item.number()?.to_string(), &item.place, scope),
             Value::String(text) => Expression::parse(text, &item.place, scope),

@@ -26,12 +26,12 @@ pub enum Value {
     Date,
     List(Vec<Node>),
     /// The entries in the order of the text.
-    Table(Vec<Entry>),
+    Table(Vec<TableEntry>),
 }
 
 /// A key of a table and its value.
 #[derive(Debug, Clone)]
-pub struct Entry {
+pub struct TableEntry {
     pub key: String,
     pub key_place: Place,
     pub node: Node,
@@ -92,11 +92,11 @@ impl Convert<'_> {
         Place { source: self.source.clone(), span: start..end }
     }
 
-    fn entries(&self, table: &DeTable<'_>) -> Result<Vec<Entry>> {
+    fn entries(&self, table: &DeTable<'_>) -> Result<Vec<TableEntry>> {
         let entry = |(key, value): (&toml::Spanned<_>, &_)| {
             let key: &toml::Spanned<toml::de::DeString<'_>> = key;
             let node = self.node(value)?;
-            Ok(Entry { key: key.get_ref().to_string(), key_place: self.place(key.span()), node })
+            Ok(TableEntry { key: key.get_ref().to_string(), key_place: self.place(key.span()), node })
         };
         let mut entries = table.iter().map(entry).collect::<Result<Vec<_>>>()?;
         entries.sort_by_key(|entry| entry.key_place.span.start);
@@ -281,7 +281,7 @@ const TOP_LEVEL: [&str; 8] = ["title", "dimension", "plane", "units", "mesh", "s
 pub struct Keys<'a> {
     /// The table itself.
     pub node: &'a Node,
-    entries: &'a [Entry],
+    entries: &'a [TableEntry],
     /// Name of the table in messages.
     name: String,
 }
@@ -294,7 +294,7 @@ impl<'a> Keys<'a> {
     pub fn open(node: &'a Node, shape: &TableShape) -> Result<Self> {
         let Value::Table(entries) = &node.value else { return Err(node.expected("a table", &key_list(shape))) };
         let keys = Self { node, entries, name: shape.name.to_string() };
-        for Entry { key: name, key_place, node } in entries {
+        for TableEntry { key: name, key_place, node } in entries {
             let Some(key) = shape.keys.iter().find(|key| key.name == name) else {
                 return Err(unknown_key(name, key_place, shape));
             };
@@ -315,7 +315,7 @@ impl<'a> Keys<'a> {
     }
 
     /// Return the key and its value, if the key is given.
-    pub fn entry(&self, key: &str) -> Option<&'a Entry> {
+    pub fn entry(&self, key: &str) -> Option<&'a TableEntry> {
         self.entries.iter().find(|entry| entry.key == key)
     }
 
@@ -349,7 +349,7 @@ impl<'a> Keys<'a> {
     /// Refuse a table that has both keys. The caret marks the later one; an override comes later than what the scene file has.
     fn exclude(&self, first: &str, second: &str) -> Result<()> {
         let mut both = self.entries.iter().filter(|entry| entry.key == first || entry.key == second);
-        let Some(Entry { key_place, .. }) = both.nth(1) else { return Ok(()) };
+        let Some(TableEntry { key_place, .. }) = both.nth(1) else { return Ok(()) };
         Err(Error::scene(key_place, format!("{} has both `{first}` and `{second}`", self.name))
             .label("only one of them can hold")
             .help(format!("remove `{first}` or `{second}`")))

@@ -3,13 +3,13 @@
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Model;
-use crate::model::rigid::{Coarse, Space};
+use crate::model::rigid::{CoarseOperator, CoarseSpace};
 use crate::petsc::Subspace;
 use std::rc::Rc;
 
-/// The [coarse space](crate::model::rigid::Coarse) of rigid motions of all bodies, in the rows of the matrix that this rank owns.
+/// The [coarse space](crate::model::rigid::CoarseOperator) of rigid motions of all bodies, in the rows of the matrix that this rank owns.
 pub struct RigidSpace {
-    space: Rc<Space>,
+    space: Rc<CoarseSpace>,
     /// The columns of B that this rank owns; one row a contact point.
     rows: Csr,
 }
@@ -28,18 +28,18 @@ impl RigidSpace {
         }
         let columns = offset[offset.len() - 1];
         let owned = rows.of_columns(columns, |i| i.checked_sub(first).filter(|i| *i < columns));
-        Some(Self { space: Rc::new(Space::of(model, Some(offset))), rows: owned })
+        Some(Self { space: Rc::new(CoarseSpace::of(model, Some(offset))), rows: owned })
     }
 
     /// Return the space for these spring stiffnesses, one a contact point.
     pub fn with(self: &Rc<Self>, springs: &[f64]) -> Box<dyn Subspace> {
-        Box::new(WithSprings { coarse: Coarse::new(self.space.clone(), springs), rigid: self.clone() })
+        Box::new(WithSprings { coarse: CoarseOperator::new(self.space.clone(), springs), rigid: self.clone() })
     }
 }
 
 /// The space of rigid motions for one set of springs.
 struct WithSprings {
-    coarse: Coarse,
+    coarse: CoarseOperator,
     rigid: Rc<RigidSpace>,
 }
 

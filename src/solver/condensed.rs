@@ -36,12 +36,12 @@ pub struct Uncondensed {
     /// Rigid motions that supports leave free, on all dofs.
     pub free: Vec<FreeMotion>,
     /// The retained dofs.
-    pub retained: Retained,
+    pub retained: InterfaceDofs,
 }
 
 /// A body whose states are its retained dofs.
 pub struct CondensedBody {
-    retained: Retained,
+    retained: InterfaceDofs,
     /// The loads on all dofs of the body, without K.
     whole: ElasticBody,
     /// f of all dofs, in the turned axes.
@@ -91,7 +91,7 @@ impl Uncondensed {
 }
 
 /// Return the body on the retained dofs, with its loads and without K. None of these dofs is prescribed. `load` is f of all dofs in the turned axes.
-fn with_loads(schur: &mut Schur, retained: &Retained, whole: &ElasticBody, load: &[f64]) -> Result<ElasticBody> {
+fn with_loads(schur: &mut Schur, retained: &InterfaceDofs, whole: &ElasticBody, load: &[f64]) -> Result<ElasticBody> {
     let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
     if !whole.lifting.is_empty() {
         whole_lifting = retained.turn(&whole.lifting);
@@ -111,7 +111,7 @@ fn with_loads(schur: &mut Schur, retained: &Retained, whole: &ElasticBody, load:
 }
 
 /// Return a motion on the retained dofs, in the turned axes.
-fn on_retained(retained: &Retained, motion: FreeMotion) -> FreeMotion {
+fn on_retained(retained: &InterfaceDofs, motion: FreeMotion) -> FreeMotion {
     let turned = retained.turn(&motion.displacement);
     FreeMotion { displacement: retained.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
 }
@@ -207,7 +207,7 @@ const SAFE: f64 = 1e-6;
 
 /// The retained dofs of a body.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Retained {
+pub struct InterfaceDofs {
     /// Dofs, sorted, in the turned axes.
     pub dofs: Vec<usize>,
     /// Contact rows; columns: the retained dofs.
@@ -217,7 +217,7 @@ pub struct Retained {
     dimension: usize,
 }
 
-impl Retained {
+impl InterfaceDofs {
     /// Choose the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
     /// rigid `motions` of the free body.
     pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: AtDofs) -> Self {
@@ -283,7 +283,7 @@ impl Retained {
         turned
     }
 
-    /// Return a vector in the axes of the scene; the inverse of [`Retained::turn`].
+    /// Return a vector in the axes of the scene; the inverse of [`InterfaceDofs::turn`].
     pub fn turn_back(&self, turned: &[f64]) -> Vec<f64> {
         let mut u = turned.to_vec();
         for (&node, axes) in &self.axes {
@@ -419,15 +419,15 @@ fn orthogonal_part(c: usize, axes: &[Vec<f64>]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fem::{Extent, rigid};
+    use crate::fem::{PointExtent, rigid};
 
     /// Nodes of a square with side 2. The dofs of node i are 2 i and 2 i + 1.
     const NODES: [[f64; 2]; 4] = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
 
-    fn of(rows: &Csr, prescribed: &[(usize, f64)]) -> Retained {
-        let motions = rigid::modes(&Extent::of(NODES.into_iter()));
+    fn of(rows: &Csr, prescribed: &[(usize, f64)]) -> InterfaceDofs {
+        let motions = rigid::modes(&PointExtent::of(NODES.into_iter()));
         let at = |k: usize, dof: usize| motions[k].at(&NODES[dof / 2])[dof % 2];
-        Retained::new(2, rows, prescribed, AtDofs { count: 3, at: &at })
+        InterfaceDofs::new(2, rows, prescribed, AtDofs { count: 3, at: &at })
     }
 
     fn rows(list: &[&[(usize, f64)]]) -> Csr {

@@ -4,7 +4,7 @@
 //! proportional to the entries of K. It is expressed in products of K with a vector, whose speed is that of the machine's memory ([`products`]).
 //! docs/solvers.md compares both ways and the choice on thirty scenes, which are called the table below.
 
-use super::Retained;
+use super::InterfaceDofs;
 use crate::error::Result;
 use crate::linalg::portable::{log2, pow};
 use crate::petsc::{Graph, nested_dissection};
@@ -46,7 +46,7 @@ const FRONTS: f64 = 1.2;
 
 /// How a linear step is solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Step {
+pub enum StepSolver {
     /// With one matrix of all bodies.
     Joined,
     /// By conjugate gradients with Robin sweeps, each with one application of the multigrid of every body.
@@ -55,26 +55,26 @@ pub enum Step {
     Sweeps,
 }
 
-impl Step {
+impl StepSolver {
     /// Return how many times as long multigrid takes as with one matrix of all bodies. On the first scenes of the table `newton-robin` took 1.0 to 1.9 times
     /// as long, and `robin` 5.4 to 12 times.
     fn times(self) -> f64 {
         match self {
-            Step::Joined => 1.0,
-            Step::Swept => 1.2,
-            Step::Sweeps => 7.0,
+            StepSolver::Joined => 1.0,
+            StepSolver::Swept => 1.2,
+            StepSolver::Sweeps => 7.0,
         }
     }
 }
 
 /// A body in space that is not assembled yet.
-pub struct Candidate<'a> {
+pub struct BodySize<'a> {
     /// Number of its dofs.
     pub dofs: usize,
     /// Order of its elements.
     pub order: Order,
     /// The dofs that the body retains if it is condensed; `None` if every factorisation is one of the whole body.
-    pub retained: Option<&'a Retained>,
+    pub retained: Option<&'a InterfaceDofs>,
     /// Number of the blocks of K: pairs of nodes that K couples, each in both orders, and each node with itself.
     pub couplings: usize,
 }
@@ -134,10 +134,10 @@ impl Comparison {
 
     /// Compare both ways to solve for these bodies on a machine that multiplies `speed` entries of a sparse matrix in a second. A factorisation is
     /// assumed to take as many operations as that of a cube with as many dofs; no body needs more.
-    pub fn of_cubes(bodies: &[Candidate], step: Step, speed: f64) -> Self {
+    pub fn of_cubes(bodies: &[BodySize], step: StepSolver, speed: f64) -> Self {
         let multigrid = bodies.iter().fold(Cost::default(), |sum, body| sum.and(body.multigrid(step, speed)));
         let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
-        let retained = if step == Step::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
+        let retained = if step == StepSolver::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
         let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
         let direct = bodies.iter().fold(dense, |sum, body| sum.and(of_cube(body, speed)));
         Self { direct, multigrid, dense, speed }
@@ -145,7 +145,7 @@ impl Comparison {
 
     /// Return whether the choice does not depend on the order of elimination. This is so if even cubes are factored sooner than multigrid solves, if the
     /// dense algebra on the contact alone takes longer than multigrid, or if a factor without any fill exceeds `memory` bytes.
-    pub fn is_known(&self, bodies: &[Candidate], memory: usize) -> bool {
+    pub fn is_known(&self, bodies: &[BodySize], memory: usize) -> bool {
         let without_fill: f64 = bodies.iter().map(|body| 8.0 * FRONTS * 0.5 * 9.0 * body.couplings as f64).sum();
         self.direct.seconds <= self.multigrid.seconds
             || self.dense.seconds > self.multigrid.seconds
@@ -154,9 +154,9 @@ impl Comparison {
 
     /// Return the comparison with a symbolic factorisation of each body's nodes. `graphs` has (`ptr`, `col`) of each body: K couples node i
     /// with the nodes `col[ptr[i]..ptr[i + 1]]`, which include i.
-    pub fn analysed(&self, bodies: &[Candidate], graphs: &[(&[u32], &[u32])]) -> Self {
+    pub fn analysed(&self, bodies: &[BodySize], graphs: &[(&[u32], &[u32])]) -> Self {
         // without METIS there is no better estimate than that of cubes
-        let cost = |(body, &(ptr, col)): (&Candidate, &(&[u32], &[u32]))| {
+        let cost = |(body, &(ptr, col)): (&BodySize, &(&[u32], &[u32]))| {
             analysed(body, ptr, col, self.speed).unwrap_or(of_cube(body, self.speed))
         };
         let direct = bodies.iter().zip(graphs).map(cost).fold(self.dense, Cost::and);
@@ -164,9 +164,9 @@ impl Comparison {
     }
 }
 
-impl Candidate<'_> {
+impl BodySize<'_> {
     /// Return the cost of multigrid.
-    fn multigrid(&self, step: Step, speed: f64) -> Cost {
+    fn multigrid(&self, step: StepSolver, speed: f64) -> Cost {
         let bytes = match self.order {
             Order::P1 => LEVELS,
             Order::P2 => LEVELS_P2,
@@ -193,13 +193,13 @@ impl Candidate<'_> {
 }
 
 /// Return the cost of factoring a cube with as many dofs by nested dissection, measured on blocks of 32 000 to 500 000 dofs. No body costs more.
-fn of_cube(body: &Candidate, speed: f64) -> Cost {
+fn of_cube(body: &BodySize, speed: f64) -> Cost {
     let n = body.dofs as f64;
     Cost { bytes: 220.0 * pow(n, 4.0 / 3.0), ..body.factored(19.0 * n * n, 0.0, speed) }
 }
 
 /// Return the cost of a factorisation from the symbolic factorisation of the nodes.
-fn analysed(body: &Candidate, ptr: &[u32], col: &[u32], speed: f64) -> Result<Cost> {
+fn analysed(body: &BodySize, ptr: &[u32], col: &[u32], speed: f64) -> Result<Cost> {
     let nodes = ptr.len() - 1;
     let mut neighbours = vec![0];
     let mut others = Vec::with_capacity(col.len() - nodes);
@@ -276,7 +276,7 @@ fn measured() -> f64 {
 
 /// The size of a factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Work {
+struct FactorSize {
     /// Entries of the factor, without those among rows that stay.
     entries: f64,
     /// Multiplications and additions: the sum of the squared lengths of the columns.
@@ -288,7 +288,7 @@ struct Work {
 /// The neighbours of node i are `col[ptr[i]..ptr[i + 1]]`, with or without i itself. Node i is the `position[i]`-th to be eliminated, with
 /// `weight[i]` unknowns; `stays` are (node, number of its unknowns that stay). The entries of a row of the factor are on its paths through the
 /// elimination tree (Liu, SIAM J. Matrix Anal. Appl. 11, 1990, 134). So the count takes as many steps as the factor of the graph has entries.
-fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize], stays: &[(usize, usize)]) -> Work {
+fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize], stays: &[(usize, usize)]) -> FactorSize {
     const NONE: u32 = u32::MAX;
     let nodes = ptr.len() - 1;
     let mut node_at = vec![0; nodes];
@@ -315,7 +315,7 @@ fn factorisation(ptr: &[u32], col: &[u32], position: &[i32], weight: &[usize], s
             }
         }
     }
-    let mut work = Work::default();
+    let mut work = FactorSize::default();
     for (&node, below) in node_at.iter().zip(below) {
         for unknown in 0..weight[node] {
             let length = below + (weight[node] - unknown) as f64;
@@ -333,7 +333,7 @@ mod tests {
     use crate::linalg::Csr;
 
     /// Return the graph (ptr, col) of the nodes of a box, each coupled to the next along its edges, with contact along z on the nodes with z = 0.
-    fn body([x, y, z]: [usize; 3]) -> (Vec<u32>, Vec<u32>, Retained) {
+    fn body([x, y, z]: [usize; 3]) -> (Vec<u32>, Vec<u32>, InterfaceDofs) {
         let (mut ptr, mut col, mut rows) = (vec![0], Vec::new(), Csr::new(3 * x * y * z));
         let range = |i: usize, n: usize| i.saturating_sub(1)..(i + 2).min(n);
         for (i, j, k) in (0..x * y * z).map(|node| (node % x, node / x % y, node / x / y)) {
@@ -346,10 +346,10 @@ mod tests {
                 rows.push_row([(3 * (i + x * (j + y * k)) + 2, 1.0)]);
             }
         }
-        (ptr, col, Retained::new(3, &rows, &[], AtDofs::NONE))
+        (ptr, col, InterfaceDofs::new(3, &rows, &[], AtDofs::NONE))
     }
 
-    fn of(sizes: &[[usize; 3]], step: Step) -> Comparison {
+    fn of(sizes: &[[usize; 3]], step: StepSolver) -> Comparison {
         let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
         let candidates = candidates(&bodies);
         let graphs: Vec<_> = bodies.iter().map(|(ptr, col, _)| (&ptr[..], &col[..])).collect();
@@ -361,11 +361,11 @@ mod tests {
         }
     }
 
-    fn candidates(bodies: &[(Vec<u32>, Vec<u32>, Retained)]) -> Vec<Candidate<'_>> {
+    fn candidates(bodies: &[(Vec<u32>, Vec<u32>, InterfaceDofs)]) -> Vec<BodySize<'_>> {
         let mut candidates = Vec::new();
         for (ptr, col, retained) in bodies {
             let (dofs, couplings) = (3 * (ptr.len() - 1), col.len());
-            candidates.push(Candidate { dofs, order: Order::P1, retained: Some(retained), couplings });
+            candidates.push(BodySize { dofs, order: Order::P1, retained: Some(retained), couplings });
         }
         candidates
     }
@@ -376,7 +376,7 @@ mod tests {
         let known = |sizes: &[[usize; 3]], memory: usize| {
             let bodies: Vec<_> = sizes.iter().map(|&size| body(size)).collect();
             let candidates = candidates(&bodies);
-            Comparison::of_cubes(&candidates, Step::Joined, REFERENCE).is_known(&candidates, memory)
+            Comparison::of_cubes(&candidates, StepSolver::Joined, REFERENCE).is_known(&candidates, memory)
         };
         assert!(known(&[[10, 10, 10]], usize::MAX) && known(&[[100, 100, 3]], usize::MAX));
         // 9 x 8 x 0.6 bytes for each of 7 couplings of a node; nodes at the surface have fewer
@@ -387,7 +387,7 @@ mod tests {
     /// A cube is expensive to factor and a long bar of as many nodes is not. The number of dofs alone does not show this.
     #[test]
     fn a_bar_is_factored_where_a_cube_is_not() {
-        let (bar, cube) = (of(&[[6, 6, 1296]], Step::Joined), of(&[[36, 36, 36]], Step::Joined));
+        let (bar, cube) = (of(&[[6, 6, 1296]], StepSolver::Joined), of(&[[36, 36, 36]], StepSolver::Joined));
         assert!(bar.is_direct(usize::MAX) && !cube.is_direct(usize::MAX));
         assert!(!bar.is_direct(1_000_000), "{}", bar.direct.bytes);
         assert!(5.0 * bar.direct.seconds < cube.direct.seconds, "{} {}", bar.direct.words(), cube.direct.words());
@@ -400,17 +400,17 @@ mod tests {
     #[test]
     fn joined_bodies_share_their_contact() {
         let wide = [[40, 40, 2]; 2];
-        let (joined, apart) = (of(&wide, Step::Joined), of(&wide, Step::Sweeps));
+        let (joined, apart) = (of(&wide, StepSolver::Joined), of(&wide, StepSolver::Sweeps));
         let dense = |retained: f64| STEPS * retained.powi(3) / 3.0 / RATE;
         let more = joined.direct.seconds - apart.direct.seconds;
         assert!((more / (dense(3200.0) - dense(1600.0)) - 1.0).abs() < 1e-9, "{more}");
-        assert!((apart.multigrid.seconds / (Step::Sweeps.times() * joined.multigrid.seconds) - 1.0).abs() < 1e-9);
+        assert!((apart.multigrid.seconds / (StepSolver::Sweeps.times() * joined.multigrid.seconds) - 1.0).abs() < 1e-9);
         assert!(!joined.is_direct(usize::MAX) && apart.is_direct(usize::MAX));
     }
 
     /// Count the work by elimination in a dense pattern, unknown by unknown.
-    fn dense(pattern: &mut [Vec<bool>], order: &[usize]) -> Work {
-        let mut work = Work::default();
+    fn dense(pattern: &mut [Vec<bool>], order: &[usize]) -> FactorSize {
+        let mut work = FactorSize::default();
         let mut gone = vec![false; pattern.len()];
         for &pivot in order {
             gone[pivot] = true;

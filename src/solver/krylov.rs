@@ -3,11 +3,11 @@
 use super::options::Chosen;
 use super::{Change, InnerSolver};
 use crate::error::Result;
-use crate::fem::Interpolation;
+use crate::fem::Prolongation;
 use crate::linalg::Csr;
 use crate::linalg::portable::log10;
 use crate::model::Solved;
-use crate::petsc::{Enough, Ksp, Matrix, Rows, Session};
+use crate::petsc::{ConvergenceTest, Ksp, Matrix, Rows, Session};
 
 /// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
 ///
@@ -66,14 +66,14 @@ impl Krylov {
         dimension: usize,
         stiffness: Rows,
         near_null_space: &[Vec<f64>],
-        interpolation: Option<Interpolation>,
+        interpolation: Option<Prolongation>,
     ) -> Result<Self> {
         let mut matrix = Matrix::new(session, dimension, stiffness)?;
         matrix.set_spd()?;
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
         if let Some(interpolation) = interpolation {
-            let Interpolation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
+            let Prolongation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.lend(session, || ksp.set_from_options())?;
@@ -228,7 +228,7 @@ impl InnerSolver for Krylov {
         Ok(solved)
     }
 
-    fn solve_until(&mut self, r: &[f64], z: &mut [f64], enough: &mut Enough) -> Result<Solved> {
+    fn solve_until(&mut self, r: &[f64], z: &mut [f64], enough: &mut ConvergenceTest) -> Result<Solved> {
         if !self.free {
             return self.solve(r, z);
         }

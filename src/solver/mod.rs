@@ -19,7 +19,7 @@ mod robin;
 mod sparse;
 
 pub use coarse::RigidSpace;
-pub use condensed::{Retained, Uncondensed};
+pub use condensed::{InterfaceDofs, Uncondensed};
 pub use dense::Dense;
 pub use krylov::Krylov;
 pub use monolithic::{Monolithic, Union};
@@ -29,7 +29,7 @@ pub use sparse::SparseBody;
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::model::Solved;
-use crate::petsc::{Enough, Int, Matrix, Rows, Subspace};
+use crate::petsc::{ConvergenceTest, Int, Matrix, Rows, Subspace};
 
 /// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
 fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
@@ -83,7 +83,7 @@ pub trait InnerSolver {
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
 
     /// Solve G z = r until `enough` accepts an iterate, for iterative solvers. If the user set a tolerance, that ends the solve instead.
-    fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut Enough) -> Result<Solved> {
+    fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut ConvergenceTest) -> Result<Solved> {
         self.solve(r, z)
     }
 

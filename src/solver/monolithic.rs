@@ -9,9 +9,9 @@ use super::{InnerSolver, Krylov, RigidSpace, RobinMatrix};
 use crate::error::Result;
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable, dot};
-use crate::model::linear::{Failure, LinearStep, Solution, Solved, System, Trial};
+use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, System, Trial};
 use crate::model::{Body, BodyCounts, BodySlot, Distribution, Field, Joint, Model, States};
-use crate::petsc::{Iterate, Rows};
+use crate::petsc::{KspIterate, Rows};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -20,13 +20,13 @@ use std::rc::Rc;
 
 /// The linear step with one matrix of all bodies.
 pub struct Monolithic<S> {
-    joined: Rc<RefCell<Joined<S>>>,
+    joined: Rc<RefCell<JointMatrix<S>>>,
     /// Whether every rank has the whole matrix and some of the bodies.
     is_redundant: bool,
 }
 
 /// The matrix of all bodies and its contact rows.
-struct Joined<S> {
+struct JointMatrix<S> {
     matrix: RobinMatrix<S>,
     rows: Csr,
     offset: Vec<usize>,
@@ -34,7 +34,7 @@ struct Joined<S> {
     first: usize,
 }
 
-impl<S> Joined<S> {
+impl<S> JointMatrix<S> {
     /// Return the range of each body's state in a vector of all bodies.
     fn parts(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.offset.windows(2).map(|part| part[0]..part[1])
@@ -63,7 +63,7 @@ impl<S> Joined<S> {
     }
 }
 
-impl Joint for Joined<Krylov> {
+impl Joint for JointMatrix<Krylov> {
     fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>> {
         let x = self.whole(states);
         let mut y = vec![0.0; x.len()];
@@ -83,7 +83,7 @@ impl<S: InnerSolver> Monolithic<S> {
         let Union { stiffness, rows, offset, start, row_stiffness, coarse, is_redundant } = union;
         let matrix = RobinMatrix::new(super::rows(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         Ok(Self {
-            joined: Rc::new(RefCell::new(Joined { matrix, rows, offset, first: start.unwrap_or(0) })),
+            joined: Rc::new(RefCell::new(JointMatrix { matrix, rows, offset, first: start.unwrap_or(0) })),
             is_redundant,
         })
     }
@@ -102,12 +102,12 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
     }
 
     fn set_up(&mut self, springs: &[f64]) -> Result<()> {
-        let Joined { matrix, rows, .. } = &mut *self.joined.borrow_mut();
+        let JointMatrix { matrix, rows, .. } = &mut *self.joined.borrow_mut();
         matrix.update(rows, springs)?;
         matrix.set_up()
     }
 
-    fn solve(&mut self, system: System) -> Result<Solved> {
+    fn solve(&mut self, system: System) -> Result<LinearResult> {
         let System { model, springs, residual, enough, .. } = system;
         let joined = &mut *self.joined.borrow_mut();
         let mut r = joined.whole(residual);
@@ -115,10 +115,10 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
             model.exchange.sum(&mut r);
         }
         let mut x = vec![0.0; r.len()];
-        let Joined { matrix, rows, first, .. } = joined;
+        let JointMatrix { matrix, rows, first, .. } = joined;
         matrix.update(rows, springs)?;
         let mut last_error = None;
-        let mut enough = |iterate: &Iterate| {
+        let mut enough = |iterate: &KspIterate| {
             let (closing, energy) = closing_and_energy(model, rows, *first, iterate.x, &r);
             let error = estimated_error(iterate, energy);
             last_error = Some(error);
@@ -134,7 +134,7 @@ impl<S: InnerSolver> LinearStep for Monolithic<S> {
         };
         let accuracy = joined.matrix.solver().accuracy();
         let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
-        Ok(Ok(Solution { field, energy, error, is_exact: accuracy == 0.0 }))
+        Ok(Ok(LinearSolution { field, energy, error, is_exact: accuracy == 0.0 }))
     }
 
     fn counts(&self) -> BodyCounts {
@@ -157,7 +157,7 @@ fn closing_and_energy(model: &Model, rows: &Csr, first: usize, x: &[f64], r: &[f
 }
 
 /// Return the estimated energy norm of the error of an iterate with this squared energy norm.
-fn estimated_error(iterate: &Iterate, energy: f64) -> f64 {
+fn estimated_error(iterate: &KspIterate, energy: f64) -> f64 {
     match iterate.least {
         // r'A^-1 r is at most r'M^-1 r over the least eigenvalue of M^-1 A
         Some(least) => iterate.residual / least.sqrt(),

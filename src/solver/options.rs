@@ -3,7 +3,7 @@
 //! Users type PETSc options as in any PETSc program, for all bodies (`-ksp_type cg`) or for one (`-upper_ksp_type cg`). An option
 //! for all bodies is called *plain* here, and an option that starts with the name of a body is that body's *own*.
 //!
-//! 1. [`Typed`] reads what the user wrote, once in a run, and gives each solver its options ([`Chosen`]). A plain option of a PETSc object (KSP,
+//! 1. [`UserOptions`] reads what the user wrote, once in a run, and gives each solver its options ([`Chosen`]). A plain option of a PETSc object (KSP,
 //!    PC, Mat) applies to every solver that has no own option of that name. The program adds its choice where the user wrote nothing.
 //! 2. These options are [lent](Chosen::lend) to PETSc's table under the prefix of the solver while it works, since PETSc never falls back from
 //!    a prefixed name to the plain one, and its table holds only 512 options.
@@ -22,9 +22,9 @@ use std::path::Path;
 
 /// The options that the user wrote: on the command line, in files, and in the scene.
 #[derive(Default)]
-pub struct Typed(Vec<Entry>);
+pub struct UserOptions(Vec<Entry>);
 
-impl Typed {
+impl UserOptions {
     /// Read PETSc's table.
     pub fn read(session: &Session) -> Result<Self> {
         session.options().all().map(Self)
@@ -33,7 +33,7 @@ impl Typed {
     /// Return the options of the solver with a prefix: its own ones, and plain ones of PETSc's objects that it has not as its own.
     pub fn of(&self, prefix: &str) -> Chosen {
         let mut chosen = Chosen::new(prefix);
-        for (start, origin) in [(format!("-{prefix}_"), Origin::Own), ("-".to_owned(), Origin::Plain)] {
+        for (start, origin) in [(format!("-{prefix}_"), OptionOrigin::Own), ("-".to_owned(), OptionOrigin::Plain)] {
             for (option, value) in &self.0 {
                 let name = option.to_ascii_lowercase();
                 // no name of a body has a word of a family in it
@@ -48,7 +48,7 @@ impl Typed {
 
 /// Why a solver has an option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Origin {
+enum OptionOrigin {
     /// The user wrote it with the prefix of this solver, so that it stands in PETSc's table.
     Own,
     /// The user wrote it for all solvers.
@@ -58,13 +58,13 @@ enum Origin {
 }
 
 #[derive(Debug, Clone)]
-struct Choice {
+struct SolverOption {
     name: String,
     value: Option<String>,
-    origin: Origin,
+    origin: OptionOrigin,
 }
 
-impl Choice {
+impl SolverOption {
     /// Return the value, empty for an option without one.
     fn value(&self) -> &str {
         self.value.as_deref().unwrap_or_default()
@@ -79,7 +79,7 @@ impl Choice {
 pub struct Chosen {
     prefix: String,
     /// Keys are names in small letters, because PETSc ignores the case of names.
-    choices: BTreeMap<String, Choice>,
+    choices: BTreeMap<String, SolverOption>,
 }
 
 impl Chosen {
@@ -89,14 +89,14 @@ impl Chosen {
     }
 
     /// Add an option, unless one of this name is there already. So own options are added first, then plain ones, then defaults.
-    fn add(&mut self, name: &str, value: Option<&str>, origin: Origin) {
-        let choice = || Choice { name: name.to_owned(), value: value.map(str::to_owned), origin };
+    fn add(&mut self, name: &str, value: Option<&str>, origin: OptionOrigin) {
+        let choice = || SolverOption { name: name.to_owned(), value: value.map(str::to_owned), origin };
         self.choices.entry(name.to_ascii_lowercase()).or_insert_with(choice);
     }
 
     /// Set an option that is not set yet, as the program's choice. It never counts as typed.
     pub fn set_default(&mut self, name: &str, value: &str) {
-        self.add(name, Some(value), Origin::Default);
+        self.add(name, Some(value), OptionOrigin::Default);
     }
 
     /// Choose MUMPS for `cholesky` and `lu`, in this solver and in those nested in it (`-sub_pc_type lu`), where
@@ -114,18 +114,18 @@ impl Chosen {
 
     /// Return the value in force, empty for an option without one.
     pub fn get(&self, name: &str) -> Option<&str> {
-        self.choices.get(&name.to_ascii_lowercase()).map(Choice::value)
+        self.choices.get(&name.to_ascii_lowercase()).map(SolverOption::value)
     }
 
     /// Return the value in force if the user wrote it.
     pub fn typed(&self, name: &str) -> Option<&str> {
         let choice = self.choices.get(&name.to_ascii_lowercase())?;
-        (choice.origin != Origin::Default).then(|| choice.value())
+        (choice.origin != OptionOrigin::Default).then(|| choice.value())
     }
 
     /// Return name, in small letters, and value of each option that the user wrote.
     pub fn all_typed(&self) -> impl Iterator<Item = (&str, &str)> {
-        let typed = self.choices.iter().filter(|(_, choice)| choice.origin != Origin::Default);
+        let typed = self.choices.iter().filter(|(_, choice)| choice.origin != OptionOrigin::Default);
         typed.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
@@ -144,7 +144,7 @@ impl Chosen {
 
     /// Return whether the user wrote an option for this solver alone.
     pub fn has_own(&self) -> bool {
-        self.choices.values().any(|choice| choice.origin == Origin::Own)
+        self.choices.values().any(|choice| choice.origin == OptionOrigin::Own)
     }
 
     /// Return whether the user wrote an option whose name begins with `family`.
@@ -164,14 +164,14 @@ impl Chosen {
     /// Those of the work, and of PETSc's table, which is full at 512 options.
     pub fn lend<T>(&self, session: &Session, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let options = session.options();
-        let copy = |choice: &Choice| format!("-{}_{}", self.prefix, choice.name);
+        let copy = |choice: &SolverOption| format!("-{}_{}", self.prefix, choice.name);
         // own options stand in the table already
-        let lent = || self.choices.values().filter(|choice| choice.origin != Origin::Own);
+        let lent = || self.choices.values().filter(|choice| choice.origin != OptionOrigin::Own);
         let done =
             lent().try_for_each(|choice| options.set(&copy(choice), choice.value.as_deref())).and_then(|()| work());
-        let take_back = |choice: &Choice| {
+        let take_back = |choice: &SolverOption| {
             let (copy, plain) = (copy(choice), format!("-{}", choice.name));
-            if choice.origin == Origin::Plain && options.used(&copy) && !options.used(&plain) {
+            if choice.origin == OptionOrigin::Plain && options.used(&copy) && !options.used(&plain) {
                 options.mark_used(&plain)?;
             }
             options.clear(&copy)
@@ -491,8 +491,8 @@ fn make(session: &Session, prefix: &str) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn typed(options: &[(&str, &str)]) -> Typed {
-        Typed(options.iter().map(|(name, value)| ((*name).to_owned(), Some((*value).to_owned()))).collect())
+    fn typed(options: &[(&str, &str)]) -> UserOptions {
+        UserOptions(options.iter().map(|(name, value)| ((*name).to_owned(), Some((*value).to_owned()))).collect())
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub struct SparseBody<S> {
 enum Lazy<S> {
     Later {
         /// The function that makes a solver of K; `None` if it has failed.
-        make: Option<Maker<S>>,
+        make: Option<SolverBuilder<S>>,
         /// Description of the solver to be made, for reports.
         words: String,
     },
@@ -32,7 +32,7 @@ enum Lazy<S> {
 }
 
 /// A function that makes a solver of K.
-type Maker<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
+type SolverBuilder<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
 
 /// What remains of a row of K.
 struct RowSize {

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 use winkler::api::Order;
-use winkler::internals::mesh::{Asked, Duty, Maker, Mesh, parse};
+use winkler::internals::mesh::{Asked, Duty, Mesh, MeshProducer, parse};
 
 /// The mesh of a script as Gmsh writes it.
 fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
@@ -266,7 +266,7 @@ fn one_facet(found: &Used, known: &Used) -> bool {
 
 /// Reads a mesh as the patch asks for it.
 fn kind(bytes: &[u8], good: &Mesh<2>, known: &Used) -> Kind {
-    let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, Maker::User) else { return Kind::Refused };
+    let Ok(mesh) = parse::<2>(Path::new("a.msh"), bytes, MeshProducer::User) else { return Kind::Refused };
     // a group is also found by another name with the same letters
     let is_there = |name: &str| mesh.groups.iter().any(|group| group.name == name);
     if good.groups.iter().any(|group| !is_there(&group.name)) {
@@ -316,7 +316,7 @@ const SECTIONS: [&str; 5] = ["$MeshFormat", "$PhysicalNames", "$Entities", "$Nod
 fn one_bit_changes() {
     for arguments in [&[][..], &["-bin"], &["-bin", "-order", "2"]] {
         let bytes = gmsh(&script(), arguments);
-        let good = parse::<2>(Path::new("a.msh"), &bytes, Maker::User).expect("a mesh");
+        let good = parse::<2>(Path::new("a.msh"), &bytes, MeshProducer::User).expect("a mesh");
         assert_eq!(good.order == Order::P2, arguments.len() == 3);
         let known = used(&good);
         assert_eq!(kind(&bytes, &good, &known), Kind::Same);
@@ -540,7 +540,7 @@ const BAR: &str = "$PhysicalNames\n3\n1 1 \"left\"\n1 2 \"right\"\n2 3 \"Bar 1\"
 
 /// Return the names of all groups, each with the number of its elements, sorted.
 fn groups<const D: usize>(bytes: &[u8]) -> Vec<(String, usize)> {
-    let mesh: Mesh<D> = parse(Path::new("a.msh"), bytes, Maker::User).unwrap_or_else(|error| panic!("{error}"));
+    let mesh: Mesh<D> = parse(Path::new("a.msh"), bytes, MeshProducer::User).unwrap_or_else(|error| panic!("{error}"));
     let mut groups: Vec<_> = mesh.groups.iter().map(|group| (group.name.clone(), group.len())).collect();
     groups.sort();
     groups
@@ -578,7 +578,7 @@ fn old_formats_have_groups_by_physical_tag() {
         (text.replace("4 0 1 0", "4 0 nan 0"), "a.msh:15: a coordinate is NaN"),
         (first.replace("4 0 3 1", "4 0 4 1"), "has 4 nodes, and its type 3"),
     ] {
-        let error = parse::<2>(Path::new("a.msh"), bad.as_bytes(), Maker::User).expect_err(words).to_string();
+        let error = parse::<2>(Path::new("a.msh"), bad.as_bytes(), MeshProducer::User).expect_err(words).to_string();
         assert!(error.contains(words), "{error}");
     }
 }

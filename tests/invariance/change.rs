@@ -5,7 +5,7 @@ use winkler::api::{
     AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Error, Field, LawKind, LayerSpec, LoadKind,
     MeshArrays, MeshSource, Plane, Result, Scene, SpringKind, Start,
 };
-use winkler::internals::expression::{Expression, Scope};
+use winkler::internals::expression::{Expression, KnownNames};
 use winkler::internals::fem::cross;
 use winkler::internals::mesh::Mesh;
 
@@ -237,7 +237,7 @@ impl Change {
             Some(format!("(({:e})*({}/({:e}) - ({:e})))", self.sign[i], names[1 + i], self.length, self.shift[i]))
         };
         let text = format!("({:e})*({})", self.stress, substituted(law.text(), &old));
-        Expression::parse(&text, law.place(), Scope::of(&names[..=dimension]))
+        Expression::parse(&text, law.place(), KnownNames::of(&names[..=dimension]))
     }
 }
 

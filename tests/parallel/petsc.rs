@@ -5,7 +5,7 @@
 use crate::common::alone::{TIMEOUT, alone, expect_success};
 use std::time::Instant;
 use winkler::error::Result;
-use winkler::internals::solver::options::{Typed, unread};
+use winkler::internals::solver::options::{UserOptions, unread};
 use winkler::petsc::{Int, Ksp, Matrix, Rows, Schur, Scope, Session};
 
 fn words(line: &str) -> Vec<String> {
@@ -176,7 +176,7 @@ fn options_come_from_line_file_and_environment() {
     expect_success(alone("petsc::options_come_from_line_file_and_environment", 0, &environment, || {
         let file = std::env::var("WINKLER_FILE").unwrap_or_default();
         let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
-        let (options, upper) = (session.options(), Typed::read(&session)?.of("upper"));
+        let (options, upper) = (session.options(), UserOptions::read(&session)?.of("upper"));
         for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
             assert_eq!(upper.typed(name), Some(value));
         }
@@ -218,7 +218,7 @@ fn an_option_read_on_one_rank_is_read() {
         let bodies = ["upper", "lower"];
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        let mut chosen = Typed::read(&session)?.of(body);
+        let mut chosen = UserOptions::read(&session)?.of(body);
         chosen.set_default("pc_type", "jacobi");
         let matrix = chain(&session, 9)?;
         chosen.lend(&session, || solver(&session, &format!("{body}_"), &matrix)?.set_up())?;

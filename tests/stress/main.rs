@@ -1,6 +1,6 @@
 //! A small part of `scripts/stress`: the default method and Newton's on random scenes, in one process.
 
-mod draft;
+mod builder;
 mod laws;
 mod random;
 mod runs;

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // the example and the test each use their own part
 
-use crate::draft::{Bodies, Holds, on};
+use crate::builder::{Bodies, Holds, on};
 use crate::laws::Law;
 use crate::random::Random;
 use std::fmt::Write;
@@ -108,8 +108,8 @@ enum Hold {
     /// As `Roller`, and the highest is moved by its face.
     Pressed,
     /// As `Pinned`, but nothing keeps the highest from moving sideways.
-    Loose,
-    /// As `Loose`, with a load along the contact.
+    Unconstrained,
+    /// As `Unconstrained`, with a load along the contact.
     Sliding,
     /// As `Roller`, with the load turned round.
     Pulled,
@@ -134,7 +134,7 @@ const HOLDS: [Hold; 20] = [
     Hold::Pressed,
     Hold::Pressed,
     Hold::Pressed,
-    Hold::Loose,
+    Hold::Unconstrained,
     Hold::Sliding,
     Hold::Pulled,
     Hold::Lifted,
@@ -400,9 +400,9 @@ impl Blocks {
     fn carried(&mut self, block: usize) -> Holds {
         let mut holds = Holds::default();
         let is_top = block + 1 == self.shape.blocks;
-        let is_free = is_top && matches!(self.hold, Hold::Loose | Hold::Sliding);
+        let is_free = is_top && matches!(self.hold, Hold::Unconstrained | Hold::Sliding);
         if !is_free {
-            let turns = matches!(self.hold, Hold::Pinned | Hold::Loose | Hold::Sliding);
+            let turns = matches!(self.hold, Hold::Pinned | Hold::Unconstrained | Hold::Sliding);
             holds.fix.push(on(block, if turns { "pin" } else { "left" }, "x = 0"));
         }
         match self.hold {
@@ -424,8 +424,8 @@ impl Blocks {
     fn expect(&self) -> Expect {
         let is_idle = self.load == 0.0;
         match self.hold {
-            Hold::Loose | Hold::Sliding if self.is_ring() => self.expect_held(),
-            Hold::Loose => Expect::Gauge,
+            Hold::Unconstrained | Hold::Sliding if self.is_ring() => self.expect_held(),
+            Hold::Unconstrained => Expect::Gauge,
             Hold::Sliding | Hold::Pulled if is_idle => Expect::Gauge,
             Hold::Sliding | Hold::Pulled => Expect::Nothing,
             Hold::Ends | Hold::Pressed | Hold::Lifted | Hold::Roller | Hold::Pinned => self.expect_held(),

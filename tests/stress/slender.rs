@@ -1,6 +1,6 @@
 //! Random scenes of slender bodies: leaves, plates, frames and hoops, from 1:5 to 1:200.
 
-use crate::draft::{Draft, Holds, on};
+use crate::builder::{Holds, SceneBuilder, on};
 use crate::random::Random;
 use crate::scenes::{Case, Expect};
 use std::path::Path;
@@ -43,7 +43,7 @@ enum Hold {
 
 /// A scene in the making.
 struct Slender {
-    draft: Draft,
+    builder: SceneBuilder,
     hold: Hold,
     /// The lowest body is held at both ends.
     is_bridge: bool,
@@ -56,21 +56,21 @@ pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
     let mut random = Random::new(seed, index);
     let scripts = root.join("tests/stress/meshes");
     let kind = random.pick(&KINDS);
-    let Slender { mut draft, hold, .. } = match kind {
+    let Slender { mut builder, hold, .. } = match kind {
         Kind::Leaves | Kind::Discs | Kind::Plates => leaves(random, kind, &scripts),
         Kind::Frames => frames(random, &scripts),
         Kind::Hoops => hoops(random, &scripts),
     };
-    let expect = if hold == Hold::Carried && draft.load == 0.0 { Expect::Gauge } else { Expect::Solution };
+    let expect = if hold == Hold::Carried && builder.load == 0.0 { Expect::Gauge } else { Expect::Solution };
     Case {
         index,
-        text: draft.text,
-        line: draft.line,
+        text: builder.text,
+        line: builder.line,
         expect,
         hanging: hold == Hold::Carried,
-        pressure: draft.pressure,
+        pressure: builder.pressure,
         carried: None,
-        gamma: draft.random.power_of_ten(-2.0, 0.08),
+        gamma: builder.random.power_of_ten(-2.0, 0.08),
         start: None,
     }
 }
@@ -83,17 +83,17 @@ fn begin(mut random: Random, kind: Kind, bodies: usize, hold: Hold) -> Slender {
     let thickness = if random.chance(0.5) { vec![1.0 / aspect; bodies] } else { thickness };
     let is_bridge = random.chance(0.4);
     let dimension = if kind == Kind::Plates { 3 } else { 2 };
-    let mut draft =
-        Draft::new(random, &format!("{kind:?} {hold:?} bridge {is_bridge} 1:{aspect:.0}"), dimension, bodies);
+    let mut builder =
+        SceneBuilder::new(random, &format!("{kind:?} {hold:?} bridge {is_bridge} 1:{aspect:.0}"), dimension, bodies);
     if kind == Kind::Discs {
-        draft.text += "plane = \"axisymmetric\"\n";
-    } else if dimension == 2 && draft.random.chance(0.4) {
-        draft.text += "plane = \"stress\"\n";
+        builder.text += "plane = \"axisymmetric\"\n";
+    } else if dimension == 2 && builder.random.chance(0.4) {
+        builder.text += "plane = \"stress\"\n";
     }
     // of a cantilever w = 3/2 q L^4/(E t^3)
-    let bends = draft.random.power_of_ten(-4.0, 1.0);
-    draft.press(bends / 1.5 * aspect.powi(-4));
-    Slender { draft, hold, is_bridge, thickness }
+    let bends = builder.random.power_of_ten(-4.0, 1.0);
+    builder.press(bends / 1.5 * aspect.powi(-4));
+    Slender { builder, hold, is_bridge, thickness }
 }
 
 fn any_hold(random: &mut Random) -> Hold {
@@ -104,18 +104,18 @@ impl Slender {
     /// A contact along s from 0 to 1: the layer and the gap are of the size of what the bodies give way through their thickness, or bend, or between.
     fn contact(&mut self, surfaces: [String; 2], bodies: [usize; 2], along: Option<&str>) {
         let thickness = self.thickness[bodies[0]].min(self.thickness[bodies[1]]);
-        let between = self.draft.random.pick(&[0.0, 0.5, 1.0]);
+        let between = self.builder.random.pick(&[0.0, 0.5, 1.0]);
         let size = thickness * thickness.powf(-4.0 * between);
-        let level = self.draft.level * self.draft.random.power_of_ten(0.0, 2.0);
-        self.draft.contact(surfaces, bodies, (size, level), along, 0.0);
+        let level = self.builder.level * self.builder.random.power_of_ten(0.0, 2.0);
+        self.builder.contact(surfaces, bodies, (size, level), along, 0.0);
     }
 
     /// Leaves or discs with their supports and loads. The last one is pressed along its length, or at its tip by a force or a displacement.
     fn leaves(&mut self, kind: Kind, count: usize) {
-        let Self { draft, hold, is_bridge, thickness } = self;
+        let Self { builder, hold, is_bridge, thickness } = self;
         let space = kind == Kind::Plates;
-        let drive = draft.random.pick(&["top", "top", "tip", "moved"]);
-        let moved = draft.random.power_of_ten(-3.0, 0.5) * thickness[count - 1];
+        let drive = builder.random.pick(&["top", "top", "tip", "moved"]);
+        let moved = builder.random.power_of_ten(-3.0, 0.5) * thickness[count - 1];
         // discs are clamped at their rim: the other end is the axis
         let (end, other) = if kind == Kind::Discs { ("right", "left") } else { ("left", "right") };
         let clamp = if space { "x = 0, y = 0, z = 0" } else { "x = 0, y = 0" };
@@ -139,16 +139,16 @@ impl Slender {
                 match (drive, *hold) {
                     ("tip", Hold::Clamped) if kind != Kind::Discs => {
                         let zero = if space { ", 0" } else { "" };
-                        holds.load.push(on(body, "right", &format!("force = [0, {:e}{zero}]", -0.4 * draft.load)));
+                        holds.load.push(on(body, "right", &format!("force = [0, {:e}{zero}]", -0.4 * builder.load)));
                     }
-                    ("moved", Hold::Clamped) if kind != Kind::Discs && draft.load > 0.0 => {
+                    ("moved", Hold::Clamped) if kind != Kind::Discs && builder.load > 0.0 => {
                         holds.fix.push(on(body, "right", &format!("y = {:e}", -moved)));
-                        draft.line += &format!(" moved {moved:.1e}");
+                        builder.line += &format!(" moved {moved:.1e}");
                     }
-                    _ => holds.load.push(on(body, "top", &format!("pressure = {:e}", draft.load))),
+                    _ => holds.load.push(on(body, "top", &format!("pressure = {:e}", builder.load))),
                 }
             }
-            draft.body(body, &holds);
+            builder.body(body, &holds);
         }
     }
 }
@@ -172,10 +172,10 @@ fn leaves(mut random: Random, kind: Kind, scripts: &Path) -> Slender {
         set += &format!(", l{0} = {1:.4}, t{0} = {2:e}, n{0} = {3}", i + 1, lengths[i], scene.thickness[i], n[i]);
     }
     if space {
-        let across = scene.draft.random.pick(&[1, 2, 4]);
-        set += &format!(", depth = {}, across = {across}", scene.draft.random.pick(&[0.1, 0.4, 1.0]));
+        let across = scene.builder.random.pick(&[1, 2, 4]);
+        set += &format!(", depth = {}, across = {across}", scene.builder.random.pick(&[0.1, 0.4, 1.0]));
     }
-    scene.draft.mesh(&scripts.join("leaves.geo"), &set);
+    scene.builder.mesh(&scripts.join("leaves.geo"), &set);
     scene.leaves(kind, count);
     for body in 0..count - 1 {
         let names = [format!("b{}_top", body + 1), format!("b{}_bottom", body + 2)];
@@ -206,8 +206,8 @@ fn frames(mut random: Random, scripts: &Path) -> Slender {
         set += &format!(", t{0} = {1:e}, n{0} = {2}", i + 1, t[i], n[i]);
     }
     set += &format!(", through = {through}");
-    scene.draft.mesh(&scripts.join("frames.geo"), &set);
-    let draft = &mut scene.draft;
+    scene.builder.mesh(&scripts.join("frames.geo"), &set);
+    let builder = &mut scene.builder;
     for body in 0..count {
         let mut holds = Holds::default();
         if body == 0 {
@@ -219,9 +219,9 @@ fn frames(mut random: Random, scripts: &Path) -> Slender {
             holds.fix.push(on(body, "pin", "x = 0"));
         }
         if body + 1 == count {
-            holds.load.push(on(body, "top", &format!("pressure = {:e}", draft.load)));
+            holds.load.push(on(body, "top", &format!("pressure = {:e}", builder.load)));
         }
-        draft.body(body, &holds);
+        builder.body(body, &holds);
     }
     for body in 0..count - 1 {
         let names = [format!("b{}_top", body + 1), format!("b{}_bottom", body + 2)];
@@ -244,8 +244,8 @@ fn hoops(mut random: Random, scripts: &Path) -> Slender {
     for i in 0..3 {
         set += &format!(", t{0} = {1:e}, n{0} = {2}", i + 1, t[i], n[i]);
     }
-    scene.draft.mesh(&scripts.join("hoops.geo"), &set);
-    let draft = &mut scene.draft;
+    scene.builder.mesh(&scripts.join("hoops.geo"), &set);
+    let builder = &mut scene.builder;
     for body in 0..count {
         let mut holds = Holds::default();
         if body == 0 {
@@ -254,9 +254,9 @@ fn hoops(mut random: Random, scripts: &Path) -> Slender {
         }
         holds.fix.push(on(body, "left", "x = 0"));
         if body + 1 == count {
-            holds.load.push(on(body, "top", &format!("pressure = {:e}", draft.load)));
+            holds.load.push(on(body, "top", &format!("pressure = {:e}", builder.load)));
         }
-        draft.body(body, &holds);
+        builder.body(body, &holds);
     }
     scene.contact(["b1_top".into(), "b2_bottom".into()], [0, 1], None);
     scene.contact(["b2_top".into(), format!("b{count}_bottom")], [1, count - 1], None);

@@ -1,6 +1,6 @@
 //! Random scenes of the wider box: bodies in space, many bodies, curved contacts, small bodies, walls, springs, all laws, given starts.
 
-use crate::draft::{Draft, Holds, on};
+use crate::builder::{Holds, SceneBuilder, on};
 use crate::random::Random;
 use crate::scenes::{Case, Expect};
 use std::path::Path;
@@ -52,7 +52,7 @@ enum Hold {
     /// Bodies may turn, too.
     Pinned,
     /// The last body may slide.
-    Loose,
+    Unconstrained,
     /// A load makes it slide.
     Sliding,
     /// The loads pull.
@@ -69,7 +69,7 @@ const HOLDS: [Hold; 12] = [
     Hold::Pinned,
     Hold::Pinned,
     Hold::Pinned,
-    Hold::Loose,
+    Hold::Unconstrained,
     Hold::Sliding,
     Hold::Pulled,
 ];
@@ -86,7 +86,7 @@ enum Springs {
 
 /// What a kind of scene leaves to be said.
 struct Made {
-    draft: Draft,
+    builder: SceneBuilder,
     expect: Expect,
     hanging: bool,
 }
@@ -103,20 +103,20 @@ pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
         Kind::Small => small(random, &scripts),
         Kind::Bricks => bricks(random, &scripts),
     };
-    let Made { mut draft, expect, hanging } = made;
-    let start = given(&mut draft.random);
+    let Made { mut builder, expect, hanging } = made;
+    let start = given(&mut builder.random);
     if let Some(start) = &start {
-        draft.line += &format!(" | start {start}");
+        builder.line += &format!(" | start {start}");
     }
     Case {
         index,
-        text: draft.text,
-        line: draft.line,
+        text: builder.text,
+        line: builder.line,
         expect,
         hanging,
-        pressure: draft.pressure,
+        pressure: builder.pressure,
         carried: None,
-        gamma: draft.random.power_of_ten(-2.0, 0.08),
+        gamma: builder.random.power_of_ten(-2.0, 0.08),
         start,
     }
 }
@@ -135,29 +135,29 @@ fn given(random: &mut Random) -> Option<String> {
 
 /// Springs, for one scene in four that they keep what it is to be, and their stiffness over the modulus of the body that they are on. In
 /// the body's matrix double precision leaves 1e-16 of its modulus: a spring of 1e-6 keeps ten digits.
-fn springs(draft: &mut Draft, hold: Hold) -> (Springs, f64) {
-    let stiffness = draft.random.power_of_ten(-6.0, 0.0);
-    let may = matches!(hold, Hold::Roller | Hold::Pinned | Hold::Pulled) && draft.random.chance(0.25);
+fn springs(builder: &mut SceneBuilder, hold: Hold) -> (Springs, f64) {
+    let stiffness = builder.random.power_of_ten(-6.0, 0.0);
+    let may = matches!(hold, Hold::Roller | Hold::Pinned | Hold::Pulled) && builder.random.chance(0.25);
     let springs = match (may, hold) {
         (false, _) => Springs::None,
         (true, Hold::Pulled) => Springs::All,
-        _ => draft.random.pick(&[Springs::Below, Springs::All]),
+        _ => builder.random.pick(&[Springs::Below, Springs::All]),
     };
     if springs != Springs::None {
-        draft.line += &format!(" springs {springs:?} {stiffness:.1e}");
+        builder.line += &format!(" springs {springs:?} {stiffness:.1e}");
     }
     (springs, stiffness)
 }
 
 /// Weight of a unit of the bodies, zero for most scenes.
-fn weight(draft: &mut Draft) -> f64 {
-    let weight = draft.level * draft.random.power_of_ten(-2.0, 0.0);
-    if draft.random.chance(0.2) { weight } else { 0.0 }
+fn weight(builder: &mut SceneBuilder) -> f64 {
+    let weight = builder.level * builder.random.power_of_ten(-2.0, 0.0);
+    if builder.random.chance(0.2) { weight } else { 0.0 }
 }
 
 /// What must come of it.
-fn expect(draft: &Draft, hold: Hold, springs: Springs, weight: f64) -> Expect {
-    let idle = draft.load == 0.0;
+fn expect(builder: &SceneBuilder, hold: Hold, springs: Springs, weight: f64) -> Expect {
+    let idle = builder.load == 0.0;
     match hold {
         _ if springs == Springs::All => Expect::Solution,
         Hold::Pulled if idle && weight == 0.0 => Expect::Gauge,
@@ -165,7 +165,7 @@ fn expect(draft: &Draft, hold: Hold, springs: Springs, weight: f64) -> Expect {
         Hold::Pulled if weight != 0.0 => Expect::Gauge,
         Hold::Pulled => Expect::Nothing,
         Hold::Sliding if !idle => Expect::Nothing,
-        Hold::Loose | Hold::Sliding => Expect::Gauge,
+        Hold::Unconstrained | Hold::Sliding => Expect::Gauge,
         Hold::Roller | Hold::Pinned if idle && weight == 0.0 => Expect::Gauge,
         Hold::Roller | Hold::Pinned => Expect::Solution,
     }
@@ -202,48 +202,48 @@ fn grid(mut random: Random, kind: Kind, root: &Path) -> Made {
     let finest = if space { 3.99 } else { 8.99 };
     let n: Vec<usize> = (0..4).map(|_| random.uniform(1.0, finest) as usize).collect();
     let hold = match random.pick(&HOLDS) {
-        Hold::Loose if columns > 1 => Hold::Pinned,
+        Hold::Unconstrained if columns > 1 => Hold::Pinned,
         Hold::Sliding if columns > 1 || kind == Kind::Rings => Hold::Pulled,
         hold => hold,
     };
     let name = format!("{kind:?} {hold:?}");
-    let mut draft = Draft::new(random, &name, if space { 3 } else { 2 }, rows * columns);
+    let mut builder = SceneBuilder::new(random, &name, if space { 3 } else { 2 }, rows * columns);
     if kind == Kind::Rings {
-        draft.text += "plane = \"axisymmetric\"\n";
-    } else if !space && draft.random.chance(0.2) {
-        draft.text += "plane = \"stress\"\n";
+        builder.text += "plane = \"axisymmetric\"\n";
+    } else if !space && builder.random.chance(0.2) {
+        builder.text += "plane = \"stress\"\n";
     }
     let script = if space { root.join("tests/stress/meshes/blocks.geo") } else { root.join("meshes/stack/stack.geo") };
     let mut set = format!("rows = {rows}, columns = {columns}, width = {width}, height = {height}, {}", numbered(&n));
     if space {
-        set += &format!(", depth = {}", draft.random.pick(&[0.5, 1.0, 3.0]));
+        set += &format!(", depth = {}", builder.random.pick(&[0.5, 1.0, 3.0]));
     }
-    draft.mesh(&script, &set);
-    let lean = if draft.random.chance(0.3) { draft.random.uniform(-0.8, 0.8) } else { 0.0 };
-    let weight = weight(&mut draft) / height / rows as f64;
-    let (springs, ratio) = springs(&mut draft, hold);
+    builder.mesh(&script, &set);
+    let lean = if builder.random.chance(0.3) { builder.random.uniform(-0.8, 0.8) } else { 0.0 };
+    let weight = weight(&mut builder) / height / rows as f64;
+    let (springs, ratio) = springs(&mut builder, hold);
     let grid = Grid { kind, hold, rows, columns, width, height, springs, ratio, lean, weight };
     for body in 0..rows * columns {
-        let holds = grid.holds(&draft, body);
-        draft.body(body, &holds);
+        let holds = grid.holds(&builder, body);
+        builder.body(body, &holds);
     }
     for body in 0..rows * columns {
-        grid.contacts(&mut draft, body);
+        grid.contacts(&mut builder, body);
     }
-    let expect = grid.expect(&draft);
-    Made { draft, expect, hanging: rows * columns > 1 }
+    let expect = grid.expect(&builder);
+    Made { builder, expect, hanging: rows * columns > 1 }
 }
 
 impl Grid {
     /// Supports, springs and loads of a block.
-    fn holds(&self, draft: &Draft, body: usize) -> Holds {
+    fn holds(&self, builder: &SceneBuilder, body: usize) -> Holds {
         let &Self { kind, hold, columns, springs, ratio, weight, .. } = self;
         let (row, column) = (body / columns, body % columns);
         let space = kind == Kind::Blocks;
         let mut holds = Holds { weight, ..Holds::default() };
         if row == 0 {
             match springs {
-                Springs::Below => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
+                Springs::Below => holds.spring.push(on(body, "bottom", &builder.spring("normal", body, ratio))),
                 _ => holds.fix.push(on(body, "bottom", "y = 0")),
             }
         }
@@ -258,21 +258,21 @@ impl Grid {
             holds.fix.push(on(body, "spin", "z = 0"));
         }
         if springs == Springs::All && (row > 0 || column > 0) {
-            holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio)));
+            holds.spring.push(on(body, "right", &builder.spring("stiffness", body, ratio)));
         }
-        self.add_loads(&mut holds, draft, body);
+        self.add_loads(&mut holds, builder, body);
         holds
     }
 
     /// Whether the blocks of a row may slide.
     fn slides(&self, row: usize) -> bool {
-        row + 1 == self.rows && matches!(self.hold, Hold::Loose | Hold::Sliding)
+        row + 1 == self.rows && matches!(self.hold, Hold::Unconstrained | Hold::Sliding)
     }
 
-    fn add_loads(&self, holds: &mut Holds, draft: &Draft, body: usize) {
+    fn add_loads(&self, holds: &mut Holds, builder: &SceneBuilder, body: usize) {
         let &Self { hold, rows, columns, width, lean, .. } = self;
         let (row, column) = (body / columns, body % columns);
-        let load = if hold == Hold::Pulled { -draft.load } else { draft.load };
+        let load = if hold == Hold::Pulled { -builder.load } else { builder.load };
         if row + 1 == rows && (rows > 1 || columns == 1) {
             let pressure = format!("{load:e} * (1 + {lean}*(2*x/{} - 1))", width * columns as f64);
             holds.load.push(on(body, "top", &format!("pressure = \"{pressure}\"")));
@@ -280,36 +280,36 @@ impl Grid {
         if column + 1 == columns && columns > 1 {
             holds.load.push(on(body, "right", &format!("pressure = {load:e}")));
         } else if self.slides(row) && hold == Hold::Sliding {
-            holds.load.push(on(body, "right", &format!("pressure = {:e}", 0.01 * draft.load)));
+            holds.load.push(on(body, "right", &format!("pressure = {:e}", 0.01 * builder.load)));
         }
     }
 
     /// Contacts of a block with the one above and the one beside.
-    fn contacts(&self, draft: &mut Draft, body: usize) {
+    fn contacts(&self, builder: &mut SceneBuilder, body: usize) {
         let &Self { rows, columns, width, height, .. } = self;
-        let (row, column, level) = (body / columns, body % columns, draft.level);
+        let (row, column, level) = (body / columns, body % columns, builder.level);
         let name = |body: usize, place: &str| format!("b{}_{place}", body + 1);
         if row + 1 < rows {
             let above = body + columns;
             let s = format!("(x/{width} - {column})");
             let names = [name(body, "top"), name(above, "bottom")];
-            draft.contact(names, [body, above], (height, level), Some(&s), 0.0);
+            builder.contact(names, [body, above], (height, level), Some(&s), 0.0);
         }
         if column + 1 < columns {
             let s = format!("(y/{height} - {row})");
             let names = [name(body, "right"), name(body + 1, "left")];
-            draft.contact(names, [body, body + 1], (width, level), Some(&s), 0.0);
+            builder.contact(names, [body, body + 1], (width, level), Some(&s), 0.0);
         }
     }
 
-    fn expect(&self, draft: &Draft) -> Expect {
+    fn expect(&self, builder: &SceneBuilder) -> Expect {
         let &Self { kind, hold, rows, columns, springs, weight, .. } = self;
         match kind {
             // a weight holds nothing sideways
-            _ if columns > 1 && draft.load == 0.0 && springs != Springs::All => Expect::Gauge,
+            _ if columns > 1 && builder.load == 0.0 && springs != Springs::All => Expect::Gauge,
             // a ring that is pulled outwards holds itself
             Kind::Rings if rows == 1 => Expect::Solution,
-            _ => expect(draft, hold, springs, weight),
+            _ => expect(builder, hold, springs, weight),
         }
     }
 }
@@ -323,34 +323,34 @@ fn round(mut random: Random, kind: Kind, scripts: &Path) -> Made {
     let finest = if space { 3.99 } else { 12.99 };
     let n: Vec<usize> = (0..bodies).map(|_| random.uniform(1.0, finest) as usize).collect();
     let hold = match random.pick(&HOLDS) {
-        Hold::Loose | Hold::Sliding if !whole => Hold::Pulled,
+        Hold::Unconstrained | Hold::Sliding if !whole => Hold::Pulled,
         // what is round may be held by what is curved, or roll
-        Hold::Sliding => Hold::Loose,
+        Hold::Sliding => Hold::Unconstrained,
         hold => hold,
     };
     let name = format!("{kind:?} {hold:?}");
-    let mut draft = Draft::new(random, &name, if space { 3 } else { 2 }, bodies);
+    let mut builder = SceneBuilder::new(random, &name, if space { 3 } else { 2 }, bodies);
     if kind == Kind::Cap {
-        draft.text += "plane = \"axisymmetric\"\n";
+        builder.text += "plane = \"axisymmetric\"\n";
     }
     let yes = |is: bool| usize::from(is);
     let mut set = format!("R = {radius}, whole = {}, lens = {}, {}", yes(whole), yes(lens), numbered(&n));
     if space {
-        set += &format!(", depth = {}", draft.random.pick(&[0.5, 2.0]));
+        set += &format!(", depth = {}", builder.random.pick(&[0.5, 2.0]));
     }
-    draft.mesh(&scripts.join("round.geo"), &set);
-    let weight = weight(&mut draft);
-    let (springs, ratio) = springs(&mut draft, hold);
+    builder.mesh(&scripts.join("round.geo"), &set);
+    let weight = weight(&mut builder);
+    let (springs, ratio) = springs(&mut builder, hold);
     let sign = if hold == Hold::Pulled { -1.0 } else { 1.0 };
     for body in 0..bodies {
         let mut holds = Holds { weight, ..Holds::default() };
         match (body, springs) {
-            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
+            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &builder.spring("normal", body, ratio))),
             (0, _) => holds.fix.push(on(body, "bottom", "y = 0")),
-            (_, Springs::All) => holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio))),
+            (_, Springs::All) => holds.spring.push(on(body, "right", &builder.spring("stiffness", body, ratio))),
             _ => {}
         }
-        let free = body == 1 && hold == Hold::Loose;
+        let free = body == 1 && hold == Hold::Unconstrained;
         if kind != Kind::Cap && !free {
             let turns = whole && body > 0 && hold == Hold::Pinned;
             holds.fix.push(on(body, if turns { "pin" } else { "left" }, "x = 0"));
@@ -359,44 +359,44 @@ fn round(mut random: Random, kind: Kind, scripts: &Path) -> Made {
             holds.fix.push(on(body, "front", "z = 0"));
         }
         if body + 1 == bodies {
-            holds.load.push(on(body, "top", &format!("pressure = {:e}", sign * draft.load)));
+            holds.load.push(on(body, "top", &format!("pressure = {:e}", sign * builder.load)));
         }
-        draft.body(body, &holds);
+        builder.body(body, &holds);
     }
-    let level = draft.level;
+    let level = builder.level;
     for body in 0..bodies - 1 {
         let names = [format!("b{}_top", body + 1), format!("b{}_bottom", body + 2)];
-        draft.contact(names, [body, body + 1], (1.0, level), None, if space { 0.01 } else { 0.0 });
+        builder.contact(names, [body, body + 1], (1.0, level), None, if space { 0.01 } else { 0.0 });
     }
-    let expect = expect(&draft, hold, springs, weight);
-    Made { draft, expect, hanging: true }
+    let expect = expect(&builder, hold, springs, weight);
+    Made { builder, expect, hanging: true }
 }
 
 fn ball(mut random: Random, scripts: &Path) -> Made {
     let radius = random.pick(&[1.5, 2.0, 10.0, 100.0]);
     let n = [random.pick(&[2, 3, 4]), random.pick(&[2, 3, 4])];
     let hold = if random.chance(0.1) { Hold::Pulled } else { Hold::Roller };
-    let mut draft = Draft::new(random, &format!("Ball {hold:?}"), 3, 2);
-    draft.mesh(&scripts.join("ball.geo"), &format!("R = {radius}, {}", numbered(&n)));
-    let (springs, ratio) = springs(&mut draft, hold);
+    let mut builder = SceneBuilder::new(random, &format!("Ball {hold:?}"), 3, 2);
+    builder.mesh(&scripts.join("ball.geo"), &format!("R = {radius}, {}", numbered(&n)));
+    let (springs, ratio) = springs(&mut builder, hold);
     let sign = if hold == Hold::Pulled { -1.0 } else { 1.0 };
     let sides = |body: usize| vec![on(body, "left", "x = 0"), on(body, "front", "y = 0")];
     let mut lower = Holds { fix: sides(0), ..Holds::default() };
     match springs {
-        Springs::Below => lower.spring.push(on(0, "bottom", &draft.spring("normal", 0, ratio))),
+        Springs::Below => lower.spring.push(on(0, "bottom", &builder.spring("normal", 0, ratio))),
         _ => lower.fix.push(on(0, "bottom", "z = 0")),
     }
     let mut upper = Holds { fix: sides(1), ..Holds::default() };
     if springs == Springs::All {
-        upper.spring.push(on(1, "left", &draft.spring("stiffness", 1, ratio)));
+        upper.spring.push(on(1, "left", &builder.spring("stiffness", 1, ratio)));
     }
-    upper.load.push(on(1, "top", &format!("pressure = {:e}", sign * draft.load)));
-    draft.body(0, &lower);
-    draft.body(1, &upper);
-    let level = draft.level;
-    draft.contact(["b1_top".into(), "b2_bottom".into()], [0, 1], (1.0, level), None, 0.0);
-    let expect = expect(&draft, hold, springs, 0.0);
-    Made { draft, expect, hanging: true }
+    upper.load.push(on(1, "top", &format!("pressure = {:e}", sign * builder.load)));
+    builder.body(0, &lower);
+    builder.body(1, &upper);
+    let level = builder.level;
+    builder.contact(["b1_top".into(), "b2_bottom".into()], [0, 1], (1.0, level), None, 0.0);
+    let expect = expect(&builder, hold, springs, 0.0);
+    Made { builder, expect, hanging: true }
 }
 
 fn small(mut random: Random, scripts: &Path) -> Made {
@@ -404,21 +404,21 @@ fn small(mut random: Random, scripts: &Path) -> Made {
     let three = random.chance(0.5);
     let n = random.pick(&[1, 2, 4, 7]);
     let hold = match random.pick(&HOLDS) {
-        Hold::Loose | Hold::Sliding => Hold::Pinned,
+        Hold::Unconstrained | Hold::Sliding => Hold::Pinned,
         hold => hold,
     };
     let bodies = if three { 3 } else { 2 };
-    let mut draft = Draft::new(random, &format!("Small {hold:?}"), 2, bodies);
-    draft.mesh(&scripts.join("small.geo"), &format!("size = {size:e}, three = {}, n = {n}", usize::from(three)));
-    let (springs, ratio) = springs(&mut draft, hold);
+    let mut builder = SceneBuilder::new(random, &format!("Small {hold:?}"), 2, bodies);
+    builder.mesh(&scripts.join("small.geo"), &format!("size = {size:e}, three = {}, n = {n}", usize::from(three)));
+    let (springs, ratio) = springs(&mut builder, hold);
     // the pressure on the small body is that of the layers
-    let load = if hold == Hold::Pulled { -draft.load } else { draft.load } * if three { size } else { 1.0 };
+    let load = if hold == Hold::Pulled { -builder.load } else { builder.load } * if three { size } else { 1.0 };
     for body in 0..bodies {
         let mut holds = Holds::default();
         match (body, springs) {
-            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &draft.spring("normal", body, ratio))),
+            (0, Springs::Below) => holds.spring.push(on(body, "bottom", &builder.spring("normal", body, ratio))),
             (0, _) => holds.fix.push(on(body, "bottom", "y = 0")),
-            (_, Springs::All) => holds.spring.push(on(body, "right", &draft.spring("stiffness", body, ratio))),
+            (_, Springs::All) => holds.spring.push(on(body, "right", &builder.spring("stiffness", body, ratio))),
             _ => {}
         }
         let turns = body == 1 && hold == Hold::Pinned;
@@ -426,15 +426,15 @@ fn small(mut random: Random, scripts: &Path) -> Made {
         if body + 1 == bodies {
             holds.load.push(on(body, "top", &format!("pressure = {load:e}")));
         }
-        draft.body(body, &holds);
+        builder.body(body, &holds);
     }
-    let (level, s) = (draft.level, format!("(x/{size:e})"));
+    let (level, s) = (builder.level, format!("(x/{size:e})"));
     for body in 0..bodies - 1 {
         let names = [format!("b{}_top", body + 1), format!("b{}_bottom", body + 2)];
-        draft.contact(names, [body, body + 1], (size, level), Some(&s), 0.0);
+        builder.contact(names, [body, body + 1], (size, level), Some(&s), 0.0);
     }
-    let expect = expect(&draft, hold, springs, 0.0);
-    Made { draft, expect, hanging: true }
+    let expect = expect(&builder, hold, springs, 0.0);
+    Made { builder, expect, hanging: true }
 }
 
 fn bricks(mut random: Random, scripts: &Path) -> Made {
@@ -444,10 +444,10 @@ fn bricks(mut random: Random, scripts: &Path) -> Made {
     let sides = random.pick(&["pressed", "pressed", "between", "free"]);
     let ends: Vec<Vec<[f64; 2]>> = (0..courses).map(|course| course_of(bricks, course % 2 == 1)).collect();
     let count = ends.iter().map(Vec::len).sum();
-    let mut draft = Draft::new(random, &format!("Bricks {sides}"), 2, count);
-    draft.mesh(&scripts.join("bricks.geo"), &format!("courses = {courses}, bricks = {bricks}, {}", numbered(&n)));
-    let weight = weight(&mut draft);
-    let side = draft.load * draft.random.power_of_ten(-2.0, 0.0);
+    let mut builder = SceneBuilder::new(random, &format!("Bricks {sides}"), 2, count);
+    builder.mesh(&scripts.join("bricks.geo"), &format!("courses = {courses}, bricks = {bricks}, {}", numbered(&n)));
+    let weight = weight(&mut builder);
+    let side = builder.load * builder.random.power_of_ten(-2.0, 0.0);
     let mut first = 0;
     let firsts: Vec<usize> = ends.iter().map(|course| (first, first += course.len()).0).collect();
     for (course, bricks) in ends.iter().enumerate() {
@@ -468,31 +468,31 @@ fn bricks(mut random: Random, scripts: &Path) -> Made {
                 }
             }
             if course + 1 == courses {
-                holds.load.push(on(body, "top", &format!("pressure = {:e}", draft.load)));
+                holds.load.push(on(body, "top", &format!("pressure = {:e}", builder.load)));
             }
-            draft.body(body, &holds);
+            builder.body(body, &holds);
         }
     }
-    let level = draft.level;
+    let level = builder.level;
     for (course, bricks) in ends.iter().enumerate() {
         for (place, [from, to]) in bricks.iter().enumerate() {
             let body = firsts[course] + place;
             if place + 1 < bricks.len() {
                 let names = [format!("b{}_right", body + 1), format!("b{}_left", body + 2)];
-                draft.contact(names, [body, body + 1], (1.0, level), Some(&format!("(2*y - {course})")), 0.0);
+                builder.contact(names, [body, body + 1], (1.0, level), Some(&format!("(2*y - {course})")), 0.0);
             }
             let above = ends.get(course + 1).into_iter().flatten().enumerate();
             for (over, _) in above.filter(|(_, [start, end])| start < to && end > from) {
                 let over = firsts[course + 1] + over;
                 let names = [format!("b{}_top", body + 1), format!("b{}_bottom", over + 1)];
-                draft.contact(names, [body, over], (0.5, level), Some(&format!("(x - {from})")), 0.0);
+                builder.contact(names, [body, over], (0.5, level), Some(&format!("(x - {from})")), 0.0);
             }
         }
     }
-    let idle = draft.load == 0.0 || sides == "free";
+    let idle = builder.load == 0.0 || sides == "free";
     // head joints that nothing presses may open, and with them bricks slide
     let expect = if idle || sides == "between" { Expect::Gauge } else { Expect::Solution };
-    Made { draft, expect, hanging: true }
+    Made { builder, expect, hanging: true }
 }
 
 /// Where the bricks of a course begin and end.

@@ -1,7 +1,7 @@
 //! The error of a contact pressure, against a table or against the closed form of the scene.
 
-use super::plan::{Plan, usage};
-use crate::commands::interpolate::{EXACT, Scattered, Squares, mean};
+use super::plan::{BenchPlan, usage};
+use crate::commands::interpolate::{EXACT, PointTree, Squares, mean};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::scene::Scene;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// The contact points of one pair, in the order of the file.
 #[derive(Debug, Clone, Default, Serialize)]
-pub(super) struct Points {
+pub(super) struct PairPoints {
     /// Name of the file, without its folder.
     name: String,
     /// Positions, n.
@@ -22,7 +22,7 @@ pub(super) struct Points {
 
 /// The columns that are read of a row of the file.
 #[derive(Deserialize)]
-struct Point {
+struct PressureRow {
     x: f64,
     y: f64,
     z: f64,
@@ -32,19 +32,19 @@ struct Point {
 
 /// The contact tables of `--against`; empty without it.
 #[derive(Default)]
-pub(super) struct References(Vec<Points>);
+pub(super) struct References(Vec<PairPoints>);
 
 impl References {
     /// Read a contact table, or all tables of a folder of results.
     ///
     /// # Errors
     /// Files that cannot be read, several scenes, one table for several pairs.
-    pub fn read(path: Option<&Path>, plan: &Plan) -> Result<Self> {
+    pub fn read(path: Option<&Path>, plan: &BenchPlan) -> Result<Self> {
         let Some(path) = path else { return Ok(Self::default()) };
         let [scene] = &plan.scenes[..] else {
             return Err(usage("`--against` goes with one scene"));
         };
-        let found = if path.is_dir() { tables(path)? } else { vec![Points::read(path)?] };
+        let found = if path.is_dir() { tables(path)? } else { vec![PairPoints::read(path)?] };
         if scene.auto.is_empty() && found.len() != scene.contacts.len() {
             let help = "give the folder of results of the same scene, or the table of its only pair";
             let message = format!(
@@ -64,13 +64,13 @@ impl References {
     }
 
     /// Return the relative error of the pressures of a run; `None` without `--against`.
-    pub fn error(&self, scene: &Scene, run: &[Points]) -> Option<f64> {
+    pub fn error(&self, scene: &Scene, run: &[PairPoints]) -> Option<f64> {
         (!self.0.is_empty()).then(|| difference(scene.dimension.value, run, &self.0))?
     }
 }
 
 /// Read the contact tables in a folder of results, in the order of their names.
-pub(super) fn tables(folder: &Path) -> Result<Vec<Points>> {
+pub(super) fn tables(folder: &Path) -> Result<Vec<PairPoints>> {
     let entries = std::fs::read_dir(folder).map_err(|cause| Error::file(folder, "read", &cause))?;
     let is_table = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -78,10 +78,10 @@ pub(super) fn tables(folder: &Path) -> Result<Vec<Points>> {
     };
     let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_table).collect();
     paths.sort();
-    paths.iter().map(|path| Points::read(path)).collect()
+    paths.iter().map(|path| PairPoints::read(path)).collect()
 }
 
-impl Points {
+impl PairPoints {
     fn read(path: &Path) -> Result<Self> {
         let refuse = |why: String| {
             Error::new(Kind::File, format!("{} is no contact table: {why}", path.display()))
@@ -91,7 +91,7 @@ impl Points {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut points = Self { name, ..Self::default() };
         for point in csv::Reader::from_reader(&bytes[..]).deserialize() {
-            let Point { x, y, z, weight, pressure } = point.map_err(|cause| refuse(cause.to_string()))?;
+            let PressureRow { x, y, z, weight, pressure } = point.map_err(|cause| refuse(cause.to_string()))?;
             points.at.push([x, y, z]);
             points.weight.push(weight.unwrap_or(1.0));
             points.pressure.push(pressure);
@@ -105,17 +105,17 @@ impl Points {
 
 /// Return the relative error in L2 of the pressures of a run against those of another run, over all pairs; `None` where they cannot be
 /// compared.
-pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points]) -> Option<f64> {
+pub(super) fn difference(dimension: usize, run: &[PairPoints], reference: &[PairPoints]) -> Option<f64> {
     if run.len() != reference.len() {
         return None;
     }
-    let known = |own: &Points| -> Option<Vec<f64>> {
+    let known = |own: &PairPoints| -> Option<Vec<f64>> {
         // tables of the same pair, or the only two
         let other = reference.iter().find(|other| other.name == own.name || reference.len() == 1)?;
         Some(match dimension {
             2 => own.at.iter().map(|x| on_curve(other, x)).collect(),
             _ => {
-                let scattered = Scattered::new(&other.at);
+                let scattered = PointTree::new(&other.at);
                 own.at.iter().map(|x| mean(&scattered.plane(x, EXACT), &other.pressure)).collect()
             }
         })
@@ -124,7 +124,7 @@ pub(super) fn difference(dimension: usize, run: &[Points], reference: &[Points])
 }
 
 /// Return the relative error in L2 of the pressures of a run against the `reference` of its contact; `None` without one, or with several pairs.
-pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
+pub(super) fn closed_form(scene: &Scene, run: &[PairPoints]) -> Option<f64> {
     // with several pairs it is not known which table belongs to which contact
     let ([contact], [own]) = (&scene.contacts[..], run) else { return None };
     let field = contact.reference.as_ref()?;
@@ -133,7 +133,7 @@ pub(super) fn closed_form(scene: &Scene, run: &[Points]) -> Option<f64> {
 }
 
 /// Return the relative error of a run against the known pressures at its points, n for each pair; `None` if it is not finite.
-fn relative(run: &[Points], known: &[Vec<f64>]) -> Option<f64> {
+fn relative(run: &[PairPoints], known: &[Vec<f64>]) -> Option<f64> {
     let mut squares = Squares::default();
     for (run, known) in run.iter().zip(known) {
         (0..known.len()).for_each(|q| squares.add(run.weight[q], known[q], run.pressure[q]));
@@ -143,7 +143,7 @@ fn relative(run: &[Points], known: &[Vec<f64>]) -> Option<f64> {
 }
 
 /// Return the pressure at the point of a curve that is nearest to `x`, linear between the points of the table.
-fn on_curve(curve: &Points, x: &[f64; 3]) -> f64 {
+fn on_curve(curve: &PairPoints, x: &[f64; 3]) -> f64 {
     let (mut least, mut pressure) = (f64::INFINITY, curve.pressure.first().copied().unwrap_or(f64::NAN));
     let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
     for q in 1..curve.at.len() {
@@ -164,8 +164,8 @@ fn on_curve(curve: &Points, x: &[f64; 3]) -> f64 {
 mod tests {
     use super::*;
 
-    fn points(at: Vec<[f64; 3]>, p: impl Fn(&[f64; 3]) -> f64) -> Points {
-        Points { name: String::new(), weight: vec![1.0; at.len()], pressure: at.iter().map(p).collect(), at }
+    fn points(at: Vec<[f64; 3]>, p: impl Fn(&[f64; 3]) -> f64) -> PairPoints {
+        PairPoints { name: String::new(), weight: vec![1.0; at.len()], pressure: at.iter().map(p).collect(), at }
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod plan;
 mod process;
 mod table;
 
-pub use plan::Request;
+pub use plan::BenchArgs;
 
 use super::folder_of;
 use crate::error::Result;
@@ -16,12 +16,12 @@ use crate::output::{Folder, say, terminal};
 use crate::petsc::Session;
 use crate::scene::Scene;
 use compare::References;
-use plan::{Case, Plan, usage};
-use process::{Run, Runner};
+use plan::{BenchCase, BenchPlan, usage};
+use process::{ProcessRun, Runner};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use table::{Row, SKIPPED, Table};
+use table::{BenchRow, BenchTable, SKIPPED};
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -30,15 +30,15 @@ use table::{Row, SKIPPED, Table};
 /// # Errors
 /// Command lines that make no sense, scenes that cannot be read, a folder that cannot be written, a signal. A failure of a run is no error,
 /// but a row.
-pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
+pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     interrupt.hold();
     if Session::is_one_of_several() {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
     }
-    let plan = Plan::new(request)?;
+    let plan = BenchPlan::new(request)?;
     let folder = Folder::claim(folder(request, &plan))?;
     let reference = References::read(request.against.as_deref(), &plan)?;
-    let mut table = Table::open(&folder, &plan, request, &reference)?;
+    let mut table = BenchTable::open(&folder, &plan, request, &reference)?;
     let runner = Runner::new(interrupt, request, folder.path())?;
     let bar = terminal::runs(plan.cases.len(), !request.quiet);
     let mut meshed = BTreeSet::new();
@@ -51,9 +51,9 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
         let is_new = old.is_none();
         let mut row = match old {
             Some(row) => row,
-            None if table.is_beyond(case) => Row::unsolved(case, SKIPPED, "an earlier mesh took too long"),
+            None if table.is_beyond(case) => BenchRow::unsolved(case, SKIPPED, "an earlier mesh took too long"),
             None if began.elapsed().as_secs_f64() >= request.budget => {
-                Row::unsolved(case, SKIPPED, "the budget is spent")
+                BenchRow::unsolved(case, SKIPPED, "the budget is spent")
             }
             None => measure(case, scene, &runner, &reference, &mut meshed)?,
         };
@@ -74,11 +74,11 @@ pub fn bench(interrupt: &Interrupt, request: &Request) -> Result<i32> {
     }
     say(format_args!("results in {}", folder.path().display()))?;
     written?;
-    Ok(i32::from(!table.rows.iter().all(Row::is_good)))
+    Ok(i32::from(!table.rows.iter().all(BenchRow::is_good)))
 }
 
 /// Return the folder of the results: that of `-o`, else `bench` in that of the only scene, else `results/bench`.
-fn folder(request: &Request, plan: &Plan) -> PathBuf {
+fn folder(request: &BenchArgs, plan: &BenchPlan) -> PathBuf {
     match (&request.folder, &plan.scenes[..]) {
         (Some(folder), _) => folder.clone(),
         (None, [scene]) => folder_of(scene, None).join("bench"),
@@ -95,17 +95,17 @@ fn inputs(scene: &Scene) -> Option<String> {
 
 /// Run a case as often as asked for, and return its row. `meshed` has the overrides of meshes that are in the cache.
 fn measure(
-    case: &Case,
+    case: &BenchCase,
     scene: Result<Scene>,
     runner: &Runner,
     reference: &References,
     meshed: &mut BTreeSet<Vec<String>>,
-) -> Result<Row> {
+) -> Result<BenchRow> {
     let scene = match scene {
         Ok(scene) => scene,
         Err(error) => {
             let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
-            return Ok(Row::unsolved(case, "refused", &format!("error: {}{help}", error.message())));
+            return Ok(BenchRow::unsolved(case, "refused", &format!("error: {}{help}", error.message())));
         }
     };
     // the mesh is made before times are measured
@@ -113,7 +113,7 @@ fn measure(
         runner.mesh(case)?;
     }
     let runs = runner.repeat(case)?;
-    let mut row = Row::new(case, &runs);
+    let mut row = BenchRow::new(case, &runs);
     if row.is_good()
         && !case.is_linear()
         && let Some((error, what)) = known_error(&scene, &runs, reference, &runner.folder(case))
@@ -125,7 +125,12 @@ fn measure(
 
 /// Return the error of a run against a known solution, and what it is measured in and against. The solution is that of `--against`, or a closed
 /// form of the scene.
-fn known_error(scene: &Scene, runs: &[Run], reference: &References, folder: &Path) -> Option<(f64, &'static str)> {
+fn known_error(
+    scene: &Scene,
+    runs: &[ProcessRun],
+    reference: &References,
+    folder: &Path,
+) -> Option<(f64, &'static str)> {
     let tables = compare::tables(folder).ok()?;
     if let Some(error) = reference.error(scene, &tables) {
         return Some((error, "pressure, --against"));

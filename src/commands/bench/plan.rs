@@ -1,6 +1,6 @@
 //! The command line of `winkler bench`, and the plan that it asks for: all combinations of scenes, keys, orders, methods, solvers and ranks.
 
-use crate::commands::axes::{Axis, Choice, combinations, named};
+use crate::commands::axes::{AxisValue, SweepAxis, combinations, named};
 use crate::commands::case_of;
 use crate::error::{Error, Kind, Result};
 use crate::problem::{Order, Preset};
@@ -8,7 +8,7 @@ use crate::scene::Scene;
 use std::path::PathBuf;
 
 /// The runs of a benchmark.
-pub(super) struct Plan {
+pub(super) struct BenchPlan {
     /// The scenes with the overrides of all runs.
     pub scenes: Vec<Scene>,
     /// Their names in the table.
@@ -16,14 +16,14 @@ pub(super) struct Plan {
     /// Names of the columns of a key: the scene, the keys of `--over`, and [`COLUMNS`].
     pub columns: Vec<String>,
     /// The combinations, ordered by scene, values of the keys, order, method, solver and ranks; the last changes first.
-    pub cases: Vec<Case>,
+    pub cases: Vec<BenchCase>,
 }
 
 /// One combination.
 #[derive(Debug, Clone)]
-pub(super) struct Case {
+pub(super) struct BenchCase {
     pub scene: PathBuf,
-    /// Values of the columns that distinguish it from other cases: those of [`Plan::columns`].
+    /// Values of the columns that distinguish it from other cases: those of [`BenchPlan::columns`].
     pub key: Vec<String>,
     /// A text that distinguishes it from the other cases of the plan.
     pub label: String,
@@ -54,13 +54,13 @@ pub(super) const ASKED: &str = "asked";
 /// Overrides of all runs: only tables are needed.
 const OUTPUT: [&str; 3] = ["output.vtu=false", "output.plots=false", "output.pairs=all"];
 
-impl Plan {
+impl BenchPlan {
     /// Return the plan of a request.
     ///
     /// # Errors
     /// Scenes that cannot be read, lists that make no sense.
-    pub fn new(request: &Request) -> Result<Self> {
-        let over = Axis::all_over(&request.over)?;
+    pub fn new(request: &BenchArgs) -> Result<Self> {
+        let over = SweepAxis::all_over(&request.over)?;
         if over.iter().any(|axis| axis.name == "solver") {
             return Err(usage("`--over solver=...` would hide the solvers of the table").help("--solver mumps,hypre"));
         }
@@ -76,13 +76,13 @@ impl Plan {
             request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
         let keys = over.iter().map(|axis| axis.name.as_str());
         let columns = std::iter::once("scene").chain(keys).chain(COLUMNS).map(str::to_owned).collect();
-        let mut plan = Plan { names: names(&scenes), scenes, columns, cases: Vec::new() };
+        let mut plan = BenchPlan { names: names(&scenes), scenes, columns, cases: Vec::new() };
         let (mut axes, keys) = (over, plan.keys().len());
         for index in 0..plan.scenes.len() {
             axes.truncate(keys);
             axes.extend(plan.own_axes(index, request, &solvers));
             let cases = combinations(&axes).into_iter().filter_map(|choices| plan.case(index, request, &choices));
-            let cases: Vec<Case> = cases.collect();
+            let cases: Vec<BenchCase> = cases.collect();
             plan.cases.extend(cases);
         }
         plan.label_cases();
@@ -90,39 +90,39 @@ impl Plan {
     }
 
     /// Return the axes of a scene behind those of `--over`, from the slowest to the fastest.
-    fn own_axes(&self, index: usize, request: &Request, solvers: &[Choice]) -> [Axis; 4] {
+    fn own_axes(&self, index: usize, request: &BenchArgs, solvers: &[AxisValue]) -> [SweepAxis; 4] {
         let scene = &self.scenes[index];
         let of_order = |order: &usize| {
             let bodies = 0..scene.bodies.len();
-            Choice::of_scene(order.to_string(), bodies.map(|body| format!("body.{body}.order={order}")).collect())
+            AxisValue::of_scene(order.to_string(), bodies.map(|body| format!("body.{body}.order={order}")).collect())
         };
-        let of_method = |name: &String| Choice::of_scene(name, vec![format!("method.name={name}")]);
+        let of_method = |name: &String| AxisValue::of_scene(name, vec![format!("method.name={name}")]);
         let orders = choices(&request.orders, of_order, || orders_of(scene));
         let mut methods = choices(&request.methods, of_method, || scene.method.name.name().to_owned());
         if request.linear {
             // a reference cost is that of a solve to 1e-8, unless another tolerance is typed
             let petsc = ["-ksp_rtol", "1e-8"].map(str::to_owned).to_vec();
-            methods.insert(0, Choice { petsc, ..Choice::of_scene(LINEAR, vec![ONE_SWEEP.to_owned()]) });
+            methods.insert(0, AxisValue { petsc, ..AxisValue::of_scene(LINEAR, vec![ONE_SWEEP.to_owned()]) });
         }
-        let ranks = request.ranks.iter().map(|ranks| Choice::of_scene(ranks.to_string(), Vec::new())).collect();
+        let ranks = request.ranks.iter().map(|ranks| AxisValue::of_scene(ranks.to_string(), Vec::new())).collect();
         [
-            Axis::new("order", orders),
-            Axis::new(ASKED, methods),
-            Axis::new("solver", solvers.to_vec()),
-            Axis::new("ranks", ranks),
+            SweepAxis::new("order", orders),
+            SweepAxis::new(ASKED, methods),
+            SweepAxis::new("solver", solvers.to_vec()),
+            SweepAxis::new("ranks", ranks),
         ]
     }
 
     /// Return the case of a scene with these choices of the axes; none for a reference cost of a solver that has none.
-    fn case(&self, index: usize, request: &Request, choices: &[&Choice]) -> Option<Case> {
+    fn case(&self, index: usize, request: &BenchArgs, choices: &[&AxisValue]) -> Option<BenchCase> {
         let (values, [order, method, solver, ranks]) = choices.split_last_chunk::<4>()?;
         if method.text == LINEAR && solver.text == CONDENSED {
             return None;
         }
-        let texts = |choices: &[&Choice]| choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
-        let overrides = |choices: &[&Choice]| choices.iter().flat_map(|choice| choice.overrides.clone()).collect();
+        let texts = |choices: &[&AxisValue]| choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
+        let overrides = |choices: &[&AxisValue]| choices.iter().flat_map(|choice| choice.overrides.clone()).collect();
         let mesh_overrides: Vec<String> = [request.all_overrides(), overrides(values), overrides(&[order])].concat();
-        Some(Case {
+        Some(BenchCase {
             scene: self.scenes[index].path.clone(),
             key: [vec![self.names[index].clone()], texts(values), texts(&[solver, method, order, ranks])].concat(),
             label: String::new(),
@@ -177,14 +177,14 @@ impl Plan {
 }
 
 /// Return a choice for each of the `requested` values, or the scene's own one, which changes nothing, if there are none.
-fn choices<T>(requested: &[T], choice: impl Fn(&T) -> Choice, own: impl Fn() -> String) -> Vec<Choice> {
+fn choices<T>(requested: &[T], choice: impl Fn(&T) -> AxisValue, own: impl Fn() -> String) -> Vec<AxisValue> {
     match requested {
-        [] => vec![Choice::of_scene(own(), Vec::new())],
+        [] => vec![AxisValue::of_scene(own(), Vec::new())],
         _ => requested.iter().map(choice).collect(),
     }
 }
 
-impl Case {
+impl BenchCase {
     /// Return whether it is one linear factor-and-solve.
     pub fn is_linear(&self) -> bool {
         self.method == LINEAR
@@ -225,8 +225,8 @@ fn orders_of(scene: &Scene) -> String {
 }
 
 /// Return the solvers of `--solver`, or all presets if there is none.
-fn solvers(typed: &[String]) -> Result<Vec<Choice>> {
-    let preset = |name: &str| Choice::of_scene(name, vec![format!("solver={name}")]);
+fn solvers(typed: &[String]) -> Result<Vec<AxisValue>> {
+    let preset = |name: &str| AxisValue::of_scene(name, vec![format!("solver={name}")]);
     if typed.is_empty() {
         return Ok(Preset::ALL.iter().map(|(name, _)| preset(name)).collect());
     }
@@ -234,7 +234,7 @@ fn solvers(typed: &[String]) -> Result<Vec<Choice>> {
     for text in typed {
         if text.trim_start().starts_with('-') {
             let petsc: Vec<String> = text.split_whitespace().map(str::to_owned).collect();
-            solvers.push(Choice { petsc: petsc.clone(), ..Choice::of_scene(petsc.join(" "), Vec::new()) });
+            solvers.push(AxisValue { petsc: petsc.clone(), ..AxisValue::of_scene(petsc.join(" "), Vec::new()) });
             continue;
         }
         for name in text.split(',').map(str::trim) {
@@ -249,7 +249,7 @@ fn solvers(typed: &[String]) -> Result<Vec<Choice>> {
 
 /// The command line of `winkler bench`.
 #[derive(clap::Args)]
-pub struct Request {
+pub struct BenchArgs {
     /// Scene files (TOML)
     #[arg(value_name = "SCENE", required = true)]
     pub scenes: Vec<PathBuf>,
@@ -303,7 +303,7 @@ pub struct Request {
     pub petsc: Vec<String>,
 }
 
-impl Request {
+impl BenchArgs {
     /// Return the overrides of the scenes for every run.
     pub(super) fn all_overrides(&self) -> Vec<String> {
         let trust = self.trust_geo.then(|| "trust_geo=true".to_owned());

@@ -1,6 +1,6 @@
 //! One run as a process of its own: its messages, its time and its memory.
 
-use super::plan::{Case, Request, usage};
+use super::plan::{BenchArgs, BenchCase, usage};
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use wait4::{ResUse, Wait4};
 
 /// The result of one run.
-pub(super) struct Run {
+pub(super) struct ProcessRun {
     /// Status of the report, or `refused`, `timeout`, `killed` or `failed`.
     pub status: String,
     pub message: String,
@@ -34,7 +34,7 @@ pub(super) struct Run {
     pub last_sweep: Option<f64>,
 }
 
-impl Run {
+impl ProcessRun {
     /// Return the number at a path of the report.
     pub fn number(&self, path: &str) -> Option<f64> {
         self.report.pointer(path).and_then(Value::as_f64)
@@ -80,7 +80,7 @@ impl Runner {
     ///
     /// # Errors
     /// A time limit that is no time, a system on which the path of the program cannot be found.
-    pub fn new(interrupt: &Interrupt, request: &Request, folder: &Path) -> Result<Self> {
+    pub fn new(interrupt: &Interrupt, request: &BenchArgs, folder: &Path) -> Result<Self> {
         let timeout = Duration::try_from_secs_f64(request.timeout)
             .ok()
             .filter(|timeout| !timeout.is_zero())
@@ -92,12 +92,12 @@ impl Runner {
     }
 
     /// Return the folder of a run's results.
-    pub fn folder(&self, case: &Case) -> PathBuf {
+    pub fn folder(&self, case: &BenchCase) -> PathBuf {
         folder_of(&self.folder, &case.key)
     }
 
     /// Make the mesh of a run. A failure is not reported here, since the run itself fails in the same way.
-    pub fn mesh(&self, case: &Case) -> Result<()> {
+    pub fn mesh(&self, case: &BenchCase) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg("mesh").arg(&case.scene);
         command.args(case.mesh_overrides.iter().flat_map(|text| ["--set", text]));
@@ -105,7 +105,7 @@ impl Runner {
     }
 
     /// Run a case as often as asked for, or until it fails.
-    pub fn repeat(&self, case: &Case) -> Result<Vec<Run>> {
+    pub fn repeat(&self, case: &BenchCase) -> Result<Vec<ProcessRun>> {
         let mut runs = Vec::new();
         for _ in 0..self.repeat {
             let run = self.run(case)?;
@@ -118,7 +118,7 @@ impl Runner {
         Ok(runs)
     }
 
-    fn run(&self, case: &Case) -> Result<Run> {
+    fn run(&self, case: &BenchCase) -> Result<ProcessRun> {
         let folder = self.folder(case);
         let mut command = match case.ranks {
             1 => Command::new(&self.program),
@@ -147,7 +147,7 @@ impl Runner {
             (_, Some(status)) => (status.to_owned(), report["message"].as_str().unwrap_or_default().to_owned()),
             (Some(used), None) => (status_of(used.status).to_owned(), message(&ended.output, used.status)),
         };
-        Ok(Run {
+        Ok(ProcessRun {
             status,
             message,
             seconds: ended.seconds,

@@ -2,23 +2,23 @@
 //! together tell; and their plots.
 
 use super::compare::{self, References};
-use super::plan::{ASKED, Case, LINEAR, Plan, Request, is_of_mesh, part};
-use super::process::{RUNS, Run, folder_of, items};
+use super::plan::{ASKED, BenchArgs, BenchCase, BenchPlan, LINEAR, is_of_mesh, part};
+use super::process::{ProcessRun, RUNS, folder_of, items};
 use crate::error::Result;
 use crate::linalg::fit;
-use crate::output::{Axis, Color, Folder, Plot, RowFile, Series, Style, sci, seconds};
+use crate::output::{Color, Folder, Plot, PlotAxis, RowFile, Series, Style, sci, seconds};
 use comfy_table::{CellAlignment, presets};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// All rows and their file.
-pub(super) struct Table<'a> {
+pub(super) struct BenchTable<'a> {
     folder: &'a Folder,
-    plan: &'a Plan,
+    plan: &'a BenchPlan,
     columns: Vec<String>,
-    pub rows: Vec<Row>,
+    pub rows: Vec<BenchRow>,
     /// Rows of an earlier benchmark that can be reused.
-    old: Vec<Row>,
+    old: Vec<BenchRow>,
     file: RowFile,
 }
 
@@ -27,10 +27,10 @@ const FILE: &str = "bench.csv";
 /// The file with the settings of the rows in the folder.
 const SETTINGS: &str = "bench.txt";
 
-impl<'a> Table<'a> {
+impl<'a> BenchTable<'a> {
     /// Open the file of a plan. With `--resume` its rows are read first, if they were made with the same settings.
-    pub fn open(folder: &'a Folder, plan: &'a Plan, request: &Request, reference: &References) -> Result<Self> {
-        let columns: Vec<String> = plan.columns.iter().cloned().chain(Row::columns().map(str::to_owned)).collect();
+    pub fn open(folder: &'a Folder, plan: &'a BenchPlan, request: &BenchArgs, reference: &References) -> Result<Self> {
+        let columns: Vec<String> = plan.columns.iter().cloned().chain(BenchRow::columns().map(str::to_owned)).collect();
         let settings = settings(request, reference);
         let path = folder.path().join(SETTINGS);
         let is_known = request.resume && crate::file::read(&path).is_ok_and(|old| old == settings.as_bytes());
@@ -38,25 +38,25 @@ impl<'a> Table<'a> {
         old.retain(|row| !matches!(row.text("status"), "killed" | "failed" | SKIPPED));
         folder.write(SETTINGS, |out| out.write_all(settings.as_bytes()))?;
         // the file has the old rows from the start, so that a benchmark that is killed loses none
-        let file = RowFile::create(folder, FILE, &columns, &old.iter().map(Row::fields).collect::<Vec<_>>())?;
+        let file = RowFile::create(folder, FILE, &columns, &old.iter().map(BenchRow::fields).collect::<Vec<_>>())?;
         Ok(Self { folder, plan, columns, rows: Vec::new(), old, file })
     }
 
     /// Return the row of a case that an earlier benchmark made from the same inputs. Scenes, data and meshes may have been edited meanwhile.
-    pub fn old_row(&self, case: &Case, inputs: Option<&str>) -> Option<Row> {
-        let is_same = |row: &&Row| row.key == case.key && Some(row.text("inputs")) == inputs;
+    pub fn old_row(&self, case: &BenchCase, inputs: Option<&str>) -> Option<BenchRow> {
+        let is_same = |row: &&BenchRow| row.key == case.key && Some(row.text("inputs")) == inputs;
         self.old.iter().find(is_same).cloned()
     }
 
     /// Return whether a case differs only by its mesh from a row that did not end in time. Lists of meshes go from coarse to fine.
-    pub fn is_beyond(&self, case: &Case) -> bool {
+    pub fn is_beyond(&self, case: &BenchCase) -> bool {
         let columns = &self.plan.columns;
-        let is_like = |row: &Row| (0..columns.len()).all(|k| is_of_mesh(&columns[k]) || row.key[k] == case.key[k]);
+        let is_like = |row: &BenchRow| (0..columns.len()).all(|k| is_of_mesh(&columns[k]) || row.key[k] == case.key[k]);
         self.rows.iter().any(|row| row.text("status") == "timeout" && is_like(row))
     }
 
     /// Add a row. A new row is written at once, so that it is kept whatever comes next. Return the message that the file lacks rows, once.
-    pub fn add(&mut self, row: Row, is_new: bool) -> Option<String> {
+    pub fn add(&mut self, row: BenchRow, is_new: bool) -> Option<String> {
         if is_new {
             self.file.push(&row.fields());
         }
@@ -68,7 +68,7 @@ impl<'a> Table<'a> {
     pub fn complete(&mut self) -> Result<()> {
         self.compare_with_finest();
         self.compare_with_linear();
-        let rows: Vec<_> = self.rows.iter().map(Row::fields).collect();
+        let rows: Vec<_> = self.rows.iter().map(BenchRow::fields).collect();
         RowFile::create(self.folder, FILE, &self.columns, &rows)?.finish()
     }
 
@@ -79,12 +79,13 @@ impl<'a> Table<'a> {
     fn compare_with_finest(&mut self) {
         let (columns, order) = (&self.plan.columns, self.plan.column("order"));
         // the first columns of the table are the scene and the keys
-        let is_alike =
-            |a: &Row, b: &Row| (0..=self.plan.keys().len()).all(|k| is_of_mesh(&columns[k]) || a.key[k] == b.key[k]);
-        let is_comparable = |row: &Row| row.is_good() && !row.is_linear();
+        let is_alike = |a: &BenchRow, b: &BenchRow| {
+            (0..=self.plan.keys().len()).all(|k| is_of_mesh(&columns[k]) || a.key[k] == b.key[k])
+        };
+        let is_comparable = |row: &BenchRow| row.is_good() && !row.is_linear();
         // dofs, and the order of the elements
-        let fineness = |row: &Row| (row.number("dofs").unwrap_or(0.0), row.key[order].clone());
-        let residual = |row: &Row| row.number("residual").unwrap_or(f64::INFINITY);
+        let fineness = |row: &BenchRow| (row.number("dofs").unwrap_or(0.0), row.key[order].clone());
+        let residual = |row: &BenchRow| row.number("residual").unwrap_or(f64::INFINITY);
         let mut found = Vec::new();
         for (index, row) in self.rows.iter().enumerate() {
             if !is_comparable(row) || row.number("error").is_some() {
@@ -105,7 +106,7 @@ impl<'a> Table<'a> {
     }
 
     /// Return the relative difference of the pressures of two rows; none where their tables cannot be compared.
-    fn difference(&self, row: &Row, reference: &Row) -> Option<f64> {
+    fn difference(&self, row: &BenchRow, reference: &BenchRow) -> Option<f64> {
         let runs = self.folder.path().join(RUNS);
         let dimension = self.plan.scene(&row.key[0])?.dimension.value;
         let [own, other] = [row, reference].map(|row| compare::tables(&folder_of(&runs, &row.key)).ok());
@@ -117,8 +118,8 @@ impl<'a> Table<'a> {
     /// Their reference cost is that of the fastest solver with a row of the method `linear`.
     fn compare_with_linear(&mut self) {
         let others = ["solver", ASKED].map(|name| self.plan.column(name));
-        let same = |a: &Row, b: &Row| (0..a.key.len()).all(|k| others.contains(&k) || a.key[k] == b.key[k]);
-        let linear: Vec<Row> = self.rows.iter().filter(|row| row.is_linear()).cloned().collect();
+        let same = |a: &BenchRow, b: &BenchRow| (0..a.key.len()).all(|k| others.contains(&k) || a.key[k] == b.key[k]);
+        let linear: Vec<BenchRow> = self.rows.iter().filter(|row| row.is_linear()).cloned().collect();
         for row in self.rows.iter_mut().filter(|row| row.is_good() && !row.is_linear()) {
             let alike = linear.iter().filter(|other| same(row, other));
             let cost = alike.filter_map(|other| other.number("linear_seconds")).fold(f64::INFINITY, f64::min);
@@ -131,7 +132,7 @@ impl<'a> Table<'a> {
 }
 
 /// Return what rows depend on beside their key and their inputs.
-fn settings(request: &Request, reference: &References) -> String {
+fn settings(request: &BenchArgs, reference: &References) -> String {
     format!(
         "winkler {}\n--set {:?}\nPETSc {:?} {:?}\n--repeat {}\n--timeout {}\n--against {:?} {}\n",
         env!("CARGO_PKG_VERSION"),
@@ -146,25 +147,25 @@ fn settings(request: &Request, reference: &References) -> String {
 }
 
 /// Return the rows of the file in a folder that has these columns; none if it has others.
-fn read(folder: &Folder, columns: &[String]) -> Vec<Row> {
+fn read(folder: &Folder, columns: &[String]) -> Vec<BenchRow> {
     let Ok(bytes) = crate::file::read(&folder.path().join(FILE)) else { return Vec::new() };
     let mut file = csv::Reader::from_reader(bytes.as_slice());
     if !file.headers().is_ok_and(|header| header.iter().eq(columns)) {
         return Vec::new();
     }
     // the last row of a benchmark that was killed may be incomplete
-    file.records().map_while(|record| record.ok()).map(|record| Row::parse(&record)).collect()
+    file.records().map_while(|record| record.ok()).map(|record| BenchRow::parse(&record)).collect()
 }
 
 /// Columns of texts and of the number of runs, after the key.
 const TEXTS: [&str; 4] = ["runs", "status", "message", "method"];
 
 /// A function that returns a number of the runs of a case, if they have it.
-type Number = fn(&Runs) -> Option<f64>;
+type Measurement = fn(&Runs) -> Option<f64>;
 
 /// Columns with a number, after the texts. Times are medians over the runs; counters are those of one run, and all runs have the same. The
 /// numbers that need the whole table, or tables of contact, are set later.
-const NUMBERS: [(&str, Number); 25] = [
+const NUMBERS: [(&str, Measurement); 25] = [
     ("dofs", |runs| runs.shown.number("/dofs")),
     ("points", |runs| Some(runs.pairs()?.map(|pair| of(pair, "points")).sum())),
     ("theta", |runs| Some(runs.pairs()?.map(coupling).fold(0.0, f64::max))),
@@ -200,21 +201,21 @@ pub(super) const SKIPPED: &str = "skipped";
 
 /// The row of a case.
 #[derive(Debug, Clone)]
-pub(super) struct Row {
+pub(super) struct BenchRow {
     /// Values of the columns of the plan.
     pub key: Vec<String>,
     /// The texts of the other columns, as they are in the file; those that are empty may be missing.
     values: BTreeMap<&'static str, String>,
 }
 
-impl Row {
+impl BenchRow {
     /// Return the names of its columns after the key.
     fn columns() -> impl Iterator<Item = &'static str> {
         TEXTS.into_iter().chain(NUMBERS.map(|(name, _)| name)).chain(LAST)
     }
 
     /// Return the row of some runs of a case.
-    pub fn new(case: &Case, runs: &[Run]) -> Self {
+    pub fn new(case: &BenchCase, runs: &[ProcessRun]) -> Self {
         let worst = runs.iter().find(|run| !is_good(&run.status));
         let Some(shown) = worst.or(runs.first()) else {
             return Self::unsolved(case, "failed", "nothing was run");
@@ -239,7 +240,7 @@ impl Row {
     }
 
     /// Return the row of a case without results.
-    pub fn unsolved(case: &Case, status: &str, message: &str) -> Self {
+    pub fn unsolved(case: &BenchCase, status: &str, message: &str) -> Self {
         let texts = [("runs", "0"), ("status", status), ("message", message), ("method", case.method.as_str())];
         let values = texts.map(|(name, text)| (name, text.to_owned())).into();
         Self { key: case.key.clone(), values }
@@ -311,15 +312,15 @@ fn is_good(status: &str) -> bool {
 }
 
 struct Runs<'a> {
-    all: &'a [Run],
+    all: &'a [ProcessRun],
     /// The first that failed, else the first.
-    shown: &'a Run,
+    shown: &'a ProcessRun,
     is_linear: bool,
 }
 
 impl Runs<'_> {
     /// Return the median of a number over the runs that have it.
-    fn median(&self, number: impl Fn(&Run) -> Option<f64>) -> Option<f64> {
+    fn median(&self, number: impl Fn(&ProcessRun) -> Option<f64>) -> Option<f64> {
         median(self.all.iter().filter_map(number).filter(|value| value.is_finite()).collect())
     }
 
@@ -377,10 +378,10 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 }
 
 /// A function that returns a number as a text.
-type Format = fn(f64) -> String;
+type NumberFormat = fn(f64) -> String;
 
 /// Columns with a number: heading, name in the rows, format.
-const SHOWN: [(&str, &str, Format); 9] = [
+const SHOWN: [(&str, &str, NumberFormat); 9] = [
     ("dofs", "dofs", |value| format!("{value:.0}")),
     ("iterations", "iterations", |value| format!("{value:.0}")),
     ("sweeps", "sweeps", |value| format!("{value:.0}")),
@@ -393,7 +394,7 @@ const SHOWN: [(&str, &str, Format); 9] = [
 ];
 
 /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
-pub(super) fn summary(rows: &[Row], plan: &Plan) -> comfy_table::Table {
+pub(super) fn summary(rows: &[BenchRow], plan: &BenchPlan) -> comfy_table::Table {
     let columns = &plan.columns;
     let mut named = plan.varied(rows.iter().map(|row| &row.key));
     named.retain(|&column| columns[column] != ASKED);
@@ -403,7 +404,7 @@ pub(super) fn summary(rows: &[Row], plan: &Plan) -> comfy_table::Table {
     table.load_style(presets::NOTHING);
     let heads = named.iter().map(|&column| columns[column].as_str());
     table.set_header(heads.chain(["method", "status"]).chain(numbers.iter().map(|number| number.0)));
-    let line = |row: &Row| -> Vec<String> {
+    let line = |row: &BenchRow| -> Vec<String> {
         let words = named.iter().map(|&column| row.key[column].clone());
         let words = words.chain(["method", "status"].map(|name| row.text(name).to_owned()));
         words.chain(numbers.iter().map(|(_, name, format)| row.number(name).map_or(String::new(), format))).collect()
@@ -416,10 +417,10 @@ pub(super) fn summary(rows: &[Row], plan: &Plan) -> comfy_table::Table {
 }
 
 /// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the scene in it.
-pub(super) fn plots(rows: &[Row], plan: &Plan) -> Vec<(String, Plot)> {
+pub(super) fn plots(rows: &[BenchRow], plan: &BenchPlan) -> Vec<(String, Plot)> {
     let mut plots = Vec::new();
     for (name, scene) in plan.names.iter().zip(&plan.scenes) {
-        let rows: Vec<&Row> =
+        let rows: Vec<&BenchRow> =
             rows.iter().filter(|row| row.key[0] == *name && row.is_good() && !row.is_linear()).collect();
         let stem =
             |what: &str| if plan.scenes.len() == 1 { format!("{what}.svg") } else { format!("{what}-{name}.svg") };
@@ -436,8 +437,8 @@ pub(super) fn plots(rows: &[Row], plan: &Plan) -> Vec<(String, Plot)> {
 }
 
 struct Chart<'a> {
-    rows: &'a [&'a Row],
-    plan: &'a Plan,
+    rows: &'a [&'a BenchRow],
+    plan: &'a BenchPlan,
     title: &'a str,
 }
 
@@ -445,7 +446,7 @@ impl Chart<'_> {
     /// Return a plot with logarithmic axes; none without points.
     fn plot(&self, x: &str, y: &str, series: Vec<Series>) -> Option<Plot> {
         let has_points = series.iter().any(|series| !series.points.is_empty());
-        has_points.then(|| Plot { title: self.title.to_owned(), x: Axis::log(x), y: Axis::log(y), series })
+        has_points.then(|| Plot { title: self.title.to_owned(), x: PlotAxis::log(x), y: PlotAxis::log(y), series })
     }
 
     /// Return the plot of time against error. The dashed line joins the runs that no other run beats in both.
@@ -473,7 +474,7 @@ impl Chart<'_> {
     /// Return the plot of sweeps against 1/(1 - theta), with the coupling theta of the bodies; none if theta was not varied.
     fn iterations_theta(&self) -> Option<Plot> {
         let is_over = |column: &str| !is_of_mesh(column) && self.plan.keys().iter().any(|key| key == column);
-        let point = |row: &Row| Some((1.0 / (1.0 - row.number("theta")?), row.number("sweeps")?));
+        let point = |row: &BenchRow| Some((1.0 / (1.0 - row.number("theta")?), row.number("sweeps")?));
         let series = self.series(is_over, point, |_| String::new());
         let varied = |series: &Series| series.points.windows(2).any(|pair| pair[1].0 > pair[0].0);
         if !series.iter().any(varied) {
@@ -487,12 +488,12 @@ impl Chart<'_> {
     fn series(
         &self,
         along: impl Fn(&str) -> bool,
-        point: impl Fn(&Row) -> Option<(f64, f64)>,
+        point: impl Fn(&BenchRow) -> Option<(f64, f64)>,
         suffix: impl Fn(&[(f64, f64)]) -> String,
     ) -> Vec<Series> {
         let (columns, solver, asked) = (&self.plan.columns, self.plan.column("solver"), self.plan.column(ASKED));
         // the method of a curve is the one that ran
-        let key = |row: &&Row| {
+        let key = |row: &&BenchRow| {
             let mut key = row.key.clone();
             key[asked] = row.text("method").to_owned();
             key

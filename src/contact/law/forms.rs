@@ -1,6 +1,6 @@
 //! Laws of a known form: linear, cubic, power and exponential.
 
-use super::numeric::{exp_less_line, gap_by_quadrature, meeting};
+use super::numeric::{exp_less_line, gap_by_quadrature, line_intersection};
 use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Field;
@@ -14,7 +14,7 @@ use std::rc::Rc;
 /// A parameter that is not finite or out of its range at a point.
 pub fn make(form: &LawForm, values: &[Field], position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match form.kind {
-        LawKind::Linear => formed(form, values, position, |v| Linear { stiffness: v[0] }),
+        LawKind::Linear => formed(form, values, position, |v| LinearLaw { stiffness: v[0] }),
         LawKind::Power => formed(form, values, position, |v| Power::new(v[0], v[1])),
         LawKind::Exponential => formed(form, values, position, |v| Exponential::new(v[0], v[1])),
         LawKind::Cubic => formed(form, values, position, |v| Cubic { k1: v[0], k3: v[1] }),
@@ -58,17 +58,17 @@ fn checked(parameter: &Parameter, field: &Field, x: [f64; 3]) -> Result<f64> {
 
 /// The law p(c) = stiffness * c.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Linear {
+pub struct LinearLaw {
     /// Pressure per unit of compression, > 0.
     pub stiffness: f64,
 }
 
-impl LayerLaw for Linear {
+impl LayerLaw for LinearLaw {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         Response { pressure: self.stiffness * c, tangent: self.stiffness, energy: 0.5 * self.stiffness * c * c }
     }
 
-    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
         s / (1.0 + self.stiffness / rho)
     }
 
@@ -123,7 +123,7 @@ impl LayerLaw for Cubic {
         }
     }
 
-    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
         self.root(rho + self.k1, rho * s)
     }
 
@@ -171,7 +171,7 @@ impl LayerLaw for Power {
         }
     }
 
-    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
         let m = self.exponent;
         if m == 1.0 {
             return s / (1.0 + 1.0 / self.b / rho);
@@ -257,14 +257,14 @@ impl LayerLaw for Exponential {
         if c <= self.end { curve } else { curve.straight(c - self.end) }
     }
 
-    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
         let beyond = self.at_end.straight_meet(self.end, s, rho);
         if beyond > 0.0 {
             return self.end + beyond;
         }
         // The start is the smaller of the c that p = 0 and c = 0 would give. The sum c + p/rho is between s and 2 s there.
         let start = s.min(self.compression_loaded(point, rho * s));
-        meeting(s, rho, [0.0, s.min(self.end)], start, |c| self.pressure_and_tangent(point, c))
+        line_intersection(s, rho, [0.0, s.min(self.end)], start, |c| self.pressure_and_tangent(point, c))
     }
 
     fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {

@@ -2,7 +2,7 @@
 //! supplies.
 
 use super::forms;
-use super::numeric::{integral, meeting, root};
+use super::numeric::{integral, line_intersection, root};
 use super::table::{Table, asperities};
 use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
@@ -26,7 +26,7 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {
             let size = extent(position);
-            let at = |&x: &[f64; 3]| Typed::new(law, x, *up_to, size);
+            let at = |&x: &[f64; 3]| ExpressionLaw::new(law, x, *up_to, size);
             match law.uses_only_first() {
                 true => Ok(Rc::new(at(&position[0])?)),
                 false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
@@ -43,7 +43,7 @@ fn extent(position: &[[f64; 3]]) -> f64 {
 
 /// The expression p(c) of a law at one point, continued as a straight line beyond its end.
 #[derive(Debug, Clone)]
-pub struct Typed {
+pub struct ExpressionLaw {
     law: Expression,
     /// The contact point (x, y, z).
     place: [f64; 3],
@@ -59,7 +59,7 @@ const HUGE: f64 = 1e60;
 /// Number of checked compressions in a factor of ten.
 const STEPS_OF_EXPRESSION: i32 = 24;
 
-impl Typed {
+impl ExpressionLaw {
     /// Make the law at a point, checked for compressions up to `end`, or else up to `size`, the extent of the surfaces. It must have
     /// p(0) = 0, increasing p and finite p'.
     ///
@@ -160,7 +160,7 @@ fn advice(last: f64, end: Option<f64>) -> String {
     }
 }
 
-impl LayerLaw for Typed {
+impl LayerLaw for ExpressionLaw {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         if c > self.end {
             return self.at_end.straight(c - self.end);
@@ -182,13 +182,13 @@ impl LayerLaw for Typed {
         (pressure, tangent)
     }
 
-    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
         let beyond = self.at_end.straight_meet(self.end, s, rho);
         if beyond > 0.0 {
             return self.end + beyond;
         }
         let high = s.min(self.end);
-        meeting(s, rho, [0.0, high], high, |c| self.value(c))
+        line_intersection(s, rho, [0.0, high], high, |c| self.value(c))
     }
 
     fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {

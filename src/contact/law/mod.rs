@@ -7,7 +7,7 @@
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). A point is found from its compression
 //! ([`LayerLaw::response`]), from its pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the graph
-//! ([`LayerLaw::meet`], or [`resolve`] for smoothed laws). [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the
+//! ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws). [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the
 //! graph. These methods handle the open layer and the ends of the range. A law implements the methods with `loaded` in their
 //! names if it has a better way than the common search.
 
@@ -18,7 +18,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use forms::Linear;
+pub use forms::LinearLaw;
 #[cfg(test)]
 pub use forms::{Cubic, Exponential, Power};
 pub use make::{OwnLaws, make};
@@ -98,14 +98,14 @@ pub trait LayerLaw: std::fmt::Debug {
     ///
     /// Both c and p/rho grow with s, but not by more than s does. The equation holds to the rounding of p(c), which is a few
     /// times 1e-16 s times the exponent of the law at c.
-    fn meet(&self, point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
         // All comparisons are false for NaN, which is then returned as it is.
-        if s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY { self.meet_loaded(point, s, rho) } else { s }
+        if s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY { self.resolvent_loaded(point, s, rho) } else { s }
     }
 
-    /// Return the same as [`LayerLaw::meet`] for finite `s > 0` and `rho > 0`.
-    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        numeric::meeting(s, rho, [0.0, s], s, |c| self.pressure_and_tangent(point, c))
+    /// Return the same as [`LayerLaw::resolvent`] for finite `s > 0` and `rho > 0`.
+    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
+        numeric::line_intersection(s, rho, [0.0, s], s, |c| self.pressure_and_tangent(point, c))
     }
 
     /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a pressure that
@@ -178,8 +178,8 @@ impl<L: LayerLaw> LayerLaw for PerPoint<L> {
         self.0[point].pressure_and_tangent(0, c)
     }
 
-    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        self.0[point].meet_loaded(0, s, rho)
+    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
+        self.0[point].resolvent_loaded(0, s, rho)
     }
 
     fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
@@ -223,8 +223,8 @@ impl LayerLaw for Scaled {
         (pressure / self.factor, tangent)
     }
 
-    fn meet_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        self.law.meet(point, self.factor * s, rho) / self.factor
+    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
+        self.law.resolvent(point, self.factor * s, rho) / self.factor
     }
 
     fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
@@ -289,7 +289,7 @@ pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) ->
 
 /// Return the state on the law itself with c + p/rho = `sum`.
 fn on_law(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64) -> LawState {
-    let compression = law.meet(point, sum, rho);
+    let compression = law.resolvent(point, sum, rho);
     let (pressure, tangent) = match compression > 0.0 {
         true => law.pressure_and_tangent(point, compression),
         false => {

@@ -73,7 +73,7 @@ pub fn root(
 
 /// Return the compression c in the bracket with c + p(c)/rho = s, searched from `start`. `law` gives pressure and tangent. A law that
 /// is NaN from some compression on has a rigid stop there.
-pub fn meeting(s: f64, rho: f64, bracket: [f64; 2], start: f64, law: impl Fn(f64) -> (f64, f64)) -> f64 {
+pub fn line_intersection(s: f64, rho: f64, bracket: [f64; 2], start: f64, law: impl Fn(f64) -> (f64, f64)) -> f64 {
     let sum = |c: f64| {
         let (pressure, tangent) = law(c);
         (c + pressure / rho, 1.0 + tangent / rho)

@@ -1,6 +1,6 @@
 //! Laws given by a curve: a smooth increasing one through measured points, and that of a layer of asperities.
 
-use super::numeric::{integral, meeting, root};
+use super::numeric::{integral, line_intersection, root};
 use super::{LayerLaw, Response};
 use crate::linalg::portable::{exp, hypot};
 use crate::problem::layer::{AsperitySpec, Depths};
@@ -121,12 +121,12 @@ impl LayerLaw for Table {
         }
     }
 
-    fn meet_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
+    fn resolvent_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
         let sum = |knot: &Knot| knot.c + knot.pressure / rho;
         match self.around(s, sum) {
             (a, Some(b)) => {
                 let start = a.c + (b.c - a.c) * ((s - sum(a)) / (sum(b) - sum(a)));
-                meeting(s, rho, [a.c, b.c], start, |c| pressure_and_tangent(a, b, c))
+                line_intersection(s, rho, [a.c, b.c], start, |c| pressure_and_tangent(a, b, c))
             }
             (end, None) => end.c + end.response().straight_meet(end.c, s, rho),
         }

@@ -1,7 +1,7 @@
 use super::make::Typed;
 use super::*;
 use crate::error::{Place, Source};
-use crate::expression::{Expression, Scope};
+use crate::expression::{Expression, KnownNames};
 use std::cell::Cell;
 use std::sync::Arc;
 
@@ -36,11 +36,11 @@ fn check(law: &dyn LayerLaw, scale: f64) {
 fn expression(text: &str) -> Expression {
     let source = Source { name: "scene.toml".into(), text: format!("pressure = \"{text}\"\n") };
     let place = Place { span: 11..13 + text.len(), source: Arc::new(source) };
-    Expression::parse(text, &place, Scope::of(&["c", "x", "y"])).unwrap_or_else(|error| panic!("{error}"))
+    Expression::parse(text, &place, KnownNames::of(&["c", "x", "y"])).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn typed(text: &str, end: Option<f64>) -> crate::error::Result<Typed> {
-    Typed::new(&expression(text), [0.5, 2.0, 0.0], end, 10.0)
+fn typed(text: &str, end: Option<f64>) -> crate::error::Result<ExpressionLaw> {
+    ExpressionLaw::new(&expression(text), [0.5, 2.0, 0.0], end, 10.0)
 }
 
 #[test]
@@ -48,7 +48,7 @@ fn laws_are_consistent() {
     for a in [0.1, 0.3, 0.5, 1.0] {
         check(&Power::new(2.5e-5, a), 5e-5);
     }
-    check(&Linear { stiffness: 1e5 }, 1e-4);
+    check(&LinearLaw { stiffness: 1e5 }, 1e-4);
     check(&Exponential::new(3.0, 2e-5), 5e-5);
     check(&Cubic { k1: 1e5, k3: 4e14 }, 2e-5);
     check(&Cubic { k1: 1e5, k3: 0.0 }, 2e-5);
@@ -129,7 +129,7 @@ fn expressions_that_are_no_laws() {
 fn all_laws() -> Vec<(Box<dyn LayerLaw>, f64)> {
     let table = [[1e-5, 2.0], [1.5e-5, 2.1], [2e-5, 40.0], [1e-4, 41.0]];
     let mut laws: Vec<(Box<dyn LayerLaw>, f64)> = vec![
-        (Box::new(Linear { stiffness: 3e7 }), 1e-5),
+        (Box::new(LinearLaw { stiffness: 3e7 }), 1e-5),
         (Box::new(Exponential::new(3.0, 2e-5)), 5e-5),
         (Box::new(Cubic { k1: 1e5, k3: 4e14 }), 2e-5),
         (Box::new(Cubic { k1: 1e5, k3: 0.0 }), 2e-5),
@@ -206,7 +206,7 @@ fn a_line_meets_the_graph_once() {
         for rho in decades(-20, 20, 1) {
             let (mut last, mut last_s) = (0.0, 0.0);
             for s in decades(-30, 30, 3).flat_map(|s| [s, s * 1.001]) {
-                let c = law.meet(0, s, rho);
+                let c = law.resolvent(0, s, rho);
                 let pressure = law.pressure(0, c);
                 let error = (c + pressure / rho - s) / s;
                 let share = pressure / rho / s;
@@ -221,10 +221,10 @@ fn a_line_meets_the_graph_once() {
             }
         }
         for s in [0.0, -2.5, f64::NEG_INFINITY] {
-            assert_eq!(law.meet(0, s, 1e5), s);
+            assert_eq!(law.resolvent(0, s, 1e5), s);
         }
-        assert!(law.meet(0, f64::NAN, 1e5).is_nan());
-        assert_eq!(law.meet(0, 1e-3, f64::INFINITY), 1e-3);
+        assert!(law.resolvent(0, f64::NAN, 1e5).is_nan());
+        assert_eq!(law.resolvent(0, 1e-3, f64::INFINITY), 1e-3);
     }
 }
 
@@ -281,7 +281,7 @@ fn what_a_law_cannot_reach() {
     assert!((found / exact - 1.0).abs() < 1e-5, "{found} {exact}");
     assert_eq!(Ending.compression(0, 1.5), f64::INFINITY);
     assert!((Ending.compression(0, 0.5) - 0.75).abs() < 1e-15);
-    assert!((Ending.meet(0, 30.0, 1.0) - 1.0).abs() < 1e-15);
+    assert!((Ending.resolvent(0, 30.0, 1.0) - 1.0).abs() < 1e-15);
     assert_eq!(Ending.duality_gap(0, 1.5, 0.5), f64::INFINITY);
 }
 
@@ -406,9 +406,9 @@ fn searches_ask_a_law_a_few_times() {
         for s in decades(-4, 4, 5).map(|s| scale * s) {
             for rho in decades(-3, 9, 1) {
                 let before = law.1.get();
-                let c = law.meet(0, s, rho);
+                let c = law.resolvent(0, s, rho);
                 most[0] = most[0].max(law.1.get() - before);
-                assert!((c - law.0.meet(0, s, rho)).abs() <= 1e-14 * c);
+                assert!((c - law.0.resolvent(0, s, rho)).abs() <= 1e-14 * c);
             }
             let pressure = law.0.pressure(0, s);
             if pressure > 1e-300 && pressure < 1e300 {
@@ -481,7 +481,7 @@ fn the_tangent_is_the_slope_and_no_smoothing_is_the_law() {
             let slope = (high.pressure - low.pressure) / (high.compression - low.compression);
             assert!((here.tangent / slope - 1.0).abs() < 1e-2, "{law:?}: {here:?} {slope}");
             let exact = resolve(&*law, 0, share * scale, rho, 0.0);
-            assert_eq!(exact.compression, law.meet(0, share * scale, rho));
+            assert_eq!(exact.compression, law.resolvent(0, share * scale, rho));
             assert_eq!(exact.pressure, law.pressure(0, exact.compression));
         }
         for sum in [f64::NEG_INFINITY, f64::INFINITY] {

@@ -21,7 +21,7 @@ use std::collections::BTreeSet;
 
 /// An integration point that both surfaces share.
 #[derive(Debug, Clone, Copy)]
-pub struct Shared<const D: usize> {
+pub struct IntegrationPoint<const D: usize> {
     /// Facet of side a.
     pub facet_a: usize,
     /// Barycentric coordinates in this facet.
@@ -38,14 +38,14 @@ pub struct Shared<const D: usize> {
 
 /// The common pieces of two surfaces.
 #[derive(Debug, Clone, Default)]
-pub struct Common<const D: usize> {
+pub struct Intersection<const D: usize> {
     /// Integration points of the common pieces, grouped by facet of side a.
-    pub points: Vec<Shared<D>>,
+    pub points: Vec<IntegrationPoint<D>>,
     /// What was refused before each facet of side a.
     pub refused: Vec<Refused>,
 }
 
-impl<const D: usize> Common<D> {
+impl<const D: usize> Intersection<D> {
     /// Return the facets of both sides that face each other, but are too far apart.
     pub fn far(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.refused.iter().enumerate().flat_map(|(i, refused)| refused.far.iter().map(move |&j| (i, j)))
@@ -53,7 +53,7 @@ impl<const D: usize> Common<D> {
 }
 
 /// A function that finds the common pieces of two surfaces.
-pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Common<D>;
+pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Intersection<D>;
 
 /// The failure of a search for a point on a facet: it did not converge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -212,11 +212,11 @@ impl Refused {
 }
 
 /// An R-tree of the boxes of facets of side b, or of bodies.
-pub struct Search<const D: usize> {
+pub struct BoxTree<const D: usize> {
     tree: RTree<GeomWithData<Rectangle<[f64; D]>, usize>>,
 }
 
-impl<const D: usize> Search<D> {
+impl<const D: usize> BoxTree<D> {
     /// Build the tree of the facets of a side.
     pub fn new(b: &Side<D>) -> Self {
         Self::of_boxes((0..b.facets.count()).map(|i| b.bounds(i)))

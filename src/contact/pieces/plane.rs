@@ -1,22 +1,25 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::{AWAY, Common, Facet, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP, Search, Shared, plus};
+use super::{
+    AWAY, BoxTree, Facet, IntegrationPoint, Intersection, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP,
+    plus,
+};
 use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
 /// Return the common pieces of two plane curves.
-pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
-    let search = Search::new(b);
+pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
+    let search = BoxTree::new(b);
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = element::gauss(if quadratic { 4 } else { 3 });
-    let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
+    let mut common = Intersection { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let pieces = search.pieces(a, i, reach, refused, |near, refused| facing(&facet, b, near, reach, refused));
-        for (low, high, Piece { index, other, .. }) in nearest(&pieces) {
+        for (low, high, FacetSegment { index, other, .. }) in nearest(&pieces) {
             let offset = minus(facet.from, other.from);
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
@@ -32,7 +35,7 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
                     refused.far.insert(*index);
                     continue;
                 }
-                common.points.push(Shared {
+                common.points.push(IntegrationPoint {
                     facet_a: i,
                     at_a: place(s),
                     facet_b: *index,
@@ -47,12 +50,12 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Common<2> {
 }
 
 /// Return the pieces of a facet of side a that face facets of side b, the nearest first. Note in `refused` why others are none.
-fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
-    let mut pieces: Vec<Piece> = Vec::new();
+fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<FacetSegment> {
+    let mut pieces: Vec<FacetSegment> = Vec::new();
     for &index in near {
         let other = Facet::of(b, index);
         let directions = [facet.direction, other.direction];
-        match Piece::between(facet, other, index) {
+        match FacetSegment::between(facet, other, index) {
             Ok(piece) => pieces.extend(piece.filter(|p| refused.admits(reach, index, p.gap, directions))),
             Err(Lost) => refused.lost += usize::from(reach.faces(directions[0], directions[1])),
         }
@@ -62,7 +65,7 @@ fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused:
 }
 
 /// Return the intervals of a facet of side a with the piece that is nearest there, ordered along the facet.
-fn nearest(pieces: &[Piece]) -> Vec<(f64, f64, &Piece)> {
+fn nearest(pieces: &[FacetSegment]) -> Vec<(f64, f64, &FacetSegment)> {
     let mut free = vec![(0.0, 1.0)];
     let mut intervals = Vec::new();
     for piece in pieces {
@@ -171,7 +174,7 @@ fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 /// The part of a facet of side a that faces one facet of side b.
-struct Piece {
+struct FacetSegment {
     /// Interval of the parameter on side a.
     range: (f64, f64),
     /// Index of the facet of side b.
@@ -181,7 +184,7 @@ struct Piece {
     gap: f64,
 }
 
-impl Piece {
+impl FacetSegment {
     /// Return the piece that faces one facet of b, if there is one.
     ///
     /// # Errors

@@ -7,7 +7,9 @@
 //! curved facet of b is split into four at the middle of its edges. All facets of b are split further where corners of some
 //! have no image.
 
-use super::{AWAY, Common, Facet, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, Search, Shared, WHOLE, plus};
+use super::{
+    AWAY, BoxTree, Facet, IntegrationPoint, Intersection, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, WHOLE, plus,
+};
 use crate::contact::side::Side;
 use crate::fem::{area_vector, cross, element, length, minus};
 use crate::linalg::dot;
@@ -31,18 +33,18 @@ const MIDDLE: [f64; 3] = [1.0 - 1.0 / 3.0 - 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
 const PARTS: [usize; 4] = [1, 2, 4, 8];
 
 /// Return the common pieces of two surfaces in space.
-pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
-    let search = Search::new(b);
+pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
+    let search = BoxTree::new(b);
     let facets_b: Vec<Facet<3>> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = element::rule(3, if quadratic { 5 } else { 2 });
-    let mut common = Common { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
+    let mut common = Intersection { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let pieces =
             search.pieces(a, i, reach, refused, |near, refused| facing(&facet, &facets_b, near, reach, refused));
-        for Piece { polygon, index, .. } in pieces {
+        for FacetPolygon { polygon, index, .. } in pieces {
             let other = &facets_b[index];
             let offset = minus(facet.from, other.from);
             for triangle in fan(&polygon) {
@@ -61,7 +63,7 @@ pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
                         refused.far.insert(index);
                         continue;
                     }
-                    common.points.push(Shared { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
+                    common.points.push(IntegrationPoint { facet_a: i, at_a, facet_b: index, at_b, weight, gap });
                 }
             }
         }
@@ -70,19 +72,19 @@ pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Common<3> {
 }
 
 /// Remove from each piece what nearer pieces cover. `pieces` are sorted by distance, the nearest first.
-fn without_overlaps(pieces: Vec<Piece>) -> Vec<Piece> {
-    let mut free: Vec<Piece> = Vec::new();
-    for Piece { polygon, index, gap } in pieces {
+fn without_overlaps(pieces: Vec<FacetPolygon>) -> Vec<FacetPolygon> {
+    let mut free: Vec<FacetPolygon> = Vec::new();
+    for FacetPolygon { polygon, index, gap } in pieces {
         let parts = free.iter().fold(vec![polygon], |parts, nearer| {
             parts.into_iter().flat_map(|part| difference(part, &nearer.polygon, 0.5 * TINY)).collect()
         });
-        free.extend(parts.into_iter().map(|polygon| Piece { polygon, index, gap }));
+        free.extend(parts.into_iter().map(|polygon| FacetPolygon { polygon, index, gap }));
     }
     free
 }
 
 /// Return the pieces of a facet of side a that face these facets of side b, without what nearer ones cover. Note in `refused` why others are none.
-fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<Piece> {
+fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refused: &mut Refused) -> Vec<FacetPolygon> {
     let mut pieces = Vec::new();
     for parts in PARTS {
         let before = refused.clone();
@@ -95,7 +97,7 @@ fn facing(facet: &Facet<3>, b: &[Facet<3>], near: &[usize], reach: &Reach, refus
                 without_image += clipped.without_image;
                 refused.lost += clipped.lost;
             }
-            let admitted = |p: &Piece| refused.admits(reach, p.index, p.gap, [facet.direction, other.direction]);
+            let admitted = |p: &FacetPolygon| refused.admits(reach, p.index, p.gap, [facet.direction, other.direction]);
             found.extend(clipped.pieces.into_iter().filter(admitted));
         }
         found.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));
@@ -128,7 +130,7 @@ impl Facet<3> {
         let found = newton(dot(&minus(middle, x), &n) / dot(&n, &n), |[u, v, t]| {
             let l = place([u, v]);
             let (on_facet, [along_u, along_v]) = (self.at(&l), self.tangents(&l));
-            System {
+            ProjectionEquations {
                 value: std::array::from_fn(|c| on_facet[c] - x[c] - t * n[c]),
                 columns: [along_u, along_v, n.map(|n| -n)],
                 terms: self.terms(&l) + length(x) + t.abs() * length(n),
@@ -151,7 +153,7 @@ impl Facet<3> {
             let l = place([u, v]);
             let (on_facet, n, tangents) = (self.at(&l), self.normal(&l), self.tangents::<2>(&l));
             let column = |k: usize| std::array::from_fn(|c| tangents[k][c] + t * turns[k][c]);
-            System {
+            ProjectionEquations {
                 value: std::array::from_fn(|c| on_facet[c] + t * n[c] - x[c]),
                 columns: [column(0), column(1), n],
                 terms: self.terms(&l) + length(x) + t.abs() * (1.0 + 2.0 * (u.abs() + v.abs())),
@@ -162,7 +164,7 @@ impl Facet<3> {
 }
 
 /// The values and derivatives of three equations in (u, v, t).
-struct System {
+struct ProjectionEquations {
     value: [f64; 3],
     /// Derivatives by u, v and t.
     columns: [[f64; 3]; 3],
@@ -177,10 +179,10 @@ struct System {
 ///
 /// # Errors
 /// [`Lost`] if the values stay larger.
-fn newton(t: f64, system: impl Fn([f64; 3]) -> System) -> Result<Option<[f64; 3]>, Lost> {
+fn newton(t: f64, system: impl Fn([f64; 3]) -> ProjectionEquations) -> Result<Option<[f64; 3]>, Lost> {
     let mut at = [1.0 / 3.0, 1.0 / 3.0, t];
     for _ in 0..MOST_STEPS {
-        let System { value, columns: [p, q, r], terms } = system(at);
+        let ProjectionEquations { value, columns: [p, q, r], terms } = system(at);
         let det = dot(&cross(p, q), &r);
         let step = [cross(q, r), cross(r, p), cross(p, q)].map(|column| dot(&column, &value) / det);
         let next = minus(at, step);
@@ -197,7 +199,7 @@ fn newton(t: f64, system: impl Fn([f64; 3]) -> System) -> Result<Option<[f64; 3]
 }
 
 /// A part of a facet of side a that faces (a part of) one facet of side b.
-struct Piece {
+struct FacetPolygon {
     /// Outline in the parameters on side a.
     polygon: Polygon,
     /// Index of the facet of side b.
@@ -209,7 +211,7 @@ struct Piece {
 /// A facet of side b, clipped by a facet of side a.
 #[derive(Default)]
 struct Clipped {
-    pieces: Vec<Piece>,
+    pieces: Vec<FacetPolygon>,
     /// Number of triangles with a corner that has no image on the facet of side a.
     without_image: usize,
     /// Number of triangles for which the search for an image did not converge.
@@ -237,7 +239,7 @@ impl Clipped {
         for corners in triangles(parts) {
             let image = corners.map(|[i, j]| feet[j][i]);
             let piece = match image {
-                [Ok(Some(p)), Ok(Some(q)), Ok(Some(r))] => Piece::under(a, b, index, [p, q, r]),
+                [Ok(Some(p)), Ok(Some(q)), Ok(Some(r))] => FacetPolygon::under(a, b, index, [p, q, r]),
                 _ => {
                     clipped.without_image += 1;
                     if image.iter().any(Result::is_err) { Err(Lost) } else { Ok(None) }
@@ -252,7 +254,7 @@ impl Clipped {
     }
 }
 
-impl Piece {
+impl FacetPolygon {
     /// Return the piece under the image of one triangle of b, if there is one.
     ///
     /// # Errors

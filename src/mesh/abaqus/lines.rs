@@ -10,7 +10,7 @@ const DEEPEST: usize = 32;
 
 /// A line: the index of its file, and its number, counted from 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct At {
+pub struct SourceLine {
     file: usize,
     line: usize,
 }
@@ -25,7 +25,7 @@ struct Open {
 }
 
 /// A keyword or a data line, without blanks at its ends.
-pub enum Line {
+pub enum InputLine {
     /// A keyword with its parameters, without the star.
     Keyword(String),
     /// Data.
@@ -33,16 +33,16 @@ pub enum Line {
 }
 
 /// The lines of a file, and of those that it includes, in turn.
-pub struct Lines {
+pub struct LineReader {
     files: Vec<PathBuf>,
     open: Vec<Open>,
     /// A line that was read too early.
-    early: Option<(At, String)>,
+    early: Option<(SourceLine, String)>,
     /// Bytes of all files so far.
     pub bytes: usize,
 }
 
-impl Lines {
+impl LineReader {
     /// Start with the first line of a file.
     pub fn new(path: &Path, bytes: &[u8]) -> Self {
         let mut lines = Self { files: Vec::new(), open: Vec::new(), early: None, bytes: 0 };
@@ -61,7 +61,7 @@ impl Lines {
     ///
     /// # Errors
     /// The file cannot be read, or it includes itself.
-    pub fn include(&mut self, name: &str, at: At) -> Result<()> {
+    pub fn include(&mut self, name: &str, at: SourceLine) -> Result<()> {
         let name = name.trim().trim_matches(['"', '\'']);
         if self.open.len() >= DEEPEST {
             return Err(self.refuse(at, format!("`{name}` is included within itself")));
@@ -78,12 +78,12 @@ impl Lines {
     }
 
     /// Return an error at a line.
-    pub fn refuse(&self, at: At, message: impl Into<String>) -> Error {
+    pub fn refuse(&self, at: SourceLine, message: impl Into<String>) -> Error {
         Error::mesh(&self.files[at.file], Some(at.line), message)
     }
 
     /// Return a line in words.
-    pub fn show(&self, at: At) -> String {
+    pub fn show(&self, at: SourceLine) -> String {
         match at.file {
             0 => format!("line {}", at.line),
             file => format!("line {} of {}", at.line, self.files[file].display()),
@@ -91,7 +91,7 @@ impl Lines {
     }
 
     /// Return the next line that is not empty and no comment.
-    fn line(&mut self) -> Option<(At, String)> {
+    fn line(&mut self) -> Option<(SourceLine, String)> {
         if let Some(early) = self.early.take() {
             return Some(early);
         }
@@ -104,16 +104,16 @@ impl Lines {
             (open.next, open.line) = (open.next + line.len() + 1, open.line + 1);
             let line = line.trim();
             if !line.is_empty() && !line.starts_with("**") {
-                return Some((At { file: open.file, line: open.line }, line.to_owned()));
+                return Some((SourceLine { file: open.file, line: open.line }, line.to_owned()));
             }
         }
         None
     }
 
     /// Return the next keyword or data line. A keyword that ends with a comma goes on in the next line, if that has parameters.
-    pub fn next(&mut self) -> Option<(At, Line)> {
+    pub fn next(&mut self) -> Option<(SourceLine, InputLine)> {
         let (at, line) = self.line()?;
-        let Some(keyword) = line.strip_prefix('*') else { return Some((at, Line::Data(line))) };
+        let Some(keyword) = line.strip_prefix('*') else { return Some((at, InputLine::Data(line))) };
         let mut keyword = keyword.to_owned();
         while keyword.ends_with(',') {
             match self.line() {
@@ -124,7 +124,7 @@ impl Lines {
                 }
             }
         }
-        Some((at, Line::Keyword(keyword)))
+        Some((at, InputLine::Keyword(keyword)))
     }
 }
 
@@ -142,12 +142,12 @@ pub struct Keyword {
     pub name: String,
     parameters: Vec<(String, String)>,
     /// Its line.
-    pub at: At,
+    pub at: SourceLine,
 }
 
 impl Keyword {
     /// Read a line without its star.
-    pub fn new(line: &str, at: At) -> Self {
+    pub fn new(line: &str, at: SourceLine) -> Self {
         let mut words = line.split(',').map(str::trim);
         let name = words.next().unwrap_or_default().to_ascii_uppercase();
         let name = name.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -11,8 +11,8 @@ mod read;
 use super::old::{self, Contents};
 use super::simplex;
 use crate::error::{Error, Result};
-use lines::Lines;
-use model::{Element, Face, Kind, Missing, Model, members};
+use lines::LineReader;
+use model::{AbaqusElement, AbaqusModel, AbaqusType, ElementFace, MissingMember, members};
 use read::Reader;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
@@ -36,7 +36,7 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
     if reader.model.nodes.is_empty() || reader.model.elements.is_empty() {
         return Err(Error::mesh(path, None, "this file has no nodes or no elements").help(help));
     }
-    let groups = Groups::new(&reader.model, &reader.lines, dimension)?;
+    let groups = GroupBuilder::new(&reader.model, &reader.lines, dimension)?;
     groups.check_nodes()?;
     if !groups.list.iter().any(|group| group.dimension >= dimension) {
         let types: Vec<&str> = groups.left_out.elements.keys().map(String::as_str).collect();
@@ -52,16 +52,16 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
 
 /// Return the mesh. Each group is a physical one on an entity of its own, so that an element of several groups is written once for
 /// each.
-fn contents(model: &Model, groups: &[Group]) -> Contents {
+fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
     let mut contents =
         Contents { nodes: model.nodes.iter().map(|(tag, node)| (*tag, node.x)).collect(), ..Contents::default() };
-    for (tag, Group { dimension, name, elements, points }) in (1..).zip(groups) {
+    for (tag, ElementGroup { dimension, name, elements, points }) in (1..).zip(groups) {
         contents.names.push(format!("{dimension} {tag} \"{name}\""));
         let mut add = |number: u64, kind: i32, nodes: &[u64]| {
             contents.elements.push(old::Element { number, kind, entity: 0, groups: vec![tag], nodes: nodes.to_vec() });
         };
         for (number, (kind, nodes)) in elements {
-            add(*number, simplex::Kind::number(kind.shape, kind.nodes()), nodes);
+            add(*number, simplex::ElementType::number(kind.shape, kind.nodes()), nodes);
         }
         points.iter().for_each(|node| add(*node, simplex::POINTS, &[*node]));
     }
@@ -109,11 +109,11 @@ fn notes(path: &Path, reader: &Reader, left_out: &LeftOut) -> Vec<String> {
     notes
 }
 
-struct Group {
+struct ElementGroup {
     dimension: usize,
     name: String,
     /// Cells, facets and edges, each with the number of its element.
-    elements: Vec<(u64, Piece)>,
+    elements: Vec<(u64, TypedNodes)>,
     /// Nodes, if it is a group of points.
     points: Vec<u64>,
 }
@@ -131,34 +131,34 @@ struct LeftOut {
     renamed: Vec<String>,
 }
 
-struct Groups<'a> {
-    model: &'a Model,
-    lines: &'a Lines,
+struct GroupBuilder<'a> {
+    model: &'a AbaqusModel,
+    lines: &'a LineReader,
     dimension: usize,
-    faces: Faces<'a>,
-    list: Vec<Group>,
+    faces: CellFaces<'a>,
+    list: Vec<ElementGroup>,
     left_out: LeftOut,
 }
 
 /// Families of elements without stiffness of their own, which Gmsh and others write for surfaces and curves.
 const MARKERS: [&str; 5] = ["T3D", "T2D", "CPS", "CPE", "SFM3D"];
 
-impl<'a> Groups<'a> {
+impl<'a> GroupBuilder<'a> {
     /// Make the groups for a scene of this dimension.
     ///
     /// # Errors
     /// A set or surface has a member that does not exist.
-    fn new(model: &'a Model, lines: &'a Lines, dimension: usize) -> Result<Self> {
+    fn new(model: &'a AbaqusModel, lines: &'a LineReader, dimension: usize) -> Result<Self> {
         let lower = || {
             model.elements.values().filter_map(|element| element.kind).filter(|kind| kind.shape.dimension < dimension)
         };
-        let is_free = |surface: &model::Surface| {
-            surface.faces.iter().any(|(_, face)| *face == Face::Free)
-                || surface.of_sets.iter().any(|(_, face)| *face == Face::Free)
+        let is_free = |surface: &model::AbaqusSurface| {
+            surface.faces.iter().any(|(_, face)| *face == ElementFace::Free)
+                || surface.of_sets.iter().any(|(_, face)| *face == ElementFace::Free)
         };
         let faces = match lower().next().is_some() || model.surfaces.values().any(is_free) {
-            true => Faces::new(model, dimension, lower().any(|kind| kind.shape.dimension == 1)),
-            false => Faces::new(model, 0, false),
+            true => CellFaces::new(model, dimension, lower().any(|kind| kind.shape.dimension == 1)),
+            false => CellFaces::new(model, 0, false),
         };
         let mut groups = Self { model, lines, dimension, faces, list: Vec::new(), left_out: LeftOut::default() };
         groups.element_sets()?;
@@ -171,12 +171,12 @@ impl<'a> Groups<'a> {
     }
 
     /// Return the kind of an element if it is a cell. In a plane scene solids are, too: the reader of the mesh refuses them.
-    fn cell(&self, element: &Element) -> Option<Kind> {
+    fn cell(&self, element: &AbaqusElement) -> Option<AbaqusType> {
         element.kind.filter(|kind| kind.shape.dimension >= self.dimension)
     }
 
     /// Return the face or edge of a cell that an element of lower dimension lies on.
-    fn under(&self, element: &Element) -> Option<Piece> {
+    fn under(&self, element: &AbaqusElement) -> Option<TypedNodes> {
         let kind = element.kind.filter(|kind| kind.shape.dimension < self.dimension)?;
         self.faces.under(kind, &element.nodes)
     }
@@ -186,7 +186,7 @@ impl<'a> Groups<'a> {
             .map_err(|missing| self.missing(missing, "an element"))
     }
 
-    fn missing(&self, Missing { set, tag }: Missing, what: &str) -> crate::error::Error {
+    fn missing(&self, MissingMember { set, tag }: MissingMember, what: &str) -> crate::error::Error {
         let message = format!("`{}` has {what} {tag}, which is not there", set.label.spelling);
         self.lines.refuse(set.label.at, message)
     }
@@ -201,7 +201,7 @@ impl<'a> Groups<'a> {
     }
 
     /// Return the group of the cells with these numbers, if there are any.
-    fn cells<'t>(&self, name: &str, tags: impl Iterator<Item = &'t u64>) -> Option<Group> {
+    fn cells<'t>(&self, name: &str, tags: impl Iterator<Item = &'t u64>) -> Option<ElementGroup> {
         let cell = |&tag: &u64| {
             let element = &self.model.elements[&tag];
             self.cell(element).map(|kind| (tag, (kind, kind.in_gmsh_order(&element.nodes))))
@@ -225,8 +225,12 @@ impl<'a> Groups<'a> {
             for (set, face) in &surface.of_sets {
                 faces.extend(self.members(set)?.into_iter().map(|tag| (tag, *face)));
             }
-            let mut group =
-                Group { dimension: self.dimension - 1, name: name.clone(), elements: Vec::new(), points: Vec::new() };
+            let mut group = ElementGroup {
+                dimension: self.dimension - 1,
+                name: name.clone(),
+                elements: Vec::new(),
+                points: Vec::new(),
+            };
             for (tag, face) in faces {
                 let spelling = &surface.label.spelling;
                 let refuse = |message: String| self.lines.refuse(surface.label.at, message);
@@ -234,21 +238,21 @@ impl<'a> Groups<'a> {
                 let element = element
                     .ok_or_else(|| refuse(format!("`{spelling}` has a face of element {tag}, which is not there")))?;
                 let pieces = match (self.cell(element), face) {
-                    (Some(_), Face::Free) => self.faces.free(tag),
-                    (Some(kind), Face::Number(number)) => {
+                    (Some(_), ElementFace::Free) => self.faces.free(tag),
+                    (Some(kind), ElementFace::Number(number)) => {
                         let piece = kind.face(&element.nodes, number);
                         vec![piece.ok_or_else(|| {
                             refuse(format!("element {tag} in `{spelling}` has no face S{}", number + 1))
                         })?]
                     }
-                    (Some(_), Face::Itself) => {
+                    (Some(_), ElementFace::Itself) => {
                         return Err(refuse(format!(
                             "element {tag} in `{spelling}` is no shell with sides SPOS and SNEG"
                         )));
                     }
                     (None, _) => self.under(element).into_iter().collect(),
                 };
-                self.left_out.faces += usize::from(pieces.is_empty() && face != Face::Free);
+                self.left_out.faces += usize::from(pieces.is_empty() && face != ElementFace::Free);
                 group.elements.extend(pieces.into_iter().map(|piece| (tag, piece)));
             }
             self.add(group, "surface");
@@ -278,13 +282,13 @@ impl<'a> Groups<'a> {
             let all = all.map_err(|missing| self.missing(missing, "a node"))?;
             let points: Vec<u64> = all.iter().copied().filter(|node| used.contains(node)).collect();
             self.left_out.nodes += all.len() - points.len();
-            self.add(Group { dimension: 0, name: name.clone(), elements: Vec::new(), points }, "nodes");
+            self.add(ElementGroup { dimension: 0, name: name.clone(), elements: Vec::new(), points }, "nodes");
         }
         Ok(())
     }
 
     /// Add a group without repeated elements. If another group has its name, it gets a suffix.
-    fn add(&mut self, mut group: Group, suffix: &str) {
+    fn add(&mut self, mut group: ElementGroup, suffix: &str) {
         let mut seen = HashSet::new();
         group.elements.retain(|(_, piece)| seen.insert(sorted(piece)));
         if group.elements.is_empty() && group.points.is_empty() {
@@ -334,28 +338,28 @@ impl<'a> Groups<'a> {
 }
 
 /// Return the group of the pieces of the highest dimension, if there are any.
-fn of_highest(name: &str, pieces: impl Iterator<Item = (u64, Piece)>) -> Option<Group> {
-    let mut of_dimension: BTreeMap<usize, Vec<(u64, Piece)>> = BTreeMap::new();
+fn of_highest(name: &str, pieces: impl Iterator<Item = (u64, TypedNodes)>) -> Option<ElementGroup> {
+    let mut of_dimension: BTreeMap<usize, Vec<(u64, TypedNodes)>> = BTreeMap::new();
     pieces.for_each(|piece| of_dimension.entry(piece.1.0.shape.dimension).or_default().push(piece));
     let (dimension, elements) = of_dimension.pop_last()?;
-    Some(Group { dimension, name: name.to_owned(), elements, points: Vec::new() })
+    Some(ElementGroup { dimension, name: name.to_owned(), elements, points: Vec::new() })
 }
 
 /// Return the corners of a piece in ascending order.
-fn sorted((kind, nodes): &Piece) -> Vec<u64> {
+fn sorted((kind, nodes): &TypedNodes) -> Vec<u64> {
     let mut corners = nodes[..kind.shape.corners].to_vec();
     corners.sort_unstable();
     corners
 }
 
 /// A facet or edge in the form of a mesh: its kind and nodes, in the order of Gmsh.
-type Piece = (Kind, Vec<u64>);
+type TypedNodes = (AbaqusType, Vec<u64>);
 
 /// Corners in ascending order, with zeros before them.
 type Corners = [u64; 4];
 
 /// A face of a cell.
-struct Place {
+struct CellFace {
     cell: u64,
     face: usize,
     /// Number of cells that have the face.
@@ -363,22 +367,22 @@ struct Place {
 }
 
 /// The faces of all cells, and in space their edges where these are asked for.
-struct Faces<'a> {
-    model: &'a Model,
-    places: HashMap<Corners, Place>,
+struct CellFaces<'a> {
+    model: &'a AbaqusModel,
+    places: HashMap<Corners, CellFace>,
     edges: HashMap<Corners, Vec<u64>>,
 }
 
-impl<'a> Faces<'a> {
+impl<'a> CellFaces<'a> {
     /// Collect the faces of the cells of a dimension. Edges are collected in space if `with_edges`.
-    fn new(model: &'a Model, dimension: usize, with_edges: bool) -> Self {
+    fn new(model: &'a AbaqusModel, dimension: usize, with_edges: bool) -> Self {
         let mut faces = Self { model, places: HashMap::new(), edges: HashMap::new() };
         for (&cell, element) in &model.elements {
             let Some(kind) = element.kind.filter(|kind| kind.shape.dimension == dimension) else { continue };
             for face in 0..kind.own.faces.len() {
                 let Some((piece, nodes)) = kind.face(&element.nodes, face) else { continue };
                 let key = corners(&nodes[..piece.shape.corners]);
-                faces.places.entry(key).or_insert(Place { cell, face, cells: 0 }).cells += 1;
+                faces.places.entry(key).or_insert(CellFace { cell, face, cells: 0 }).cells += 1;
             }
             if with_edges && dimension == 3 {
                 let edges = kind.edges(&element.nodes);
@@ -389,13 +393,13 @@ impl<'a> Faces<'a> {
     }
 
     /// Return the faces of a cell that no other cell has.
-    fn free(&self, cell: u64) -> Vec<Piece> {
+    fn free(&self, cell: u64) -> Vec<TypedNodes> {
         let Some((kind, element)) = self.model.elements.get(&cell).and_then(|element| Some((element.kind?, element)))
         else {
             return Vec::new();
         };
         let faces = (0..kind.own.faces.len()).filter_map(|face| kind.face(&element.nodes, face));
-        let is_free = |(piece, nodes): &Piece| {
+        let is_free = |(piece, nodes): &TypedNodes| {
             self.places.get(&corners(&nodes[..piece.shape.corners])).is_some_and(|place| place.cells == 1)
         };
         faces.filter(is_free).collect()
@@ -403,7 +407,7 @@ impl<'a> Faces<'a> {
 
     /// Return the face or edge of a cell that an element of lower dimension lies on, if there is one. Its nodes are those of
     /// the cell, which may have middle nodes that the element does not have.
-    fn under(&self, kind: Kind, nodes: &[u64]) -> Option<Piece> {
+    fn under(&self, kind: AbaqusType, nodes: &[u64]) -> Option<TypedNodes> {
         match nodes {
             // Programs do not agree on the place of the middle node of a line.
             [a, b, c, ..] if kind.shape.dimension == 1 && kind.is_quadratic => {
@@ -416,9 +420,9 @@ impl<'a> Faces<'a> {
         }
     }
 
-    fn piece(&self, key: Corners) -> Option<Piece> {
+    fn piece(&self, key: Corners) -> Option<TypedNodes> {
         if let Some(nodes) = self.edges.get(&key) {
-            return Kind::of(1, 2, nodes.len() == 3).map(|kind| (kind, nodes.clone()));
+            return AbaqusType::of(1, 2, nodes.len() == 3).map(|kind| (kind, nodes.clone()));
         }
         let place = self.places.get(&key)?;
         let element = &self.model.elements[&place.cell];

@@ -1,6 +1,6 @@
 //! The contents of an input file: nodes, elements with the types of Abaqus and CalculiX, and named sets of them.
 
-use super::lines::At;
+use super::lines::SourceLine;
 use crate::mesh::simplex::{HEXAHEDRON, LINE, PRISM, PYRAMID, QUADRANGLE, Shape, TETRAHEDRON, TRIANGLE};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
@@ -8,29 +8,29 @@ use std::rc::Rc;
 
 /// A node.
 #[derive(Clone, Copy)]
-pub struct Node {
+pub struct AbaqusNode {
     /// Coordinates (x, y, z).
     pub x: [f64; 3],
     /// Its line.
-    pub at: At,
+    pub at: SourceLine,
 }
 
 /// An element.
 #[derive(Clone)]
-pub struct Element {
+pub struct AbaqusElement {
     /// Its type, as the file spells it.
     pub name: Rc<str>,
     /// Its kind; none for elements that have no place in a mesh.
-    pub kind: Option<Kind>,
+    pub kind: Option<AbaqusType>,
     /// Numbers of its nodes.
     pub nodes: Vec<u64>,
     /// Its line.
-    pub at: At,
+    pub at: SourceLine,
 }
 
 /// A face of an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Face {
+pub enum ElementFace {
     /// The face with this number, counted from 0.
     Number(usize),
     /// The element itself, if it is a shell or membrane.
@@ -45,7 +45,7 @@ pub struct Label {
     /// The name in small letters, before characters that no name can have are replaced.
     pub spelling: String,
     /// The line.
-    pub at: At,
+    pub at: SourceLine,
 }
 
 /// A set of nodes or elements.
@@ -62,28 +62,28 @@ pub struct Set {
 
 /// A surface: faces of elements, and of the elements of sets.
 #[derive(Clone, Default)]
-pub struct Surface {
+pub struct AbaqusSurface {
     pub label: Label,
     /// Faces of single elements.
-    pub faces: BTreeSet<(u64, Face)>,
+    pub faces: BTreeSet<(u64, ElementFace)>,
     /// Faces of all elements of sets.
-    pub of_sets: BTreeSet<(String, Face)>,
+    pub of_sets: BTreeSet<(String, ElementFace)>,
 }
 
 /// The contents of a file, or of a part.
 #[derive(Clone, Default)]
-pub struct Model {
-    pub nodes: BTreeMap<u64, Node>,
-    pub elements: BTreeMap<u64, Element>,
+pub struct AbaqusModel {
+    pub nodes: BTreeMap<u64, AbaqusNode>,
+    pub elements: BTreeMap<u64, AbaqusElement>,
     pub element_sets: BTreeMap<String, Set>,
     pub node_sets: BTreeMap<String, Set>,
-    pub surfaces: BTreeMap<String, Surface>,
+    pub surfaces: BTreeMap<String, AbaqusSurface>,
     /// Names of the element sets of `*SOLID SECTION`.
     pub sections: BTreeSet<String>,
 }
 
 /// A member of a set that does not exist.
-pub struct Missing<'a> {
+pub struct MissingMember<'a> {
     pub set: &'a Set,
     pub tag: u64,
 }
@@ -96,12 +96,12 @@ pub fn members<'a, T>(
     sets: &'a BTreeMap<String, Set>,
     name: &'a str,
     known: &BTreeMap<u64, T>,
-) -> Result<BTreeSet<u64>, Missing<'a>> {
+) -> Result<BTreeSet<u64>, MissingMember<'a>> {
     let (mut found, mut seen, mut rest) = (BTreeSet::new(), BTreeSet::new(), vec![name]);
     while let Some(name) = rest.pop() {
         let Some(set) = sets.get(name).filter(|_| seen.insert(name)) else { continue };
         if let Some(&tag) = set.members.iter().find(|tag| !known.contains_key(tag)) {
-            return Err(Missing { set, tag });
+            return Err(MissingMember { set, tag });
         }
         found.extend(&set.members);
         for &[first, last, step] in &set.ranges {
@@ -119,7 +119,7 @@ fn range<T>(known: &BTreeMap<u64, T>, range: RangeInclusive<u64>) -> impl Iterat
     known.range(range).map(|(tag, _)| *tag).filter(move |_| !is_empty)
 }
 
-impl Model {
+impl AbaqusModel {
     /// Return the largest number of a node or element.
     pub fn largest(&self) -> u64 {
         let last = [self.nodes.keys().next_back(), self.elements.keys().next_back()];
@@ -127,7 +127,7 @@ impl Model {
     }
 
     /// Add a copy of a part. Its numbers become larger by `shift`, and its names begin with `prefix`.
-    pub fn add(&mut self, part: &Model, prefix: &str, shift: u64) {
+    pub fn add(&mut self, part: &AbaqusModel, prefix: &str, shift: u64) {
         let moved = |tag: &u64| tag.saturating_add(shift);
         let name = |name: &String| format!("{}{name}", normal(prefix));
         let label = |label: &Label| Label { spelling: format!("{prefix}{}", label.spelling), at: label.at };
@@ -139,14 +139,14 @@ impl Model {
         };
         self.nodes.extend(part.nodes.iter().map(|(tag, node)| (moved(tag), *node)));
         self.elements.extend(part.elements.iter().map(|(tag, element)| {
-            (moved(tag), Element { nodes: element.nodes.iter().map(moved).collect(), ..element.clone() })
+            (moved(tag), AbaqusElement { nodes: element.nodes.iter().map(moved).collect(), ..element.clone() })
         }));
         self.element_sets.extend(part.element_sets.iter().map(|(key, own)| (name(key), set(own))));
         self.node_sets.extend(part.node_sets.iter().map(|(key, own)| (name(key), set(own))));
         self.surfaces.extend(part.surfaces.iter().map(|(key, own)| {
             let faces = own.faces.iter().map(|(tag, face)| (moved(tag), *face)).collect();
             let of_sets = own.of_sets.iter().map(|(set, face)| (name(set), *face)).collect();
-            (name(key), Surface { label: label(&own.label), faces, of_sets })
+            (name(key), AbaqusSurface { label: label(&own.label), faces, of_sets })
         }));
         self.sections.extend(part.sections.iter().map(name));
     }
@@ -166,7 +166,7 @@ pub fn normal(spelling: &str) -> String {
 
 /// The numbering of a shape by Abaqus. Corners are those of Gmsh.
 #[derive(Debug, PartialEq, Eq)]
-pub struct Numbering {
+pub struct AbaqusNumbering {
     shape: &'static Shape,
     /// Corners of the faces S1, S2, ... In the plane these are edges.
     pub faces: &'static [&'static [usize]],
@@ -174,30 +174,30 @@ pub struct Numbering {
     edges: &'static [[usize; 2]],
 }
 
-static NUMBERINGS: [Numbering; 7] = [
-    Numbering { shape: &LINE, faces: &[], edges: &[[0, 1]] },
-    Numbering { shape: &TRIANGLE, faces: &[&[0, 1], &[1, 2], &[2, 0]], edges: &[[0, 1], [1, 2], [2, 0]] },
-    Numbering {
+static NUMBERINGS: [AbaqusNumbering; 7] = [
+    AbaqusNumbering { shape: &LINE, faces: &[], edges: &[[0, 1]] },
+    AbaqusNumbering { shape: &TRIANGLE, faces: &[&[0, 1], &[1, 2], &[2, 0]], edges: &[[0, 1], [1, 2], [2, 0]] },
+    AbaqusNumbering {
         shape: &QUADRANGLE,
         faces: &[&[0, 1], &[1, 2], &[2, 3], &[3, 0]],
         edges: &[[0, 1], [1, 2], [2, 3], [3, 0]],
     },
-    Numbering {
+    AbaqusNumbering {
         shape: &TETRAHEDRON,
         faces: &[&[0, 1, 2], &[0, 3, 1], &[1, 3, 2], &[2, 3, 0]],
         edges: &[[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]],
     },
-    Numbering {
+    AbaqusNumbering {
         shape: &PYRAMID,
         faces: &[&[0, 1, 2, 3], &[0, 4, 1], &[1, 4, 2], &[2, 4, 3], &[3, 4, 0]],
         edges: &[[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]],
     },
-    Numbering {
+    AbaqusNumbering {
         shape: &PRISM,
         faces: &[&[0, 1, 2], &[3, 5, 4], &[0, 3, 4, 1], &[1, 4, 5, 2], &[2, 5, 3, 0]],
         edges: &[[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5, 3], [0, 3], [1, 4], [2, 5]],
     },
-    Numbering {
+    AbaqusNumbering {
         shape: &HEXAHEDRON,
         faces: &[&[0, 1, 2, 3], &[4, 7, 6, 5], &[0, 4, 5, 1], &[1, 5, 6, 2], &[2, 6, 7, 3], &[3, 7, 4, 0]],
         edges: &[[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]],
@@ -206,10 +206,11 @@ static NUMBERINGS: [Numbering; 7] = [
 
 /// A shape with or without middle nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Kind {
+pub struct AbaqusType {
+    /// The shape.
     pub shape: &'static Shape,
     /// How Abaqus numbers it.
-    pub own: &'static Numbering,
+    pub own: &'static AbaqusNumbering,
     /// Whether there is a node in the middle of each edge.
     pub is_quadratic: bool,
 }
@@ -218,18 +219,18 @@ pub struct Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Elements of this kind are cells in their own dimension, and facets or edges in a higher one.
-    Mesh(Kind),
+    Mesh(AbaqusType),
     /// Elements without a place in the mesh, such as springs.
     LeftOut,
     /// Solids that cannot be read. Without them the body would have holes.
     Refused,
 }
 
-impl Kind {
+impl AbaqusType {
     /// Return the kind with this dimension and number of corners.
-    pub fn of(dimension: usize, corners: usize, is_quadratic: bool) -> Option<Kind> {
+    pub fn of(dimension: usize, corners: usize, is_quadratic: bool) -> Option<AbaqusType> {
         let own = NUMBERINGS.iter().find(|own| own.shape.dimension == dimension && own.shape.corners == corners)?;
-        Some(Kind { shape: own.shape, own, is_quadratic })
+        Some(AbaqusType { shape: own.shape, own, is_quadratic })
     }
 
     /// Return the number of nodes.
@@ -254,9 +255,9 @@ impl Kind {
     }
 
     /// Return a face of an element, numbered from 0: its kind, and its nodes in the order of Gmsh, corners first.
-    pub fn face(self, nodes: &[u64], number: usize) -> Option<(Kind, Vec<u64>)> {
+    pub fn face(self, nodes: &[u64], number: usize) -> Option<(AbaqusType, Vec<u64>)> {
         let corners = *self.own.faces.get(number)?;
-        let kind = Kind::of(self.shape.dimension - 1, corners.len(), self.is_quadratic)?;
+        let kind = AbaqusType::of(self.shape.dimension - 1, corners.len(), self.is_quadratic)?;
         let mut face: Vec<u64> = corners.iter().map(|&at| nodes[at]).collect();
         if self.is_quadratic {
             let ends = kind.shape.edges.iter().map(|edge| edge.map(|at| corners[at]));
@@ -299,7 +300,7 @@ impl Role {
             ("STRI", "65") => 6,
             (_, digits) => digits.parse().unwrap_or(0),
         };
-        let kinds = |is_quadratic| (2..=8).filter_map(move |corners| Kind::of(dimension, corners, is_quadratic));
+        let kinds = |is_quadratic| (2..=8).filter_map(move |corners| AbaqusType::of(dimension, corners, is_quadratic));
         match kinds(false).chain(kinds(true)).find(|kind| kind.nodes() == nodes) {
             Some(kind) => Role::Mesh(kind),
             None if dimension == 3 || name.starts_with('C') => Role::Refused,
@@ -316,7 +317,7 @@ mod tests {
     #[test]
     fn names_give_shapes() {
         let of = |name: &str| match Role::of(name) {
-            Role::Mesh(kind) => (kind.shape.dimension, simplex::Kind::number(kind.shape, kind.nodes())),
+            Role::Mesh(kind) => (kind.shape.dimension, simplex::ElementType::number(kind.shape, kind.nodes())),
             Role::LeftOut => (0, 0),
             Role::Refused => (0, -1),
         };

@@ -1,16 +1,20 @@
 //! From the lines of a file to its contents.
 
-use super::lines::{At, Keyword, Line, Lines, TextResult, coordinates, count, generated, reals, spelled};
-use super::model::{Element, Face, Kind, Label, Model, Node, Role, Set, Surface, members, normal};
+use super::lines::{
+    InputLine, Keyword, LineReader, SourceLine, TextResult, coordinates, count, generated, reals, spelled,
+};
+use super::model::{
+    AbaqusElement, AbaqusModel, AbaqusNode, AbaqusSurface, AbaqusType, ElementFace, Label, Role, Set, members, normal,
+};
 use crate::error::Result;
-use crate::mesh::frame::{Coordinates, Frame};
+use crate::mesh::frame::{Coordinates, LocalAxes};
 use nalgebra::{Point3, Rotation3, Unit};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 
 /// The kind of data lines that follow a keyword.
-enum Data {
+enum DataLines {
     Nodes { set: Option<String>, coordinates: Coordinates },
     Elements { name: Rc<str>, role: Role, set: Option<String>, open: Vec<u64> },
     Set { name: String, nodes: bool, generate: bool, shift: u64 },
@@ -23,35 +27,35 @@ enum Data {
 }
 
 /// A part or instance that is being read, and what surrounds it.
-struct Scope {
+struct PartScope {
     /// Beginning of the names of its sets.
     prefix: String,
     /// Number that is added to those of nodes and elements.
     shift: u64,
     /// Axes of `*SYSTEM`.
-    frame: Frame,
+    frame: LocalAxes,
 }
 
 /// A node whose number stands twice with different coordinates.
 pub struct Twice {
     pub tag: u64,
-    pub lines: [At; 2],
+    pub lines: [SourceLine; 2],
 }
 
 /// A reader of a file, with what it has read so far.
 pub struct Reader {
-    pub lines: Lines,
-    pub model: Model,
+    pub lines: LineReader,
+    pub model: AbaqusModel,
     /// Nodes that stand twice.
     pub twice: Vec<Twice>,
     /// Number of `*TRANSFORM` keywords, which only turn dofs.
     pub transforms: usize,
     /// Number of elements with more nodes than their type has.
     pub longer: usize,
-    scope: Scope,
+    scope: PartScope,
     /// The rest of the file while a part is read, and the name of the part.
-    outer: Option<(String, Model)>,
-    parts: BTreeMap<String, Model>,
+    outer: Option<(String, AbaqusModel)>,
+    parts: BTreeMap<String, AbaqusModel>,
     /// Shifts of the instances by name.
     instances: BTreeMap<String, u64>,
     /// Lines behind `*INSTANCE` that place it.
@@ -62,7 +66,7 @@ pub struct Reader {
 ///
 /// # Errors
 /// Another name becomes the same.
-fn entry<'a>(sets: &'a mut BTreeMap<String, Set>, spelling: &str, at: At) -> TextResult<&'a mut Set> {
+fn entry<'a>(sets: &'a mut BTreeMap<String, Set>, spelling: &str, at: SourceLine) -> TextResult<&'a mut Set> {
     let new = || Set { label: Label { spelling: spelling.to_owned(), at }, ..Set::default() };
     let set = sets.entry(normal(spelling)).or_insert_with(new);
     same(&set.label, spelling)?;
@@ -85,10 +89,10 @@ impl Reader {
     /// A line is not one of Abaqus or CalculiX, or it is one that the program does not know and that changes the mesh. The
     /// error names the file and the line.
     pub fn read(path: &Path, bytes: &[u8]) -> Result<Reader> {
-        let scope = Scope { prefix: String::new(), shift: 0, frame: Frame::default() };
+        let scope = PartScope { prefix: String::new(), shift: 0, frame: LocalAxes::default() };
         let mut reader = Reader {
-            lines: Lines::new(path, bytes),
-            model: Model::default(),
+            lines: LineReader::new(path, bytes),
+            model: AbaqusModel::default(),
             twice: Vec::new(),
             transforms: 0,
             longer: 0,
@@ -98,12 +102,14 @@ impl Reader {
             instances: BTreeMap::new(),
             moves: Vec::new(),
         };
-        let (mut data, mut last) = (Data::Other, At::default());
+        let (mut data, mut last) = (DataLines::Other, SourceLine::default());
         while let Some((at, line)) = reader.lines.next() {
             last = at;
             data = match line {
-                Line::Data(line) => reader.data(data, &line, at).map_err(|message| reader.lines.refuse(at, message))?,
-                Line::Keyword(line) => reader.keyword(data, &line, at)?,
+                InputLine::Data(line) => {
+                    reader.data(data, &line, at).map_err(|message| reader.lines.refuse(at, message))?
+                }
+                InputLine::Keyword(line) => reader.keyword(data, &line, at)?,
             };
         }
         reader.end(data).map_err(|message| reader.lines.refuse(last, message))?;
@@ -115,7 +121,7 @@ impl Reader {
     }
 
     /// End the data of a keyword and begin those of another one. An included file continues the data before it.
-    fn keyword(&mut self, data: Data, line: &str, at: At) -> Result<Data> {
+    fn keyword(&mut self, data: DataLines, line: &str, at: SourceLine) -> Result<DataLines> {
         let keyword = Keyword::new(line, at);
         if keyword.name == "INCLUDE" {
             let input = keyword.get("INPUT").ok_or_else(|| self.lines.refuse(at, "*INCLUDE has no INPUT"))?;
@@ -124,18 +130,18 @@ impl Reader {
         let refuse = |reader: &Self, message: String| reader.lines.refuse(at, message);
         self.end(data).map_err(|message| refuse(self, message))?;
         let data = self.begin(&keyword).map_err(|message| refuse(self, message))?;
-        match keyword.get("INPUT").filter(|_| !matches!(data, Data::Other)) {
+        match keyword.get("INPUT").filter(|_| !matches!(data, DataLines::Other)) {
             Some(input) => self.lines.include(input, at).map(|()| data),
             None => Ok(data),
         }
     }
 
     /// Start a keyword: return the kind of its data lines.
-    fn begin(&mut self, keyword: &Keyword) -> TextResult<Data> {
+    fn begin(&mut self, keyword: &Keyword) -> TextResult<DataLines> {
         let spelling = |key: &str| keyword.get(key).map(|word| format!("{}{}", self.scope.prefix, spelled(word)));
         let named = |key: &str| spelling(key).ok_or_else(|| format!("*{} has no {key}", keyword.name));
         Ok(match keyword.name.as_str() {
-            "NODE" => Data::Nodes { set: spelling("NSET"), coordinates: coordinates(keyword)? },
+            "NODE" => DataLines::Nodes { set: spelling("NSET"), coordinates: coordinates(keyword)? },
             "ELEMENT" => {
                 let name: Rc<str> = keyword.get("TYPE").unwrap_or_default().to_ascii_uppercase().into();
                 let role = Role::of(&name);
@@ -145,21 +151,21 @@ impl Reader {
                          hexahedra of order 1 or 2 can, of the families CPS, CPE, CAX and C3D"
                     ));
                 }
-                Data::Elements { name, role, set: spelling("ELSET"), open: Vec::new() }
+                DataLines::Elements { name, role, set: spelling("ELSET"), open: Vec::new() }
             }
             "NSET" | "ELSET" => self.set(keyword, named(&keyword.name)?)?,
             "SURFACE" => self.surface(keyword, named("NAME")?)?,
             "SOLID SECTION" => {
                 self.model.sections.extend(spelling("ELSET").map(|spelling| normal(&spelling)));
-                Data::Other
+                DataLines::Other
             }
             "SYSTEM" => {
-                self.scope.frame = Frame::default();
-                Data::System(Vec::new())
+                self.scope.frame = LocalAxes::default();
+                DataLines::System(Vec::new())
             }
             "TRANSFORM" => {
                 self.transforms += 1;
-                Data::Other
+                DataLines::Other
             }
             "PART" | "END PART" | "INSTANCE" | "END INSTANCE" | "END ASSEMBLY" => return self.assembly(keyword),
             "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" => {
@@ -168,17 +174,17 @@ impl Reader {
                     keyword.name
                 ));
             }
-            _ => Data::Other,
+            _ => DataLines::Other,
         })
     }
 
-    fn set(&mut self, keyword: &Keyword, spelling: String) -> TextResult<Data> {
+    fn set(&mut self, keyword: &Keyword, spelling: String) -> TextResult<DataLines> {
         let shift = match keyword.get("INSTANCE").map(spelled) {
             Some(name) => *self.instances.get(&name).ok_or_else(|| format!("there is no instance `{name}`"))?,
             None => self.scope.shift,
         };
         let nodes = keyword.name == "NSET";
-        let Model { elements, element_sets, node_sets, .. } = &mut self.model;
+        let AbaqusModel { elements, element_sets, node_sets, .. } = &mut self.model;
         match keyword.get("ELSET").filter(|_| nodes) {
             Some(word) => {
                 let name = known(element_sets, &self.scope.prefix, word)?;
@@ -192,16 +198,16 @@ impl Reader {
             }
         }
         let generate = keyword.get("GENERATE").is_some();
-        Ok(Data::Set { name: normal(&spelling), nodes, generate, shift })
+        Ok(DataLines::Set { name: normal(&spelling), nodes, generate, shift })
     }
 
-    fn surface(&mut self, keyword: &Keyword, spelling: String) -> TextResult<Data> {
+    fn surface(&mut self, keyword: &Keyword, spelling: String) -> TextResult<DataLines> {
         let name = normal(&spelling);
         let kind = keyword.get("TYPE").unwrap_or("ELEMENT").to_ascii_uppercase();
         let combine = keyword.get("COMBINE").map(str::to_ascii_uppercase);
         if kind == "NODE" {
             entry(&mut self.model.node_sets, &spelling, keyword.at)?;
-            return Ok(Data::NodeSurface(name));
+            return Ok(DataLines::NodeSurface(name));
         }
         if kind != "ELEMENT" || combine.as_deref().is_some_and(|combine| combine != "UNION") {
             let what = combine.map_or(format!("TYPE={kind}"), |combine| format!("COMBINE={combine}"));
@@ -209,16 +215,16 @@ impl Reader {
         }
         let label = Label { spelling: spelling.clone(), at: keyword.at };
         let surface = self.model.surfaces.entry(name.clone());
-        let surface = surface.or_insert_with(|| Surface { label, ..Surface::default() });
+        let surface = surface.or_insert_with(|| AbaqusSurface { label, ..AbaqusSurface::default() });
         same(&surface.label, &spelling)?;
-        Ok(if combine.is_some() { Data::Union(name) } else { Data::Surface(name) })
+        Ok(if combine.is_some() { DataLines::Union(name) } else { DataLines::Surface(name) })
     }
 
     /// Begin or end a part, an instance or an assembly.
-    fn assembly(&mut self, keyword: &Keyword) -> TextResult<Data> {
+    fn assembly(&mut self, keyword: &Keyword) -> TextResult<DataLines> {
         let name = keyword.get("NAME").map(spelled);
         let named = || name.clone().ok_or_else(|| format!("*{} has no NAME", keyword.name));
-        self.scope.frame = Frame::default();
+        self.scope.frame = LocalAxes::default();
         match keyword.name.as_str() {
             "PART" if self.outer.is_some() => return Err("a part stands in another one: *END PART is missing".into()),
             "PART" => self.outer = Some((named()?, std::mem::take(&mut self.model))),
@@ -236,16 +242,16 @@ impl Reader {
                     return Err("this instance stands twice".into());
                 }
                 self.moves.clear();
-                return Ok(Data::Instance(Vec::new()));
+                return Ok(DataLines::Instance(Vec::new()));
             }
             "END INSTANCE" => self.end_instance(keyword.at)?,
             _ => {}
         }
-        Ok(Data::Other)
+        Ok(DataLines::Other)
     }
 
     /// Place an instance. All its elements become a set with its name.
-    fn end_instance(&mut self, at: At) -> TextResult<()> {
+    fn end_instance(&mut self, at: SourceLine) -> TextResult<()> {
         let (shift, moves) = (self.scope.shift, std::mem::take(&mut self.moves));
         let vector = |line: &[f64], from: usize| std::array::from_fn(|c| line.get(from + c).copied().unwrap_or(0.0));
         let translation = moves.first().map_or([0.0; 3], |line| vector(line, 0));
@@ -258,7 +264,7 @@ impl Reader {
             Some(_) => return Err("a rotation has two points of its axis and an angle, seven numbers".into()),
             None => None,
         };
-        let frame = Frame::at(translation);
+        let frame = LocalAxes::at(translation);
         self.model.place(shift, |x| match rotation {
             Some((a, rotation)) => (a + rotation * (Point3::from(frame.place(x)) - a)).into(),
             None => frame.place(x),
@@ -267,15 +273,15 @@ impl Reader {
         let elements: Vec<u64> = self.model.elements.range(shift.saturating_add(1)..).map(|(tag, _)| *tag).collect();
         let set = entry(&mut self.model.element_sets, &name, at)?;
         set.members.extend(elements);
-        self.scope = Scope { prefix: String::new(), shift: self.model.largest(), frame: Frame::default() };
+        self.scope = PartScope { prefix: String::new(), shift: self.model.largest(), frame: LocalAxes::default() };
         Ok(())
     }
 
     /// End the data lines of a keyword.
-    fn end(&mut self, data: Data) -> TextResult<()> {
+    fn end(&mut self, data: DataLines) -> TextResult<()> {
         match data {
-            Data::Elements { role: Role::Mesh(kind), open, .. } if !open.is_empty() => check_count(kind, &open),
-            Data::Instance(moves) => {
+            DataLines::Elements { role: Role::Mesh(kind), open, .. } if !open.is_empty() => check_count(kind, &open),
+            DataLines::Instance(moves) => {
                 self.moves = moves;
                 Ok(())
             }
@@ -283,34 +289,36 @@ impl Reader {
         }
     }
 
-    fn data(&mut self, data: Data, line: &str, at: At) -> TextResult<Data> {
+    fn data(&mut self, data: DataLines, line: &str, at: SourceLine) -> TextResult<DataLines> {
         let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
         match data {
-            Data::Nodes { ref set, coordinates } => self.node(&words, set.as_deref(), coordinates, at).map(|()| data),
-            Data::Elements { .. } => self.element(data, &words, line.ends_with(','), at),
-            Data::Set { ref name, nodes, generate, shift } => {
+            DataLines::Nodes { ref set, coordinates } => {
+                self.node(&words, set.as_deref(), coordinates, at).map(|()| data)
+            }
+            DataLines::Elements { .. } => self.element(data, &words, line.ends_with(','), at),
+            DataLines::Set { ref name, nodes, generate, shift } => {
                 self.members(name, nodes, generate, shift, &words).map(|()| data)
             }
-            Data::Surface(ref name) => self.face(name, &words, line).map(|()| data),
-            Data::NodeSurface(ref name) => {
+            DataLines::Surface(ref name) => self.face(name, &words, line).map(|()| data),
+            DataLines::NodeSurface(ref name) => {
                 self.members(name, true, false, self.scope.shift, &words[..1]).map(|()| data)
             }
-            Data::Union(ref name) => self.unite(name, &words).map(|()| data),
-            Data::System(points) => self.system(points, &reals(&words)?),
-            Data::Instance(mut moves) => {
+            DataLines::Union(ref name) => self.unite(name, &words).map(|()| data),
+            DataLines::System(points) => self.system(points, &reals(&words)?),
+            DataLines::Instance(mut moves) => {
                 moves.push(reals(&words)?);
-                Ok(Data::Instance(moves))
+                Ok(DataLines::Instance(moves))
             }
-            Data::Other => Ok(data),
+            DataLines::Other => Ok(data),
         }
     }
 
-    fn node(&mut self, words: &[&str], set: Option<&str>, coordinates: Coordinates, at: At) -> TextResult<()> {
+    fn node(&mut self, words: &[&str], set: Option<&str>, coordinates: Coordinates, at: SourceLine) -> TextResult<()> {
         let tag = count(words[0])?.saturating_add(self.scope.shift);
         let given = reals(&words[1..words.len().min(4)])?;
         let given = std::array::from_fn(|c| given.get(c).copied().unwrap_or(0.0));
         let x = self.scope.frame.place(coordinates.rectangular(given));
-        if let Some(old) = self.model.nodes.insert(tag, Node { x, at }).filter(|old| old.x != x) {
+        if let Some(old) = self.model.nodes.insert(tag, AbaqusNode { x, at }).filter(|old| old.x != x) {
             self.twice.push(Twice { tag, lines: [old.at, at] });
         }
         if let Some(set) = set {
@@ -320,8 +328,8 @@ impl Reader {
     }
 
     /// Read an element, or a part of it.
-    fn element(&mut self, data: Data, words: &[&str], continues: bool, at: At) -> TextResult<Data> {
-        let Data::Elements { name, role, set, mut open } = data else { return Ok(data) };
+    fn element(&mut self, data: DataLines, words: &[&str], continues: bool, at: SourceLine) -> TextResult<DataLines> {
+        let DataLines::Elements { name, role, set, mut open } = data else { return Ok(data) };
         let kind = if let Role::Mesh(kind) = role { Some(kind) } else { None };
         if kind.is_none() {
             // The number of nodes is unknown, so that the element ends where its line does not go on.
@@ -330,7 +338,7 @@ impl Reader {
             open.extend(words.iter().map(|word| count(word)).collect::<TextResult<Vec<u64>>>()?);
         }
         if continues && kind.is_none_or(|kind| open.len() <= kind.nodes()) {
-            return Ok(Data::Elements { name, role, set, open });
+            return Ok(DataLines::Elements { name, role, set, open });
         }
         if let Some(kind) = kind {
             // A beam may have a node more, for its direction.
@@ -344,11 +352,11 @@ impl Reader {
         if let Some(set) = &set {
             entry(&mut self.model.element_sets, set, at)?.members.insert(tag);
         }
-        let element = Element { name: name.clone(), kind, nodes, at };
+        let element = AbaqusElement { name: name.clone(), kind, nodes, at };
         if let Some(old) = self.model.elements.insert(tag, element) {
             return Err(format!("the element {tag} stands twice, also in {}", self.lines.show(old.at)));
         }
-        Ok(Data::Elements { name, role, set, open: Vec::new() })
+        Ok(DataLines::Elements { name, role, set, open: Vec::new() })
     }
 
     fn members(&mut self, name: &str, nodes: bool, generate: bool, shift: u64, words: &[&str]) -> TextResult<()> {
@@ -376,9 +384,9 @@ impl Reader {
         let label = words.get(1).map(|word| word.to_ascii_uppercase()).unwrap_or_default();
         let number = label.strip_prefix('S').and_then(|digits| digits.parse::<usize>().ok());
         let face = match (label.as_str(), number) {
-            ("", _) => Face::Free,
-            ("SPOS" | "SNEG", _) => Face::Itself,
-            (_, Some(number @ 1..=6)) => Face::Number(number - 1),
+            ("", _) => ElementFace::Free,
+            ("SPOS" | "SNEG", _) => ElementFace::Itself,
+            (_, Some(number @ 1..=6)) => ElementFace::Number(number - 1),
             _ => return Err(format!("`{line}` is no face of elements such as `12, S1`")),
         };
         let one = words[0].parse::<u64>().map(|tag| tag.saturating_add(self.scope.shift));
@@ -406,20 +414,20 @@ impl Reader {
     }
 
     /// Read a line of `*SYSTEM`: the origin and a point on the first axis; then a point in the plane of the first two axes.
-    fn system(&mut self, mut points: Vec<[f64; 3]>, numbers: &[f64]) -> TextResult<Data> {
+    fn system(&mut self, mut points: Vec<[f64; 3]>, numbers: &[f64]) -> TextResult<DataLines> {
         if !matches!(numbers.len(), 3 | 6) {
             return Err("*SYSTEM has three numbers of each point: origin, first axis; then the second axis".into());
         }
         points.extend(numbers.chunks_exact(3).map(|point| [point[0], point[1], point[2]]));
         let frame = match points[..] {
-            [origin] => Some(Frame::at(origin)),
+            [origin] => Some(LocalAxes::at(origin)),
             // The third axis stays where it is.
-            [[x, y, z], first] => Frame::by_third_axis([x, y, z], [x, y, z + 1.0], first),
-            [origin, first, second] => Frame::by_first_axis(origin, first, second),
+            [[x, y, z], first] => LocalAxes::by_third_axis([x, y, z], [x, y, z + 1.0], first),
+            [origin, first, second] => LocalAxes::by_first_axis(origin, first, second),
             _ => return Err("*SYSTEM has three points at most".into()),
         };
         self.scope.frame = frame.ok_or("the points of *SYSTEM lie on a line")?;
-        Ok(Data::System(points))
+        Ok(DataLines::System(points))
     }
 }
 
@@ -431,7 +439,7 @@ fn known(sets: &BTreeMap<String, Set>, prefix: &str, word: &str) -> TextResult<S
 }
 
 /// Check the number of nodes behind the number of an element.
-fn check_count(kind: Kind, open: &[u64]) -> TextResult<()> {
+fn check_count(kind: AbaqusType, open: &[u64]) -> TextResult<()> {
     match open.len() == kind.nodes() + 1 {
         true => Ok(()),
         false => Err(format!("an element has {} nodes here, not {}", kind.nodes(), open.len() - 1)),

@@ -33,12 +33,12 @@ mod tests;
 
 use super::{Group, Mesh};
 use crate::error::{Error, Result};
-use crate::linalg::{Joined, bounds};
+use crate::linalg::{DisjointSets, bounds};
 use crate::problem::order::Order;
 use faces::{Cells, Faces, NONE, refuse};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashSet};
-use surface::Surface;
+use surface::BoundarySurface;
 
 /// A body to check, and the groups that serve it.
 #[derive(Debug, Clone)]
@@ -53,13 +53,13 @@ pub struct Asked<'a> {
 
 /// Results of the check of a body.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Checked {
+pub struct BodyCheck {
     /// Number of facets between two cells.
     pub inner: usize,
     /// Number of facets of the boundary.
     pub outer: usize,
     /// Parts of the body that are connected by facets.
-    pub parts: Parts,
+    pub parts: Components,
     /// Point of the mesh of each node of the body.
     #[serde(skip)]
     pub points: Vec<u32>,
@@ -72,7 +72,7 @@ impl<const D: usize> Mesh<D> {
     ///
     /// # Errors
     /// A group of cells is not a mesh of a body. The error gives the body, the place and the elements.
-    pub fn check(&self, bodies: &[Asked], contacts: &[&str], shared: bool) -> Result<Vec<Checked>> {
+    pub fn check(&self, bodies: &[Asked], contacts: &[&str], shared: bool) -> Result<Vec<BodyCheck>> {
         let mut in_use: BTreeMap<(&str, Duty), InUse> = BTreeMap::new();
         let contacts = || contacts.iter().map(|&name| (name, Duty::Acts));
         for (name, duty) in bodies.iter().flat_map(|body| body.groups.iter().copied()).chain(contacts()) {
@@ -98,7 +98,7 @@ impl<const D: usize> Mesh<D> {
             curved::check(&cells)?;
             let faces = Faces::new(&cells);
             faces.check(&cells)?;
-            let surface = Surface::new(&cells, faces.outer().collect());
+            let surface = BoundarySurface::new(&cells, faces.outer().collect());
             surface.check()?;
             surface.check_nesting()?;
             let (inner, outer) = (faces.inner().count(), surface.faces.len());
@@ -109,7 +109,7 @@ impl<const D: usize> Mesh<D> {
                 group.compare(&cells, &faces, &node, !served);
             }
             cells.points.iter().for_each(|&point| node[point as usize] = NONE);
-            checked.push(Checked { inner, outer, parts, points: cells.points });
+            checked.push(BodyCheck { inner, outer, parts, points: cells.points });
         }
         in_use.values().try_for_each(|group| group.judge(self))?;
         Ok(checked)
@@ -140,12 +140,12 @@ struct InUse<'a> {
     group: &'a Group,
     duty: Duty,
     /// The relation of each simplex to the bodies.
-    found: Vec<Found>,
+    found: Vec<Relation>,
 }
 
 /// The relation of a simplex to the bodies that were compared so far.
 #[derive(Clone, Copy, Default)]
-struct Found {
+struct Relation {
     /// Whether it lies where the duty requires it.
     serves: bool,
     /// Whether its nodes are nodes of a body that it serves.
@@ -154,7 +154,7 @@ struct Found {
 
 impl<'a> InUse<'a> {
     fn new(group: &'a Group, duty: Duty) -> Self {
-        Self { group, duty, found: vec![Found::default(); group.len()] }
+        Self { group, duty, found: vec![Relation::default(); group.len()] }
     }
 
     /// Compare the group with a body. `other` tells that the group does not serve this body. Only supports are compared with
@@ -257,7 +257,7 @@ impl<'a> InUse<'a> {
 
 /// The parts of a body, numbered 0, 1, ... in the order of their first cells.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Parts {
+pub struct Components {
     /// Number of parts.
     pub count: usize,
     /// Part of each node of the body; empty if there is one part.
@@ -268,15 +268,15 @@ pub struct Parts {
 ///
 /// # Errors
 /// Two parts share nodes: an edge or a corner alone does not join elastic bodies.
-fn parts<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> Result<Parts> {
+fn parts<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> Result<Components> {
     let (count, of_cell) = classes(cells, faces);
     let of_node = if count == 1 { Vec::new() } else { of_nodes(cells, &of_cell)? };
-    Ok(Parts { count, of_node })
+    Ok(Components { count, of_node })
 }
 
 /// Return the number of parts, and the part of each cell.
 fn classes<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> (usize, Vec<u32>) {
-    let mut joined = Joined::new(cells.count());
+    let mut joined = DisjointSets::new(cells.count());
     for two in faces.alike().flat_map(|alike| alike.windows(2)) {
         joined.join(two[0].cell() as u32, two[1].cell() as u32);
     }

@@ -2,7 +2,7 @@
 
 use super::faces::{Cells, Face, NONE};
 use crate::error::Result;
-use crate::linalg::{self, Joined, cross, dot, length, minus};
+use crate::linalg::{self, DisjointSets, cross, dot, length, minus};
 use robust::Coord3D;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -14,7 +14,7 @@ const TOUCH: f64 = 1e-9;
 const FINE: usize = 8;
 
 /// The facets of the boundary of a body, with a search tree of their boxes.
-pub struct Surface<'a, const D: usize> {
+pub struct BoundarySurface<'a, const D: usize> {
     cells: &'a Cells<'a, D>,
     /// The facets as faces of cells.
     pub faces: Vec<Face<D>>,
@@ -26,14 +26,14 @@ pub struct Surface<'a, const D: usize> {
 
 /// A flat part of a facet between corners: a segment in the plane, a triangle in space.
 #[derive(Clone, Copy)]
-struct Piece {
+struct FlatFacet {
     /// Corners; a segment has the last one twice.
     x: [Point; 3],
     /// Nodes of the corners, or [`NONE`] where a corner is not a node.
     node: [u32; 3],
 }
 
-impl<'a, const D: usize> Surface<'a, D> {
+impl<'a, const D: usize> BoundarySurface<'a, D> {
     /// Make the surface of the facets that bound one cell, in the order of [`Faces::outer`](super::faces::Faces::outer).
     pub fn new(cells: &'a Cells<'a, D>, faces: Vec<Face<D>>) -> Self {
         let nodes: Vec<u32> = faces.iter().flat_map(|face| face.nodes(cells)).collect();
@@ -62,19 +62,19 @@ impl<'a, const D: usize> Surface<'a, D> {
         self.pieces(i).map(|piece| std::array::from_fn(|k| piece.x[k]))
     }
 
-    fn pieces(&self, i: usize) -> impl Iterator<Item = Piece> + '_ {
+    fn pieces(&self, i: usize) -> impl Iterator<Item = FlatFacet> + '_ {
         const SPLIT: [&[[usize; 3]]; 4] =
             [&[[0, 1, 1]], &[[0, 2, 2], [2, 1, 1]], &[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]];
         let facet = self.facet(i);
         let split = SPLIT[2 * (D - 2) + usize::from(self.cells.is_quadratic())];
         split.iter().map(move |corners| {
             let node = corners.map(|k| facet[k]);
-            Piece { x: node.map(|node| self.cells.at(node)), node }
+            FlatFacet { x: node.map(|node| self.cells.at(node)), node }
         })
     }
 
     /// Return the pieces of a curved facet that has no node in common with the facet to which it is compared.
-    fn fine_pieces(&self, i: usize) -> Vec<Piece> {
+    fn fine_pieces(&self, i: usize) -> Vec<FlatFacet> {
         let x: Vec<Point> = self.facet(i).iter().map(|&node| self.cells.at(node)).collect();
         let point = |l: [f64; 3]| -> Point {
             let edges = [[0, 1], [1, 2], [0, 2]];
@@ -88,7 +88,7 @@ impl<'a, const D: usize> Surface<'a, D> {
             let [s, t] = [i, j].map(|i| i as f64 / FINE as f64);
             point([1.0 - s - t, s, t])
         };
-        let piece = |corners: [[usize; 2]; 3]| Piece { x: corners.map(|[i, j]| at(i, j)), node: [NONE; 3] };
+        let piece = |corners: [[usize; 2]; 3]| FlatFacet { x: corners.map(|[i, j]| at(i, j)), node: [NONE; 3] };
         if D == 2 {
             return (0..FINE).map(|i| piece([[i, 0], [i + 1, 0], [i + 1, 0]])).collect();
         }
@@ -116,7 +116,7 @@ impl<'a, const D: usize> Surface<'a, D> {
 
     /// Return whether two facets meet where they should not.
     fn meet(&self, i: usize, j: usize) -> bool {
-        let other: Vec<Piece> = self.pieces(j).collect();
+        let other: Vec<FlatFacet> = self.pieces(j).collect();
         if !self.pieces(i).any(|piece| other.iter().any(|other| meet::<D>(&piece, other))) {
             return false;
         }
@@ -172,7 +172,7 @@ impl<'a, const D: usize> Surface<'a, D> {
     /// The number of cells behind a facet is not one.
     pub fn check_nesting(&self) -> Result<()> {
         let cells = self.cells;
-        let mut joined = Joined::new(cells.node_count());
+        let mut joined = DisjointSets::new(cells.node_count());
         for i in 0..self.faces.len() {
             let facet = self.facet(i);
             (1..D).for_each(|k| joined.join(facet[0], facet[k]));
@@ -228,14 +228,14 @@ fn bounds<const D: usize>(nodes: &[u32], cells: &Cells<D>) -> [Point; 2] {
 }
 
 /// Return whether two pieces meet except in the corners that they share.
-fn meet<const D: usize>(a: &Piece, b: &Piece) -> bool {
-    let largest = |piece: &Piece| {
+fn meet<const D: usize>(a: &FlatFacet, b: &FlatFacet) -> bool {
+    let largest = |piece: &FlatFacet| {
         let [p, q, r] = piece.x;
         apart(p, q).max(apart(q, r)).max(apart(r, p))
     };
     let within = TOUCH * largest(a).max(largest(b));
-    let low = |piece: &Piece, c: usize| piece.x.iter().map(|x| x[c]).fold(f64::INFINITY, f64::min);
-    let high = |piece: &Piece, c: usize| piece.x.iter().map(|x| x[c]).fold(f64::NEG_INFINITY, f64::max);
+    let low = |piece: &FlatFacet, c: usize| piece.x.iter().map(|x| x[c]).fold(f64::INFINITY, f64::min);
+    let high = |piece: &FlatFacet, c: usize| piece.x.iter().map(|x| x[c]).fold(f64::NEG_INFINITY, f64::max);
     if (0..3).any(|c| low(a, c) > high(b, c) + within || low(b, c) > high(a, c) + within) {
         return false;
     }

@@ -1,6 +1,6 @@
 //! Tests on meshes with one mistake each, and on meshes without mistakes.
 
-use super::{Asked, Checked, Duty};
+use super::{Asked, BodyCheck, Duty};
 use crate::mesh::{Group, Mesh};
 use crate::problem::order::Order;
 
@@ -19,7 +19,7 @@ fn with_group<const D: usize>(mesh: Mesh<D>, name: &str, dimension: usize, conne
     Mesh { groups: groups.into(), ..mesh }
 }
 
-fn check<const D: usize>(mesh: &Mesh<D>, groups: &[(&str, Duty)]) -> Result<Checked, String> {
+fn check<const D: usize>(mesh: &Mesh<D>, groups: &[(&str, Duty)]) -> Result<BodyCheck, String> {
     let asked = Asked { name: "body", order: mesh.order, groups: groups.to_vec() };
     mesh.check(&[asked], &[], false).map(|mut found| found.remove(0)).map_err(|error| error.to_string())
 }

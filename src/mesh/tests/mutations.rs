@@ -2,7 +2,7 @@
 //! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed. `scripts/fuzz` runs this
 //! test, too, with more of them.
 
-use crate::mesh::{Asked, Duty, Maker, Mesh, abaqus, foreign, nastran, parse};
+use crate::mesh::{Asked, Duty, Mesh, MeshProducer, abaqus, foreign, nastran, parse};
 use std::path::Path;
 
 /// Valid files: their names tell which reader they are for.
@@ -104,7 +104,7 @@ fn read_any(name: &str, bytes: &[u8]) {
 
 /// Read a mesh, split its bodies and check them with every group as a load and a support.
 fn read_as<const D: usize>(bytes: &[u8]) {
-    for maker in [Maker::User, Maker::Other] {
+    for maker in [MeshProducer::User, MeshProducer::Other] {
         let mut mesh: Mesh<D> = match parse(Path::new("a.msh"), bytes, maker) {
             Ok(mesh) => mesh,
             Err(error) => {

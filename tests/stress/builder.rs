@@ -15,7 +15,7 @@ pub struct Bodies {
 }
 
 /// A scene in the making.
-pub struct Draft {
+pub struct SceneBuilder {
     /// The stream of its numbers.
     pub random: Random,
     /// Text of the scene file so far.
@@ -105,7 +105,7 @@ impl Bodies {
     }
 }
 
-impl Draft {
+impl SceneBuilder {
     /// Draws bodies and loads.
     pub fn new(mut random: Random, name: &str, dimension: usize, bodies: usize) -> Self {
         let bodies = Bodies::draw(&mut random, bodies);

@@ -63,13 +63,13 @@ pub fn earlier(on: &Located<String>) -> String {
 }
 
 /// The values of fields at many points, with the first error. It is returned after all points are evaluated.
-pub struct Values<'a> {
+pub struct FieldValues<'a> {
     what: &'static str,
     body: &'a str,
     refused: RefCell<Option<Error>>,
 }
 
-impl<'a> Values<'a> {
+impl<'a> FieldValues<'a> {
     /// Make an evaluator of the quantity `what` of a body, both in words for the error.
     pub fn of(what: &'static str, body: &'a str) -> Self {
         Self { what, body, refused: RefCell::new(None) }
@@ -124,7 +124,7 @@ pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> R
     let mut lying = lying.iter().map(|groups| groups.iter().map(|&group| &mesh.groups[group as usize]).collect());
     let mut bodies = Vec::new();
     for (table, names) in scene.bodies.iter().zip(&members) {
-        let lines = Lines { table, mesh, names, lying: lying.by_ref().take(names.len()).collect() };
+        let lines = PatternTable { table, mesh, names, lying: lying.by_ref().take(names.len()).collect() };
         let all: Vec<usize> = (0..=D).rev().collect();
         let regions = lines.deal(&table.regions, |line| &mut line.on, "region", |_| &[D])?;
         let fix = lines.deal(
@@ -360,14 +360,14 @@ fn called<'a>(wanted: &Located<String>, groups: impl Iterator<Item = &'a &'a Gro
 }
 
 /// A table with its bodies, and the groups on each of them.
-struct Lines<'a, const D: usize> {
+struct PatternTable<'a, const D: usize> {
     table: &'a BodySpec,
     mesh: &'a Mesh<D>,
     names: &'a [&'a str],
     lying: Vec<Vec<&'a Group>>,
 }
 
-impl<const D: usize> Lines<'_, D> {
+impl<const D: usize> PatternTable<'_, D> {
     /// Return the lines of one key for each body, each with the name of a single group. `kinds` are the dimensions of the groups
     /// on which a line can act.
     fn deal<'k, T: Clone>(
