@@ -16,9 +16,22 @@ fuzz_target!(|bytes: &[u8]| {
             [(Interpolation::Linear, Outside::Clamp), (Interpolation::Cubic, Outside::Periodic)]
         {
             let (name, place, file) = ("f".to_owned(), place.clone(), file.clone());
-            let (origin, spacing) = ([0.0; 2], [1.0; 2]);
-            let data =
-                Data::new(DataSpec { name, file, place, points, origin, spacing, unit: 1.0, interpolation, outside });
+            let (origin, spacing, missing) = ([0.0; 2], [1.0; 2], None);
+            let (fill, detrend) = Default::default();
+            let data = Data::new(DataSpec {
+                name,
+                file,
+                place,
+                points,
+                origin,
+                spacing,
+                unit: 1.0,
+                missing,
+                fill,
+                detrend,
+                interpolation,
+                outside,
+            });
             match data.load() {
                 Err(error) => assert!(!error.to_string().is_empty()),
                 Ok(()) => {
