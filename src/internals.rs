@@ -15,7 +15,7 @@ pub mod contact {
 
 pub mod data {
     //! Functions from files.
-    pub use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
+    pub use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, Outside};
 }
 
 pub mod ddm {

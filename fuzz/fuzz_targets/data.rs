@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use std::sync::Arc;
 use winkler::error::{Place, Source};
-use winkler::internals::data::{Data, DataSpec, Interpolation, Outside};
+use winkler::internals::data::{Data, DataSpec, Detrend, Fill, Interpolation, Outside};
 
 fuzz_target!(|bytes: &[u8]| {
     let file = std::env::temp_dir().join(format!("winkler-fuzz-{}", std::process::id()));
@@ -17,7 +17,7 @@ fuzz_target!(|bytes: &[u8]| {
         {
             let (name, place, file) = ("f".to_owned(), place.clone(), file.clone());
             let (origin, spacing, missing) = ([0.0; 2], [1.0; 2], None);
-            let (fill, detrend) = Default::default();
+            let (fill, detrend) = (Fill::Error, Detrend::None);
             let data = Data::new(DataSpec {
                 name,
                 file,

@@ -40,7 +40,7 @@ fuzz_target!(|bytes: &[u8]| {
     let [below, above] = [1.0 - 1e-14, 1.0 + 1e-14].map(|by| law.response(0, back * by).pressure);
     let brackets = below <= response.pressure * (1.0 + 1e-6) && above >= response.pressure * (1.0 - 1e-6);
     assert!(brackets, "{c} {back} of {points:?}");
-    let meet = law.meet(0, c, rho);
+    let meet = law.resolvent(0, c, rho);
     assert!((0.0..=c * (1.0 + 1e-12)).contains(&meet), "{meet} of {c}, {rho} of {points:?}");
     let gap = law.duality_gap(0, c, 0.5 * response.pressure);
     assert!(gap >= 0.0, "{gap} at {c} of {points:?}");
