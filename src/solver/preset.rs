@@ -83,16 +83,6 @@ impl Size {
 
 /// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
 /// lack of memory speaks against it. In space [`cost`] decides.
-///
-/// ```
-/// use winkler::{problem::Preset, solver::preset::{Size, in_plane}};
-/// let size = Size { dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
-/// assert_eq!(in_plane(&size).0, Preset::Condensed);
-/// // a sheet whose dofs are mostly on the contact gains nothing by condensation
-/// assert_eq!(in_plane(&Size { dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
-/// // multigrid is for a factor that does not fit into memory
-/// assert_eq!(in_plane(&Size { memory: 50_000_000, ..size }).0, Preset::Hypre);
-/// ```
 pub fn in_plane(size: &Size) -> (Preset, String) {
     let &Size { dofs, retained, memory } = size;
     let what = format!("{dofs} dofs in the plane, {retained} of them on the contact");
@@ -189,5 +179,15 @@ mod tests {
         assert!(check(Some(Preset::Gamg), false).is_ok());
         let error = check(Some(Preset::Hypre), false).expect_err("no hypre");
         assert!(error.render(false).contains("solver=gamg"), "{error}");
+    }
+
+    /// Bodies in the plane are condensed where that pays, and multigrid is for a factor that does not fit into memory.
+    #[test]
+    fn a_body_in_the_plane_is_condensed_where_that_pays() {
+        let size = Size { dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
+        assert_eq!(in_plane(&size).0, Preset::Condensed);
+        // a sheet whose dofs are mostly on the contact gains nothing by condensation
+        assert_eq!(in_plane(&Size { dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
+        assert_eq!(in_plane(&Size { memory: 50_000_000, ..size }).0, Preset::Hypre);
     }
 }

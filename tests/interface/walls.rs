@@ -194,6 +194,15 @@ fn none(breaches: Vec<String>) {
     assert!(breaches.is_empty(), "{} breaches:\n{}", breaches.len(), breaches.join("\n"));
 }
 
+/// The library is `api` and `petsc` with their errors; the program needs `cli`, and tests have `internals` by a feature.
+#[test]
+fn modules_are_private_but_for_the_library() {
+    let library = fs::read_to_string(root().join("src/lib.rs")).expect("the library");
+    let public: Vec<&str> = library.lines().filter_map(|line| line.strip_prefix("pub mod ")).collect();
+    assert_eq!(public, ["api;", "cli;", "error;", "internals;", "petsc;"]);
+    assert!(library.contains("#[cfg(feature = \"internals\")]\npub mod internals;"));
+}
+
 #[test]
 fn unsafe_stays_in_petsc() {
     let mut breaches = Vec::new();
