@@ -8,9 +8,9 @@ use clap::Parser;
 use series::{Boxes, Series};
 use std::f64::consts::PI;
 use std::path::Path;
+use winkler::api::load;
 use winkler::api::{ContactTable, Error, Kind, Result, Session, solve};
-use winkler::data::{Data, DataSpec};
-use winkler::scene::load;
+use winkler::internals::data::{Data, DataSpec};
 
 /// Estimated over true errors of pressures in space.
 #[derive(Parser)]

@@ -1,4 +1,4 @@
-//! The library: a scene is built in Rust and solved, and its solution is read as arrays. The command line goes the same way ([`run`]).
+//! The library: a scene is built in Rust and solved, and its solution is read as arrays. The command line goes the same way.
 //!
 //! Lengths and stresses are in any consistent units; forces are in stress times length squared, in the plane for a thickness of one length.
 //! Points and vectors have three components, z = 0 in the plane. docs/library.md has more examples.
@@ -41,16 +41,17 @@ pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
 pub use crate::model::field::Unbounded;
-pub use crate::output::{BodyField, ContactTable, PairReport, Report};
+pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{
-    AutoContact, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LayerSpec, Linear,
-    Load, LoadKind, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Overlap, Plane, Preset, RobinRule,
-    SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Zone,
+    AsperitySpec, AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, GroupArrays,
+    History, LawKind, LayerSpec, Linear, Load, LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec,
+    Order, Overlap, Plane, Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support,
+    Units, Zone,
 };
 pub use crate::robin::Ritz;
 pub use crate::run::recorder::Recorder;
-pub use crate::scene::Scene;
+pub use crate::scene::{AdaptSpec, Most, OutputSpec, Precision, Scene, load};
 
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
@@ -65,7 +66,7 @@ pub struct Solution {
     report: Report,
 }
 
-/// Solve a scene, built in Rust or [loaded](crate::scene::load) from a file. Collective: all ranks call it with the same scene.
+/// Solve a scene, built in Rust or [loaded](load) from a file. Collective: all ranks call it with the same scene.
 ///
 /// A run that does not converge is no error: see [`Solution::status`].
 ///

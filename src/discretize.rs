@@ -22,16 +22,15 @@ pub use local::BodyInfo;
 pub use mechanism::Balanced;
 pub use pairs::ContactInfo;
 pub use patterns::point;
-pub use post::{ForceBalance, Post, Resultant, Unbalanced};
-pub use surface::{ContactSurface, Resolution, resolution};
-pub use unassembled::RemovedModes;
+pub use post::{ForceBalance, Unbalanced};
+pub use surface::{Resolution, resolution};
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::linalg::axpy;
-use crate::model::{Mechanism, Model};
+use crate::model::{Local, Mechanism, Model};
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
 use assembler::Assembler;
@@ -170,7 +169,7 @@ impl Discrete {
         let mut message = vec![0.0; count + 2 * self.model.points()];
         for (body, slot) in self.model.bodies.iter().enumerate() {
             message[body] = slot.scale;
-            if slot.local.is_some() {
+            if !matches!(slot.local, Local::Elsewhere) {
                 self.model.put(body, &slot.row_stiffness, &mut message[count..]);
             }
         }

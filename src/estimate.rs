@@ -121,13 +121,14 @@ pub fn estimate(
 fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<Vec<Option<Vec<f64>>>> {
     let mut all = Vec::new();
     for (index, state) in iterate.states.iter().enumerate() {
-        let Some(body) = &model.bodies[index].local else {
+        let slot = &model.bodies[index];
+        let Some(body) = slot.local.as_ref() else {
             all.push(None);
             continue;
         };
         let mut u = body.recover(state)?;
-        u.iter_mut().zip(body.carried()).for_each(|(u, carried)| *u += carried);
-        all.push(body.leads().then(|| meshes.displacements(index, &u)));
+        u.iter_mut().zip(&slot.carried).for_each(|(u, carried)| *u += carried);
+        all.push(body.states().leads().then(|| meshes.displacements(index, &u)));
     }
     Ok(all)
 }
@@ -276,7 +277,7 @@ fn to_dofs(meshes: &dyn Meshes, model: &Model, loads: &mut [Vec<f64>]) {
         meshes.forces(body, load);
     }
     for (slot, load) in model.bodies.iter().zip(loads) {
-        if let Some(distribution) = slot.local.as_ref().and_then(|body| body.distribution()) {
+        if let Some(distribution) = slot.distribution() {
             load.resize(distribution.dofs, 0.0);
             model.exchange.sum(load);
         }

@@ -140,11 +140,11 @@ impl fmt::Debug for Field {
 }
 
 impl Field {
-    /// Parse an expression in x, y, in space also z, and with `iteration` also k: see [`Expression::parse`]. An expression without variables
+    /// Parse an expression in x, y, in space also z, and with `iteration` also k: see `Expression::parse`. An expression without variables
     /// becomes a constant.
     ///
     /// # Errors
-    /// Those of [`Expression::parse`], and a constant that is not finite.
+    /// Those of `Expression::parse`, and a constant that is not finite.
     pub fn parse(text: &str, place: &Place, dimension: usize, iteration: bool, data: &Library) -> Result<Self> {
         let names: Vec<_> = COORDINATES
             .into_iter()

@@ -3,8 +3,8 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::sync::Arc;
-use winkler::data::{Data, DataSpec, Interpolation, Outside};
 use winkler::error::{Place, Source};
+use winkler::internals::data::{Data, DataSpec, Interpolation, Outside};
 
 fuzz_target!(|bytes: &[u8]| {
     let file = std::env::temp_dir().join(format!("winkler-fuzz-{}", std::process::id()));

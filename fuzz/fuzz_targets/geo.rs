@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
-use winkler::mesh::{breach, unstructured};
+use winkler::internals::mesh::{breach, unstructured};
 
 fuzz_target!(|bytes: &[u8]| {
     let (path, home) = (Path::new("a.geo"), Path::new("/nowhere"));

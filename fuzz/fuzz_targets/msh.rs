@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
-use winkler::mesh::{Asked, Duty, Maker, Mesh, parse};
+use winkler::internals::mesh::{Asked, Duty, Mesh, MeshProducer, parse};
 
 fuzz_target!(|bytes: &[u8]| {
     read::<2>(bytes);
@@ -11,7 +11,7 @@ fuzz_target!(|bytes: &[u8]| {
 });
 
 fn read<const D: usize>(bytes: &[u8]) {
-    let mesh: Mesh<D> = match parse(Path::new("a.msh"), bytes, Maker::User) {
+    let mesh: Mesh<D> = match parse(Path::new("a.msh"), bytes, MeshProducer::User) {
         Ok(mesh) => mesh,
         Err(error) => return assert!(!error.to_string().is_empty()),
     };

@@ -10,7 +10,7 @@ const SCENE: &str = include_str!("../../meshes/groove/scene.toml");
 
 fuzz_target!(|text: &str| {
     let overrides: Vec<String> = text.lines().take(4).map(str::to_owned).collect();
-    if let Err(error) = winkler::scene::parse(Path::new(PATH), SCENE.to_owned(), &overrides) {
+    if let Err(error) = winkler::internals::scene::parse(Path::new(PATH), SCENE.to_owned(), &overrides) {
         assert!(!error.message().is_empty() && !error.to_string().is_empty());
     }
 });

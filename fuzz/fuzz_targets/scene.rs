@@ -6,7 +6,7 @@ use std::path::Path;
 
 fuzz_target!(|text: &str| {
     // beside it stands the project itself, whose Cargo.toml serves as a mesh file that is there
-    if let Err(error) = winkler::scene::parse(Path::new("scene.toml"), text.to_owned(), &[]) {
+    if let Err(error) = winkler::internals::scene::parse(Path::new("scene.toml"), text.to_owned(), &[]) {
         assert!(!error.message().is_empty() && !error.to_string().contains("internal"), "{error}");
     }
 });

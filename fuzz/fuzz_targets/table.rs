@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use winkler::contact::law::{LayerLaw, Table};
+use winkler::internals::contact::law::{LayerLaw, Table};
 
 /// A positive number between 1e-12 and 1e12, from three bytes.
 fn positive(bytes: &[u8]) -> f64 {

@@ -28,7 +28,7 @@ fn main() -> Result<()> {
     for gamma in
         [Gamma::Stationary(0.6), Gamma::Own("chebyshev".to_owned()), Gamma::Aitken, Gamma::Spectral, Gamma::LineSearch]
     {
-        let mut scene = winkler::scene::load(Path::new("meshes/groove/scene.toml"), &overrides)?;
+        let mut scene = winkler::api::load(Path::new("meshes/groove/scene.toml"), &overrides)?;
         scene.method = MethodSpec { gamma, stop: scene.method.stop.clone(), ..MethodSpec::new(MethodName::Robin) };
         let name = format!("{:?}", scene.method.gamma);
         let solution = solve(&session, scene.rule("chebyshev", || Chebyshev))?;

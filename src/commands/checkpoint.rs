@@ -7,7 +7,7 @@ use crate::ddm::{InitialGuess, Row, State};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, all_gather, broadcast};
 use crate::file::digest;
-use crate::model::{BodySlot, Distribution, Field, Model};
+use crate::model::{BodySlot, Distribution, Field, Local, Model};
 use crate::output::{RoundReport, StepReport, write_whole};
 use crate::run::stages::{Begin, Built, Done};
 use crate::scene::Scene;
@@ -116,13 +116,12 @@ impl Checkpoint {
         let discrete = &built.discrete;
         let Self { head, earlier, mut state, .. } = self;
         for (state, slot) in state.field.states.iter_mut().zip(&discrete.model.bodies) {
-            let Some(body) = &slot.local else {
+            if matches!(slot.local, Local::Elsewhere) {
                 state.clear();
-                continue;
-            };
+            }
             // a state of another length is that of another solver, for which the traces are used
-            let fits = |whole: &&Distribution| state.len() == whole.dofs + body.rigid();
-            if let Some(distribution) = body.distribution().filter(fits) {
+            let fits = |whole: &&Distribution| state.len() == whole.dofs + whole.products.nrows();
+            if let Some(distribution) = slot.distribution().filter(fits) {
                 *state = distribution.scatter(state);
             }
         }
@@ -152,12 +151,10 @@ fn gather(model: &Model, field: &Field) -> Vec<Vec<f64>> {
 
 /// Return the state of a body with all of its dofs on the rank that owns the body; on other ranks it is empty.
 fn whole_state(slot: &BodySlot, state: &[f64]) -> Vec<f64> {
-    let Some((body, distribution)) = slot.local.as_ref().and_then(|body| Some((body, body.distribution()?))) else {
-        return state.to_vec();
-    };
-    let (own, rigid) = state.split_at(state.len() - body.rigid());
+    let Some(distribution) = slot.distribution() else { return state.to_vec() };
+    let (own, rigid) = state.split_at(distribution.own.len());
     let all = distribution.gather(own, rigid);
-    if body.leads() { all } else { Vec::new() }
+    if distribution.leads { all } else { Vec::new() }
 }
 
 /// Return the checkpoint in the bytes of a file; none if they are damaged or of another version.

@@ -13,7 +13,9 @@ mod side;
 
 pub use basis::Carriers;
 pub use fine::{Fine, FinePoints};
-pub use law::{LayerLaw, Response};
-pub use pair::{ContactPair, Coverage, Fault, Left, LostPieces, OwnSurface, add, assemble, moment_in_scene};
+pub use law::LayerLaw;
+#[cfg(test)]
+pub use law::Response;
+pub use pair::{ContactPair, Fault, Left, LostPieces, add, assemble, moment_in_scene};
 pub use review::{Chords, UncoveredPoint};
 pub use side::{ROUNDING, Side, SmoothFaces};

@@ -40,7 +40,6 @@ pub struct Grid {
 struct Stencil {
     /// Indices of the points.
     at: [usize; 4],
-    /// Their weights.
     weight: [f64; 4],
     /// Derivatives of the weights by the coordinate.
     slope: [f64; 4],

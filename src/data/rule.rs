@@ -95,7 +95,6 @@ impl NoData {
 /// A value and its gradient; NaN where there is no value.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// The value.
     pub value: f64,
     /// The derivatives by both arguments; the second is zero for a profile.
     pub gradient: [f64; 2],

@@ -204,7 +204,6 @@ impl Reached {
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.
     energy: f64,
-    /// Pressure.
     pressure: f64,
     /// Sum of contact forces.
     force: f64,

@@ -374,7 +374,7 @@ pub fn respond(
 ) -> Result<std::result::Result<(Field, f64), Failure>> {
     let mut residual = Vec::new();
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
-        residual.push(match &mut slot.local {
+        residual.push(match slot.local.as_mut() {
             Some(body) => body.reduce(load)?,
             None => Vec::new(),
         });

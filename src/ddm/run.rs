@@ -80,7 +80,8 @@ impl Run<'_> {
         let mut sums = [0.0; SUMS + ASKS];
         (sums[0], sums[1]) = (energy.strain, energy.potential);
         sums[SUMS..].copy_from_slice(&asks(self.observer.asked()));
-        for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.leads()) {
+        for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.states().leads())
+        {
             let counts = body.counts();
             sums[2] += counts.factorizations as f64;
             sums[3] += counts.inner_iterations as f64;
@@ -317,7 +318,7 @@ pub(super) struct MeasuredIterate<'a> {
 pub(super) fn rounding(model: &Model, u: &Field, layer: &Layer) -> f64 {
     let mut sum = [0.0];
     for (index, slot) in model.bodies.iter().enumerate() {
-        if let Some(body) = &slot.local {
+        if let Some(body) = slot.local.as_ref() {
             sum[0] += body.rounding(&u.states[index], &model.at_rows(index, &layer.force));
         }
     }
@@ -371,7 +372,7 @@ pub struct Row {
 pub trait Observer {
     /// Take a complete row.
     fn row(&mut self, row: &Row);
-    /// Return the requests from outside, as [`ASKS`](crate::exchange::ASKS) bits whose meaning is the caller's own; called once an iterate. The
+    /// Return the requests from outside, as `exchange::ASKS` bits whose meaning is the caller's own; called once an iterate. The
     /// requests of one rank reach all ranks, and the run ends with [`Status::Paused`](super::Status::Paused), from where it can go on.
     fn asked(&self) -> u8 {
         0

@@ -439,7 +439,7 @@ fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> Laye
 pub(super) fn fits(model: &Model, field: &Field) -> bool {
     let bodies = model.bodies.iter().map(|slot| slot.local.as_ref());
     let is_odd =
-        |(body, state): (Option<&Box<dyn Body>>, &Vec<f64>)| body.is_some_and(|body| body.state_len() != state.len());
+        |(body, state): (Option<&dyn Body>, &Vec<f64>)| body.is_some_and(|body| body.states().size() != state.len());
     let mut odd = [bodies.zip(&field.states).filter(|pair| is_odd(*pair)).count() as f64];
     model.exchange.sum(&mut odd);
     if odd[0] > 0.0 {

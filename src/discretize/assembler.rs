@@ -10,21 +10,19 @@ use super::unassembled::{Supported, Unconstrained};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::{self, AtDofs};
-use crate::fem::{ElasticBody, FreeMotion, NodalForces, NodeGraph, Prolongation, RigidMotion, Space};
+use crate::fem::{ElasticBody, NodalForces, NodeGraph, Prolongation, RigidMotion, Space};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Distribution, Loads};
+use crate::model::{BodySlot, Distribution, FreeMotion, Loads, Local};
 use crate::problem::order::Order;
 use crate::problem::{BodySpec, Plane};
 use std::rc::Rc;
 
 /// The assembly of all bodies on one rank.
 pub struct Assembler<'a, const D: usize, F> {
-    /// The mesh.
     pub mesh: &'a Mesh<D>,
     /// Kind of a plane problem.
     pub plane: Plane,
-    /// This rank.
     pub rank: usize,
     /// The maker of solvers.
     pub factory: &'a mut F,
@@ -39,7 +37,8 @@ pub struct Assembler<'a, const D: usize, F> {
 /// What only the ranks with a part of a body have of it, until [`Discrete::share`](super::Discrete::share).
 #[derive(Default)]
 struct Made {
-    local: Option<Box<dyn Body>>,
+    local: Local,
+    carried: Vec<f64>,
     scale: f64,
     row_stiffness: Vec<f64>,
 }
@@ -90,9 +89,9 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             let (unloaded, motions) = (local.unloaded, unsupported);
             self.shapes.push(FemBody { space, held, elasticity, unloaded, motions });
         }
-        let Made { local, scale, row_stiffness } = made;
+        let Made { local, carried, scale, row_stiffness } = made;
         let name = info.name.clone();
-        let slot = BodySlot { name, local, segments, motions, sprung, scale, modulus, depth, row_stiffness };
+        let slot = BodySlot { name, local, carried, segments, motions, sprung, scale, modulus, depth, row_stiffness };
         Ok((slot, info))
     }
 
@@ -112,7 +111,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             graph = graph.of(|node| share.is_own::<D>(node));
         }
         let Loads { force, prescribed, carried, .. } = loads;
-        let mut body = part.assemble(self.mesh, &graph, force, prescribed, carried)?;
+        let mut body = part.assemble(self.mesh, &graph, force, prescribed, &carried)?;
         drop(graph);
         let scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
@@ -136,7 +135,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             left,
             interpolation,
         })?;
-        Ok(Made { local: Some(local), scale, row_stiffness })
+        Ok(Made { local, carried, scale, row_stiffness })
     }
 }
 
@@ -199,12 +198,12 @@ fn evaluate<const D: usize>(
 
 /// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
 fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
-    let Some(mut before) = kept else { return Ok(None) };
-    let serves = match &mut before.local {
+    let Some(BodySlot { mut local, scale, row_stiffness, .. }) = kept else { return Ok(None) };
+    let serves = match local.as_mut() {
         Some(body) => body.reload(loads)?,
         None => false,
     };
-    let made = Made { local: before.local, scale: before.scale, row_stiffness: before.row_stiffness };
+    let made = Made { local, carried: loads.carried.clone(), scale, row_stiffness };
     Ok(serves.then_some(made))
 }
 
@@ -254,7 +253,7 @@ pub trait Factory {
     ///
     /// # Errors
     /// PETSc refuses a matrix or the value of an option.
-    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>>;
+    fn make(&mut self, assembled: Assembled) -> Result<Local>;
 
     /// Return a body of this name with the same K and contact rows that an earlier scene or leg has left. It is on the rank that
     /// owns the body.

@@ -22,11 +22,9 @@ pub struct BodyInfo {
     pub name: String,
     /// Point of the scene about which the [`ForceBalance`](super::ForceBalance) of the body has moments.
     pub datum: [f64; 3],
-    /// Number of nodes.
     pub nodes: usize,
     /// Point of the mesh for each node of the cells that this rank writes.
     pub points: Vec<u32>,
-    /// Number of cells.
     pub cells: usize,
     /// Counts from the check of the mesh.
     pub facets: BodyCheck,
@@ -101,7 +99,6 @@ pub struct LocalBody<const D: usize> {
     pub regions: Vec<usize>,
     /// Supports and rigid surfaces.
     pub held: Constraints<D>,
-    /// Springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Facts of the whole body, and the points of the mesh that these nodes come from.
     pub facts: BodyFacts,

@@ -360,7 +360,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         graph: &NodeGraph,
         mut load: Vec<f64>,
         prescribed: Vec<(usize, f64)>,
-        carried: Vec<f64>,
+        carried: &[f64],
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;

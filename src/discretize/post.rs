@@ -76,7 +76,6 @@ pub struct OnPart<const D: usize> {
     pub elasticity: Rc<Elasticity>,
     /// Supports and rigid surfaces.
     pub held: Rc<Constraints<D>>,
-    /// Springs.
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Number of supports in the scene.
     pub supports: usize,
@@ -349,9 +348,7 @@ impl<const D: usize> Post for OnPart<D> {
 /// A force and its moment about the datum (x, y, z).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Resultant {
-    /// Force.
     pub force: [f64; 3],
-    /// Moment.
     pub moment: [f64; 3],
 }
 

@@ -19,11 +19,11 @@ mod tests;
 
 pub use crate::linalg::{cross, length, minus, pad, unit};
 pub use assemble::{Couplings, ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
-pub use elasticity::{Elasticity, Material};
+pub use elasticity::Elasticity;
 pub use element::{EDGES, Subdivision};
 pub use facets::{Facets, area_vector};
 pub use frame::{Frame, Levers, place};
 pub use interpolation::Prolongation;
 pub use recovery::{Errors, Recovery};
-pub use rigid::{FreeMotion, PointExtent, RigidMotion};
-pub use space::{Slope, Space};
+pub use rigid::{PointExtent, RigidMotion};
+pub use space::Space;

@@ -51,24 +51,8 @@ pub struct AtDofs<'a> {
 
 impl AtDofs<'_> {
     /// No motions.
+    #[cfg(test)]
     pub const NONE: AtDofs<'static> = AtDofs { count: 0, at: &|_, _| 0.0 };
-}
-
-/// A rigid motion that supports leave unconstrained.
-#[derive(Debug, Clone)]
-pub struct FreeMotion {
-    /// Displacement, one entry a dof of the nodes that this rank has, zero at supports.
-    pub displacement: Vec<f64>,
-    /// Work of all loads on the motion.
-    pub work: f64,
-}
-
-impl FreeMotion {
-    /// Make the motion from the displacements of dofs, which are set to zero at prescribed ones. `work` gives the work of the loads.
-    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], work: impl Fn(&[f64]) -> f64) -> Self {
-        prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
-        Self { work: work(&displacement), displacement }
-    }
 }
 
 /// Return the rigid motions of a body. A body of revolution has only the translation along its axis.

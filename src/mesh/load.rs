@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 /// A mesh and its origin.
 #[derive(Debug, Clone)]
 pub struct Loaded<const D: usize> {
-    /// The mesh.
     pub mesh: Mesh<D>,
     /// Where the mesh came from.
     pub origin: MeshOrigin,

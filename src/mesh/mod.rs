@@ -32,10 +32,14 @@ pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
 pub use load::{Loaded, MeshOrigin, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
+#[cfg(feature = "internals")]
 pub use msh::{MeshProducer, parse};
-pub use script::{unstructured, view};
-pub use simplex::{EDGES, Quality};
-pub use trust::{Breach, breach};
+#[cfg(feature = "internals")]
+pub use script::unstructured;
+pub use script::view;
+pub use simplex::EDGES;
+#[cfg(feature = "internals")]
+pub use trust::breach;
 
 use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;

@@ -24,10 +24,11 @@ pub enum MeshProducer {
     Other,
 }
 
-/// Read the bytes of a `.msh` file. Cells are in the order of the file, with the local numbering of [`Mesh`].
+/// Read the bytes of a `.msh` file, for tests. Cells are in the order of the file, with the local numbering of [`Mesh`].
 ///
 /// # Errors
 /// The input is not a mesh. The error names the file and the line.
+#[cfg(feature = "internals")]
 pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: MeshProducer) -> Result<Mesh<D>> {
     read(path, Box::new(std::io::Cursor::new(bytes)), maker)
 }

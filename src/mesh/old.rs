@@ -234,7 +234,6 @@ pub struct Contents {
     pub names: Vec<String>,
     /// Number and place of each node.
     pub nodes: Vec<(u64, [f64; 3])>,
-    /// The elements.
     pub elements: Vec<Element>,
 }
 

@@ -17,7 +17,6 @@ pub struct Shape {
     pub name: &'static str,
     /// Dimension, 0 to 3.
     pub dimension: usize,
-    /// Number of corners.
     pub corners: usize,
     /// Ends of the edges in Gmsh's order of mid-edge nodes.
     pub edges: &'static [[usize; 2]],
@@ -85,7 +84,6 @@ pub const POINTS: i32 = 15;
 pub struct ElementType {
     /// Gmsh's number.
     pub number: i32,
-    /// The shape.
     pub shape: &'static Shape,
     /// Number of nodes: corners, then those of edges, then those of quadrangular faces, then that of the cell.
     pub nodes: usize,

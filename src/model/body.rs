@@ -1,11 +1,9 @@
-//! The interface of a body for the methods, and how its dofs are distributed over the ranks.
+//! The interface of a body for the methods.
 
+use super::states::States;
 use crate::error::Result;
-use crate::exchange::{Exchange, Serial, all_to_all};
 use crate::linalg::Csr;
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use std::rc::Rc;
 
 /// The terms of one body in the functional F1 (25).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -71,26 +69,6 @@ impl std::ops::AddAssign for BodyCounts {
     }
 }
 
-/// The matrices of a body whose states are (v, a) for the displacement v + R a, with the rigid motions R that its supports leave free.
-#[derive(Debug, Clone, Copy)]
-pub struct Matrices<'a> {
-    /// K on the dofs v.
-    pub stiffness: &'a Csr,
-    /// B on the dofs v.
-    pub rows: &'a Csr,
-    /// R, one vector over the dofs v for each entry of a.
-    pub motions: &'a [Rc<[f64]>],
-    /// B R, one vector over the contact rows for each entry of a.
-    pub traces: &'a [Vec<f64>],
-}
-
-impl Matrices<'_> {
-    /// Return the length of a state.
-    pub fn state_len(&self) -> usize {
-        self.stiffness.rows() + self.motions.len()
-    }
-}
-
 /// New loads of a body whose K stays.
 #[derive(Debug)]
 pub struct Loads {
@@ -98,7 +76,7 @@ pub struct Loads {
     pub force: Vec<f64>,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
-    /// The rigid motion of [`Body::carried`].
+    /// The rigid motion by which supports move the body, one entry a dof; empty for none.
     pub carried: Vec<f64>,
     /// Work of f on each rigid motion that supports leave free.
     pub work: Vec<f64>,
@@ -106,27 +84,24 @@ pub struct Loads {
 
 /// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
-/// A state is a vector of `state_len()` numbers whose meaning is the body's own: all dofs, or only the retained ones.
-/// Solves may be inexact, but [`Body::residual`] is exact.
+/// Its [`States`] say what a state is. Solves may be inexact, but [`Body::residual`] is exact. For a body that is distributed over ranks
+/// `residual` and `recover` are collective. Errors are failures of the solver library.
 pub trait Body {
-    /// Return the length of a state.
-    fn state_len(&self) -> usize;
-
-    /// Return the undeformed state: zero on free dofs, prescribed values on supports.
-    fn rest(&self) -> Vec<f64>;
-
-    /// Compute t = B u, the outer normal displacement at each row, without what prescribed dofs contribute.
-    fn trace(&self, u: &[f64], t: &mut [f64]);
-
-    /// Add B' rows to y: forces at the contact rows as forces at the dofs.
-    fn add_rows(&self, rows: &[f64], y: &mut [f64]);
+    /// Return the facts on the states of the body. They stay as they are until [`Body::reload`].
+    fn states(&self) -> &States;
 
     /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each row. Return the
     /// energies of u.
     fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
 
+    /// Return the estimated size of the rounding errors e in [`Body::residual`], as the square of |e|_{diag(G)^-1}.
+    fn rounding(&self, u: &[f64], force: &[f64]) -> f64;
+
     /// Compute y = K u, for a body that has not given its K away.
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]);
+
+    /// Return K on the dofs of a state; it is empty if the inner solver stores K, or if it was given away.
+    fn stiffness(&self) -> &Csr;
 
     /// Give K away to a matrix of all bodies ([`Joint`]). Return `None` if the body needs it itself.
     fn give_stiffness(&mut self) -> Option<Csr> {
@@ -135,62 +110,35 @@ pub trait Body {
 
     /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing happens if the weights
     /// are those of the last call.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn robin(&mut self, weight: &[f64]) -> Result<()>;
 
     /// Factor G, or set up its preconditioner, if that has not been done since G changed.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn set_up(&mut self) -> Result<()>;
 
-    /// Solve G z = r (41) with zero initial guess.
-    ///
-    /// # Errors
-    /// Failures of the solver library. A solve that does not converge is reported in [`Solved`].
+    /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`Solved`].
     fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
-
-    /// Set the relative tolerance of iterative solves, unless the user has set one. Return false if solves do not depend on
-    /// it.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn precision(&mut self, _rtol: f64) -> Result<bool> {
-        Ok(false)
-    }
-
-    /// Return the relative error of solves in the energy norm, at most: zero for a direct solver.
-    fn accuracy(&self) -> f64 {
-        0.0
-    }
-
-    /// Make [`Body::matrices`] available, which may take an elimination.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn reveal(&mut self) -> Result<()> {
-        Ok(())
-    }
 
     /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
     /// a solve, and for an iterative inner solver only one application of its preconditioner.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
         self.solve(r, z)
     }
 
-    /// Return the estimated size of the rounding errors e in [`Body::residual`], as the square of |e|_{diag(G)^-1}.
-    fn rounding(&self, u: &[f64], force: &[f64]) -> f64;
+    /// Set the relative tolerance of iterative solves, unless the user has set one. Return false if solves do not depend on
+    /// it.
+    fn precision(&mut self, _rtol: f64) -> Result<bool> {
+        Ok(false)
+    }
 
     /// Return the right-hand side r of [`Body::solve`] that has the same effect as a load on all dofs. What acts on supports is left out.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>>;
+    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
+        Ok(self.states().reduce(load))
+    }
+
+    /// Return the displacements of the owned and ghost nodes of this rank for a state, without the motion that supports impose.
+    fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
+        Ok(self.states().recover(u))
+    }
 
     /// Return the counters of the work so far.
     fn counts(&self) -> BodyCounts;
@@ -200,127 +148,62 @@ pub trait Body {
 
     /// Replace the loads and keep what was made of K. Return false, with nothing changed, if other dofs are prescribed or K is needed
     /// again.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
     fn reload(&mut self, _loads: &Loads) -> Result<bool> {
         Ok(false)
     }
 
-    /// Return the matrices of the body, if they are in the memory of this process. They serve methods that join the bodies.
-    fn matrices(&self) -> Option<Matrices<'_>> {
-        None
+    /// Return one line about the inner solver.
+    fn describe(&self) -> String;
+}
+
+/// A body as this rank has it.
+#[derive(Default)]
+pub enum Local {
+    /// The body lives on other ranks.
+    #[default]
+    Elsewhere,
+    /// The body will be condensed when solvers are set up.
+    Uncondensed(Condensation),
+    /// The body, or the part of it that this rank owns.
+    Ready(Box<dyn Body>),
+}
+
+/// The elimination of the interior of a body, which returns the condensed body.
+pub type Condensation = Box<dyn FnOnce() -> Result<Box<dyn Body>>>;
+
+impl Local {
+    /// Return the body, if it is ready.
+    pub fn as_ref(&self) -> Option<&dyn Body> {
+        match self {
+            Self::Ready(body) => Some(&**body),
+            _ => None,
+        }
     }
 
-    /// Return the number of entries at the end of a state that are amounts of rigid motions.
-    fn rigid(&self) -> usize {
-        0
+    /// Return the body for changes, if it is ready.
+    pub fn as_mut(&mut self) -> Option<&mut (dyn Body + 'static)> {
+        match self {
+            Self::Ready(body) => Some(&mut **body),
+            _ => None,
+        }
     }
 
-    /// Split a state that was computed with [`Body::matrices`] into deformation and rigid motion as the body itself does.
-    fn separate(&self, _state: &mut [f64]) {}
-
-    /// Return the rigid motion by which supports move the body, one entry a dof of the owned and ghost nodes of this rank; empty for none. It is not
-    /// part of states.
-    fn carried(&self) -> &[f64] {
-        &[]
-    }
-
-    /// Return how the dofs of the body are distributed over the ranks; `None` for a body of this rank alone. For a distributed body `residual`,
-    /// `separate` and `recover` are collective.
-    fn distribution(&self) -> Option<&Distribution> {
-        None
-    }
-
-    /// Return whether this rank owns the body.
-    fn leads(&self) -> bool {
-        self.distribution().is_none_or(|distribution| distribution.leads)
-    }
-
-    /// Return the displacements of the owned and ghost nodes of this rank for a state, without the motion of [`Body::carried`].
+    /// Condense the body, if it is still to be condensed.
     ///
     /// # Errors
     /// Failures of the solver library.
-    fn recover(&self, u: &[f64]) -> Result<Vec<f64>>;
-
-    /// Return one line about the inner solver.
-    fn describe(&self) -> String;
+    pub fn condense(&mut self) -> Result<()> {
+        if let Self::Uncondensed(_) = self
+            && let Self::Uncondensed(condense) = std::mem::take(self)
+        {
+            *self = Self::Ready(condense()?);
+        }
+        Ok(())
+    }
 }
 
 /// K of all bodies, in the matrix that serves the linear step. The bodies then have no K of their own.
 pub trait Joint {
     /// Return K v for every local body, from their states. Rigid motions contribute nothing, because they cause no strain. Collective.
     fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>>;
-}
-
-/// The distribution of the dofs of a body over the ranks, as one of them sees it: the dofs that it owns, and their places in the distributed matrix that has their rows of K. That is the matrix of all bodies, or
-/// one of the body's own.
-///
-/// A state is (v, a): v has the dofs that this rank owns, and the rigid motion a is the same on all ranks. Every rank has a part of a
-/// force, also of the force on the rigid motion, so that work is a sum over ranks.
-#[derive(Serialize, Deserialize)]
-pub struct Distribution {
-    /// Number of dofs of the body.
-    pub dofs: usize,
-    /// The dofs that this rank owns, sorted.
-    pub own: Vec<u32>,
-    /// Their positions among the dofs of the owned and ghost nodes of this rank, sorted.
-    pub places: Vec<u32>,
-    /// For each other rank, the ghost dofs that it owns: their positions among the dofs of the owned and ghost nodes, and their rows in the matrix.
-    pub near: Vec<(Vec<u32>, Vec<u32>)>,
-    /// Products, over all dofs of the body, of the rigid motions that its supports leave free.
-    pub products: DMatrix<f64>,
-    /// Row of the first owned dof of the body in the matrix; the others follow.
-    pub first: usize,
-    /// First row of the matrix that this rank owns.
-    pub start: usize,
-    /// Number of rows of the matrix.
-    pub total: usize,
-    /// All contact rows of the body; columns: rows of the matrix.
-    pub rows: Csr,
-    /// Whether this rank owns the body. It is one of the ranks that own most of its dofs.
-    pub leads: bool,
-    /// Connection to the other ranks; whoever receives a distribution sets it.
-    #[serde(skip, default = "alone")]
-    pub exchange: Rc<dyn Exchange>,
-}
-
-fn alone() -> Rc<dyn Exchange> {
-    Rc::new(Serial)
-}
-
-impl Distribution {
-    /// Return the values at all dofs of the body, on every rank, from those at owned dofs. `rest` is appended. Collective.
-    pub fn gather(&self, own: &[f64], rest: &[f64]) -> Vec<f64> {
-        let mut all = vec![0.0; self.dofs];
-        self.own.iter().zip(own).for_each(|(&dof, &value)| all[dof as usize] = value);
-        self.exchange.sum(&mut all);
-        all.extend(rest);
-        all
-    }
-
-    /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every rank. Collective.
-    pub fn near(&self, own: &[f64]) -> Vec<f64> {
-        let requested = all_to_all(&*self.exchange, self.near.iter().map(|(_, rows)| rows.clone()).collect());
-        let value = |row: u32| own[row as usize - self.first];
-        let answers = requested.into_iter().map(|rows| rows.into_iter().map(value).collect::<Vec<f64>>());
-        let ghosts: usize = self.near.iter().map(|(positions, _)| positions.len()).sum();
-        let mut known = vec![0.0; self.places.len() + ghosts];
-        self.places.iter().zip(own).for_each(|(&at, &value)| known[at as usize] = value);
-        for ((positions, _), values) in self.near.iter().zip(all_to_all(&*self.exchange, answers.collect())) {
-            positions.iter().zip(values).for_each(|(&at, value)| known[at as usize] = value);
-        }
-        known
-    }
-
-    /// Return the values at owned dofs from those at the dofs of owned and ghost nodes.
-    pub fn of_known(&self, known: &[f64]) -> Vec<f64> {
-        self.places.iter().map(|&at| known[at as usize]).collect()
-    }
-
-    /// Return the values at owned dofs from those at all dofs, and append the entries behind the latter.
-    pub fn scatter(&self, all: &[f64]) -> Vec<f64> {
-        let own = self.own.iter().map(|&dof| all[dof as usize]);
-        own.chain(all[self.dofs..].iter().copied()).collect()
-    }
 }

@@ -18,13 +18,13 @@ pub struct Field {
 impl Field {
     /// Return the field of all bodies at rest.
     pub fn rest(model: &Model) -> Field {
-        let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.rest());
+        let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.states().rest());
         Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
     }
 
     /// Return the field without displacement of any body.
     pub fn zero(model: &Model) -> Field {
-        let state = |slot: &BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.state_len())];
+        let state = |slot: &BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.states().size())];
         Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
     }
 
@@ -62,9 +62,9 @@ impl Field {
     pub fn trace_here(&mut self, model: &Model) {
         let mut trace = vec![0.0; self.trace.len()];
         for (index, slot) in model.bodies.iter().enumerate() {
-            if let Some(body) = &slot.local {
+            if let Some(body) = slot.local.as_ref() {
                 let mut rows = vec![0.0; slot.row_stiffness.len()];
-                body.trace(&self.states[index], &mut rows);
+                body.states().trace(&self.states[index], &mut rows);
                 model.put(index, &rows, &mut trace);
             }
         }
@@ -90,7 +90,7 @@ pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
     }
     let apply = |(slot, v): (&mut BodySlot, &Vec<f64>)| {
         let mut y = vec![0.0; v.len()];
-        if let Some(body) = &mut slot.local {
+        if let Some(body) = slot.local.as_mut() {
             body.apply_stiffness(v, &mut y);
         }
         y
@@ -125,8 +125,8 @@ pub fn residuals(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>,
 /// Add B' `force` to y for every local body, for forces at the points (n).
 pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
     for (index, y) in y.iter_mut().enumerate() {
-        if let Some(body) = &model.bodies[index].local {
-            body.add_rows(&model.at_rows(index, force), y);
+        if let Some(body) = model.bodies[index].local.as_ref() {
+            body.states().add_rows(1.0, &model.at_rows(index, force), y);
         }
     }
 }

@@ -9,12 +9,14 @@ pub mod field;
 pub mod layer;
 pub mod linear;
 pub mod rigid;
+pub mod states;
 
-pub use body::{Body, BodyCounts, Distribution, Energy, Joint, Loads, Matrices, Solved};
+pub use body::{Body, BodyCounts, Energy, Joint, Loads, Local, Solved};
 pub use field::Field;
 pub use layer::Layer;
-pub use linear::{LinearSolution, LinearStep};
+pub use linear::LinearStep;
 pub use rigid::{Motions, Moved};
+pub use states::{Distribution, FreeMotion, States};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -72,7 +74,10 @@ pub struct BodySlot {
     /// Name in the scene.
     pub name: String,
     /// The body, on the rank that owns it, or on every rank that may own a part of it.
-    pub local: Option<Box<dyn Body>>,
+    pub local: Local,
+    /// The rigid motion by which supports move the body, one entry a dof of the owned and ghost nodes of this rank; empty for none. It is not
+    /// part of states.
+    pub carried: Vec<f64>,
     /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,
     /// Rigid motions that neither supports nor springs constrain.
@@ -87,6 +92,13 @@ pub struct BodySlot {
     pub depth: f64,
     /// b diag(K) b' of each contact row b: the stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
+}
+
+impl BodySlot {
+    /// Return how the dofs of the body are distributed over the ranks; `None` for a body of one rank, and for one that does not live here.
+    pub fn distribution(&self) -> Option<&Distribution> {
+        self.local.as_ref()?.states().distribution.as_deref()
+    }
 }
 
 /// The discrete problem.
@@ -163,7 +175,7 @@ impl Model {
 
     /// Return whether the dofs of some bodies are distributed over the ranks.
     pub fn is_distributed(&self) -> bool {
-        self.bodies.iter().any(|slot| slot.local.as_ref().is_some_and(|body| body.distribution().is_some()))
+        self.bodies.iter().any(|slot| slot.distribution().is_some())
     }
 
     /// Return the number of contact points of all pairs.
@@ -212,6 +224,14 @@ impl Model {
         }
     }
 
+    /// Condense the bodies that are to be condensed and are not yet.
+    ///
+    /// # Errors
+    /// Failures of the solver library.
+    pub fn condense(&mut self) -> Result<()> {
+        self.bodies.iter_mut().try_for_each(|slot| slot.local.condense())
+    }
+
     /// Set the relative tolerance of solves in every body. Return whether the solves of some body depend on it.
     ///
     /// # Errors
@@ -228,7 +248,7 @@ impl Model {
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
         for body in 0..self.bodies.len() {
             let rows = self.of_body(body, weight);
-            if let Some(local) = &mut self.bodies[body].local {
+            if let Some(local) = self.bodies[body].local.as_mut() {
                 local.robin(&rows)?;
             }
         }
@@ -288,7 +308,8 @@ pub(crate) mod sample {
         };
         let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
             name: side.to_string(),
-            local: None,
+            local: Local::Elsewhere,
+            carried: Vec::new(),
             segments: (0..2).map(|pair| Segment { pair, side }).collect(),
             motions: Vec::new(),
             sprung: None,

@@ -83,11 +83,6 @@ impl<'a> Motions<'a> {
         Self::new(model.bodies.iter().map(|slot| (&slot.segments[..], &motions(slot)[..])), &points)
     }
 
-    /// Return the motions of each body.
-    pub fn bodies(&self) -> &[&'a [Motion]] {
-        &self.bodies
-    }
-
     /// Return the number of all motions.
     pub fn count(&self) -> usize {
         self.first[self.first.len() - 1]
@@ -162,12 +157,11 @@ impl<'a> Motions<'a> {
         let mut field = Field::zero(model);
         field.trace = self.trace(model, amounts);
         for (body, slot) in model.bodies.iter().enumerate() {
-            let Some(matrices) = slot.local.as_ref().and_then(|body| body.matrices()) else { continue };
+            let Some(facts) = slot.local.as_ref().map(|body| body.states()) else { continue };
             // a state ends with the amounts of its rigid motions
-            let own = fit(matrices.traces, &model.of_body(body, &field.trace));
+            let own = fit(&facts.traces, &model.of_body(body, &field.trace));
             let state = &mut field.states[body];
-            let deformation = state.len() - own.len();
-            state[deformation..].copy_from_slice(&own);
+            state[facts.dofs..].copy_from_slice(&own);
         }
         field
     }
@@ -258,17 +252,14 @@ impl CoarseSpace {
         for (body, slot) in model.bodies.iter().enumerate() {
             let numbers = first_motion..;
             first_motion += slot.motions.len();
-            let Some(local) = &slot.local else { continue };
-            let Some(matrices) = local.matrices() else { continue };
+            let Some(states) = slot.local.as_ref().map(|local| local.states()) else { continue };
             for (motion, Motion { trace, .. }) in numbers.zip(&slot.motions) {
-                let amounts = fit(matrices.traces, trace);
+                let amounts = fit(&states.traces, trace);
                 columns.push(match offset {
-                    None => {
-                        MotionColumn { motion, vector: body, first: local.state_len() - amounts.len(), values: amounts }
-                    }
+                    None => MotionColumn { motion, vector: body, first: states.dofs, values: amounts },
                     Some(offset) => {
                         let mut values = vec![0.0; offset[body + 1] - offset[body]];
-                        amounts.iter().zip(matrices.motions).for_each(|(a, shape)| axpy(*a, shape, &mut values));
+                        amounts.iter().zip(&states.motions).for_each(|(a, shape)| axpy(*a, shape, &mut values));
                         MotionColumn { motion, vector: 0, first: offset[body], values }
                     }
                 });
@@ -353,9 +344,6 @@ impl CoarseOperator {
 /// Binary digits of the amounts of motions in an origin. Their products with coordinates of 29 digits are then exact.
 const DIGITS: u32 = 24;
 
-/// Largest relative difference between an amount of the start and that in its origin.
-pub const ROUNDING: f64 = 1.0 / (1 << DIGITS) as f64;
-
 /// Rigid motions of the start that were subtracted from displacements and gaps: the origin of displacements.
 ///
 /// A body that falls far onto its neighbour has traces that are huge compared with the compression of the layer. Each sum of two
@@ -389,17 +377,17 @@ impl DisplacementOrigin {
                 state.fill(0.0);
                 continue;
             }
-            let Some(body) = slot.local.as_mut() else { continue };
-            let Some(count) = body.matrices().map(|matrices| matrices.traces.len()) else { continue };
-            let deformation = state.len() - count;
+            let Some(body) = slot.local.as_ref() else { continue };
+            let deformation = body.states().dofs;
             for (origin, beyond) in state[deformation..].iter_mut().zip(&mut rest.states[index][deformation..]) {
                 let amount = *origin;
                 *origin = short(amount);
                 *beyond += amount - *origin;
             }
             // at rest and without contact the residual is the load; rigid motions cause no strain, so K u = 0
-            let mut load = vec![0.0; state.len()];
-            body.residual(&body.rest(), &vec![0.0; state.len()], &vec![0.0; slot.row_stiffness.len()], &mut load);
+            let (at_rest, product) = (body.states().rest(), vec![0.0; state.len()]);
+            let mut load = product.clone();
+            body.residual(&at_rest, &product, &vec![0.0; slot.row_stiffness.len()], &mut load);
             energy[0] -= dot(&load[deformation..], &state[deformation..]);
         }
         // one message has the energy and both traces

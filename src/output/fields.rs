@@ -82,7 +82,7 @@ pub struct BodyField {
     pub points: Vec<[f64; 3]>,
     /// Kind of all cells.
     pub cell: CellKind,
-    /// Point numbers, [`CellKind::stride`] per cell.
+    /// Point numbers, as many for each cell as its kind has.
     pub connectivity: Vec<u32>,
     /// Displacement at each point.
     pub displacement: Vec<[f64; 3]>,
@@ -147,7 +147,7 @@ pub struct UnstructuredGrid {
     pub points: Vec<[f64; 3]>,
     /// Kind of all cells.
     pub cell: CellKind,
-    /// Point numbers, [`CellKind::stride`] per cell.
+    /// Point numbers, as many for each cell as its kind has.
     pub connectivity: Vec<u32>,
     /// Arrays at the points: name, components, values.
     pub at_points: Vec<(String, u32, Vec<f64>)>,

@@ -12,13 +12,13 @@ use serde_json::{Value as Json, json};
 
 keys! {
     /// A body: a named group of cells with its elasticity, supports and loads. In a scene file the name may be a
-    /// [pattern](super::pattern); the table then stands for all bodies whose names match.
+    /// pattern; the table then stands for all bodies whose names match.
     #[derive(Debug, Clone)]
     pub struct BodySpec "[[body]]" {
         required {
             /// group of cells, or a pattern such as "brick_*" for many bodies
             ///
-            /// It has the form of [`plain`]. It is a prefix of PETSc options, without words of PETSc's own.
+            /// It has the form of `plain`. It is a prefix of PETSc options, without words of PETSc's own.
             pub name: Located<String> => body_name,
         }
         optional {
@@ -203,7 +203,7 @@ pub fn plain(name: &str) -> String {
     if word.starts_with(|c: char| c.is_ascii_lowercase()) { word } else { format!("body_{word}") }
 }
 
-/// Return a pattern of names of bodies by the rule of [`plain`]. Signs of patterns stay.
+/// Return a pattern of names of bodies by the rule of `plain`. Signs of patterns stay.
 pub fn plain_pattern(text: &str) -> String {
     let mut in_class = false;
     let mut write = |c: char| {

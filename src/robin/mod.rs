@@ -6,6 +6,6 @@ pub mod spectrum;
 pub mod sweep;
 mod sweeps;
 
-pub use spectrum::{Interval, Ritz};
+pub use spectrum::Ritz;
 pub use sweep::{Coefficient, Sweep, Sweeper, prepare};
 pub use sweeps::Sweeps;

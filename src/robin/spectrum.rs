@@ -85,9 +85,9 @@ fn loads(model: &Model) -> Vec<Vec<f64>> {
     let rows: Vec<f64> = (0..2 * points).map(|i| model.weight[i % points] * pressure(i)).collect();
     let mut loads: Vec<Vec<f64>> = Vec::new();
     for (index, slot) in model.bodies.iter().enumerate() {
-        let mut load = vec![0.0; slot.local.as_ref().map_or(0, |body| body.state_len())];
-        if let Some(body) = &slot.local {
-            body.add_rows(&model.of_body(index, &rows), &mut load);
+        let mut load = vec![0.0; slot.local.as_ref().map_or(0, |body| body.states().size())];
+        if let Some(body) = slot.local.as_ref() {
+            body.states().add_rows(1.0, &model.of_body(index, &rows), &mut load);
         }
         loads.push(load);
     }

@@ -119,14 +119,14 @@ impl Sweeper {
         let mut reasons = vec![String::new(); bodies];
         for index in 0..bodies {
             let slot = &mut model.bodies[index];
-            let Some(body) = &mut slot.local else {
+            let Some(body) = slot.local.as_mut() else {
                 states.push(Vec::new());
                 continue;
             };
             let scalars = &mut message[rows + SCALARS * index..][..SCALARS];
-            let z = task.solve_body(index, &mut **body, scalars, &mut reasons[index])?;
+            let z = task.solve_body(index, body, scalars, &mut reasons[index])?;
             let mut trace = vec![0.0; slot.row_stiffness.len()];
-            body.trace(&z, &mut trace);
+            body.states().trace(&z, &mut trace);
             model.put(index, &trace, &mut message[..rows]);
             states.push(z);
         }
@@ -180,7 +180,7 @@ impl Task<'_> {
         scalars[POTENTIAL] = self.energies[index].potential;
         scalars[PRODUCT] = self.other.map_or(0.0, |other| dot(&other[index], &z));
         // a body that is distributed over several ranks counts once
-        if body.leads() {
+        if body.states().leads() {
             let counts = body.counts();
             scalars[SKIPPED] = f64::from(is_skipped);
             scalars[FACTORIZATIONS] = counts.factorizations as f64;
@@ -202,11 +202,11 @@ fn known_correction(model: &Model, index: usize, r: &[f64], last: &Sweep, factor
     // |r - factor r_last|^2 and |r|^2
     let difference = r.iter().zip(&last.residual[index]).map(|(r, last)| (r - factor * last).powi(2)).sum();
     let mut sums = [difference, dot(r, r)];
-    if body.distribution().is_some() {
+    if body.states().distribution.is_some() {
         model.exchange.sum(&mut sums);
     }
     (sums[0] <= 1e-12 * sums[1]).then(|| {
-        let mut z = vec![0.0; body.state_len()];
+        let mut z = vec![0.0; body.states().size()];
         axpy(factor, &last.correction.states[index], &mut z);
         z
     })
@@ -331,9 +331,10 @@ const STEPS: usize = 4;
 /// Give every body that lives on this rank the Robin term of its extension, and set its solver up. A refusal of the solver or of an option
 /// then comes before the first sweep, and the extension needs no other factorisation.
 pub fn prepare(model: &mut Model) -> Result<()> {
+    model.condense()?;
     for index in 0..model.bodies.len() {
         let springs = extension_springs(&model.bodies[index]);
-        if let Some(body) = &mut model.bodies[index].local {
+        if let Some(body) = model.bodies[index].local.as_mut() {
             body.robin(&springs)?;
             body.set_up()?;
         }
@@ -361,11 +362,11 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
         let target = model.of_body(index, trace);
         let slot = &mut model.bodies[index];
         let springs = extension_springs(slot);
-        let Some(body) = &mut slot.local else {
+        let Some(body) = slot.local.as_mut() else {
             iterate.states.push(Vec::new());
             continue;
         };
-        let Extension { state, rows, failure } = extend_body(&mut **body, &*model.exchange, &springs, &target)?;
+        let Extension { state, rows, failure } = extend_body(body, &*model.exchange, &springs, &target)?;
         model.put(index, &rows, &mut iterate.trace);
         iterate.states.push(state);
         if let Some(reason) = failure {
@@ -396,13 +397,13 @@ struct Extension {
 /// Extend the trace `target` of a body, with springs of this stiffness at its contact rows. Collective for a distributed body.
 fn extend_body(body: &mut dyn Body, exchange: &dyn Exchange, springs: &[f64], target: &[f64]) -> Result<Extension> {
     body.robin(springs)?;
-    let mut u = body.rest();
+    let mut u = body.states().rest();
     let [mut r, mut z, mut product] = [(); 3].map(|()| vec![0.0; u.len()]);
     let [mut rows, mut multiplier, mut force] = [(); 3].map(|()| vec![0.0; springs.len()]);
     let (mut first, mut failure) = (None, None);
     for step in 0..STEPS {
-        body.trace(&u, &mut rows);
-        if body.distribution().is_some() {
+        body.states().trace(&u, &mut rows);
+        if body.states().distribution.is_some() {
             exchange.sum(&mut rows);
         }
         let mut violation = 0.0f64;
@@ -424,6 +425,6 @@ fn extend_body(body: &mut dyn Body, exchange: &dyn Exchange, springs: &[f64], ta
         failure = body.solve(&r, &mut z)?.failure.or(failure);
         axpy(1.0, &z, &mut u);
     }
-    body.trace(&u, &mut rows);
+    body.states().trace(&u, &mut rows);
     Ok(Extension { state: u, rows, failure })
 }

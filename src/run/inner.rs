@@ -8,7 +8,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::file::available_memory;
 use crate::linalg::Csr;
-use crate::model::{Body, BodySlot};
+use crate::model::{BodySlot, Local};
 use crate::parallel::owners;
 use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Order, Preset};
@@ -17,7 +17,7 @@ use crate::solver::cost::{self, BodySize, Comparison, StepSolver};
 use crate::solver::names::WHOLE;
 use crate::solver::options::{Chosen, UserOptions};
 use crate::solver::preset::{self, Size, Smoother};
-use crate::solver::{CondensedBody, InterfaceDofs, Krylov, SparseBody};
+use crate::solver::{InterfaceDofs, Krylov, SparseBody, Uncondensed};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
 use serde::{Deserialize, Serialize};
@@ -389,14 +389,15 @@ impl Factory for SolverFactory<'_> {
         }
     }
 
-    fn make(&mut self, assembled: Assembled) -> Result<Box<dyn Body>> {
+    fn make(&mut self, assembled: Assembled) -> Result<Local> {
         let Assembled { name, dimension, body, distribution, rows, motions, left, interpolation } = assembled;
         let Some(plan) = self.places.get(&name).map(|&place| &mut self.plans[place]) else {
             return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
         };
         let (session, chosen) = (self.session.clone(), plan.chosen.clone());
         if let Some(retained) = plan.retained.take() {
-            return Ok(Box::new(CondensedBody::new(&session, chosen, dimension, body, left, retained)));
+            let whole = Uncondensed { session, chosen, dimension, body, free: left, retained };
+            return Ok(Local::Uncondensed(Box::new(|| Ok(Box::new(whole.condense()?)))));
         }
         let words = match self.linear {
             Linear::Sweeps => preset::in_words(&chosen),
@@ -420,11 +421,11 @@ impl Factory for SolverFactory<'_> {
             modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
         }
         let make = move |stiffness: Rows| Krylov::new(&session, chosen, dimension, stiffness, &modes, levels);
-        Ok(Box::new(SparseBody::new(body, rows, &left, distribution, make, words)))
+        Ok(Local::Ready(Box::new(SparseBody::new(body, rows, &left, distribution, make, words))))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {
-        self.kept.remove(name).filter(|slot| slot.local.is_some())
+        self.kept.remove(name).filter(|slot| slot.local.as_ref().is_some())
     }
 }
 

@@ -193,7 +193,7 @@ fn forces_on_hats(done: &Done, found: &[Option<Unbalanced>]) -> Vec<Vec<f64>> {
 
 /// Fill in the values of a field at ghost nodes from the ranks that own them. Collective where the nodes of the body are distributed.
 fn with_ghosts(slot: &BodySlot, field: Vec<f64>) -> Vec<f64> {
-    match slot.local.as_ref().and_then(|body| body.distribution()) {
+    match slot.distribution() {
         Some(distribution) => distribution.near(&distribution.of_known(&field)),
         None => field,
     }

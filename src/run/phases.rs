@@ -407,7 +407,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         crate::robin::prepare(model)?;
         return Ok(Box::new(Sweeps::new(coefficient_of(scene))));
     }
-    model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(|body| body.reveal())?;
+    model.condense()?;
     // Multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows.
     let nodes = linear == Linear::Multigrid || model.is_distributed();
     let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };

@@ -15,7 +15,7 @@ pub trait Recorder: Observer {
     /// Save the state of a run, or of its load step, from which it can continue.
     fn state(&mut self, _done: &Done) {}
 
-    /// Save the results of a finished load step, the last of [`Done::steps`], in the units of the scene, with its bodies.
+    /// Save the results of a finished load step, the last of `Done::steps`, in the units of the scene, with its bodies.
     fn step(&mut self, _done: &Done, _recovered: &All) {}
 
     /// Save the results so far without changing the run.

@@ -237,7 +237,7 @@ impl GatheredCounters {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
-            let owned = slot.local.as_ref().filter(|body| body.leads());
+            let owned = slot.local.as_ref().filter(|body| body.states().leads());
             mine.solvers.push(owned.map_or(String::new(), |body| body.describe()));
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
         }

@@ -24,7 +24,7 @@ pub fn recover(done: &Done) -> Rc<All> {
     done.recovered.clone().unwrap_or_else(|| {
         let bodies = done.model().bodies.iter().zip(&done.outcome.iterate.states);
         let local = |(slot, state): (&BodySlot, &Vec<f64>)| {
-            slot.local.as_ref().map(|body| recover_body(slot, &**body, state, done.share))
+            slot.local.as_ref().map(|body| recover_body(slot, body, state, done.share))
         };
         Rc::new(bodies.map(local).collect())
     })
@@ -33,14 +33,14 @@ pub fn recover(done: &Done) -> Rc<All> {
 /// Return the displacements of a body from its state at a share of the loads. Collective.
 fn recover_body(slot: &BodySlot, body: &dyn Body, state: &[f64], share: f64) -> Result<Recovered> {
     // A motion that springs resist counts as deformation, too.
-    let rigid = if slot.sprung.is_some() { 0 } else { body.rigid() };
+    let rigid = if slot.sprung.is_some() { 0 } else { body.states().rigid() };
     // bodies expect states at the full load
     let state: Vec<f64> = state.iter().map(|u| u / share).collect();
     let (deformation, motion) = state.split_at(state.len() - rigid);
     let mut bent = body.recover(&[deformation, &vec![0.0; rigid]].concat())?;
     // The rigid motion is the same on all ranks, so all of them take the same branch.
     let mut state = if motion.iter().all(|a| *a == 0.0) { bent.clone() } else { body.recover(&state)? };
-    state.iter_mut().zip(body.carried()).for_each(|(u, imposed)| *u += imposed);
+    state.iter_mut().zip(&slot.carried).for_each(|(u, imposed)| *u += imposed);
     bent.iter_mut().chain(&mut state).for_each(|u| *u *= share);
     Ok(Recovered::new(state, bent))
 }

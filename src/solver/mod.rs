@@ -19,7 +19,7 @@ mod robin;
 mod sparse;
 
 pub use coarse::RigidSpace;
-pub use condensed::{CondensedBody, InterfaceDofs};
+pub use condensed::{InterfaceDofs, Uncondensed};
 pub use dense::Dense;
 pub use krylov::Krylov;
 pub use monolithic::{Monolithic, Union};

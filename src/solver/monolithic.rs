@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable, dot};
 use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, System, Trial};
-use crate::model::{BodyCounts, BodySlot, Distribution, Field, Joint, Matrices, Model};
+use crate::model::{Body, BodyCounts, BodySlot, Distribution, Field, Joint, Model, States};
 use crate::petsc::{KspIterate, Rows};
 use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
@@ -53,10 +53,10 @@ impl<S> JointMatrix<S> {
     /// Return the state of each local body from a vector of all bodies.
     fn states(&self, model: &Model, x: &[f64]) -> Vec<Vec<f64>> {
         let state = |(slot, part): (&BodySlot, Range<usize>)| {
-            let Some(body) = &slot.local else { return Vec::new() };
+            let Some(states) = slot.local.as_ref().map(|body| body.states()) else { return Vec::new() };
             let mut state = x[part].to_vec();
-            state.resize(body.state_len(), 0.0);
-            body.separate(&mut state);
+            state.resize(states.size(), 0.0);
+            states.separate(&mut state);
             state
         };
         model.bodies.iter().zip(self.parts()).map(state).collect()
@@ -259,6 +259,29 @@ impl Union {
     }
 }
 
+/// The matrices of a body whose states are (v, a) for the displacement v + R a, with the rigid motions R that its supports leave free.
+struct Matrices<'a> {
+    /// K on the dofs v.
+    stiffness: &'a Csr,
+    /// B on the dofs v.
+    rows: &'a Csr,
+    /// R, one vector over the dofs v for each entry of a.
+    motions: &'a [Rc<[f64]>],
+    /// B R, one vector over the contact rows for each entry of a.
+    traces: &'a [Vec<f64>],
+}
+
+impl<'a> Matrices<'a> {
+    fn of(body: &'a dyn Body) -> Self {
+        let States { rows, motions, traces, .. } = body.states();
+        Self { stiffness: body.stiffness(), rows, motions, traces }
+    }
+
+    fn state_len(&self) -> usize {
+        self.stiffness.rows() + self.motions.len()
+    }
+}
+
 /// The places of all bodies in one matrix.
 struct Layout<'a> {
     model: &'a Model,
@@ -285,7 +308,7 @@ struct BodyRow {
 
 impl<'a> Layout<'a> {
     fn new(model: &'a Model, parts: &'a [Matrices<'a>]) -> Self {
-        let distribution = |slot: &'a BodySlot| slot.local.as_ref().and_then(|body| body.distribution());
+        let distribution = |slot: &'a BodySlot| slot.distribution();
         let distributions: Vec<_> = model.bodies.iter().map(distribution).collect();
         let mut offset = vec![0];
         for part in parts {
@@ -415,7 +438,7 @@ impl Gathered {
 
 /// Return the matrices of the local bodies.
 fn matrices(model: &Model) -> impl Iterator<Item = Option<Matrices<'_>>> {
-    model.bodies.iter().map(|slot| slot.local.as_ref().and_then(|body| body.matrices()))
+    model.bodies.iter().map(|slot| slot.local.as_ref().map(Matrices::of))
 }
 
 /// Send the matrices of all bodies to every rank. Each body lives on one rank. One message. Return `None` if a body has no matrices.

@@ -3,12 +3,12 @@
 use crate::common::{Run, Scene, root, solve, winkler};
 use std::collections::HashMap;
 use std::f64::consts::PI;
-use winkler::contact::Side;
-use winkler::fem::{Elasticity, Frame, Space, displacement};
-use winkler::interrupt::Interrupt;
-use winkler::mesh::load;
-use winkler::problem::order::Order;
-use winkler::scene;
+use winkler::api::Order;
+use winkler::api::load as load_scene;
+use winkler::internals::Interrupt;
+use winkler::internals::contact::Side;
+use winkler::internals::fem::{Elasticity, Frame, Space, displacement};
+use winkler::internals::mesh::load;
 
 /// Lamé's lambda and mu.
 fn lame(young: f64, poisson: f64) -> (f64, f64) {
@@ -383,7 +383,7 @@ fn soft_layer() {
 /// A surface of revolution is smooth where it meets the axis: its normal there is along the axis.
 #[test]
 fn normals_on_the_axis() {
-    let scene = scene::load(&case("shells"), &[]).expect("a scene");
+    let scene = load_scene(&case("shells"), &[]).expect("a scene");
     for degree in [Order::P1, Order::P2] {
         let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);
@@ -404,7 +404,7 @@ fn stress_along_the_circles() {
     let (lambda, mu) = lame(young, poisson);
     let volume = lambda * (2.0 * a + b);
     let (across, along) = (volume + 2.0 * mu * a, volume + 2.0 * mu * b);
-    let scene = scene::load(&case("shells"), &[]).expect("a scene");
+    let scene = load_scene(&case("shells"), &[]).expect("a scene");
     let elasticity =
         Elasticity::new(&[&scene.bodies[0].elasticity], Vec::new(), 2, scene.plane).expect("an isotropic material");
     for degree in [Order::P1, Order::P2] {

@@ -3,14 +3,14 @@
 use crate::common::{Scene, case, distance, solve, text_of, winkler};
 use std::collections::HashMap;
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
-use winkler::contact::law::{self, OwnLaws};
-use winkler::contact::pieces::{self, Cut, Reach};
-use winkler::contact::{Carriers, ContactPair, Side, assemble};
-use winkler::fem::{Frame, Space, Subdivision, assemble as fem};
-use winkler::interrupt::Interrupt;
-use winkler::mesh::{Mesh, load};
-use winkler::problem::order::Order;
-use winkler::scene;
+use winkler::api::Order;
+use winkler::api::load as load_scene;
+use winkler::internals::Interrupt;
+use winkler::internals::contact::law::{self, OwnLaws};
+use winkler::internals::contact::pieces::{self, Cut, Reach};
+use winkler::internals::contact::{Carriers, ContactPair, Side, assemble};
+use winkler::internals::fem::{Frame, Space, Subdivision, assemble as fem};
+use winkler::internals::mesh::{Mesh, load};
 
 /// Runs a case with overrides of its scene; the run must converge.
 fn run(name: &str, set: &[&str]) -> crate::common::Run {
@@ -20,7 +20,7 @@ fn run(name: &str, set: &[&str]) -> crate::common::Run {
 
 /// The mesh of a case, with overrides.
 fn mesh<const D: usize>(name: &str, set: &str, order: Order) -> Mesh<D> {
-    let scene = scene::load(&case(name), &[format!("mesh.set={set}")]).expect("a scene");
+    let scene = load_scene(&case(name), &[format!("mesh.set={set}")]).expect("a scene");
     load::<D>(&scene.mesh, order, &Interrupt::default()).expect("a mesh").mesh
 }
 
@@ -103,7 +103,7 @@ fn pair_on<const D: usize>(
     };
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
-    let layer = scene::load(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
+    let layer = load_scene(&case("patch"), &[]).expect("a scene").contacts.remove(0).layer;
     let pair =
         assemble(&a, &b, [0, 1], &shared, &|_| 0.0, &|at| law::make(&layer, &OwnLaws::default(), at)).expect("a pair");
     (pair, spaces)
@@ -117,7 +117,7 @@ fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: 
             for (dof, entry) in pair.rows[side].row(q) {
                 let mut f = [0.0; 3];
                 f[dof % D] = entry * pair.weight[q];
-                let x = winkler::fem::pad(space.nodes[dof / D]);
+                let x = winkler::internals::fem::pad(space.nodes[dof / D]);
                 for c in 0..3 {
                     force[c] += f[c];
                     moment[c] += x[(c + 1) % 3] * f[(c + 2) % 3] - x[(c + 2) % 3] * f[(c + 1) % 3];
@@ -202,7 +202,7 @@ fn points_of_quadratic_triangles() {
     let text = "dimension = 3\nmesh = { geo = \"blocks.geo\", set = { h = 0.3 } }\n[[body]]\nname = \"large\"\nyoung = 1\npoisson = 0.3\n";
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("a scene");
-    let mesh = load::<3>(&scene::load(&path, &[]).expect("a scene").mesh, Order::P2, &Interrupt::default())
+    let mesh = load::<3>(&load_scene(&path, &[]).expect("a scene").mesh, Order::P2, &Interrupt::default())
         .expect("a mesh")
         .mesh;
     for (bodies, kinds) in [
@@ -247,15 +247,16 @@ fn volume_and_area_of_a_ball() {
     std::fs::write(&path, text).expect("a scene");
     for (degree, expected) in [(Order::P1, 1.7), (Order::P2, 3.5)] {
         let errors = [0.4, 0.2].map(|h| {
-            let scene = scene::load(&path, &[format!("mesh.set.h={h}")]).expect("a scene");
+            let scene = load_scene(&path, &[format!("mesh.set.h={h}")]).expect("a scene");
             let mesh = load::<3>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
             let space = Space::new(&mesh, mesh.group("ball").expect("a body"), degree);
             let volume = fem::body_force(&space, Subdivision::Whole, &|_| [1.0, 0.0, 0.0]).sum()[0];
             let facets = space.facets(mesh.group("skin").expect("a surface"));
             let unit = |_, _| [1.0, 0.0, 0.0];
-            let area = winkler::fem::surface::surface_load(&space, &facets, Subdivision::Whole, &unit).sum()[0];
+            let area =
+                winkler::internals::fem::surface::surface_load(&space, &facets, Subdivision::Whole, &unit).sum()[0];
             // the boundary found from the cells is the group, facet by facet
-            let sorted = |facets: &winkler::fem::Facets<3>| {
+            let sorted = |facets: &winkler::internals::fem::Facets<3>| {
                 let mut all: Vec<Vec<u32>> = (0..facets.count()).map(|i| facets.facet(i).to_vec()).collect();
                 all.iter_mut().for_each(|facet| facet.sort_unstable());
                 all.sort();

@@ -213,6 +213,8 @@ pub fn environment(command: &mut Command) {
         .envs(CROWDED)
         // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
         .envs(UNBOUND)
+        // a rank that waits leaves its core to the ranks of other tests; busy waiting makes the tests on ranks several times as long
+        .env("OMPI_MCA_mpi_yield_when_idle", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
         .env("OPENBLAS_NUM_THREADS", std::env::var("OPENBLAS_NUM_THREADS").as_deref().unwrap_or("1"))

@@ -2,15 +2,16 @@
 
 use crate::common::alone::{alone, expect_success};
 use std::path::Path;
-use winkler::ddm::{Outcome, Silent};
+use winkler::api::Silent;
+use winkler::api::load as load_scene;
 use winkler::error::Result;
-use winkler::interrupt::Interrupt;
-use winkler::model::field::{apply_stiffness, local_dot, residual};
-use winkler::model::{Field, Model};
+use winkler::internals::Interrupt;
+use winkler::internals::ddm::Outcome;
+use winkler::internals::model::field::{apply_stiffness, local_dot, residual};
+use winkler::internals::model::{Field, Model};
+use winkler::internals::run;
+use winkler::internals::run::stages::{Begin, Clock};
 use winkler::petsc::Session;
-use winkler::run;
-use winkler::run::stages::{Begin, Clock};
-use winkler::scene;
 
 /// Every law, stiff and soft beside blocks of 2.1e5 of height 1 under pressures of 10.
 const LAWS: [&str; 14] = [
@@ -47,7 +48,7 @@ struct Ended {
 
 fn solve(session: &Session, path: &Path, sets: &[String]) -> Result<Ended> {
     let (mut clock, interrupt) = (Clock::default(), Interrupt::default());
-    let scene = scene::load(path, sets)?;
+    let scene = load_scene(path, sets)?;
     let built = run::build(session, scene, &interrupt, &mut clock)?;
     let ready = run::set_up(session, built, Begin::default(), &mut clock)?;
     let done = run::iterate(ready, &interrupt, &mut Silent, &mut clock)?;

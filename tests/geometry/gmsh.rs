@@ -62,7 +62,9 @@ fn gmsh_opens_bodies_and_contact_surfaces_with_their_fields() {
         if (name, order) == ("patch-3d", 2) {
             let path = run.folder.join("upper.msh");
             let bytes = std::fs::read(&path).expect("a file");
-            let mesh = winkler::mesh::parse::<3>(&path, &bytes, winkler::mesh::MeshProducer::User).expect("a mesh");
+            let mesh =
+                winkler::internals::mesh::parse::<3>(&path, &bytes, winkler::internals::mesh::MeshProducer::User)
+                    .expect("a mesh");
             let cells = mesh.group("upper").expect("a body");
             assert_eq!(cells.len() as f64, run.report["bodies"][1]["cells"].as_f64().expect("a number"));
             for cell in cells.connectivity.chunks_exact(10) {

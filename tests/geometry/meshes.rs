@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use winkler::mesh::{Asked, Duty, Mesh, MeshProducer, parse};
-use winkler::problem::order::Order;
+use winkler::api::Order;
+use winkler::internals::mesh::{Asked, Duty, Mesh, MeshProducer, parse};
 
 /// The mesh of a script as Gmsh writes it.
 fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
@@ -218,7 +218,7 @@ type Used = BTreeMap<String, Vec<Vec<[u64; 2]>>>;
 
 fn used(mesh: &Mesh<2>) -> Used {
     let place = |&point: &u32| mesh.points[point as usize].map(f64::to_bits);
-    let of = |group: &winkler::mesh::Group| {
+    let of = |group: &winkler::internals::mesh::Group| {
         let sorted = |simplex: &[u32]| {
             let mut places: Vec<[u64; 2]> = simplex.iter().map(place).collect();
             places.sort_unstable();

@@ -4,8 +4,8 @@ use crate::common::{Run, Scene, solve, solve_on, text_of, winkler};
 use serde_json::Value;
 use std::f64::consts::PI;
 use std::fs;
-use winkler::commands::checkpoint::settings_digest;
-use winkler::scene::load;
+use winkler::api::load;
+use winkler::internals::settings_digest;
 
 /// A bilinear function on 4 x 4 points three apart, from -1 on, as a file.
 fn bilinear(value: impl Fn(f64, f64) -> f64) -> String {

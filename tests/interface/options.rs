@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use winkler::internals::solver::options::check_of_scene;
 use winkler::petsc::launcher;
-use winkler::solver::options::check_of_scene;
 
 const SCENE: [&str; 2] = ["--set", "mesh.set.n=8"];
 const TIGHT: [&str; 2] = ["--set", "method.stop={residual=1e-8,iterations=5000}"];

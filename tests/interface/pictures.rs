@@ -8,8 +8,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
+use winkler::api::{BodyField, CellKind};
 use winkler::error::Kind;
-use winkler::output::{BodyField, CellKind};
 
 fn page(folder: &Path) -> String {
     fs::read_to_string(folder.join("report.html")).expect("report.html")
@@ -295,7 +295,7 @@ fn damaged_results_are_not_shown() {
     let space = solve(case("patch-3d"), &["--vtu", "--set", "output.compress=false"]).converged();
     let mut chance = Chance(1);
     for run in [&plane, &space] {
-        let page = || winkler::report::save(&run.folder, None).map(|path| fs::read(path).expect("a page"));
+        let page = || winkler::internals::save(&run.folder, None).map(|path| fs::read(path).expect("a page"));
         let good = page().expect("a page");
         let read = ["report.json", "history.csv", "contacts.csv", "contact-lower-upper.csv", "SHA256SUMS"];
         let fields = ["lower.vtu", "upper.vtu", "contact-lower-upper.vtu"];
@@ -381,7 +381,7 @@ fn a_hundred_thousand_triangles_take_less_than_five_megabytes() {
         "bodies": [{ "name": "slab" }], "files": ["slab.vtu"], "times": { "total": 1.0 }, "inner_times": {},
     });
     fs::write(folder.path().join("report.json"), report.to_string()).expect("a report");
-    winkler::report::save(folder.path(), None).expect("a page");
+    winkler::internals::save(folder.path(), None).expect("a page");
     let page = page(folder.path());
     let count = triangles(&view(&page)["bodies"][0]);
     assert_eq!(count, 4 * n * n + 8 * n);

@@ -40,7 +40,7 @@ fn scenes() -> Vec<PathBuf> {
 fn every_scene_fits_the_schema() {
     let printed = winkler(&["schema"]);
     let schema: Value = serde_json::from_str(&printed.stdout).expect("JSON");
-    assert_eq!(schema, winkler::scene::schema());
+    assert_eq!(schema, winkler::internals::scene::schema());
     let validator = validator(&schema);
     for path in scenes() {
         let scene = parsed(&fs::read_to_string(&path).expect("a scene")).expect("TOML");
@@ -64,7 +64,7 @@ fn the_pieces_in_the_documents_fit_the_schema() {
             _ => {}
         }
     }
-    let mut schema = winkler::scene::schema();
+    let mut schema = winkler::internals::scene::schema();
     without_required(&mut schema);
     let validator = validator(&schema);
     let mut seen = 0;
@@ -104,14 +104,14 @@ fn paths(value: &Value, path: &str, found: &mut Vec<String>) {
 /// Each key of a scene, misspelt or with a value of another kind, is refused by the schema as by the program.
 #[test]
 fn the_schema_refuses_what_the_program_refuses() {
-    let validator = validator(&winkler::scene::schema());
+    let validator = validator(&winkler::internals::scene::schema());
     let mut tried = 0;
     for name in ["groove", "flange", "coating", "bearing"] {
         let folder = root().join("meshes").join(name);
         let scene = parsed(&fs::read_to_string(folder.join("scene.toml")).expect("a scene")).expect("TOML");
         let refused = |scene: &Value, what: &str| {
             let text = toml::to_string(&scene).expect("TOML");
-            let program = winkler::scene::parse(&folder.join("scene.toml"), text, &[]).is_err();
+            let program = winkler::internals::scene::parse(&folder.join("scene.toml"), text, &[]).is_err();
             assert_eq!((program, !validator.is_valid(scene)), (true, true), "{name}: {what}");
         };
         let mut found = Vec::new();
@@ -146,7 +146,7 @@ fn keys<'a>(schema: &'a Value, table: &str, found: &mut Vec<(String, &'a str, &'
 /// The page of the scene file has a row for every key, in the section of its table, with the default that the program has.
 #[test]
 fn the_page_has_every_key_with_its_default() {
-    let schema = winkler::scene::schema();
+    let schema = winkler::internals::scene::schema();
     let mut found = Vec::new();
     keys(&schema, "Top level", &mut found);
     let page = fs::read_to_string(root().join("docs/scene-file.md")).expect("the page");

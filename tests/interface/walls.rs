@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: [&str; 28] = [
+const MODULES: [&str; 29] = [
     "error",
     "exchange",
     "file",
@@ -33,6 +33,7 @@ const MODULES: [&str; 28] = [
     "run",
     "api",
     "commands",
+    "internals",
     "cli",
     "main",
 ];

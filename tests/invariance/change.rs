@@ -2,13 +2,12 @@
 
 use std::rc::Rc;
 use winkler::api::{
-    Constants, ContactSpec, ElasticitySpec, Error, Field, LayerSpec, LoadKind, MeshArrays, MeshSource, Plane, Result,
-    Scene, SpringKind, Start,
+    AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Error, Field, LawKind, LayerSpec, LoadKind,
+    MeshArrays, MeshSource, Plane, Result, Scene, SpringKind, Start,
 };
-use winkler::expression::{Expression, KnownNames};
-use winkler::fem::cross;
-use winkler::mesh::Mesh;
-use winkler::problem::{AxesSpec, BodySpec, Depths, LawKind};
+use winkler::internals::expression::{Expression, KnownNames};
+use winkler::internals::fem::cross;
+use winkler::internals::mesh::Mesh;
 
 /// x' = length * (Q x + shift), with a signed permutation Q: (Q x)_i = sign_i x_axis_i. Stresses are multiplied by `stress`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,8 +3,8 @@
 use super::change::Change;
 use std::path::Path;
 use winkler::api::{Constants, Field, MeshSource, Order, Plane, Result, Scene, Session, Solution, solve};
-use winkler::interrupt::Interrupt;
-use winkler::linalg::bounds;
+use winkler::internals::Interrupt;
+use winkler::internals::bounds;
 
 /// Relative difference that is none.
 const SAME: f64 = 1e-8;
@@ -95,7 +95,7 @@ pub struct PairAnswer {
 /// Refusals of the scene and failures of solvers.
 pub fn run(session: &Session, root: &Path, case: &Case, kind: Option<&Kind>) -> Result<Option<(Answer, Change)>> {
     let set: Vec<String> = case.set.iter().map(|&set| set.to_owned()).collect();
-    let mut scene = winkler::scene::load(&root.join(case.scene), &set)?;
+    let mut scene = winkler::api::load(&root.join(case.scene), &set)?;
     match scene.dimension.value {
         2 => run_in::<2>(session, &mut scene, kind),
         _ => run_in::<3>(session, &mut scene, kind),
@@ -108,7 +108,7 @@ fn run_in<const D: usize>(
     kind: Option<&Kind>,
 ) -> Result<Option<(Answer, Change)>> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let mesh = winkler::mesh::load::<D>(&scene.mesh, order, &Interrupt::default())?.mesh;
+    let mesh = winkler::internals::mesh::load::<D>(&scene.mesh, order, &Interrupt::default())?.mesh;
     let [low, high] = bounds(mesh.points.iter().map(|&x| mesh.in_scene(x)));
     let size = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     let Some(change) = change::<D>(scene, size, kind) else { return Ok(None) };

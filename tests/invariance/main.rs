@@ -9,8 +9,8 @@ use change::Change;
 use judge::{Answer, Case, KINDS, Kind};
 use std::path::Path;
 use winkler::api::{MeshSource, Order, Session, solve};
-use winkler::fem::cross;
-use winkler::interrupt::Interrupt;
+use winkler::internals::Interrupt;
+use winkler::internals::fem::cross;
 
 /// What a test takes: a scene, which of its cases, and a change by its name. Every change is there, and order 1 and 2, the plane, bodies
 /// of revolution and space, curved surfaces, layers typed in, `auto`, springs, rigid surfaces, data, own axes.
@@ -65,8 +65,8 @@ fn two_pairs_far_from_each_other(session: &Session) {
     let case = Case { scene: "patch-3d/scene.toml", set: &["body.0.order=2", "body.1.order=2"] };
     let (own, _): (Answer, Change) = judge::run(session, root(), &case, None).expect("solved").expect("a change");
     let set: Vec<String> = case.set.iter().map(|&set| set.to_owned()).collect();
-    let mut scene = winkler::scene::load(&root().join(case.scene), &set).expect("a scene");
-    let mesh = winkler::mesh::load::<3>(&scene.mesh, Order::P2, &Interrupt::default()).expect("a mesh").mesh;
+    let mut scene = winkler::api::load(&root().join(case.scene), &set).expect("a scene");
+    let mesh = winkler::internals::mesh::load::<3>(&scene.mesh, Order::P2, &Interrupt::default()).expect("a mesh").mesh;
     let mut far = scene.clone();
     let mut change = Change::none();
     change.shift = [1e5 * 0.918_273_6, -7e4, 4.3e4];

@@ -5,8 +5,8 @@
 use crate::common::alone::{TIMEOUT, alone, expect_success};
 use std::time::Instant;
 use winkler::error::Result;
+use winkler::internals::solver::options::{UserOptions, unread};
 use winkler::petsc::{Int, Ksp, Matrix, Rows, Schur, Scope, Session};
-use winkler::solver::options::{UserOptions, unread};
 
 fn words(line: &str) -> Vec<String> {
     line.split_whitespace().map(String::from).collect()

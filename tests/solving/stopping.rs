@@ -545,7 +545,8 @@ fn a_checkpoint_of_a_mesh_or_data_of_equal_counts_is_refused() {
 
 /// The mesh, in which numbers have eight bytes, with a node inside a body a little aside.
 fn moved_inside(path: &Path, bytes: &[u8]) -> Vec<u8> {
-    let mesh = winkler::mesh::parse::<2>(path, bytes, winkler::mesh::MeshProducer::User).expect("a mesh");
+    let mesh = winkler::internals::mesh::parse::<2>(path, bytes, winkler::internals::mesh::MeshProducer::User)
+        .expect("a mesh");
     let on_surfaces: Vec<u32> =
         mesh.groups.iter().filter(|group| group.dimension < 2).flat_map(|group| group.connectivity.clone()).collect();
     let inside = |point: &usize| {

@@ -18,8 +18,11 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use forms::{Cubic, Exponential, LinearLaw, Power};
-pub use make::{ExpressionLaw, OwnLaws, make};
+pub use forms::LinearLaw;
+#[cfg(test)]
+pub use forms::{Cubic, Exponential, Power};
+pub use make::{OwnLaws, make};
+#[cfg(feature = "internals")]
 pub use table::Table;
 
 use std::rc::Rc;

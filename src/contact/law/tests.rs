@@ -1,3 +1,4 @@
+use super::make::Typed;
 use super::*;
 use crate::error::{Place, Source};
 use crate::expression::{Expression, KnownNames};

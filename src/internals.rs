@@ -1,0 +1,59 @@
+//! The items of private modules that integration tests, examples and fuzz targets use. They change without notice.
+
+pub use crate::interrupt::Interrupt;
+pub use crate::linalg::bounds;
+
+#[cfg(feature = "cli")]
+pub use crate::commands::checkpoint::settings_digest;
+#[cfg(feature = "cli")]
+pub use crate::report::save;
+
+pub mod contact {
+    //! Contact points and laws of layers.
+    pub use crate::contact::{Carriers, ContactPair, Side, assemble, law, pieces};
+}
+
+pub mod data {
+    //! Functions from files.
+    pub use crate::data::{Data, DataSpec, Interpolation, Library, Outside};
+}
+
+pub mod ddm {
+    //! The methods.
+    pub use crate::ddm::Outcome;
+}
+
+pub mod expression {
+    //! Numbers written as expressions.
+    pub use crate::expression::{Expression, Field, KnownNames};
+}
+
+pub mod fem {
+    //! Finite elements.
+    pub use crate::fem::{Elasticity, Facets, Frame, Space, Subdivision, assemble, cross, displacement, pad, surface};
+}
+
+pub mod mesh {
+    //! Meshes.
+    pub use crate::mesh::{Asked, Duty, Group, Mesh, MeshProducer, breach, load, parse, unstructured};
+}
+
+pub mod model {
+    //! The discrete problem.
+    pub use crate::model::{Field, Model, field};
+}
+
+pub mod run {
+    //! A run in stages.
+    pub use crate::run::{build, iterate, report, results, set_up, stages};
+}
+
+pub mod scene {
+    //! Scene files.
+    pub use crate::scene::{parse, schema};
+}
+
+pub mod solver {
+    //! PETSc options.
+    pub use crate::solver::options;
+}
