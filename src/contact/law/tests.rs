@@ -1,4 +1,4 @@
-use super::make::Typed;
+use super::make::ExpressionLaw;
 use super::*;
 use crate::error::{Place, Source};
 use crate::expression::{Expression, KnownNames};
