@@ -53,7 +53,7 @@ pub struct Discrete {
     pub balanced: Vec<Balanced>,
     /// Trace (2n) of the rigid motions that supports impose on bodies. Layer states, and so the traces of iterates, are relative
     /// to them.
-    pub carried: Vec<f64>,
+    pub imposed: Vec<f64>,
     /// The meshes, kept only if an estimate of the error was requested.
     pub meshes: Option<Rc<dyn Meshes>>,
     /// Number of stiffness matrices assembled on this rank.
@@ -102,7 +102,7 @@ where
             pair.law = law::make(&contact.spec.layer, &scene.laws, &pair.position)?;
         }
     }
-    let carried: Vec<Vec<f64>> = shared.iter().map(|body| body.carried.clone()).collect();
+    let imposed: Vec<Vec<f64>> = shared.iter().map(|body| body.imposed.clone()).collect();
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
     let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
     let (mut slots, mut infos) = (Vec::new(), Vec::new());
@@ -115,14 +115,14 @@ where
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    let carried = carry(&mut model, &carried);
+    let imposed = impose(&mut model, &imposed);
     Ok(Discrete {
         model,
         bodies: infos,
         contacts,
         mechanisms,
         balanced,
-        carried,
+        imposed,
         meshes,
         assemblies,
         assemblies_avoided,
@@ -149,11 +149,11 @@ where
 
 /// Impose on the bodies of a model the rigid motions of their supports. `each` holds the traces of these motions on the contact
 /// rows of each body. Return the trace of all of them, 2n.
-fn carry(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
-    let mut carried = vec![0.0; 2 * model.points()];
-    each.iter().enumerate().for_each(|(body, trace)| model.put(body, trace, &mut carried));
-    model.carry(&carried);
-    carried
+fn impose(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
+    let mut imposed = vec![0.0; 2 * model.points()];
+    each.iter().enumerate().for_each(|(body, trace)| model.put(body, trace, &mut imposed));
+    model.impose(&imposed);
+    imposed
 }
 
 impl Discrete {
@@ -203,6 +203,6 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
             }
         }
     }
-    axpy(-1.0, &discrete.carried, &mut trace);
+    axpy(-1.0, &discrete.imposed, &mut trace);
     Ok(Some(trace))
 }

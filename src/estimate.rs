@@ -127,7 +127,7 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
             continue;
         };
         let mut u = body.recover(state)?;
-        u.iter_mut().zip(&slot.carried).for_each(|(u, carried)| *u += carried);
+        u.iter_mut().zip(&slot.imposed).for_each(|(u, imposed)| *u += imposed);
         all.push(body.states().leads().then(|| meshes.displacements(index, &u)));
     }
     Ok(all)

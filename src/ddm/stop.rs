@@ -454,7 +454,7 @@ mod tests {
         let mut balance = BalanceRule::new(Box::new(Fixed(asked.clone(), vec![0.1, 0.02, 0.02])));
         let mut model = Model::new(Vec::new(), Vec::new(), std::rc::Rc::new(Serial));
         let layer = Layer::default();
-        let mut linear = Sweeps::carried();
+        let mut linear = Sweeps::with_robin_term();
         let mut ask = |error: f64| {
             let met = balance.is_met(&mut model, &mut linear, &Field::default(), &layer, error).unwrap();
             (met, asked.get())

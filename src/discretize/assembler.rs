@@ -38,7 +38,7 @@ pub struct Assembler<'a, const D: usize, F> {
 #[derive(Default)]
 struct Made {
     local: Local,
-    carried: Vec<f64>,
+    imposed: Vec<f64>,
     scale: f64,
     row_stiffness: Vec<f64>,
 }
@@ -89,9 +89,9 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             let (unloaded, motions) = (local.unloaded, unsupported);
             self.shapes.push(FemBody { space, held, elasticity, unloaded, motions });
         }
-        let Made { local, carried, scale, row_stiffness } = made;
+        let Made { local, imposed, scale, row_stiffness } = made;
         let name = info.name.clone();
-        let slot = BodySlot { name, local, carried, segments, motions, sprung, scale, modulus, depth, row_stiffness };
+        let slot = BodySlot { name, local, imposed, segments, motions, sprung, scale, modulus, depth, row_stiffness };
         Ok((slot, info))
     }
 
@@ -110,8 +110,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if let Some(share) = &share {
             graph = graph.of(|node| share.is_own::<D>(node));
         }
-        let Loads { force, prescribed, carried, .. } = loads;
-        let mut body = part.assemble(self.mesh, &graph, force, prescribed, &carried)?;
+        let Loads { force, prescribed, imposed, .. } = loads;
+        let mut body = part.assemble(self.mesh, &graph, force, prescribed, &imposed)?;
         drop(graph);
         let scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
@@ -135,7 +135,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             left,
             interpolation,
         })?;
-        Ok(Made { local, carried, scale, row_stiffness })
+        Ok(Made { local, imposed, scale, row_stiffness })
     }
 }
 
@@ -144,7 +144,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 fn loads<const D: usize>(
     part: &SceneBody<D>,
     load: &NodalForces<D>,
-    Supported { carried, prescribed }: Supported<D>,
+    Supported { imposed, prescribed }: Supported<D>,
     left: Vec<RigidMotion<D>>,
     works: Option<Vec<f64>>,
 ) -> (Loads, Vec<FreeMotion>) {
@@ -155,8 +155,8 @@ fn loads<const D: usize>(
     });
     let free: Vec<FreeMotion> = free.collect();
     let work = free.iter().map(|motion| motion.work).collect();
-    let carried = carried.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
-    (Loads { work, force, prescribed, carried }, free)
+    let imposed = imposed.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
+    (Loads { work, force, prescribed, imposed }, free)
 }
 
 /// Give `info` the evaluation of displacements and forces of a body at the nodes that this rank has. `own` marks the nodes that
@@ -203,7 +203,7 @@ fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
         Some(body) => body.reload(loads)?,
         None => false,
     };
-    let made = Made { local, carried: loads.carried.clone(), scale, row_stiffness };
+    let made = Made { local, imposed: loads.imposed.clone(), scale, row_stiffness };
     Ok(serves.then_some(made))
 }
 

@@ -86,7 +86,7 @@ pub struct SharedBody<const D: usize> {
     /// Depth of the body behind its contact surfaces.
     pub depth: f64,
     /// Trace on the contact rows of the rigid motion that supports impose.
-    pub carried: Vec<f64>,
+    pub imposed: Vec<f64>,
 }
 
 /// What one rank has of a body: all of it, or the part on the nodes that this rank needs, with local numbers.
@@ -177,7 +177,7 @@ impl<const D: usize> LocalBody<D> {
             nodal_rows: rows_here(&body.nodal_rows),
             load: body.nodal_load.only(is_assembled).on(&nodes),
             supported: Supported {
-                carried: supported.carried.clone(),
+                imposed: supported.imposed.clone(),
                 prescribed: supported.prescribed.iter().filter_map(prescribed_here).collect(),
             },
             works: on_dofs.map(|on| on.works.clone()),
@@ -196,14 +196,14 @@ impl<const D: usize> Unassembled<'_, D> {
         let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
         let modulus = dot(&self.part.facts.moduli, &along_axes(of_body()));
         let depth = self.part.facts.volume / surface;
-        let carried = self.supported.carried.as_ref();
+        let imposed = self.supported.imposed.as_ref();
         SharedBody {
             info: self.info(checked, plane, modulus, depth),
             segments: self.segments.clone(),
             unconstrained: self.unconstrained.clone(),
             modulus,
             depth,
-            carried: carried.map_or_else(|| vec![0.0; self.rows.rows()], |motion| self.trace(motion)),
+            imposed: imposed.map_or_else(|| vec![0.0; self.rows.rows()], |motion| self.trace(motion)),
         }
     }
 

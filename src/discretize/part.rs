@@ -352,7 +352,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
-    /// Assemble K on its graph, with f and the supports. `carried` is the rigid motion that was subtracted from `prescribed`, if
+    /// Assemble K on its graph, with f and the supports. `imposed` is the rigid motion that was subtracted from `prescribed`, if
     /// any. If the graph has the rows of some nodes only, so have K and f.
     pub fn assemble(
         &self,
@@ -360,7 +360,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         graph: &NodeGraph,
         mut load: Vec<f64>,
         prescribed: Vec<(usize, f64)>,
-        carried: &[f64],
+        imposed: &[f64],
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
@@ -383,7 +383,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         frame.turn_matrix(&mut stiffness);
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        Ok(support(stiffness, load, prescribed, carried))
+        Ok(support(stiffness, load, prescribed, imposed))
     }
 }
 

@@ -82,7 +82,7 @@ pub struct RemovedModes {
 #[serde(bound = "[f64; D]: Plain")]
 pub struct Supported<const D: usize> {
     /// Rigid motion by which the supports move the body as one.
-    pub carried: Option<RigidMotion<D>>,
+    pub imposed: Option<RigidMotion<D>>,
     /// Prescribed (dof, value) relative to this motion, sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
 }
@@ -218,10 +218,10 @@ impl<'a, const D: usize> Unassembled<'a, D> {
     pub fn support(&mut self) {
         let prescribed = self.part.prescribed_sorted();
         let value = |k: usize, dof: usize| self.part.dof_of(&self.free[k], dof);
-        let carried = carried(self.free.len(), &value, &prescribed).filter(|_| self.part.springs.is_empty());
-        self.supported = match carried {
-            None => Supported { carried: None, prescribed },
-            Some((weights, rest)) => Supported { carried: Some(rigid::sum(&self.free, &weights)), prescribed: rest },
+        let imposed = imposed_motion(self.free.len(), &value, &prescribed).filter(|_| self.part.springs.is_empty());
+        self.supported = match imposed {
+            None => Supported { imposed: None, prescribed },
+            Some((weights, rest)) => Supported { imposed: Some(rigid::sum(&self.free, &weights)), prescribed: rest },
         };
     }
 
@@ -251,7 +251,7 @@ type Prescribed = Vec<(usize, f64)>;
 /// Return the weights of the `count` motions whose sum the supports prescribe, and the prescribed values relative to this sum.
 /// `value(k, dof)` is the displacement of motion k at a dof. The result is `None` if the supports prescribe zero or deform the
 /// body.
-fn carried(
+fn imposed_motion(
     count: usize,
     value: &dyn Fn(usize, usize) -> f64,
     prescribed: &[(usize, f64)],
@@ -285,10 +285,10 @@ mod tests {
         let all = modes(&PointExtent::of(nodes.into_iter()));
         let value = |k: usize, dof: usize| all[k].at(&nodes[dof / 2])[dof % 2];
         // The upper edge moves down by 0.3, and one node is constrained along x.
-        let (weights, rest) = carried(3, &value, &[(0, 0.0), (5, -0.3), (7, -0.3)]).expect("a translation");
+        let (weights, rest) = imposed_motion(3, &value, &[(0, 0.0), (5, -0.3), (7, -0.3)]).expect("a translation");
         assert!(weights[0].abs() < 1e-15 && (weights[1] + 0.3).abs() < 1e-15 && weights[2].abs() < 1e-15);
         assert!(rest.iter().all(|(_, u)| u.abs() < 1e-15));
-        assert!(carried(3, &value, &[(1, 0.0), (3, 0.0), (5, -0.3), (7, -0.3)]).is_none());
-        assert!(carried(3, &value, &[(1, 0.0), (3, 0.0)]).is_none());
+        assert!(imposed_motion(3, &value, &[(1, 0.0), (3, 0.0), (5, -0.3), (7, -0.3)]).is_none());
+        assert!(imposed_motion(3, &value, &[(1, 0.0), (3, 0.0)]).is_none());
     }
 }

@@ -461,15 +461,15 @@ pub struct Couplings {
 }
 
 impl ElasticBody {
-    /// Replace the loads f, one entry a dof, the values at the same prescribed dofs (dof, value), and the rigid displacement `carried`
+    /// Replace the loads f, one entry a dof, the values at the same prescribed dofs (dof, value), and the rigid displacement `imposed`
     /// that these values are relative to.
-    pub fn reload(&mut self, load: Vec<f64>, mut prescribed: Vec<(usize, f64)>, carried: &[f64]) {
+    pub fn reload(&mut self, load: Vec<f64>, mut prescribed: Vec<(usize, f64)>, imposed: &[f64]) {
         let n = load.len();
         let (mut value, mut has_row, scale) = (vec![None; n], vec![false; n], self.held.diagonal);
         prescribed.iter().for_each(|&(dof, u)| value[dof] = Some(u));
         let is_moved = prescribed.iter().any(|&(_, u)| u != 0.0);
         self.lifting = if is_moved { vec![0.0; n] } else { Vec::new() };
-        self.energy_constant = if carried.is_empty() { 0.0 } else { -dot(&load, carried) };
+        self.energy_constant = if imposed.is_empty() { 0.0 } else { -dot(&load, imposed) };
         self.strain_constant = 0.0;
         for &(i, j, k) in &self.held.columns {
             let (i, j) = (i as usize, j as usize);
@@ -496,9 +496,9 @@ impl ElasticBody {
 
 /// Eliminate prescribed dofs from K and f, symmetrically, and keep the terms that energies need.
 ///
-/// `prescribed` holds (dof, value), sorted, without repetition. `carried` is the rigid displacement that all displacements are relative
+/// `prescribed` holds (dof, value), sorted, without repetition. `imposed` is the rigid displacement that all displacements are relative
 /// to, empty for none. Empty rows of K belong to other ranks, which also account for their energies.
-pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>, carried: &[f64]) -> ElasticBody {
+pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>, imposed: &[f64]) -> ElasticBody {
     let n = load.len();
     let mut is_free = vec![true; n];
     prescribed.iter().for_each(|entry| is_free[entry.0] = false);
@@ -518,7 +518,7 @@ pub fn support(mut stiffness: Csr, load: Vec<f64>, prescribed: Vec<(usize, f64)>
         }
     }
     let mut body = ElasticBody { stiffness, held: Couplings { columns, diagonal }, ..ElasticBody::default() };
-    body.reload(load, prescribed, carried);
+    body.reload(load, prescribed, imposed);
     body
 }
 
@@ -554,10 +554,10 @@ mod tests {
     /// A reloaded body equals a body that is made with the other loads and prescribed values.
     #[test]
     fn a_body_takes_other_loads() {
-        for (u, carried) in [(0.4, vec![]), (0.0, vec![0.5, 0.5])] {
+        for (u, imposed) in [(0.4, vec![]), (0.0, vec![0.5, 0.5])] {
             let mut body = support(springs(), vec![1.0, 2.0], vec![(1, -0.3)], &[]);
-            body.reload(vec![5.0, 0.7], vec![(1, u)], &carried);
-            let new = support(springs(), vec![5.0, 0.7], vec![(1, u)], &carried);
+            body.reload(vec![5.0, 0.7], vec![(1, u)], &imposed);
+            let new = support(springs(), vec![5.0, 0.7], vec![(1, u)], &imposed);
             assert_eq!((&body.load, &body.prescribed, &body.lifting), (&new.load, &new.prescribed, &new.lifting));
             assert_eq!([body.energy_constant, body.strain_constant], [new.energy_constant, new.strain_constant]);
         }

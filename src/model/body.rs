@@ -77,7 +77,7 @@ pub struct Loads {
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
     /// The rigid motion by which supports move the body, one entry a dof; empty for none.
-    pub carried: Vec<f64>,
+    pub imposed: Vec<f64>,
     /// Work of f on each rigid motion that supports leave free.
     pub work: Vec<f64>,
 }

@@ -77,7 +77,7 @@ pub struct BodySlot {
     pub local: Local,
     /// The rigid motion by which supports move the body, one entry a dof of the owned and ghost nodes of this rank; empty for none. It is not
     /// part of states.
-    pub carried: Vec<f64>,
+    pub imposed: Vec<f64>,
     /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,
     /// Rigid motions that neither supports nor springs constrain.
@@ -142,7 +142,7 @@ impl Model {
     }
 
     /// Count a displacement with the trace `trace` (2n) as prescribed by supports. From now on states are relative to it.
-    pub fn carry(&mut self, trace: &[f64]) {
+    pub fn impose(&mut self, trace: &[f64]) {
         let points = self.points();
         for i in 0..self.pairs.len() {
             for q in self.range(i) {
@@ -309,7 +309,7 @@ pub(crate) mod sample {
         let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
             name: side.to_string(),
             local: Local::Elsewhere,
-            carried: Vec::new(),
+            imposed: Vec::new(),
             segments: (0..2).map(|pair| Segment { pair, side }).collect(),
             motions: Vec::new(),
             sprung: None,

@@ -38,7 +38,7 @@ const RESERVED: [(usize, &str); 8] = [
 
 /// A sparse symmetric positive definite matrix K whose interior dofs are eliminated.
 ///
-/// R are the retained dofs and I the interior dofs, which are all others. The Schur complement is S = K_RR - K_RI K_II^-1 K_IR. One symbolic
+/// R are the interface dofs and I the interior dofs, which are all others. The Schur complement is S = K_RR - K_RI K_II^-1 K_IR. One symbolic
 /// and one numeric factorisation of K_II give S, condensed right-hand sides, and the solution in the interior.
 ///
 /// ```
@@ -63,7 +63,7 @@ pub struct Schur {
     columns: Vec<MumpsInt>,
     values: Vec<f64>,
     positions: Vec<MumpsInt>,
-    retained: Vec<MumpsInt>,
+    interface: Vec<MumpsInt>,
     complement: Vec<f64>,
     /// Powers of two D, one for each dof, with which D K D has diagonal entries near one.
     scale: Vec<f64>,
@@ -78,7 +78,7 @@ struct Padded {
 }
 
 impl Schur {
-    /// Analyse the elimination of all dofs but the `retained` ones, which may be none.
+    /// Analyse the elimination of all dofs but the `interface` ones, which may be none.
     ///
     /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong to one node. Options
     /// `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
@@ -97,11 +97,11 @@ impl Schur {
         block_size: usize,
         rows: usize,
         lower: &[(usize, usize, f64)],
-        retained: &[usize],
+        interface: &[usize],
     ) -> Result<Schur> {
         let one = |i: usize| i as MumpsInt + 1;
-        let inside = lower.iter().all(|&(i, j, _)| i < rows && j <= i) && retained.iter().all(|&i| i < rows);
-        if !inside || retained.len() >= rows || !rows.is_multiple_of(block_size) {
+        let inside = lower.iter().all(|&(i, j, _)| i < rows && j <= i) && interface.iter().all(|&i| i < rows);
+        if !inside || interface.len() >= rows || !rows.is_multiple_of(block_size) {
             return Err(Error::new(Kind::Solver, "not a lower triangle with interior rows"));
         }
         fit::<MumpsInt>("MUMPS", "dofs", rows + 1)?;
@@ -115,8 +115,8 @@ impl Schur {
             values: lower.iter().map(|&(i, j, value)| value * scale[i] * scale[j]).collect(),
             scale,
             positions: Vec::new(),
-            retained: retained.iter().map(|&i| one(i)).collect(),
-            complement: vec![0.0; retained.len() * retained.len()],
+            interface: interface.iter().map(|&i| one(i)).collect(),
+            complement: vec![0.0; interface.len() * interface.len()],
             _session: session.clone(),
         };
         schur.start()?;
@@ -125,7 +125,7 @@ impl Schur {
         schur.read_options(session, body)?;
         let mumps = &mut schur.mumps.head;
         if mumps.icntl[6] == GIVEN {
-            schur.positions = positions(block_size, rows, lower, retained)?;
+            schur.positions = positions(block_size, rows, lower, interface)?;
             mumps.perm_in = schur.positions.as_mut_ptr();
         }
         mumps.n = rows as MumpsInt;
@@ -133,8 +133,8 @@ impl Schur {
         mumps.irn = schur.rows.as_mut_ptr();
         mumps.jcn = schur.columns.as_mut_ptr();
         mumps.a = schur.values.as_mut_ptr();
-        mumps.size_schur = schur.retained.len() as MumpsInt;
-        mumps.listvar_schur = schur.retained.as_mut_ptr();
+        mumps.size_schur = schur.interface.len() as MumpsInt;
+        mumps.listvar_schur = schur.interface.as_mut_ptr();
         mumps.schur = schur.complement.as_mut_ptr();
         schur.call(1)?;
         Ok(schur)
@@ -183,8 +183,8 @@ impl Schur {
 
     /// Undo the scaling of S and fill its upper triangle. MUMPS writes the lower triangle, row by row.
     fn complete(&mut self) {
-        let (n, scale) = (self.retained.len(), &self.scale);
-        let of = |i: usize| scale[self.retained[i] as usize - 1];
+        let (n, scale) = (self.interface.len(), &self.scale);
+        let of = |i: usize| scale[self.interface[i] as usize - 1];
         for i in 0..n {
             for j in 0..=i {
                 let value = self.complement[i * n + j] / of(i) / of(j);
@@ -194,36 +194,36 @@ impl Schur {
         }
     }
 
-    /// Take S out, both triangles, row by row, in the order of the retained dofs. No function of this type needs it.
+    /// Take S out, both triangles, row by row, in the order of the interface dofs. No function of this type needs it.
     pub fn take_complement(&mut self) -> Vec<f64> {
         std::mem::take(&mut self.complement)
     }
 
     /// Return the condensed right-hand side b_R - K_RI K_II^-1 b_I.
     pub fn condense(&mut self, b: &[f64]) -> Result<Vec<f64>> {
-        let mut reduced = vec![0.0; self.retained.len()];
+        let mut reduced = vec![0.0; self.interface.len()];
         if reduced.is_empty() {
             return Ok(reduced);
         }
         self.solve(1, &mut self.scaled(b), &mut reduced)?;
-        self.retained.iter().zip(&mut reduced).for_each(|(&dof, value)| *value /= self.scale[dof as usize - 1]);
+        self.interface.iter().zip(&mut reduced).for_each(|(&dof, value)| *value /= self.scale[dof as usize - 1]);
         Ok(reduced)
     }
 
-    /// Return x with the given x_R = `x_retained` and K_II x_I = b_I - K_IR x_R.
-    pub fn expand(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
+    /// Return x with the given x_R = `x_interface` and K_II x_I = b_I - K_IR x_R.
+    pub fn expand(&mut self, b: &[f64], x_interface: &[f64]) -> Result<Vec<f64>> {
         self.condense(b)?;
-        self.expand_condensed(b, x_retained)
+        self.expand_condensed(b, x_interface)
     }
 
     /// Return the same x for the right-hand side of the last [`condense`](Self::condense), whose intermediate result MUMPS has kept.
-    pub fn expand_condensed(&mut self, b: &[f64], x_retained: &[f64]) -> Result<Vec<f64>> {
+    pub fn expand_condensed(&mut self, b: &[f64], x_interface: &[f64]) -> Result<Vec<f64>> {
         let mut x = self.scaled(b);
         let mut reduced: Vec<f64> =
-            self.retained.iter().zip(x_retained).map(|(&dof, x)| x / self.scale[dof as usize - 1]).collect();
+            self.interface.iter().zip(x_interface).map(|(&dof, x)| x / self.scale[dof as usize - 1]).collect();
         self.solve(2, &mut x, &mut reduced)?;
         x.iter_mut().zip(&self.scale).for_each(|(x, scale)| *x *= scale);
-        for (&dof, value) in self.retained.iter().zip(x_retained) {
+        for (&dof, value) in self.interface.iter().zip(x_interface) {
             x[dof as usize - 1] = *value;
         }
         Ok(x)
@@ -237,7 +237,7 @@ impl Schur {
     /// Do one phase of the solution (ICNTL(26)): phase 1 condenses `b` into `reduced`, phase 2 expands `reduced` into `b`.
     fn solve(&mut self, phase: MumpsInt, b: &mut [f64], reduced: &mut [f64]) -> Result<()> {
         let mumps = &mut self.mumps.head;
-        if b.len() != mumps.n as usize || reduced.len() != self.retained.len() {
+        if b.len() != mumps.n as usize || reduced.len() != self.interface.len() {
             return Err(Error::new(Kind::Solver, "a right-hand side of the wrong length for a Schur complement"));
         }
         (mumps.rhs, mumps.nrhs, mumps.lrhs) = (b.as_mut_ptr(), 1, mumps.n);
@@ -258,7 +258,7 @@ impl Schur {
         check_version(&self.mumps.head.version_number)?;
         let icntl = &mut self.mumps.head.icntl;
         icntl[..4].copy_from_slice(&[-1, -1, -1, 0]);
-        icntl[18] = MumpsInt::from(!self.retained.is_empty());
+        icntl[18] = MumpsInt::from(!self.interface.is_empty());
         Ok(())
     }
 
@@ -333,12 +333,12 @@ fn scales(rows: usize, lower: &[(usize, usize, f64)]) -> Vec<f64> {
     scale
 }
 
-/// Return the position of each dof in the order of elimination, from 1: nested dissection of the nodes, then the retained dofs in their order.
+/// Return the position of each dof in the order of elimination, from 1: nested dissection of the nodes, then the interface dofs in their order.
 fn positions(
     block_size: usize,
     rows: usize,
     lower: &[(usize, usize, f64)],
-    retained: &[usize],
+    interface: &[usize],
 ) -> Result<Vec<MumpsInt>> {
     let nodes = rows / block_size;
     // the rows of a node follow each other, so that each edge is found once
@@ -366,8 +366,8 @@ fn positions(
     let mut node_at = vec![0; nodes];
     order.iter().enumerate().for_each(|(node, &at)| node_at[at as usize] = node);
     let mut position = vec![0; rows];
-    for (i, &dof) in retained.iter().enumerate() {
-        position[dof] = (rows - retained.len() + i + 1) as MumpsInt;
+    for (i, &dof) in interface.iter().enumerate() {
+        position[dof] = (rows - interface.len() + i + 1) as MumpsInt;
     }
     let mut next = 1;
     for dof in node_at.into_iter().flat_map(|node| node * block_size..(node + 1) * block_size) {

@@ -40,11 +40,11 @@ pub struct Sweeps {
 impl Sweeps {
     /// Return a solver that gives the bodies' matrices the Robin term of this coefficient.
     pub fn new(coefficient: Coefficient) -> Self {
-        Self { coefficient: Some(coefficient), ..Self::carried() }
+        Self { coefficient: Some(coefficient), ..Self::with_robin_term() }
     }
 
     /// Return a solver that takes the Robin term that the bodies carry.
-    pub fn carried() -> Self {
+    pub fn with_robin_term() -> Self {
         Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, spectrum: None, least: f64::INFINITY }
     }
 }

@@ -181,7 +181,7 @@ impl<'a> SolverFactory<'a> {
         // The memory of a reused body is allocated already.
         let is_kept = self.kept.contains_key(&plan.name);
         let memory = if is_kept { usize::MAX } else { self.memory };
-        let size = Size { dofs: plan.dofs, retained: plan.on_contact(), memory };
+        let size = Size { dofs: plan.dofs, interface: plan.on_contact(), memory };
         (plan.preset, plan.reason) = preset::in_plane(&size);
         if plan.preset == Preset::Condensed && !plan.condensable {
             plan.preset = Preset::Mumps;
@@ -203,8 +203,8 @@ impl<'a> SolverFactory<'a> {
             };
             let graphs: Vec<_> = outlines.iter().map(|outline| (outline.graph)()).collect();
             let candidates = plans.iter().zip(&graphs).map(|(plan, graph)| {
-                let retained = plan.retained.as_ref().filter(|_| plan.condensable);
-                BodySize { dofs: plan.dofs, order: plan.order, retained, couplings: graph.col.len() }
+                let interface = plan.interface.as_ref().filter(|_| plan.condensable);
+                BodySize { dofs: plan.dofs, order: plan.order, interface, couplings: graph.col.len() }
             });
             let candidates: Vec<_> = candidates.collect();
             // The memory of reused bodies is allocated already.
@@ -322,18 +322,18 @@ impl Factory for SolverFactory<'_> {
         // This marks the bodies for which the program is to choose.
         let mut open = Vec::new();
         for (index, &Outline { name, dimension, order, rows, prescribed, motions, .. }) in outlines.iter().enumerate() {
-            let (dofs, retained) = (rows.columns, InterfaceDofs::new(dimension, rows, prescribed, motions));
+            let (dofs, interface) = (rows.columns, InterfaceDofs::new(dimension, rows, prescribed, motions));
             let chosen = self.typed.of(name);
             // A KSP for all bodies together needs them uncondensed.
             let typed = chosen.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp());
-            let condensable = (1..dofs).contains(&retained.dofs.len()) && !typed;
+            let condensable = (1..dofs).contains(&interface.dofs.len()) && !typed;
             let asked = self.asked_for(typed, condensable);
             open.push(asked.is_none());
             let (preset, reason) =
                 asked.map_or((Preset::Mumps, String::new()), |(preset, why)| (preset, why.to_owned()));
-            let (name, retained) = (name.to_owned(), Some(retained));
+            let (name, interface) = (name.to_owned(), Some(interface));
             self.places.insert(name.clone(), index);
-            plans.push(Plan { name, chosen, preset, reason, dimension, order, dofs, condensable, retained });
+            plans.push(Plan { name, chosen, preset, reason, dimension, order, dofs, condensable, interface });
         }
         let (mut plans_open, outlines_open): (Vec<&mut Plan>, Vec<&Outline>) =
             plans.iter_mut().zip(outlines).zip(open).filter_map(|(both, open)| open.then_some(both)).unzip();
@@ -344,7 +344,7 @@ impl Factory for SolverFactory<'_> {
         self.plans = plans;
         self.linear = self.join()?;
         for plan in &mut self.plans {
-            plan.retained = plan.retained.take().filter(|_| plan.preset == Preset::Condensed);
+            plan.interface = plan.interface.take().filter(|_| plan.preset == Preset::Condensed);
         }
         if self.linear == Linear::Sweeps {
             self.distributed = distributed_bodies(&self.plans, self.session.size());
@@ -395,8 +395,8 @@ impl Factory for SolverFactory<'_> {
             return Err(Error::new(Kind::Solver, format!("no solver is planned for body `{name}`")));
         };
         let (session, chosen) = (self.session.clone(), plan.chosen.clone());
-        if let Some(retained) = plan.retained.take() {
-            let whole = Uncondensed { session, chosen, dimension, body, free: left, retained };
+        if let Some(interface) = plan.interface.take() {
+            let whole = Uncondensed { session, chosen, dimension, body, free: left, interface };
             return Ok(Local::Uncondensed(Box::new(|| Ok(Box::new(whole.condense()?)))));
         }
         let words = match self.linear {
@@ -455,13 +455,13 @@ pub struct Plan {
     #[serde(skip)]
     pub condensable: bool,
     /// Interface dofs of a condensed body, until it is made.
-    pub retained: Option<InterfaceDofs>,
+    pub interface: Option<InterfaceDofs>,
 }
 
 impl Plan {
     /// Return the number of dofs that a condensed body would keep.
     fn on_contact(&self) -> usize {
-        self.retained.as_ref().map_or(0, |retained| retained.dofs.len())
+        self.interface.as_ref().map_or(0, |interface| interface.dofs.len())
     }
 }
 
@@ -550,7 +550,7 @@ mod tests {
         let mut rows = Csr::new(30_000);
         (0..contact).for_each(|i| rows.push_row([(3 * i, 1.0)]));
         let prescribed: Vec<(usize, f64)> = (29_000..30_000).map(|dof| (dof, 0.0)).collect();
-        let retained = Some(InterfaceDofs::new(3, &rows, &prescribed, AtDofs::NONE));
+        let interface = Some(InterfaceDofs::new(3, &rows, &prescribed, AtDofs::NONE));
         let chosen = UserOptions::default().of(name);
         Plan {
             name: name.to_owned(),
@@ -561,7 +561,7 @@ mod tests {
             order: Order::P1,
             dofs: 30_000,
             condensable: true,
-            retained,
+            interface,
         }
     }
 

@@ -392,7 +392,7 @@ fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Resul
         MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
     };
     crate::robin::prepare(&mut built.discrete.model)?;
-    Ok(Method::Sweeps { acceleration, coefficient, linear: Box::new(Sweeps::carried()) })
+    Ok(Method::Sweeps { acceleration, coefficient, linear: Box::new(Sweeps::with_robin_term()) })
 }
 
 fn coefficient_of(scene: &Scene) -> Coefficient {

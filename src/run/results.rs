@@ -40,7 +40,7 @@ fn recover_body(slot: &BodySlot, body: &dyn Body, state: &[f64], share: f64) -> 
     let mut bent = body.recover(&[deformation, &vec![0.0; rigid]].concat())?;
     // The rigid motion is the same on all ranks, so all of them take the same branch.
     let mut state = if motion.iter().all(|a| *a == 0.0) { bent.clone() } else { body.recover(&state)? };
-    state.iter_mut().zip(&slot.carried).for_each(|(u, imposed)| *u += imposed);
+    state.iter_mut().zip(&slot.imposed).for_each(|(u, imposed)| *u += imposed);
     bent.iter_mut().chain(&mut state).for_each(|u| *u *= share);
     Ok(Recovered::new(state, bent))
 }

@@ -1,6 +1,6 @@
 //! A body condensed to its contact: the interior is eliminated once, and the method works on the remaining dofs.
 //!
-//! Let R be the retained dofs and I the interior ones, in axes turned to the contact normals. Then S = K_RR - K_RI K_II^-1 K_IR is the
+//! Let R be the interface dofs and I the interior ones, in axes turned to the contact normals. Then S = K_RR - K_RI K_II^-1 K_IR is the
 //! stiffness and g = f_R - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R is dense and small.
 //! A state stands for that of the whole body with its interior in equilibrium. So residual, energies and all output have the values of the whole body.
 //!
@@ -35,22 +35,22 @@ pub struct Uncondensed {
     pub body: ElasticBody,
     /// Rigid motions that supports leave free, on all dofs.
     pub free: Vec<FreeMotion>,
-    /// The retained dofs.
-    pub retained: InterfaceDofs,
+    /// The interface dofs.
+    pub interface: InterfaceDofs,
 }
 
-/// A body whose states are its retained dofs.
+/// A body whose states are its interface dofs.
 pub struct CondensedBody {
-    retained: InterfaceDofs,
+    interface: InterfaceDofs,
     /// The loads on all dofs of the body, without K.
     whole: ElasticBody,
     /// f of all dofs, in the turned axes.
     load: Vec<f64>,
-    /// Rigid motions that supports leave free, on the retained dofs.
+    /// Rigid motions that supports leave free, on the interface dofs.
     free: Vec<FreeMotion>,
     /// The factor of the interior.
     schur: RefCell<Schur>,
-    /// The body on its retained dofs.
+    /// The body on its interface dofs.
     body: SparseBody<Dense>,
     /// Whether the interior was eliminated in an earlier run.
     is_reused: bool,
@@ -65,12 +65,12 @@ impl Uncondensed {
     /// Failures of MUMPS, and a factorisation that needs more memory than is free.
     pub fn condense(self) -> Result<CondensedBody> {
         let began = Instant::now();
-        let Self { session, chosen, dimension, body: mut whole, free, retained } = self;
-        let free: Vec<FreeMotion> = free.into_iter().map(|motion| on_retained(&retained, motion)).collect();
-        let (load, name) = (retained.turn(&whole.load), chosen.prefix());
-        let lower = retained.lower_triangle(&whole.stiffness);
+        let Self { session, chosen, dimension, body: mut whole, free, interface } = self;
+        let free: Vec<FreeMotion> = free.into_iter().map(|motion| on_interface(&interface, motion)).collect();
+        let (load, name) = (interface.turn(&whole.load), chosen.prefix());
+        let lower = interface.lower_triangle(&whole.stiffness);
         whole.stiffness = Csr::new(0);
-        let analyse = || Schur::analyse(&session, name, dimension, load.len(), &lower, &retained.dofs);
+        let analyse = || Schur::analyse(&session, name, dimension, load.len(), &lower, &interface.dofs);
         let mut schur = chosen.lend(&session, analyse)?;
         drop(lower);
         let (needed, available) = (schur.expected_megabytes(), available_memory() / 1_000_000);
@@ -80,26 +80,26 @@ impl Uncondensed {
             return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));
         }
         schur.factor()?;
-        let with_loads = with_loads(&mut schur, &retained, &whole, &load)?;
-        let stiffness = Csr::full(retained.dofs.len(), schur.take_complement());
+        let with_loads = with_loads(&mut schur, &interface, &whole, &load)?;
+        let stiffness = Csr::full(interface.dofs.len(), schur.take_complement());
         let body = ElasticBody { stiffness, ..with_loads };
         let dense = |stiffness: Rows| Ok(Dense::new(stiffness));
-        let body = SparseBody::new(body, retained.rows.clone(), &free, None, dense, String::new());
+        let body = SparseBody::new(body, interface.rows.clone(), &free, None, dense, String::new());
         let (schur, seconds) = (RefCell::new(schur), began.elapsed().as_secs_f64());
-        Ok(CondensedBody { retained, whole, load, free, schur, body, is_reused: false, seconds })
+        Ok(CondensedBody { interface, whole, load, free, schur, body, is_reused: false, seconds })
     }
 }
 
-/// Return the body on the retained dofs, with its loads and without K. None of these dofs is prescribed. `load` is f of all dofs in the turned axes.
-fn with_loads(schur: &mut Schur, retained: &InterfaceDofs, whole: &ElasticBody, load: &[f64]) -> Result<ElasticBody> {
+/// Return the body on the interface dofs, with its loads and without K. None of these dofs is prescribed. `load` is f of all dofs in the turned axes.
+fn with_loads(schur: &mut Schur, interface: &InterfaceDofs, whole: &ElasticBody, load: &[f64]) -> Result<ElasticBody> {
     let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
     if !whole.lifting.is_empty() {
-        whole_lifting = retained.turn(&whole.lifting);
+        whole_lifting = interface.turn(&whole.lifting);
         lifting = schur.condense(&whole_lifting)?;
     }
     let reduced = schur.condense(load)?;
-    // displacement of the interior under the loads alone, with the retained dofs at rest
-    let interior = schur.expand_condensed(load, &vec![0.0; retained.dofs.len()])?;
+    // displacement of the interior under the loads alone, with the interface dofs at rest
+    let interior = schur.expand_condensed(load, &vec![0.0; interface.dofs.len()])?;
     let work = dot(load, &interior);
     Ok(ElasticBody {
         load: reduced,
@@ -110,10 +110,10 @@ fn with_loads(schur: &mut Schur, retained: &InterfaceDofs, whole: &ElasticBody, 
     })
 }
 
-/// Return a motion on the retained dofs, in the turned axes.
-fn on_retained(retained: &InterfaceDofs, motion: FreeMotion) -> FreeMotion {
-    let turned = retained.turn(&motion.displacement);
-    FreeMotion { displacement: retained.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
+/// Return a motion on the interface dofs, in the turned axes.
+fn on_interface(interface: &InterfaceDofs, motion: FreeMotion) -> FreeMotion {
+    let turned = interface.turn(&motion.displacement);
+    FreeMotion { displacement: interface.dofs.iter().map(|&dof| turned[dof]).collect(), work: motion.work }
 }
 
 impl Body for CondensedBody {
@@ -152,13 +152,13 @@ impl Body for CondensedBody {
     fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
         let mut load = load.to_vec();
         self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
-        let load = self.schur.get_mut().condense(&self.retained.turn(&load))?;
+        let load = self.schur.get_mut().condense(&self.interface.turn(&load))?;
         self.body.reduce(&load)
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
         let turned = self.schur.borrow_mut().expand(&self.load, &self.states().join(u))?;
-        Ok(self.retained.turn_back(&turned))
+        Ok(self.interface.turn_back(&turned))
     }
 
     fn counts(&self) -> BodyCounts {
@@ -183,17 +183,17 @@ impl Body for CondensedBody {
         let dofs = |prescribed: &[(usize, f64)]| prescribed.iter().map(|entry| entry.0).collect::<Vec<_>>();
         let fits = dofs(&self.whole.prescribed) == dofs(&loads.prescribed) && self.free.len() == loads.work.len();
         if fits {
-            self.whole.reload(loads.force.clone(), loads.prescribed.clone(), &loads.carried);
-            self.load = self.retained.turn(&self.whole.load);
+            self.whole.reload(loads.force.clone(), loads.prescribed.clone(), &loads.imposed);
+            self.load = self.interface.turn(&self.whole.load);
             self.free.iter_mut().zip(&loads.work).for_each(|(motion, work)| motion.work = *work);
-            let with_loads = with_loads(self.schur.get_mut(), &self.retained, &self.whole, &self.load)?;
+            let with_loads = with_loads(self.schur.get_mut(), &self.interface, &self.whole, &self.load)?;
             self.body.reload(with_loads, &self.free);
         }
         Ok(fits)
     }
 
     fn describe(&self) -> String {
-        format!("condensed to {} dofs by mumps", self.retained.dofs.len())
+        format!("condensed to {} dofs by mumps", self.interface.dofs.len())
     }
 }
 
@@ -205,12 +205,12 @@ const PARALLEL: f64 = 1e-12;
 /// sixteen digits.
 const SAFE: f64 = 1e-6;
 
-/// The retained dofs of a body.
+/// The interface dofs of a body.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct InterfaceDofs {
     /// Dofs, sorted, in the turned axes.
     pub dofs: Vec<usize>,
-    /// Contact rows; columns: the retained dofs.
+    /// Contact rows; columns: the interface dofs.
     pub rows: Csr,
     /// Axes of each turned node, by its number; the first axis is the normal.
     axes: BTreeMap<usize, Vec<Vec<f64>>>,
@@ -228,22 +228,22 @@ impl InterfaceDofs {
             // a normal along an axis of the scene needs no turn
             (normal.iter().filter(|n| **n != 0.0).count() > 1).then(|| (node, frame(normal)))
         });
-        let mut retained = Self { dofs: Vec::new(), rows: Csr::new(0), axes: axes.collect(), dimension };
-        let turned = retained.turn_rows(rows);
+        let mut interface = Self { dofs: Vec::new(), rows: Csr::new(0), axes: axes.collect(), dimension };
+        let turned = interface.turn_rows(rows);
         let mut dofs: BTreeSet<usize> = turned.col.iter().map(|&dof| dof as usize).collect();
-        retained.constrain(&mut dofs, &prescribed, rows.columns, motions);
-        retained.dofs = dofs.into_iter().collect();
-        let number = |dof: usize| retained.dofs.binary_search(&dof).ok();
-        retained.rows = turned.of_columns(retained.dofs.len(), number);
-        retained
+        interface.constrain(&mut dofs, &prescribed, rows.columns, motions);
+        interface.dofs = dofs.into_iter().collect();
+        let number = |dof: usize| interface.dofs.binary_search(&dof).ok();
+        interface.rows = turned.of_columns(interface.dofs.len(), number);
+        interface
     }
 
-    /// Add dofs to the `retained` ones until they constrain every rigid motion together with the `prescribed` ones.
-    fn constrain(&self, retained: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, dofs: usize, motions: AtDofs) {
+    /// Add dofs to the `interface` ones until they constrain every rigid motion together with the `prescribed` ones.
+    fn constrain(&self, interface: &mut BTreeSet<usize>, prescribed: &HashSet<usize>, dofs: usize, motions: AtDofs) {
         let AtDofs { count: motions, at: motion } = motions;
         loop {
             let mut gram = DMatrix::zeros(motions, motions);
-            let constrained: BTreeSet<usize> = retained.iter().chain(prescribed).copied().collect();
+            let constrained: BTreeSet<usize> = interface.iter().chain(prescribed).copied().collect();
             for &dof in &constrained {
                 let at = DVector::from_fn(motions, |k, _| self.turned(dof, |dof| motion(k, dof)));
                 gram.syger(1.0, &at, &at, 1.0);
@@ -258,7 +258,7 @@ impl InterfaceDofs {
             };
             let sizes = (0..dofs).filter_map(|dof| Some((dof, size(dof)?)));
             match sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((dof, size)) if size > 1e-3 => retained.insert(dof),
+                Some((dof, size)) if size > 1e-3 => interface.insert(dof),
                 _ => return,
             };
         }
@@ -441,25 +441,25 @@ mod tests {
         let supported = [(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.0)];
         let s = 0.5f64.sqrt();
         let plane = rows(&[&[(4, s), (5, s), (6, 0.5 * s), (7, 0.5 * s)], &[(6, s), (7, s)]]);
-        let retained = of(&plane, &supported);
-        assert_eq!(retained.dofs, [4, 6]);
-        assert!((retained.rows.values[0] - 1.0).abs() < 1e-15 && (retained.rows.values[1] - 0.5).abs() < 1e-15);
+        let interface = of(&plane, &supported);
+        assert_eq!(interface.dofs, [4, 6]);
+        assert!((interface.rows.values[0] - 1.0).abs() < 1e-15 && (interface.rows.values[1] - 0.5).abs() < 1e-15);
         let u = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8];
-        let turned = retained.turn(&u);
+        let turned = interface.turn(&u);
         assert!((turned[4] - 1.1 * s).abs() < 1e-15);
-        assert!(retained.turn_back(&turned).iter().zip(u).all(|(a, b)| (a - b).abs() < 1e-15));
+        assert!(interface.turn_back(&turned).iter().zip(u).all(|(a, b)| (a - b).abs() < 1e-15));
         let corner = rows(&[&[(4, s), (5, s)], &[(4, 1.0), (6, 1.0)]]);
-        let retained = of(&corner, &supported);
-        assert_eq!(retained.dofs, [4, 5, 6]);
+        let interface = of(&corner, &supported);
+        assert_eq!(interface.dofs, [4, 5, 6]);
     }
 
     /// Contact constrains one translation and the rotation. The other translation takes one more dof, and none if a support constrains it.
     #[test]
     fn what_contact_does_not_constrain_gets_a_dof() {
         let flat = rows(&[&[(5, 1.0)], &[(7, 1.0)]]);
-        let retained = of(&flat, &[]);
-        assert_eq!(retained.dofs.len(), 3);
-        assert!(retained.dofs.iter().any(|dof| dof % 2 == 0), "{:?}", retained.dofs);
+        let interface = of(&flat, &[]);
+        assert_eq!(interface.dofs.len(), 3);
+        assert!(interface.dofs.iter().any(|dof| dof % 2 == 0), "{:?}", interface.dofs);
         assert_eq!(of(&flat, &[(0, 0.0)]).dofs, [5, 7]);
         assert_eq!(of(&rows(&[]), &[]).dofs.len(), 3);
     }
@@ -468,18 +468,18 @@ mod tests {
     fn a_turned_matrix_is_the_same_form() {
         let s = [0.6, 0.8];
         let flat = rows(&[&[(4, s[0]), (5, s[1])]]);
-        let retained = of(&flat, &[(0, 0.0), (1, 0.0), (3, 0.0)]);
-        assert_eq!(retained.dofs, [4]);
+        let interface = of(&flat, &[(0, 0.0), (1, 0.0), (3, 0.0)]);
+        assert_eq!(interface.dofs, [4]);
         let mut matrix = Csr::new(8);
         for i in 0..8usize {
             matrix.push_row((0..8).map(|j: usize| (j, 1.0 / (1.0 + i as f64 + j as f64))));
         }
-        let lower = retained.lower_triangle(&matrix);
+        let lower = interface.lower_triangle(&matrix);
         assert_eq!(lower.len(), 36);
         let u: Vec<f64> = (0..8).map(|i| (i as f64).sin()).collect();
         let mut product = vec![0.0; 8];
         matrix.multiply(&u, &mut product);
-        let v = retained.turn(&u);
+        let v = interface.turn(&u);
         let form: f64 = lower.iter().map(|&(i, j, value)| if i == j { 1.0 } else { 2.0 } * value * v[i] * v[j]).sum();
         assert!((form - dot(&u, &product)).abs() < 1e-14, "{form}");
     }

@@ -74,7 +74,7 @@ pub struct BodySize<'a> {
     /// Order of its elements.
     pub order: Order,
     /// The dofs that the body retains if it is condensed; `None` if every factorisation is one of the whole body.
-    pub retained: Option<&'a InterfaceDofs>,
+    pub interface: Option<&'a InterfaceDofs>,
     /// Number of the blocks of K: pairs of nodes that K couples, each in both orders, and each node with itself.
     pub couplings: usize,
 }
@@ -136,9 +136,9 @@ impl Comparison {
     /// assumed to take as many operations as that of a cube with as many dofs; no body needs more.
     pub fn of_cubes(bodies: &[BodySize], step: StepSolver, speed: f64) -> Self {
         let multigrid = bodies.iter().fold(Cost::default(), |sum, body| sum.and(body.multigrid(step, speed)));
-        let retained = bodies.iter().map(|body| body.retained.map_or(0, |retained| retained.dofs.len()));
-        let retained = if step == StepSolver::Joined { retained.sum() } else { retained.max().unwrap_or(0) } as f64;
-        let dense = Cost { seconds: STEPS * retained.powi(3) / 3.0 / RATE, bytes: 36.0 * retained * retained };
+        let interface = bodies.iter().map(|body| body.interface.map_or(0, |interface| interface.dofs.len()));
+        let interface = if step == StepSolver::Joined { interface.sum() } else { interface.max().unwrap_or(0) } as f64;
+        let dense = Cost { seconds: STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
         let direct = bodies.iter().fold(dense, |sum, body| sum.and(of_cube(body, speed)));
         Self { direct, multigrid, dense, speed }
     }
@@ -188,7 +188,7 @@ impl BodySize<'_> {
 
     /// Return how often the body is factored.
     fn times(&self) -> f64 {
-        if self.retained.is_some() { 1.0 } else { STEPS }
+        if self.interface.is_some() { 1.0 } else { STEPS }
     }
 }
 
@@ -211,9 +211,9 @@ fn analysed(body: &BodySize, ptr: &[u32], col: &[u32], speed: f64) -> Result<Cos
     let position = nested_dissection(Graph { ptr: neighbours, col: others })?;
     // number of dofs of each node that are eliminated
     let mut eliminated = vec![3; nodes];
-    body.retained.into_iter().flat_map(|retained| &retained.dofs).for_each(|dof| eliminated[dof / 3] -= 1);
-    let retained = (0..nodes).map(|node| (node, 3 - eliminated[node])).filter(|(_, count)| *count > 0);
-    let work = factorisation(ptr, col, &position, &eliminated, &retained.collect::<Vec<_>>());
+    body.interface.into_iter().flat_map(|interface| &interface.dofs).for_each(|dof| eliminated[dof / 3] -= 1);
+    let interface = (0..nodes).map(|node| (node, 3 - eliminated[node])).filter(|(_, count)| *count > 0);
+    let work = factorisation(ptr, col, &position, &eliminated, &interface.collect::<Vec<_>>());
     Ok(body.factored(work.operations, work.entries, speed))
 }
 
@@ -225,8 +225,8 @@ pub fn plane_factor_bytes(dofs: usize) -> usize {
 }
 
 /// Return the bytes of a condensed body besides its sparse factor: S with its pattern, G, and the factor of G.
-pub fn condensed_bytes(retained: usize) -> usize {
-    36 * retained * retained
+pub fn condensed_bytes(interface: usize) -> usize {
+    36 * interface * interface
 }
 
 /// Return the estimated operations of a sparse Cholesky factorisation of a plane body by nested dissection, measured on the same blocks as [`plane_factor_bytes`].
@@ -363,9 +363,9 @@ mod tests {
 
     fn candidates(bodies: &[(Vec<u32>, Vec<u32>, InterfaceDofs)]) -> Vec<BodySize<'_>> {
         let mut candidates = Vec::new();
-        for (ptr, col, retained) in bodies {
+        for (ptr, col, interface) in bodies {
             let (dofs, couplings) = (3 * (ptr.len() - 1), col.len());
-            candidates.push(BodySize { dofs, order: Order::P1, retained: Some(retained), couplings });
+            candidates.push(BodySize { dofs, order: Order::P1, interface: Some(interface), couplings });
         }
         candidates
     }
@@ -401,7 +401,7 @@ mod tests {
     fn joined_bodies_share_their_contact() {
         let wide = [[40, 40, 2]; 2];
         let (joined, apart) = (of(&wide, StepSolver::Joined), of(&wide, StepSolver::Sweeps));
-        let dense = |retained: f64| STEPS * retained.powi(3) / 3.0 / RATE;
+        let dense = |interface: f64| STEPS * interface.powi(3) / 3.0 / RATE;
         let more = joined.direct.seconds - apart.direct.seconds;
         assert!((more / (dense(3200.0) - dense(1600.0)) - 1.0).abs() < 1e-9, "{more}");
         assert!((apart.multigrid.seconds / (StepSolver::Sweeps.times() * joined.multigrid.seconds) - 1.0).abs() < 1e-9);

@@ -59,7 +59,7 @@ impl Smoother {
 /// Relative tolerance of an inner Krylov solve. It is relative to the outer residual, because solves are for corrections.
 const TOLERANCE: &str = "1e-6";
 
-/// Number of retained dofs up to which the cost of a dense factorisation need not be compared.
+/// Number of interface dofs up to which the cost of a dense factorisation need not be compared.
 const SMALL: usize = 300;
 
 /// The sizes on which the choice of a solver in the plane depends.
@@ -68,7 +68,7 @@ pub struct Size {
     /// Number of dofs of the body.
     pub dofs: usize,
     /// Number of dofs that a condensed body would retain.
-    pub retained: usize,
+    pub interface: usize,
     /// Bytes of memory that are left after the solvers of earlier bodies.
     pub memory: usize,
 }
@@ -76,7 +76,7 @@ pub struct Size {
 impl Size {
     /// Return the estimated bytes of a solver that factors, for a plane body.
     pub fn bytes(&self, preset: Preset) -> usize {
-        let dense = if preset == Preset::Condensed { cost::condensed_bytes(self.retained) } else { 0 };
+        let dense = if preset == Preset::Condensed { cost::condensed_bytes(self.interface) } else { 0 };
         cost::plane_factor_bytes(self.dofs) + dense
     }
 }
@@ -84,14 +84,14 @@ impl Size {
 /// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
 /// lack of memory speaks against it. In space [`cost`] decides.
 pub fn in_plane(size: &Size) -> (Preset, String) {
-    let &Size { dofs, retained, memory } = size;
-    let what = format!("{dofs} dofs in the plane, {retained} of them on the contact");
+    let &Size { dofs, interface, memory } = size;
+    let what = format!("{dofs} dofs in the plane, {interface} of them on the contact");
     let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
     let fits = |preset: Preset| size.bytes(preset) < memory;
     // some dofs can be eliminated, and some remain
-    let can_condense = (1..dofs).contains(&retained);
-    let dense = (retained as f64).powi(3) / 3.0;
-    let pays = retained <= SMALL || dense <= cost::plane_factor_work(dofs);
+    let can_condense = (1..dofs).contains(&interface);
+    let dense = (interface as f64).powi(3) / 3.0;
+    let pays = interface <= SMALL || dense <= cost::plane_factor_work(dofs);
     if can_condense && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {
@@ -184,10 +184,10 @@ mod tests {
     /// Bodies in the plane are condensed where that pays, and multigrid is for a factor that does not fit into memory.
     #[test]
     fn a_body_in_the_plane_is_condensed_where_that_pays() {
-        let size = Size { dofs: 98_000, retained: 1024, memory: 8_000_000_000 };
+        let size = Size { dofs: 98_000, interface: 1024, memory: 8_000_000_000 };
         assert_eq!(in_plane(&size).0, Preset::Condensed);
         // a sheet whose dofs are mostly on the contact gains nothing by condensation
-        assert_eq!(in_plane(&Size { dofs: 40_000, retained: 20_000, ..size }).0, Preset::Mumps);
+        assert_eq!(in_plane(&Size { dofs: 40_000, interface: 20_000, ..size }).0, Preset::Mumps);
         assert_eq!(in_plane(&Size { memory: 50_000_000, ..size }).0, Preset::Hypre);
     }
 }

@@ -9,6 +9,7 @@ mod library;
 mod manners;
 mod options;
 mod pictures;
+mod planted;
 mod refusals;
 mod schema;
 mod walls;

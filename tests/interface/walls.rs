@@ -1,8 +1,7 @@
-//! The walls between the modules, held by reading the sources.
+//! The walls between the modules, held by reading the sources line by line. Comments are left out, texts are not.
 
-mod circles;
 use crate::common::root;
-use circles::Crate;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -40,7 +39,8 @@ const MODULES: [&str; 29] = [
 ];
 
 /// Modules that may use less than what lies below them.
-const NARROW: [(&str, &str); 5] = [
+const NARROW: [(&str, &str); 6] = [
+    ("petsc", "error"),
     ("model", "error exchange linalg contact"),
     ("robin", "error exchange linalg contact problem model"),
     ("ddm", "error exchange linalg contact problem model robin"),
@@ -54,30 +54,89 @@ const SPATIAL: [&str; 7] = ["scene", "mesh", "fem", "contact", "discretize", "ru
 /// Lines that a file may have.
 const LONGEST: usize = 800;
 
+/// Words before the name of an item.
+const ITEMS: [&str; 10] =
+    ["fn ", "struct ", "enum ", "trait ", "type ", "const ", "static ", "mod ", "macro_rules! ", "union "];
+
 /// A source file.
 struct Source {
     /// Path below `src/`.
     path: String,
-    /// Its text.
-    text: String,
-    /// Its words outside comments and texts, `::` and other signs each a word, with their lines.
-    words: Vec<(usize, String)>,
+    /// Its path as a module: `fem::space::`, and nothing for the crate.
+    module: String,
+    /// Its lines without comments.
+    code: String,
+    /// Names of the items that it makes, not imports, outside tests.
+    items: BTreeSet<String>,
 }
 
 impl Source {
-    fn module(&self) -> &str {
-        let first = self.path.split('/').next().unwrap_or_default();
-        first.strip_suffix(".rs").unwrap_or(first)
+    fn new(path: &str, text: &str) -> Self {
+        let lines = text.lines().map(|line| line.split("//").next().unwrap_or_default().to_owned() + "\n");
+        let code: String = lines.collect();
+        let bare = path.trim_end_matches(".rs").trim_end_matches("/mod");
+        let module = if bare == "lib" { String::new() } else { bare.replace('/', "::") + "::" };
+        let behind = |word: &str| before_tests(&code).split(word).skip(1).map(first_word).collect::<Vec<_>>();
+        let items = ITEMS.iter().flat_map(|word| behind(word)).collect();
+        Self { path: path.to_owned(), module, code, items }
+    }
+
+    fn top(&self) -> &str {
+        self.path.split(['/', '.']).next().unwrap_or_default()
     }
 
     /// Whether it lies in a module or is a file of that path.
     fn is_in(&self, place: &str) -> bool {
-        self.module() == place || self.path == place
+        self.top() == place || self.path == place
     }
 
-    fn at(&self, line: usize) -> String {
-        format!("src/{}:{line}", self.path)
+    /// Return the paths behind `root::` in the code, one for each name of a list, with their lines.
+    fn paths(&self, code: &str, root: &str) -> Vec<(usize, String)> {
+        let starts = code.match_indices(root).filter(|(at, _)| !code[..*at].ends_with(is_word));
+        let lists = starts.map(|(at, _)| (code[..at].matches('\n').count() + 1, path(&code[at + root.len()..])));
+        lists.flat_map(|(line, list)| names(list).into_iter().map(move |name| (line, name))).collect()
     }
+}
+
+fn is_word(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+fn first_word(code: &str) -> String {
+    code.chars().take_while(|&c| is_word(c)).collect()
+}
+
+fn before_tests(code: &str) -> &str {
+    code.split("#[cfg(test)]\nmod ").next().unwrap_or_default()
+}
+
+/// Return the path at the beginning of `code`, with its list in braces.
+fn path(code: &str) -> &str {
+    let mut depth = 0;
+    for (at, c) in code.char_indices() {
+        match c {
+            '{' if code[..at].is_empty() || code[..at].ends_with("::") || depth > 0 => depth += 1,
+            '}' if depth > 0 => depth -= 1,
+            _ if depth > 0 || is_word(c) || c == ':' => {}
+            _ => return &code[..at],
+        }
+    }
+    code
+}
+
+/// Return the paths of `a::{b, c::{d, e}}`: `a::b`, `a::c::d`, `a::c::e`.
+fn names(path: &str) -> Vec<String> {
+    let Some((head, list)) = path.split_once('{') else {
+        return vec![path.split(" as ").next().unwrap_or_default().trim().to_owned()];
+    };
+    let mut depth = 0;
+    let ends_name = |c: char| {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        depth == 0 && c == ','
+    };
+    let list = list.rsplit_once('}').map_or(list, |(list, _)| list);
+    let parts: Vec<&str> = list.split(ends_name).map(str::trim).filter(|part| !part.is_empty()).collect();
+    parts.into_iter().flat_map(names).map(|name| head.trim().to_owned() + &name).collect()
 }
 
 fn sources() -> Vec<Source> {
@@ -96,97 +155,8 @@ fn sources() -> Vec<Source> {
     collect(&base, &mut files);
     files.sort();
     assert!(files.len() > 50, "only {} sources", files.len());
-    let read = |file: PathBuf| {
-        let text = fs::read_to_string(&file).expect("a source");
-        let path = file.strip_prefix(&base).expect("a file below src").display().to_string();
-        Source { path, words: words(&text), text }
-    };
-    files.into_iter().map(read).collect()
-}
-
-/// Words and signs of Rust code with their lines, without comments, texts and characters.
-fn words(text: &str) -> Vec<(usize, String)> {
-    let code: Vec<char> = text.chars().collect();
-    let is_word = |c: char| c.is_alphanumeric() || c == '_';
-    let (mut words, mut i, mut line) = (Vec::new(), 0, 1);
-    while i < code.len() {
-        let (c, next) = (code[i], code.get(i + 1).copied());
-        let from = i;
-        let raw = code[i..].iter().skip(1).position(|&c| c != '#').map(|hashes| (hashes, code[i + 1 + hashes]));
-        match (c, next, raw) {
-            ('/', Some('/'), _) => i = end(&code, i, &['\n']) - 1,
-            ('/', Some('*'), _) => i = end(&code, i + 2, &['*', '/']),
-            ('r', _, Some((hashes, '"'))) if i == 0 || !is_word(code[i - 1]) => {
-                let close: Vec<char> = std::iter::once('"').chain(std::iter::repeat_n('#', hashes)).collect();
-                i = end(&code, i + hashes + 2, &close);
-            }
-            ('"', ..) => {
-                i += 1;
-                while i < code.len() && code[i] != '"' {
-                    i += if code[i] == '\\' { 2 } else { 1 };
-                }
-                i += 1;
-            }
-            // a character, not a lifetime
-            ('\'', Some('\\'), _) => i = end(&code, i + 3, &['\'']),
-            ('\'', ..) if code.get(i + 2) == Some(&'\'') => i += 3,
-            (':', Some(':'), _) => {
-                words.push((line, "::".to_owned()));
-                i += 2;
-            }
-            _ if is_word(c) => {
-                while i < code.len() && is_word(code[i]) {
-                    i += 1;
-                }
-                words.push((line, code[from..i].iter().collect()));
-            }
-            _ => {
-                if !c.is_whitespace() {
-                    words.push((line, c.to_string()));
-                }
-                i += 1;
-            }
-        }
-        line += code[from..i.min(code.len())].iter().filter(|&&c| c == '\n').count();
-    }
-    words
-}
-
-/// The place behind the next `sign` from `i` on.
-fn end(code: &[char], i: usize, sign: &[char]) -> usize {
-    let found = (i..code.len()).find(|&k| code[k..].starts_with(sign));
-    found.map_or(code.len() + 1, |k| k + sign.len())
-}
-
-/// Modules that a file names in paths from the root, with the lines: `crate::a::b` and `crate::{a::b, c}`; examples and the
-/// main program say `winkler` for `crate`.
-fn modules_used(source: &Source) -> Vec<(usize, String)> {
-    let word = |i: usize| source.words.get(i).map_or("", |(_, word)| word.as_str());
-    let mut used = Vec::new();
-    for i in 0..source.words.len() {
-        if !matches!(word(i), "crate" | "winkler") || word(i + 1) != "::" {
-            continue;
-        }
-        if word(i + 2) != "{" {
-            used.push(source.words[i + 2].clone());
-            continue;
-        }
-        let (mut depth, mut k, mut first) = (1, i + 3, true);
-        while depth > 0 && k < source.words.len() {
-            match word(k) {
-                "{" => depth += 1,
-                "}" => depth -= 1,
-                "," if depth == 1 => first = true,
-                _ if first && depth == 1 => {
-                    used.push(source.words[k].clone());
-                    first = false;
-                }
-                _ => {}
-            }
-            k += 1;
-        }
-    }
-    used
+    let place = |file: &PathBuf| file.strip_prefix(&base).expect("a file below src").display().to_string();
+    files.iter().map(|file| Source::new(&place(file), &fs::read_to_string(file).expect("a source"))).collect()
 }
 
 /// Fails with all breaches, one a line.
@@ -203,168 +173,164 @@ fn modules_are_private_but_for_the_library() {
     assert!(library.contains("#[cfg(feature = \"internals\")]\npub mod internals;"));
 }
 
+/// The compiler refuses unsafe code where nothing allows it.
 #[test]
 fn unsafe_stays_in_petsc() {
-    let mut breaches = Vec::new();
-    for source in sources().iter().filter(|source| source.module() != "petsc") {
-        breaches.extend(source.words.iter().filter(|(_, word)| word == "unsafe").map(|(line, _)| source.at(*line)));
-        // and nobody else is let off
-        let allowed = source.text.matches("allow(unsafe_code)").count();
-        let expected = usize::from(source.path == "lib.rs");
-        if allowed != expected {
-            breaches.push(format!("src/{}: allows unsafe code {allowed} times", source.path));
-        }
-    }
-    none(breaches);
-    let library = fs::read_to_string(root().join("src/lib.rs")).expect("the library");
-    assert!(library.contains("#![deny(unsafe_code)]"));
-    assert!(library.contains("#[allow(unsafe_code)]\npub mod petsc;"));
+    let allows = |source: &Source| source.code.matches("allow(unsafe_code)").count();
+    let allowed = sources().into_iter().filter(|source| allows(source) > usize::from(source.path == "lib.rs"));
+    none(allowed.map(|source| format!("src/{} allows unsafe code", source.path)).collect());
+    let read = |file: &str| fs::read_to_string(root().join("src").join(file)).expect("a source");
+    assert!(read("lib.rs").contains("#![deny(unsafe_code)]"));
+    assert!(read("lib.rs").contains("#[allow(unsafe_code)]\npub mod petsc;"));
     // a call of PETSc is unsafe where it stands, not inside the macro that checks its code, and clippy asks for the reason
-    let binding = |file: &str| fs::read_to_string(root().join("src/petsc").join(file)).expect("the binding");
-    let calls = binding("library.rs");
+    let calls = read("petsc/library.rs");
     let (_, body) = calls.split_once("macro_rules! petsc {").expect("the macro");
     assert!(!body.split_once("\n}").expect("its end").0.contains("unsafe"));
-    assert!(binding("mod.rs").contains("#![warn(clippy::undocumented_unsafe_blocks)]"));
+    assert!(read("petsc/mod.rs").contains("#![warn(clippy::undocumented_unsafe_blocks)]"));
 }
 
 #[test]
-fn the_method_knows_no_mesh_no_element_no_petsc() {
-    let forbidden = ["petsc", "mesh", "fem", "const", "mpi", "Session", "Ksp", "element", "simplex", "dimension"];
-    let mut breaches = Vec::new();
-    for source in sources().iter().filter(|source| source.module() == "ddm") {
-        for (k, (line, word)) in source.words.iter().enumerate() {
-            // constants and const functions are no dimensions
-            let generic = word == "const" && source.words.get(k + 1).is_some_and(|(_, next)| next == "D");
-            if forbidden.contains(&word.as_str()) && (word != "const" || generic) {
-                breaches.push(format!("{}: {word}", source.at(*line)));
-            }
-        }
-    }
-    none(breaches);
-}
-
-#[test]
-fn few_rooms_know_the_dimension() {
+fn few_modules_know_the_dimension() {
     let mut breaches = Vec::new();
     for source in sources().iter().filter(|source| !SPATIAL.iter().any(|place| source.is_in(place))) {
-        for three in source.words.windows(3) {
-            let [(line, a), (_, b), (_, c)] = three else { continue };
-            let generic = a == "const" && b == "D";
-            let chosen = a == "<" && matches!(b.as_str(), "2" | "3" | "D") && c == ">";
-            if generic || chosen {
-                breaches.push(format!("{}: {a} {b} {c}", source.at(*line)));
+        let lines = source.code.lines().zip(1..);
+        let spatial =
+            lines.filter(|(line, _)| ["const D:", "<2>", "<3>", "<D>"].iter().any(|sign| line.contains(sign)));
+        breaches.extend(spatial.map(|(line, number)| format!("src/{}:{number}: {}", source.path, line.trim())));
+    }
+    none(breaches);
+}
+
+/// Return the uses of modules that are not below the module of their file, and the number of all uses.
+fn upward(sources: &[Source]) -> (Vec<String>, usize) {
+    let floor = |module: &str| MODULES.iter().position(|known| *known == module);
+    let (mut breaches, mut uses) = (Vec::new(), 0);
+    for source in sources.iter().filter(|source| source.top() != "lib") {
+        let module = source.top();
+        let narrow = NARROW.iter().find(|(name, _)| *name == module);
+        // the main program says `winkler` for `crate`
+        let paths = ["crate::", "winkler::"].into_iter().flat_map(|root| source.paths(&source.code, root));
+        for (line, path) in paths {
+            let other = path.split("::").next().unwrap_or_default();
+            let allowed = match narrow {
+                Some((_, below)) => below.split(' ').any(|below| below == other),
+                None => floor(other) < floor(module) && floor(other).is_some(),
+            };
+            uses += 1;
+            if other != module && !allowed {
+                breaches.push(format!("src/{}:{line}: `{module}` uses `{other}`", source.path));
             }
         }
     }
-    none(breaches);
+    (breaches, uses)
 }
 
 #[test]
 fn modules_use_only_lower_modules() {
-    let floor = |module: &str| MODULES.iter().position(|known| *known == module);
-    let mut breaches = Vec::new();
-    let mut uses = 0;
-    for source in sources().iter().filter(|source| source.module() != "lib") {
-        let module = source.module();
-        let Some(own) = floor(module) else {
-            breaches.push(format!("src/{}: the module `{module}` has no floor", source.path));
-            continue;
-        };
-        for (line, other) in modules_used(source).into_iter().filter(|(_, other)| other != module) {
-            uses += 1;
-            let narrow = NARROW.iter().find(|(name, _)| *name == module);
-            let allowed = match narrow {
-                Some((_, below)) => below.split(' ').any(|below| below == other),
-                None => floor(&other).is_some_and(|other| other < own),
-            };
-            if !allowed {
-                breaches.push(format!("{}: `{module}` uses `{other}`", source.at(line)));
-            }
-        }
-    }
+    let (breaches, uses) = upward(&sources());
     assert!(uses > 50, "only {uses} uses found");
     none(breaches);
+    let planted = |text: &str| upward(&[Source::new("fem/a.rs", text)]).0;
+    assert!(planted("use crate::{\n    error::{Error, Result},\n    mesh::Mesh,\n};\n// crate::run\n").is_empty());
+    assert_eq!(planted("\nuse crate::{\n    mesh::{A, B},\n    run::C,\n};\n"), ["src/fem/a.rs:2: `fem` uses `run`"]);
+    assert_eq!(planted("fn f() { crate::ddm::solve() }\n"), ["src/fem/a.rs:1: `fem` uses `ddm`"]);
 }
 
-/// Circles that are being taken apart elsewhere: their files. An entry whose files are on no circle any more is a breach.
-const ROUND: [&[&str]; 0] = [];
-
-/// Circles of files, each as `a -> b`, the first file being used by the last.
-fn circles<'a>(files: impl IntoIterator<Item = (&'a str, &'a [(usize, String)])>) -> Vec<Vec<String>> {
-    let mut all = Crate::default();
-    for (place, words) in files {
-        all.add(place, &words.iter().map(|(_, word)| word.as_str()).collect::<Vec<_>>());
+/// Return the indices of the files that file `from` uses. A path leads to the module that it names. If that does not make the
+/// next name, it passes on one of a module inside it.
+fn used(sources: &[Source], from: usize) -> BTreeSet<usize> {
+    let source = &sources[from];
+    let module = &source.module;
+    let parent = |module: &str| match module.trim_end_matches("::").rsplit_once("::") {
+        Some((parent, _)) => parent.to_owned() + "::",
+        None => String::new(),
+    };
+    // a re-export alone is no use
+    let mut code = before_tests(&source.code).to_owned();
+    for public in ["pub use ", "pub(crate) use ", "pub(super) use "] {
+        while let Some(at) = code.find(public) {
+            let end = code[at..].find(';').map_or(code.len(), |end| at + end);
+            code.replace_range(at..end, "");
+        }
     }
-    all.circles()
+    let mut paths: Vec<String> = source.paths(&code, "crate::").into_iter().map(|(_, path)| path).collect();
+    for (_, path) in source.paths(&code, "super::") {
+        let ups = path.matches("super::").count();
+        let from = (0..=ups).fold(module.clone(), |module, _| parent(&module));
+        paths.push(from + &path["super::".len() * ups..]);
+    }
+    let children = sources
+        .iter()
+        .map(|source| &source.module)
+        .filter(|child| child.len() > module.len() && parent(child) == *module);
+    for child in children {
+        let inside = source.paths(&code, &child[module.len()..]);
+        paths.extend(inside.into_iter().map(|(_, path)| child.clone() + &path));
+    }
+    let leads_to = |path: &String| {
+        let path = path.trim_end_matches("self").to_owned() + "::";
+        let holders = (0..sources.len()).filter(|&i| path.starts_with(&sources[i].module));
+        let holder = holders.max_by_key(|&i| sources[i].module.len())?;
+        let inner = &sources[holder].module;
+        let name = path[inner.len()..].split("::").next()?;
+        if matches!(name, "" | "*") {
+            return Some(holder);
+        }
+        let passed_on = |&i: &usize| sources[i].module.starts_with(inner) && sources[i].items.contains(name);
+        if sources[holder].items.contains(name) { Some(holder) } else { (0..sources.len()).find(passed_on) }
+    };
+    paths.iter().filter_map(leads_to).filter(|&i| i != from).collect()
+}
+
+/// Return the uses, as `a -> b`, among files that use each other directly or through others.
+fn circles(sources: &[Source]) -> Vec<String> {
+    let uses: Vec<BTreeSet<usize>> = (0..sources.len()).map(|i| used(sources, i)).collect();
+    let mut left: BTreeSet<usize> = (0..sources.len()).collect();
+    // a file on a circle uses another one on it, and is used
+    while let Some(outside) = left
+        .iter()
+        .copied()
+        .find(|&i| uses[i].is_disjoint(&left) || !left.iter().any(|&other| uses[other].contains(&i)))
+    {
+        left.remove(&outside);
+    }
+    let arrow = |from: usize, to: &usize| format!("{} -> {}", sources[from].path, sources[*to].path);
+    left.iter().flat_map(|&i| uses[i].intersection(&left).map(move |to| arrow(i, to))).collect()
 }
 
 #[test]
 fn files_use_each_other_one_way() {
     let sources = sources();
-    let found = circles(sources.iter().map(|source| (source.path.as_str(), &source.words[..])));
-    let is_within = |circle: &[String], files: &[&str]| circle.iter().all(|file| files.contains(&file.as_str()));
-    let unknown = found.iter().filter(|circle| !ROUND.iter().any(|files| is_within(circle, files)));
-    let breaches = unknown.map(|circle| circle.join(" -> "));
-    let gone = ROUND.iter().filter(|files| !found.iter().any(|circle| is_within(circle, files)));
-    none(breaches.chain(gone.map(|files| format!("no circle any more: {}", files.join(", ")))).collect());
+    let uses: usize = (0..sources.len()).map(|i| used(&sources, i).len()).sum();
+    assert!(uses > 500, "only {uses} uses found");
+    none(circles(&sources));
 }
 
 #[test]
 fn planted_circles_are_found() {
-    let found = |files: &[(&str, &str)]| {
-        let files: Vec<_> = files.iter().map(|(place, text)| (*place, words(text))).collect();
-        let found = circles(files.iter().map(|(place, words)| (*place, &words[..])));
-        found.iter().map(|circle| circle.join(" ")).collect::<Vec<_>>()
-    };
-    // by `super`, and by a path in the code
-    let (a, b) = (("r/a.rs", "use super::b::{self, B};"), ("r/b.rs", "fn f() { crate::r::a::g(); }"));
-    assert_eq!(found(&[a, b, ("r/mod.rs", "mod a; mod b;")]), ["r/a.rs r/b.rs"]);
-    // a re-export leads on, also by another name, and is no use itself
-    let a = ("r/a.rs", "use super::{Other, X};");
-    let b = ("r/b.rs", "use super::a; pub struct B; impl B { fn f() -> a::A {} }");
-    let module = ("r/mod.rs", "mod a; mod b; pub use b::B as X; pub struct Other;");
-    assert_eq!(found(&[a, b, module]), ["r/a.rs r/b.rs"]);
-    assert!(found(&[a, ("r/b.rs", "use super::Other;"), module]).is_empty());
-    // unless the file itself says the name
-    let module = ("r/mod.rs", "mod b; pub use b::B; pub struct Other(B);");
-    assert_eq!(found(&[("r/b.rs", "use super::Other; pub struct B;"), module]), ["r/b.rs r/mod.rs"]);
-    // by all names at once, by the name of a module, from a module within the file, and around three
-    let a = ("r/a.rs", "pub fn f() {} mod tests { use super::super::c; fn g() { c::h() } }");
-    let b = ("r/b.rs", "use super::f;");
-    let c = ("r/c.rs", "use crate::r; fn h() { r::b::k() }");
-    assert_eq!(found(&[a, b, c, ("r/mod.rs", "mod a; mod b; mod c; pub use a::*;")]), ["r/a.rs r/c.rs r/b.rs"]);
-    // a file and a folder of its name; what a comment or a text says is nothing
-    let (outer, inner) =
-        (("r.rs", "mod s; use s::S; pub fn f() {}"), ("r/s.rs", "fn g() { super::f() } pub struct S;"));
-    assert_eq!(found(&[outer, inner]), ["r.rs r/s.rs"]);
-    assert!(found(&[outer, ("r/s.rs", "// super::f()\nfn g() { say(\"super::f()\") }")]).is_empty());
-}
-
-/// The binding is a product of its own: it knows errors, and nothing else of the program.
-#[test]
-fn the_binding_stands_alone() {
-    let binding = sources().into_iter().filter(|source| source.module() == "petsc");
-    let others = binding.flat_map(|source| {
-        let used = modules_used(&source).into_iter().filter(|(_, module)| module != "petsc" && module != "error");
-        used.map(|(line, module)| format!("{}: {module}", source.at(line))).collect::<Vec<_>>()
-    });
-    none(others.collect());
+    let found =
+        |files: &[(&str, &str)]| circles(&files.iter().map(|(path, text)| Source::new(path, text)).collect::<Vec<_>>());
+    let a = ("r/a.rs", "use super::b::{self, B};\npub struct A;");
+    let b = ("r/b.rs", "pub struct B;\nfn f() { crate::r::a::A; }");
+    let module = ("r/mod.rs", "mod a;\nmod b;\npub use a::A;\npub use b::{\n    B,\n};\npub struct Other;");
+    assert_eq!(found(&[a, b, module]), ["r/a.rs -> r/b.rs", "r/b.rs -> r/a.rs"]);
+    // a re-export leads on
+    assert_eq!(found(&[a, ("r/b.rs", "use super::A;\npub struct B;"), module]).len(), 2);
+    assert!(found(&[a, ("r/b.rs", "use super::Other;\npub struct B;"), module]).is_empty());
+    // a folder and its file; tests, and what a comment says, are no uses
+    let module = ("r.rs", "mod b;\nuse b::B;\npub struct Other;");
+    assert_eq!(found(&[("r/b.rs", "use super::Other;\npub struct B;"), module]), ["r/b.rs -> r.rs", "r.rs -> r/b.rs"]);
+    assert!(
+        found(&[
+            ("r/b.rs", "pub struct B; // super::Other\n#[cfg(test)]\nmod tests {\n    use super::super::Other;\n}"),
+            module
+        ])
+        .is_empty()
+    );
 }
 
 #[test]
 fn no_file_is_too_long() {
-    let long = |source: &Source| (source.text.lines().count() > LONGEST).then(|| source.path.clone());
-    let lines = |path: String| format!("src/{path} has more than {LONGEST} lines");
-    none(sources().iter().filter_map(long).map(lines).collect());
-}
-
-#[test]
-fn words_are_those_outside_comments_and_texts() {
-    let code = "a::b // unsafe\n/* unsafe\n */ \"un\\\"safe\" r#\"unsafe \" \"# 'x' '\\'' &'c d";
-    let found: Vec<String> = words(code).into_iter().map(|(line, word)| format!("{line}{word}")).collect();
-    assert_eq!(found, ["1a", "1::", "1b", "3&", "3'", "3c", "3d"]);
-    let text = "use crate::{mesh::{A, B}, fem}; crate::ddm::X".to_owned();
-    let source = Source { path: "x.rs".into(), words: words(&text), text };
-    let used: Vec<String> = modules_used(&source).into_iter().map(|(_, module)| module).collect();
-    assert_eq!(used, ["mesh", "fem", "ddm"]);
+    let long = sources().into_iter().filter(|source| source.code.lines().count() > LONGEST);
+    none(long.map(|source| format!("src/{} has more than {LONGEST} lines", source.path)).collect());
 }

@@ -344,11 +344,11 @@ fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
             // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
             for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1), ("own", 101, 0)] {
                 let dofs = 2 * side * side;
-                let retained: Vec<usize> = (dofs - 2 * side..dofs).collect();
-                let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &retained)?;
+                let interface: Vec<usize> = (dofs - 2 * side..dofs).collect();
+                let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &interface)?;
                 assert_eq!(schur.ordering(), order, "{body}");
                 schur.factor()?;
-                for row in schur.take_complement().chunks_exact(retained.len()) {
+                for row in schur.take_complement().chunks_exact(interface.len()) {
                     let force: f64 = row.iter().sum();
                     assert!((force * side as f64 - 1.0).abs() < 1e-10, "{body}: {force}");
                 }
