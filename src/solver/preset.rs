@@ -170,8 +170,7 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
 
 #[cfg(test)]
 mod tests {
-    use super::check;
-    use crate::problem::method::Preset;
+    use super::*;
 
     #[test]
     fn hypre_is_refused_only_where_it_is_missing_and_asked_for() {
