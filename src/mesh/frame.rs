@@ -108,6 +108,7 @@ mod tests {
         assert_eq!(Coordinates::Cylindrical.rectangular([2.0, 90.0, 5.0]), [0.0, 2.0, 5.0]);
         assert_eq!(Coordinates::Spherical.rectangular([2.0, 90.0, 180.0]), [-2.0, 0.0, 0.0]);
         assert_eq!(Coordinates::Spherical.rectangular([2.0, 0.0, 45.0]), [0.0, 0.0, 2.0]);
+        assert!((Coordinates::Cylindrical.rectangular([2.0, 30.0, 5.0])[1] - 1.0).abs() < 1e-15);
         // The third axis is x, and the first one y, so that the second one is z.
         let frame = LocalAxes::by_third_axis([1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.0, 2.0, 1.0]).unwrap();
         assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
