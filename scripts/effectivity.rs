@@ -8,9 +8,7 @@ use clap::Parser;
 use series::{Boxes, Series};
 use std::f64::consts::PI;
 use std::path::Path;
-use winkler::api::load;
-use winkler::api::{ContactTable, Error, Kind, Result, Session, solve};
-use winkler::internals::data::{Data, DataSpec};
+use winkler::api::{ContactTable, Data, DataSpec, Error, Kind, Result, Session, load, solve};
 
 /// Estimated over true errors of pressures in space.
 #[derive(Parser)]

@@ -35,6 +35,7 @@
 //! ```
 
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
+pub use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, NoData, Outside};
 pub use crate::ddm::gamma::GammaRule;
 pub use crate::ddm::robin::Iterate;
 pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};

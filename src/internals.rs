@@ -13,11 +13,6 @@ pub mod contact {
     pub use crate::contact::{Carriers, ContactPair, Side, assemble, law, pieces};
 }
 
-pub mod data {
-    //! Functions from files.
-    pub use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, Outside};
-}
-
 pub mod ddm {
     //! The methods.
     pub use crate::ddm::Outcome;

@@ -1,8 +1,8 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
-//! Programs use [`api`] (a scene built in Rust, solved, read as arrays) and [`petsc`] (the binding, useful alone). The feature `cli`, which
-//! is on by default, is the command line. All other modules are private. The feature `internals` shows some of their items to the tests;
-//! these items change without notice.
+//! Programs use [`api`] (a scene built in Rust, solved, read as arrays) and [`petsc`] (the binding, useful alone). The errors of
+//! both are in [`error`]. The feature `cli`, which is on by default, is the command line. Other modules are private. The feature
+//! `internals` shows some of their items to the tests; these items change without notice.
 //!
 //! Data flows one way: scene file -> `scene::Scene`, made of the types in `problem` -> `mesh::Mesh` -> `fem` bodies and `contact` pairs ->
 //! `model::Model` -> sweeps of `robin` -> `ddm::Outcome` -> `run::report`. The loops are those of `ddm`.

@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use std::sync::Arc;
 use winkler::error::{Place, Source};
-use winkler::internals::data::{Data, DataSpec, Detrend, Fill, Interpolation, Outside};
+use winkler::api::{Data, DataSpec, Detrend, Fill, Interpolation, Outside};
 
 fuzz_target!(|bytes: &[u8]| {
     let file = std::env::temp_dir().join(format!("winkler-fuzz-{}", std::process::id()));

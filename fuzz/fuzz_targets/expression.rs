@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use std::sync::Arc;
 use winkler::error::{Place, Source};
-use winkler::internals::data::Library;
+use winkler::api::Library;
 use winkler::internals::expression::{Expression, Field, KnownNames};
 
 fuzz_target!(|text: &str| {

@@ -163,7 +163,12 @@ pub enum Local {
     #[default]
     Elsewhere,
     /// The body will be condensed when solvers are set up.
-    Uncondensed(Condensation),
+    Uncondensed {
+        /// What the condensed body says of its inner solver.
+        words: String,
+        /// The elimination of the interior.
+        condense: Condensation,
+    },
     /// The body, or the part of it that this rank owns.
     Ready(Box<dyn Body>),
 }
@@ -172,7 +177,7 @@ pub enum Local {
 pub type Condensation = Box<dyn FnOnce() -> Result<Box<dyn Body>>>;
 
 impl Local {
-    /// Return the body, if it is ready.
+    /// Return the body, if it is ready. A body that is still to be condensed gives `None`, as one of another rank does.
     pub fn as_ref(&self) -> Option<&dyn Body> {
         match self {
             Self::Ready(body) => Some(&**body),
@@ -188,13 +193,22 @@ impl Local {
         }
     }
 
+    /// Return one line about the inner solver; it is empty on ranks that do not own the body.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Uncondensed { words, .. } => words.clone(),
+            Self::Ready(body) if body.states().leads() => body.describe(),
+            Self::Elsewhere | Self::Ready(_) => String::new(),
+        }
+    }
+
     /// Condense the body, if it is still to be condensed.
     ///
     /// # Errors
     /// Failures of the solver library.
     pub fn condense(&mut self) -> Result<()> {
-        if let Self::Uncondensed(_) = self
-            && let Self::Uncondensed(condense) = std::mem::take(self)
+        if let Self::Uncondensed { .. } = self
+            && let Self::Uncondensed { condense, .. } = std::mem::take(self)
         {
             *self = Self::Ready(condense()?);
         }

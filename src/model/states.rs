@@ -222,8 +222,8 @@ impl States {
     }
 }
 
-/// The distribution of the dofs of a body over the ranks, as one of them sees it: the dofs that it owns, and their places in the distributed matrix that has their rows of K. That is the matrix of all bodies, or
-/// one of the body's own.
+/// The distribution of the dofs of a body over the ranks, as one of them sees it: the dofs that it owns, and their places in the
+/// distributed matrix that has their rows of K. The matrix is that of all bodies, or one of the body's own.
 ///
 /// A state is (v, a): v has the dofs that this rank owns, and the rigid motion a is the same on all ranks. Every rank has a part of a
 /// force, also of the force on the rigid motion, so that work is a sum over ranks.

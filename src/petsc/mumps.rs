@@ -43,7 +43,7 @@ const RESERVED: [(usize, &str); 8] = [
 ///
 /// ```
 /// use winkler::petsc::{Schur, Session};
-/// // the chain 0 - 1 - 2 of springs, held to the ground at 0 and 2, of which dof 2 is retained
+/// // the chain 0 - 1 - 2 of springs, held to the ground at 0 and 2, of which dof 2 is on the interface
 /// let session = Session::start(&[])?;
 /// let lower = [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0), (2, 1, -1.0), (2, 2, 2.0)];
 /// let mut schur = Schur::analyse(&session, "up", 1, 3, &lower, &[2])?;

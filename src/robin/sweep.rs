@@ -331,7 +331,6 @@ const STEPS: usize = 4;
 /// Give every body that lives on this rank the Robin term of its extension, and set its solver up. A refusal of the solver or of an option
 /// then comes before the first sweep, and the extension needs no other factorisation.
 pub fn prepare(model: &mut Model) -> Result<()> {
-    model.condense()?;
     for index in 0..model.bodies.len() {
         let springs = extension_springs(&model.bodies[index]);
         if let Some(body) = model.bodies[index].local.as_mut() {

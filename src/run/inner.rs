@@ -396,8 +396,9 @@ impl Factory for SolverFactory<'_> {
         };
         let (session, chosen) = (self.session.clone(), plan.chosen.clone());
         if let Some(interface) = plan.interface.take() {
+            let words = interface.in_words();
             let whole = Uncondensed { session, chosen, dimension, body, free: left, interface };
-            return Ok(Local::Uncondensed(Box::new(|| Ok(Box::new(whole.condense()?)))));
+            return Ok(Local::Uncondensed { words, condense: Box::new(|| Ok(Box::new(whole.condense()?))) });
         }
         let words = match self.linear {
             Linear::Sweeps => preset::in_words(&chosen),

@@ -229,6 +229,8 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         None => InitialGuess::Automatic,
     };
     let mut full = start.clone();
+    // A condensed body lives on one rank. If its factorisation is refused, no other rank may wait for it in what follows.
+    collectively(session, built.discrete.model.condense())?;
     let method = collectively(session, make(session, &mut built, &mut full))?;
     if scene.method.steps.is_empty() {
         // The start that the set-up found is that of the run. Load steps have other loads.
@@ -407,7 +409,6 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         crate::robin::prepare(model)?;
         return Ok(Box::new(Sweeps::new(coefficient_of(scene))));
     }
-    model.condense()?;
     // Multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows.
     let nodes = linear == Linear::Multigrid || model.is_distributed();
     let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };

@@ -238,7 +238,7 @@ impl GatheredCounters {
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
             let owned = slot.local.as_ref().filter(|body| body.states().leads());
-            mine.solvers.push(owned.map_or(String::new(), |body| body.describe()));
+            mine.solvers.push(slot.local.describe());
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
         }
         all_gather(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()

@@ -4,9 +4,9 @@
 //! stiffness and g = f_R - K_RI K_II^-1 f_I the load of a body with the same contact rows. Its matrix G = S + B_R' diag(weight) B_R is dense and small.
 //! A state stands for that of the whole body with its interior in equilibrium. So residual, energies and all output have the values of the whole body.
 //!
-//! The method sees a body only through its contact rows, so the dofs in these rows are retained. Where all rows that touch a node have the same normal n,
-//! the node is turned to axes (n, t, ...), and only its dof along n is retained. Some more dofs are
-//! retained where supports and contact do not constrain the interior well.
+//! The method sees a body only through its contact rows, so the dofs in these rows are interface dofs. Where all rows that touch a node have the same normal n,
+//! the node is turned to axes (n, t, ...), and only its dof along n is one. Some more dofs are
+//! added where supports and contact do not constrain the interior well.
 
 use super::options::Chosen;
 use super::{Dense, SparseBody};
@@ -193,14 +193,14 @@ impl Body for CondensedBody {
     }
 
     fn describe(&self) -> String {
-        format!("condensed to {} dofs by mumps", self.interface.dofs.len())
+        self.interface.in_words()
     }
 }
 
 /// Normals at a node count as parallel if the sine of their angle is at most this.
 const PARALLEL: f64 = 1e-12;
 
-/// One more dof is retained for a rigid motion that is constrained by less than this share of what all constrained dofs could do. This is about accuracy, not
+/// One more interface dof is added for a rigid motion that is constrained by less than this share of what all constrained dofs could do. This is about accuracy, not
 /// only about whether the motion is constrained at all: the condition of the interior is about 1/SAFE times that of a clamped body, which leaves ten of
 /// sixteen digits.
 const SAFE: f64 = 1e-6;
@@ -218,6 +218,11 @@ pub struct InterfaceDofs {
 }
 
 impl InterfaceDofs {
+    /// Return the description of the inner solver of a body that is condensed to these dofs.
+    pub fn in_words(&self) -> String {
+        format!("condensed to {} dofs by mumps", self.dofs.len())
+    }
+
     /// Choose the dofs for contact `rows` (columns: all dofs, `dimension` of them a node), `prescribed` (dof, value) and the
     /// rigid `motions` of the free body.
     pub fn new(dimension: usize, rows: &Csr, prescribed: &[(usize, f64)], motions: AtDofs) -> Self {

@@ -138,6 +138,20 @@ fn quiet_runs_say_what_matters() {
     assert_eq!((all.code, all.stdout.trim()), (0, format!("results in {out}").as_str()), "{}", all.said());
 }
 
+/// `check` names the solvers that `solve` takes.
+#[test]
+fn check_names_the_solvers_of_a_run() {
+    let words = ["--set", "mesh.set.n=8"];
+    for solver in ["solver=condensed", "solver=mumps", "solver=hypre"] {
+        let words = [&words[..], &["--set", solver]].concat();
+        let scene = case("groove");
+        let checked = winkler(&[&["check", scene.to_str().expect("a path"), "--json"], &words[..]].concat());
+        let facts: serde_json::Value = serde_json::from_str(&checked.stdout).expect("JSON");
+        let solvers = facts["bodies"].as_array().expect("bodies").iter().map(|body| body["solver"].clone());
+        assert_eq!(solvers.collect::<Vec<_>>(), solve(scene, &words).solvers(), "{solver}");
+    }
+}
+
 /// With `-v` standard error has the decisions and the PETSc options of each body, typed ones and the program's own.
 #[test]
 fn verbose_runs_say_what_was_decided() {

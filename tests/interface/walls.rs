@@ -267,19 +267,21 @@ fn used(sources: &[Source], from: usize) -> BTreeSet<usize> {
         let inside = source.paths(&code, &child[module.len()..]);
         paths.extend(inside.into_iter().map(|(_, path)| child.clone() + &path));
     }
-    let leads_to = |path: &String| {
-        let path = path.trim_end_matches("self").to_owned() + "::";
-        let holders = (0..sources.len()).filter(|&i| path.starts_with(&sources[i].module));
-        let holder = holders.max_by_key(|&i| sources[i].module.len())?;
-        let inner = &sources[holder].module;
-        let name = path[inner.len()..].split("::").next()?;
-        if matches!(name, "" | "*") {
-            return Some(holder);
-        }
-        let passed_on = |&i: &usize| sources[i].module.starts_with(inner) && sources[i].items.contains(name);
-        if sources[holder].items.contains(name) { Some(holder) } else { (0..sources.len()).find(passed_on) }
-    };
-    paths.iter().filter_map(leads_to).filter(|&i| i != from).collect()
+    paths.iter().filter_map(|path| file_of(sources, path)).filter(|&i| i != from).collect()
+}
+
+/// Return the file that makes the item of a path.
+fn file_of(sources: &[Source], path: &str) -> Option<usize> {
+    let path = path.trim_end_matches("self").to_owned() + "::";
+    let holders = (0..sources.len()).filter(|&i| path.starts_with(&sources[i].module));
+    let holder = holders.max_by_key(|&i| sources[i].module.len())?;
+    let inner = &sources[holder].module;
+    let name = path[inner.len()..].split("::").next()?;
+    if matches!(name, "" | "*") {
+        return Some(holder);
+    }
+    let passed_on = |&i: &usize| sources[i].module.starts_with(inner) && sources[i].items.contains(name);
+    if sources[holder].items.contains(name) { Some(holder) } else { (0..sources.len()).find(passed_on) }
 }
 
 /// Return the uses, as `a -> b`, among files that use each other directly or through others.

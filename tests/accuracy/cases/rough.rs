@@ -3,11 +3,11 @@
 use super::{close, solved};
 use crate::common::series::{Boxes, Series};
 use crate::common::{case, root};
-use winkler::internals::data::{Data, DataSpec};
+use winkler::api::{Data, DataSpec, load};
 
 /// The heights of the case, as a scene has them.
 fn rough() -> Data {
-    let scene = winkler::api::load(&case("rough"), &[]).expect("the case");
+    let scene = load(&case("rough"), &[]).expect("the case");
     let data = Data::new(DataSpec { file: root().join("meshes/rough/rough.csv"), ..scene.data["rough"].spec.clone() });
     data.load().expect("its heights");
     data
