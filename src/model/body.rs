@@ -84,10 +84,10 @@ pub struct Loads {
 
 /// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
-/// Its [`States`] say what a state is. Solves may be inexact, but [`Body::residual`] is exact. For a body that is distributed over ranks
+/// Its [`States`] describe a state. Solves may be inexact, but [`Body::residual`] is exact. For a body that is distributed over ranks
 /// `residual` and `recover` are collective. Errors are failures of the solver library.
 pub trait Body {
-    /// Return the facts on the states of the body. They stay as they are until [`Body::reload`].
+    /// Return what a state of the body is. Only [`Body::reload`] changes it.
     fn states(&self) -> &States;
 
     /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each row. Return the
@@ -207,11 +207,10 @@ impl Local {
     /// # Errors
     /// Failures of the solver library.
     pub fn condense(&mut self) -> Result<()> {
-        if let Self::Uncondensed { .. } = self
-            && let Self::Uncondensed { condense, .. } = std::mem::take(self)
-        {
-            *self = Self::Ready(condense()?);
-        }
+        *self = match std::mem::take(self) {
+            Self::Uncondensed { condense, .. } => Self::Ready(condense()?),
+            local => local,
+        };
         Ok(())
     }
 }

@@ -32,7 +32,7 @@ impl FreeMotion {
 /// state is the work on the displacement. The rigid part R'r comes from loads and contact forces, without K.
 #[derive(Default)]
 pub struct States {
-    /// Number of dofs of a state, which the amounts of its rigid motions follow.
+    /// Number of dofs of a state. The amounts of the rigid motions come after the dofs.
     pub dofs: usize,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
@@ -52,9 +52,14 @@ pub struct States {
 }
 
 impl States {
-    /// Describe the states of a body with so many `dofs`, of which some are `prescribed`, with its contact `rows`. The independent rigid motions `free`
-    /// that its supports leave are made orthogonal. For a distributed body `rows` and `free` have the dofs of the owned and ghost nodes of this rank, and
-    /// forces on rigid motions belong to the rank that owns the body.
+    /// Make the states of a body.
+    ///
+    /// - `dofs` is the number of dofs of a state.
+    /// - `prescribed` lists the prescribed dofs with their values.
+    /// - `rows` are the contact rows B of the body.
+    /// - `free` are independent rigid motions that its supports leave. This function makes them orthogonal.
+    ///
+    /// If the body is distributed, the columns of `rows` and the displacements of `free` belong to the owned and ghost nodes of this rank.
     pub fn new(
         dofs: usize,
         prescribed: Vec<(usize, f64)>,
@@ -128,7 +133,7 @@ impl States {
         self.distribution.as_ref().is_none_or(|distribution| distribution.leads)
     }
 
-    /// Return the number of rigid motions. A state ends with so many amounts of them.
+    /// Return the number of rigid motions. A state ends with one amount for each.
     pub fn rigid(&self) -> usize {
         self.motions.len()
     }

@@ -5,7 +5,7 @@
 //! A state stands for that of the whole body with its interior in equilibrium. So residual, energies and all output have the values of the whole body.
 //!
 //! The method sees a body only through its contact rows, so the dofs in these rows are interface dofs. Where all rows that touch a node have the same normal n,
-//! the node is turned to axes (n, t, ...), and only its dof along n is one. Some more dofs are
+//! the node is turned to axes (n, t, ...), and only its dof along n is an interface dof. Some more dofs are
 //! added where supports and contact do not constrain the interior well.
 
 use super::options::Chosen;
