@@ -293,12 +293,17 @@ impl AdaptiveRun {
             return false;
         };
         self.record(done, estimate, clock);
-        if !is_solved || self.repeats_best {
+        if !is_solved {
             return false;
         }
         let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
         if error <= goal.error.value {
+            // the best mesh once more may have the error, because its estimate is held against another mesh than the first time
+            self.limit = None;
             return self.end_meshes();
+        }
+        if self.repeats_best {
+            return false;
         }
         if self.rounds.len() >= goal.rounds {
             self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));

@@ -252,6 +252,19 @@ fn options_that_spoil_solves_are_found_out() {
     assert!(found_out > 1, "{found_out}");
 }
 
+/// An inaccurate result with three digits tells the tolerance that accepts it.
+#[test]
+fn an_inaccurate_result_tells_what_accepts_it() {
+    let options = "-ksp_type cg -pc_type icc -ksp_atol 1e-6";
+    let refused = held(options);
+    assert_eq!(refused.text("status"), "inaccurate", "{}", refused.said());
+    let message = refused.text("message");
+    let (_, set) = message.split_once("--set ").expect("the first advice");
+    let (_, set) = set.split_once("--set method.stop.residual=").expect("the tolerance");
+    let accepting = format!("{options} --set method.stop.residual={}", set.trim_end_matches(')'));
+    held(&accepting).converged();
+}
+
 /// The error of a run that stopped too early, from the look at its forces: never more than that from the energies, and not much less.
 #[test]
 fn the_last_look_sees_the_error_that_is_there() {
