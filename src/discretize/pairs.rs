@@ -112,7 +112,9 @@ pub fn all<const D: usize>(
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
     let named = scene.contacts.iter().enumerate();
-    let mut found = named.map(|named| self::named(named, mesh, cut, &owners, parts)).collect::<Result<Vec<_>>>()?;
+    let mut found = named
+        .map(|named| self::named(named, mesh, cut, &owners, parts, scene.adapt.is_some()))
+        .collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
@@ -133,6 +135,7 @@ fn named<'a, const D: usize>(
     cut: Cut<D>,
     owners: &Owners,
     parts: &[SceneBody<D>],
+    adapts: bool,
 ) -> Result<SurfacePair<'a, D>> {
     let surface = |k: usize| {
         let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
@@ -152,8 +155,8 @@ fn named<'a, const D: usize>(
     };
     let mut pieces = Vec::new();
     if !sides.iter().all(is_smooth) {
-        // The finer side is projected onto the other, so that the order of the names changes nothing.
-        let swapped = second_carries([&sides[0], &sides[1]]);
+        // The side with the contact points is projected onto the other, so that the order of the names changes nothing.
+        let swapped = second_carries([&sides[0], &sides[1]], adapts);
         let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
         let reach = Reach::between(a, b, spec.angle, spec.distance);
         pieces = FaceSplit::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
@@ -170,12 +173,26 @@ fn named<'a, const D: usize>(
     Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], names, pieces })
 }
 
-/// Return whether the second of two surfaces carries the contact points of their pair: the finer one does, whatever the order in the
-/// scene, and the first by name if both are equally fine.
-fn second_carries<const D: usize>([first, second]: [&Side<D>; 2]) -> bool {
-    let (fine_a, fine_b) = (first.mean_measure(), second.mean_measure());
-    let equal = (fine_a - fine_b).abs() <= 1e-6 * fine_a;
-    if equal { first.name >= second.name } else { fine_a >= fine_b }
+/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points. Uniform meshes of one size stay below it.
+const MUCH_FINER: f64 = 2.0;
+
+/// Return whether the second of two surfaces carries the contact points of their pair. If meshes are adapted (`adapts`), their sizes have no say.
+fn second_carries<const D: usize>([first, second]: [&Side<D>; 2], adapts: bool) -> bool {
+    let ratio = (first.mean_measure() / second.mean_measure()).powf(1.0 / (D - 1) as f64);
+    second_is_chosen([first.name, second.name], (!adapts).then_some(ratio))
+}
+
+/// Return whether the second of two surfaces with these names carries the contact points, if the sizes of their facets have this ratio. The first
+/// one by name does, whatever the order in the scene, unless the facets of the other are much smaller.
+///
+/// Compressions are measured along the normals of the chosen side, and those of the other side give other pressures on curved surfaces that
+/// slide. So the side must not change from one mesh of a scene to the next.
+fn second_is_chosen([first, second]: [&str; 2], ratio: Option<f64>) -> bool {
+    match ratio {
+        Some(ratio) if ratio > MUCH_FINER => true,
+        Some(ratio) if ratio < MUCH_FINER.recip() => false,
+        _ => first >= second,
+    }
 }
 
 /// Two surfaces that are to be a pair.
@@ -209,7 +226,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
         let first = parts[bodies[0]].side(names[0], on_first);
         let second = parts[bodies[1]].side(names[1], on_second);
-        let swapped = second_carries([&first, &second]);
+        let swapped = second_carries([&first, &second], scene.adapt.is_some());
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
@@ -393,4 +410,20 @@ fn closest<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
     let (ours, others) = (normals(a), normals(b));
     let facing = |n: &[f64; D]| others.iter().map(|m| -dot(n, m)).fold(-1.0, f64::max);
     ours.iter().map(facing).fold(-1.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The side of the contact points does not depend on the order of the surfaces, and not on sizes that are alike or adapted.
+    #[test]
+    fn the_side_of_the_contact_points_is_that_of_the_scene() {
+        for (ratio, first_name_carries) in
+            [(None, true), (Some(1.0), true), (Some(1.9), true), (Some(2.1), false), (Some(0.4), true)]
+        {
+            assert_eq!(second_is_chosen(["a", "b"], ratio), !first_name_carries, "{ratio:?}");
+            assert_eq!(second_is_chosen(["b", "a"], ratio.map(f64::recip)), first_name_carries, "{ratio:?}");
+        }
+    }
 }
