@@ -248,11 +248,14 @@ impl Inputs {
     }
 }
 
+/// What Gmsh says of a script whose mesh is larger than its shape. Fields of sizes are evaluated on the shape, and sizes are known on the mesh.
+const SCALED: &str = "Mesh.ScalingFactor must be 1 where meshes follow sizes: scale the shape (Dilate) instead";
+
 /// Write a script into the folder `work` that meshes another script to a field of sizes, and return its path.
 ///
 /// `field` is a view of Gmsh (`.pos`). Where a point is in none of the view's cells, Gmsh would make cells as large as the
-/// part, so the script limits sizes to the largest of the view. Structured meshes cannot follow sizes, so their commands are
-/// removed in a copy.
+/// part, so the script limits sizes to the largest of the view. A smallest size that the other script sets (`Mesh.MeshSizeMin`) gives way to
+/// the smallest of the view, and a factor on sizes (`Mesh.MeshSizeFactor`) to one. Structured meshes cannot follow sizes, so their commands are removed in a copy.
 ///
 /// # Errors
 /// A structured script reads other files, which a copy would not find. The folder cannot be written.
@@ -272,9 +275,12 @@ pub(super) fn script(file: &Located<PathBuf>, read: &Script, field: &str, work: 
     let sizes = work.join("sizes.pos");
     write(&sizes, field)?;
     let text = format!(
-        "Include {};\nMesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\n\
+        "Include {};\nIf (Mesh.ScalingFactor != 1)\nError(\"{SCALED}\");\nExit;\nEndIf\n\
+         Mesh.MeshSizeExtendFromBoundary = 0;\nMesh.MeshSizeFromPoints = 0;\nMesh.MeshSizeFactor = 1;\n\
          Merge {};\nBackground Mesh View[PostProcessing.NbViews - 1];\n\
-         Mesh.MeshSizeMax = View[PostProcessing.NbViews - 1].Max;\n",
+         Mesh.MeshSizeMax = View[PostProcessing.NbViews - 1].Max;\n\
+         If (Mesh.MeshSizeMin > View[PostProcessing.NbViews - 1].Min)\n\
+         Mesh.MeshSizeMin = View[PostProcessing.NbViews - 1].Min;\nEndIf\n",
         quoted(&script)?,
         quoted(&sizes)?
     );

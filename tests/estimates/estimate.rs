@@ -439,6 +439,26 @@ fn limits_of_adaptation() {
     assert_eq!((two.code, two.stderr.matches("cannot be made anew").count()), (3, 1), "{}", two.said());
 }
 
+/// What a script says of sizes gives way to sizes that a mesh follows, and a script that scales its mesh is refused.
+#[test]
+fn adapted_meshes_of_scripts_with_sizes_of_their_own() {
+    let case = crate::common::text_of("groove-held");
+    let script = std::fs::read_to_string(root().join("meshes/groove/groove.geo")).expect("the script of the groove");
+    let adapted = |line: &str| {
+        let scene = Scene::new(
+            case.replace(&format!("{}/../groove/groove.geo", root().join("meshes/groove-held").display()), "own.geo"),
+        );
+        std::fs::write(scene.path.with_file_name("own.geo"), format!("{script}\n{line}\n")).expect("a script");
+        solve(&scene, &["--tolerance", "2e-3"])
+    };
+    for line in ["Mesh.MeshSizeMin = 0.2;", "Mesh.MeshSizeFactor = 2;"] {
+        adapted(line).converged();
+    }
+    let scaled = adapted("Mesh.ScalingFactor = 10;");
+    assert_eq!(scaled.code, 4, "{}", scaled.said());
+    assert!(scaled.stderr.contains("own.geo") && scaled.stderr.contains("Mesh.ScalingFactor"), "{}", scaled.said());
+}
+
 /// Springs to the ground that only hold bodies whose loads balance: the estimate is the same however soft they are, while what quadrature misses of the
 /// loads moves the bodies by more than all of their deformation. Springs that carry a load count.
 #[test]
