@@ -37,7 +37,7 @@ pub struct BodyInfo {
     /// Names of the rigid motions that no contact row can resist either.
     pub left_by_all: Vec<String>,
     /// Rigid motions that only the mesh resists.
-    pub gauged: RemovedModes,
+    pub removed_modes: RemovedModes,
     /// Warning for the user about the elasticity.
     pub warning: Option<String>,
     /// Stiffness of the body against a uniform contact pressure, per area. It is the modulus over the depth, which is the area
@@ -229,7 +229,7 @@ impl<const D: usize> Unassembled<'_, D> {
             supported: part.held.supported(),
             left_by_supports: unconstrained.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: unconstrained.unresisted.iter().map(|(name, _)| name.clone()).collect(),
-            gauged: self.removed_modes.clone(),
+            removed_modes: self.removed_modes.clone(),
             warning: part.locking(plane),
             stiffness: if is_held { modulus / depth } else { 0.0 },
             load,

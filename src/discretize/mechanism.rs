@@ -284,6 +284,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             };
             let (idle, worked): (Vec<_>, Vec<_>) =
                 round.into_iter().map(moving).partition(|moving| self.work(moving) == 0.0);
+            self.bodies[body].removed_modes.slides |= !(idle.is_empty() && worked.is_empty());
             if idle.first().and_then(|moving| self.pin(moving)).is_none() {
                 self.bodies[body].removed_modes.spinning = worked.into_iter().map(|moving| moving.name).collect();
                 return;

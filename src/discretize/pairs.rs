@@ -97,7 +97,7 @@ impl PairOrigin {
 }
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests
-/// integration points.
+/// integration points. The bodies `sliding` can move along their own contact surfaces.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
@@ -107,20 +107,21 @@ pub fn all<const D: usize>(
     cut: Cut<D>,
     parts: &[SceneBody<D>],
     fine: bool,
+    sliding: &[usize],
 ) -> Result<Vec<Contact<D>>> {
     let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
+    let rule = CarrierRule { adapts: scene.adapt.is_some(), sliding };
     let named = scene.contacts.iter().enumerate();
-    let mut found = named
-        .map(|named| self::named(named, mesh, cut, &owners, parts, scene.adapt.is_some()))
-        .collect::<Result<Vec<_>>>()?;
+    let mut found =
+        named.map(|named| self::named(named, mesh, cut, &owners, parts, rule)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
     let mut opposite = Vec::new();
     for SurfacePair { entry, bodies, names, pieces } in found {
-        opposite.extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece)));
+        opposite.extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece, rule)));
     }
     opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
 }
@@ -135,7 +136,7 @@ fn named<'a, const D: usize>(
     cut: Cut<D>,
     owners: &Owners,
     parts: &[SceneBody<D>],
-    adapts: bool,
+    rule: CarrierRule,
 ) -> Result<SurfacePair<'a, D>> {
     let surface = |k: usize| {
         let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
@@ -156,7 +157,7 @@ fn named<'a, const D: usize>(
     let mut pieces = Vec::new();
     if !sides.iter().all(is_smooth) {
         // The side with the contact points is projected onto the other, so that the order of the names changes nothing.
-        let swapped = second_carries([&sides[0], &sides[1]], adapts);
+        let swapped = rule.chooses_second([first, second], [&sides[0], &sides[1]]);
         let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
         let reach = Reach::between(a, b, spec.angle, spec.distance);
         pieces = FaceSplit::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
@@ -176,22 +177,35 @@ fn named<'a, const D: usize>(
 /// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points. Uniform meshes of one size stay below it.
 const MUCH_FINER: f64 = 2.0;
 
-/// Return whether the second of two surfaces carries the contact points of their pair. If meshes are adapted (`adapts`), their sizes have no say.
-fn second_carries<const D: usize>([first, second]: [&Side<D>; 2], adapts: bool) -> bool {
-    let ratio = (first.mean_measure() / second.mean_measure()).powf(1.0 / (D - 1) as f64);
-    second_is_chosen([first.name, second.name], (!adapts).then_some(ratio))
+/// The rule by which one of two surfaces carries the contact points of their pair, whatever their order in the scene.
+///
+/// Compressions are measured along the normals of that side, and those of the other side give other pressures on curved surfaces that
+/// slide. So the side must not change from one mesh of a scene to the next.
+#[derive(Clone, Copy)]
+struct CarrierRule<'a> {
+    /// Whether meshes are adapted. Their sizes have no say then.
+    adapts: bool,
+    /// Bodies that can move along their own contact surfaces, such as rollers. Only their own normals leave such a motion free.
+    sliding: &'a [usize],
 }
 
-/// Return whether the second of two surfaces with these names carries the contact points, if the sizes of their facets have this ratio. The first
-/// one by name does, whatever the order in the scene, unless the facets of the other are much smaller.
-///
-/// Compressions are measured along the normals of the chosen side, and those of the other side give other pressures on curved surfaces that
-/// slide. So the side must not change from one mesh of a scene to the next.
-fn second_is_chosen([first, second]: [&str; 2], ratio: Option<f64>) -> bool {
-    match ratio {
-        Some(ratio) if ratio > MUCH_FINER => true,
-        Some(ratio) if ratio < MUCH_FINER.recip() => false,
-        _ => first >= second,
+impl CarrierRule<'_> {
+    /// Return whether the second of two surfaces of these bodies carries the contact points.
+    fn chooses_second<const D: usize>(self, bodies: [usize; 2], [first, second]: [&Side<D>; 2]) -> bool {
+        let ratio = (first.mean_measure() / second.mean_measure()).powf(1.0 / (D - 1) as f64);
+        self.chooses_second_of(bodies, [first.name, second.name], ratio)
+    }
+
+    /// Return whether the second of two surfaces with these names carries the contact points, if the sizes of their facets have this `ratio`.
+    /// That is the surface of the only sliding body, else the much finer one, else the first one by name.
+    fn chooses_second_of(self, bodies: [usize; 2], [first, second]: [&str; 2], ratio: f64) -> bool {
+        match bodies.map(|body| self.sliding.contains(&body)) {
+            [false, true] => true,
+            [true, false] => false,
+            _ if !self.adapts && ratio > MUCH_FINER => true,
+            _ if !self.adapts && ratio < MUCH_FINER.recip() => false,
+            _ => first >= second,
+        }
     }
 }
 
@@ -220,13 +234,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
         bodies: [usize; 2],
         names: [&'a str; 2],
         piece: PairPart<D>,
+        rule: CarrierRule,
     ) -> Self {
         let origin = PairOrigin::new(entry, names, piece.face);
         let spec = origin.spec(scene);
         let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
         let first = parts[bodies[0]].side(names[0], on_first);
         let second = parts[bodies[1]].side(names[1], on_second);
-        let swapped = second_carries([&first, &second], scene.adapt.is_some());
+        let swapped = rule.chooses_second(bodies, [&first, &second]);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
@@ -419,11 +434,25 @@ mod tests {
     /// The side of the contact points does not depend on the order of the surfaces, and not on sizes that are alike or adapted.
     #[test]
     fn the_side_of_the_contact_points_is_that_of_the_scene() {
-        for (ratio, first_name_carries) in
-            [(None, true), (Some(1.0), true), (Some(1.9), true), (Some(2.1), false), (Some(0.4), true)]
-        {
-            assert_eq!(second_is_chosen(["a", "b"], ratio), !first_name_carries, "{ratio:?}");
-            assert_eq!(second_is_chosen(["b", "a"], ratio.map(f64::recip)), first_name_carries, "{ratio:?}");
+        let cases = [
+            (false, 1.0, &[][..], true),
+            (false, 1.9, &[], true),
+            (false, 2.1, &[], false),
+            (true, 2.1, &[], true),
+            (false, 0.4, &[], true),
+            (false, 0.4, &[8], false),
+            (true, 1.0, &[8], false),
+            (false, 2.1, &[7], true),
+            (false, 2.1, &[7, 8], false),
+        ];
+        for (adapts, ratio, sliding, is_first) in cases {
+            let rule = CarrierRule { adapts, sliding };
+            assert_eq!(rule.chooses_second_of([7, 8], ["a", "b"], ratio), !is_first, "{adapts} {ratio} {sliding:?}");
+            assert_eq!(
+                rule.chooses_second_of([8, 7], ["b", "a"], ratio.recip()),
+                is_first,
+                "{adapts} {ratio} {sliding:?}"
+            );
         }
     }
 }

@@ -68,13 +68,15 @@ pub struct Unconstrained<const D: usize> {
     pub unresisted: Vec<(String, DVector<f64>)>,
 }
 
-/// Names of the rigid motions of a body that neither supports nor smooth surfaces resist.
+/// The rigid motions of a body that neither supports nor smooth surfaces resist, by name.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct RemovedModes {
     /// Motions without work of the loads, which are fixed at one node each.
     pub fixed: Vec<String>,
     /// Motions on which loads work. Only the facets of the mesh resist them.
     pub spinning: Vec<String>,
+    /// Whether some of these motions are along the body's own curved surface, so that normals of other bodies would resist them.
+    pub slides: bool,
 }
 
 /// The displacements that supports prescribe.

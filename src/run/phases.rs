@@ -278,7 +278,7 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
              cells smaller there, or less flat"
         ));
     }
-    let warnings = warnings::of_pressures(&discrete.model, &estimate);
+    let warnings = warnings::of_pressures(discrete, &estimate);
     done.warnings.extend(warnings);
     clock.phase("estimate");
     Ok(Some(estimate))

@@ -10,7 +10,7 @@ use crate::discretize::{Balanced, ContactInfo, Discrete, point};
 use crate::error::few;
 use crate::estimate::{Cause, Estimate};
 use crate::linalg::diagonal;
-use crate::model::{Mechanism, Model};
+use crate::model::Mechanism;
 use crate::output::sci;
 use crate::petsc::{Schur, Session, has_metis};
 use crate::problem::LayerSpec;
@@ -51,15 +51,15 @@ pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> V
             session.size()
         ));
     }
-    for body in discrete.bodies.iter().filter(|body| !body.gauged.fixed.is_empty()) {
-        let motions = body.gauged.fixed.join("; ");
+    for body in discrete.bodies.iter().filter(|body| !body.removed_modes.fixed.is_empty()) {
+        let motions = body.removed_modes.fixed.join("; ");
         warnings.push(format!(
             "body {}: nothing holds its {motions}, and no load works on it: it is fixed at one node",
             body.name
         ));
     }
-    for body in discrete.bodies.iter().filter(|body| !body.gauged.spinning.is_empty()) {
-        let motions = body.gauged.spinning.join("; ");
+    for body in discrete.bodies.iter().filter(|body| !body.removed_modes.spinning.is_empty()) {
+        let motions = body.removed_modes.spinning.join("; ");
         warnings.push(format!(
             "body {}: only the facets of the mesh resist its {motions}, and loads work on it: its displacements mean nothing; hold it, or load it through its centre",
             body.name
@@ -68,8 +68,21 @@ pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> V
     warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
+    warnings.extend(discrete.model.pairs.iter().filter_map(|pair| sliding_on_each_other(discrete, pair)));
     warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.contacts));
     warnings
+}
+
+/// Return the warning of a pair whose bodies can both move along their surfaces. The normals are those of one of them, and resist the other one.
+fn sliding_on_each_other(discrete: &Discrete, pair: &ContactPair) -> Option<String> {
+    let [a, b] = pair.bodies.map(|body| &discrete.bodies[body]);
+    (a.removed_modes.slides && b.removed_modes.slides).then(|| {
+        format!(
+            "bodies {} and {}: both can turn or slide along their surfaces, and the normals of {0} resist that of {1}: pressures depend on the node at which \
+             {1} is fixed; hold its motion by a support or a weak spring",
+            a.name, b.name
+        )
+    })
 }
 
 /// Return the warning of elements that were split, if any.
@@ -112,9 +125,9 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
 const ONE_SIDED: f64 = 0.01;
 
 /// Return warnings of pressures whose estimated error is a guess, or that depend on the side that gives the normals by more than that error.
-pub fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
+pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
-    for (i, pair) in model.pairs.iter().enumerate() {
+    for (i, pair) in discrete.model.pairs.iter().enumerate() {
         let [a, b] = &pair.surfaces;
         if let Some(guess) = estimate.guesses[i] {
             let place = point(guess.place);
@@ -131,7 +144,9 @@ pub fn of_pressures(model: &Model, estimate: &Estimate) -> Vec<String> {
             warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
         }
         let change = estimate.sides[i];
-        if change > estimate.pressure[i].max(ONE_SIDED) {
+        // a body that moves along its own surface stands at any place of this motion, which the normals of the other body would resist
+        let is_free = discrete.bodies[pair.bodies[0]].removed_modes.slides;
+        if !is_free && change > estimate.pressure[i].max(ONE_SIDED) {
             warnings.push(format!(
                 "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
                  than by their estimated error: the surfaces slide or tilt too far for small displacements",

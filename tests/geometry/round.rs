@@ -16,7 +16,7 @@ Line(11) = {10, 11}; Line(12) = {11, 12}; Line(13) = {12, 13}; Line(14) = {13, 1
 Curve Loop(2) = {11 : 15}; Plane Surface(2) = {2};
 Field[1] = MathEval; Field[1].F = Sprintf(\"%g + 0.25*Sqrt((Fabs(x) - %g)^2 + (y - %g)^2)\", h, 7.07, 7.07);
 Background Field = 1; Mesh.MeshSizeExtendFromBoundary = 0; Mesh.MeshSizeFromPoints = 0;
-Physical Surface(\"roller\") = {1}; Physical Surface(\"vee\") = {2}; Physical Curve(\"skin\") = {1}; Physical Curve(\"base\") = {13};
+Physical Surface(\"roller\") = {1}; Physical Surface(\"groove\") = {2}; Physical Curve(\"skin\") = {1}; Physical Curve(\"base\") = {13};
 ";
 
 /// Two rings, the outer one around the inner one, and balls: one in a hollow of another.
@@ -51,7 +51,7 @@ fn in_vee(order: usize, a: f64, load: &str) -> Scene {
     let text = format!(
         "dimension = 2\nmesh = {{ geo = \"round.geo\", set = {{ a = {a} }} }}
 [[body]]\nname = \"roller\"\norder = {order}\nyoung = 2.1e5\npoisson = 0.3\n{load}
-[[body]]\nname = \"vee\"\norder = {order}\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"base\", x = 0, y = 0 }}]
+[[body]]\nname = \"groove\"\norder = {order}\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"base\", x = 0, y = 0 }}]
 [[contact]]\nbetween = \"auto\"\ndistance = 1\nlayer = {{ linear = {{ stiffness = 1e6 }} }}\n"
     );
     scene(VEE, &text)
@@ -72,13 +72,17 @@ fn displacement(run: &Run, body: usize) -> f64 {
     run.number(&format!("bodies/{body}/max_displacement"))
 }
 
-/// The walls carry the roller, at whatever fineness and order, and it stays where it is, whichever side carries the points.
+/// The walls carry the roller, at whatever fineness and order, and it stays where it is. Its own surface carries the points, so that the node at
+/// which it is fixed has no reaction.
 #[test]
 fn a_roller_in_a_vee_does_not_spin() {
     for (order, h) in [(1, "0.3"), (1, "0.1"), (2, "0.3"), (2, "0.1")] {
         let run = solve(in_vee(order, 10.0, WEIGHT), &["--set", &format!("mesh.set.h={h}")]).converged();
         assert!(is_fixed(&run, "roller"), "{order} {h}\n{}", run.said());
         assert!(displacement(&run, 0) < 0.1, "{order} {h}: {}\n{}", displacement(&run, 0), run.said());
+        // facets of straight edges turn it a little
+        let most = if order == 1 { 1e-4 } else { 1e-7 };
+        assert!(run.number("bodies/0/balance/force_imbalance") < most, "{order} {h}: {}", run.said());
         let [force, _] = run.forces(0);
         assert!((force[1].abs() / 1000.0 - 1.0).abs() < 2e-2, "{order} {h}: {force:?}");
     }
