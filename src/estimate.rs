@@ -56,7 +56,7 @@ impl Estimate {
 
 /// Relative error of the response in the solve for the nodal errors. The error of conjugate gradients is orthogonal to their iterate, so the energy norm is
 /// wrong by half of the square of this. Pressures changed by at most 0.3 % from those with a tolerance of 0.01.
-const TOLERANCE: f64 = 0.1;
+const TOLERANCE: f64 = 0.01;
 
 /// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies, and `share` is the factor of prescribed
 /// displacements to which the iterate belongs. Collective.

@@ -372,17 +372,17 @@ pub fn respond(
     loads: &[Vec<f64>],
     share: f64,
 ) -> Result<std::result::Result<(Field, f64), Failure>> {
-    let mut residual = Vec::new();
+    let (mut residual, mut work) = (Vec::new(), [0.0]);
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
-        residual.push(match slot.local.as_mut() {
-            Some(body) => body.reduce(load)?,
-            None => Vec::new(),
-        });
+        let reduced = slot.local.as_mut().map(|body| body.reduce(load)).transpose()?.unwrap_or_default();
+        residual.push(reduced.force);
+        work[0] += reduced.work;
     }
+    model.exchange.sum(&mut work);
     let springs = resisting(model, places.springs(model));
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(share);
     let system = System { model, places, springs: &springs, residual: &residual, enough: &mut enough };
-    Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy)))
+    Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy + work[0])))
 }
 
 /// Stiffness, as a share of the springs of whole surfaces, that resists motions which no closed contact resists: such motions then go far, but not

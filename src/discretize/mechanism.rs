@@ -263,6 +263,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         while let Some(moving) = self.of_one(body).into_iter().find(|moving| self.work(moving) == 0.0)
             && self.pin(&moving).is_some()
         {
+            self.bodies[body].removed_modes.slides |= moving.error > 0.0;
             self.bodies[body].removed_modes.fixed.extend(moving.motions.into_iter().map(|motion| motion.name));
         }
     }
@@ -389,9 +390,15 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions of a body that contact does not resist.
     fn of_one(&self, body: usize) -> Vec<Moving<D>> {
         let Unconstrained { left, unresisted, .. } = &self.bodies[body].unconstrained;
+        if unresisted.is_empty() {
+            return Vec::new();
+        }
+        let is_curved = SurfacePoints::of(&self.bodies[body], self.pairs).are_curved();
         let moving = |(name, weights): &(String, DVector<f64>)| {
-            let motions = vec![rigid::combine(left, weights)];
-            Moving { bodies: vec![body], motions, name: name.clone(), error: 0.0 }
+            let motion = rigid::combine(left, weights);
+            // the normals of a round partner may leave the spin of a round body free to the last digit, but its centre is that of a mesh
+            let error = if is_curved && motion.turns() { FLAWED } else { 0.0 };
+            Moving { bodies: vec![body], motions: vec![motion], name: name.clone(), error }
         };
         unresisted.iter().map(moving).collect()
     }
@@ -557,6 +564,11 @@ impl<const D: usize> SurfacePoints<D> {
             }));
         }
         Self(points)
+    }
+
+    /// Return whether the surface is curved. Normals of flat facets differ by rounding, those of quadratic ones by the cube of the angle of a facet.
+    fn are_curved(&self) -> bool {
+        self.0.iter().any(|point| point.spread > f64::EPSILON.sqrt())
     }
 
     /// Return the combinations of motions that only facets resist. Pure motions are returned as such.

@@ -13,6 +13,7 @@ use crate::fem::{Facets, unit};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{ContactSpec, Overlap};
+use crate::problem::order::Order;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -157,7 +158,7 @@ fn named<'a, const D: usize>(
     let mut pieces = Vec::new();
     if !sides.iter().all(is_smooth) {
         // The side with the contact points is projected onto the other, so that the order of the names changes nothing.
-        let swapped = rule.chooses_second([first, second], [&sides[0], &sides[1]]);
+        let swapped = rule.chooses_second(parts, [first, second], [&sides[0], &sides[1]]);
         let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
         let reach = Reach::between(a, b, spec.angle, spec.distance);
         pieces = FaceSplit::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
@@ -174,8 +175,9 @@ fn named<'a, const D: usize>(
     Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], names, pieces })
 }
 
-/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points. Uniform meshes of one size stay below it.
-const MUCH_FINER: f64 = 2.0;
+/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points: errors are those of a mesh of its size. Facets
+/// of one nominal size stay below it, since a mesher makes them fit the lengths of boundaries.
+const FINER: f64 = 1.1;
 
 /// The rule by which one of two surfaces carries the contact points of their pair, whatever their order in the scene.
 ///
@@ -191,19 +193,35 @@ struct CarrierRule<'a> {
 
 impl CarrierRule<'_> {
     /// Return whether the second of two surfaces of these bodies carries the contact points.
-    fn chooses_second<const D: usize>(self, bodies: [usize; 2], [first, second]: [&Side<D>; 2]) -> bool {
+    fn chooses_second<const D: usize>(
+        self,
+        parts: &[SceneBody<D>],
+        bodies: [usize; 2],
+        [first, second]: [&Side<D>; 2],
+    ) -> bool {
         let ratio = (first.mean_measure() / second.mean_measure()).powf(1.0 / (D - 1) as f64);
-        self.chooses_second_of(bodies, [first.name, second.name], ratio)
+        let names = bodies.map(|body| &*parts[body].spec.name.value);
+        let is_straight = [first, second].map(|side| side.facets.order == Order::P1);
+        self.chooses_second_of(bodies, names, is_straight, ratio)
     }
 
-    /// Return whether the second of two surfaces with these names carries the contact points, if the sizes of their facets have this `ratio`.
-    /// That is the surface of the only sliding body, else the much finer one, else the first one by name.
-    fn chooses_second_of(self, bodies: [usize; 2], [first, second]: [&str; 2], ratio: f64) -> bool {
-        match bodies.map(|body| self.sliding.contains(&body)) {
+    /// Return whether the second of two bodies with these names carries the contact points, if the sizes of their facets have this `ratio`.
+    /// That is the only sliding body, else the one with finer facets, else the first one by name. Coarser facets that are straight (`is_straight`)
+    /// do not follow a curved surface well enough for the points of a sliding body.
+    fn chooses_second_of(
+        self,
+        bodies: [usize; 2],
+        [first, second]: [&str; 2],
+        is_straight: [bool; 2],
+        ratio: f64,
+    ) -> bool {
+        let coarser = [ratio > FINER, ratio < FINER.recip()];
+        let slides = |k: usize| self.sliding.contains(&bodies[k]) && !(is_straight[k] && coarser[k]);
+        match [slides(0), slides(1)] {
             [false, true] => true,
             [true, false] => false,
-            _ if !self.adapts && ratio > MUCH_FINER => true,
-            _ if !self.adapts && ratio < MUCH_FINER.recip() => false,
+            _ if !self.adapts && coarser[0] => true,
+            _ if !self.adapts && coarser[1] => false,
             _ => first >= second,
         }
     }
@@ -241,7 +259,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
         let first = parts[bodies[0]].side(names[0], on_first);
         let second = parts[bodies[1]].side(names[1], on_second);
-        let swapped = rule.chooses_second(bodies, [&first, &second]);
+        let swapped = rule.chooses_second(parts, bodies, [&first, &second]);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
@@ -434,25 +452,27 @@ mod tests {
     /// The side of the contact points does not depend on the order of the surfaces, and not on sizes that are alike or adapted.
     #[test]
     fn the_side_of_the_contact_points_is_that_of_the_scene() {
+        let curved = [false; 2];
         let cases = [
-            (false, 1.0, &[][..], true),
-            (false, 1.9, &[], true),
-            (false, 2.1, &[], false),
-            (true, 2.1, &[], true),
-            (false, 0.4, &[], true),
-            (false, 0.4, &[8], false),
-            (true, 1.0, &[8], false),
-            (false, 2.1, &[7], true),
-            (false, 2.1, &[7, 8], false),
+            (false, 1.0, &[][..], curved, true),
+            (false, 1.05, &[], curved, true),
+            (false, 1.3, &[], curved, false),
+            (true, 1.3, &[], curved, true),
+            (false, 0.4, &[], curved, true),
+            (false, 0.4, &[8], curved, false),
+            (true, 1.0, &[8], curved, false),
+            (false, 1.3, &[7], curved, true),
+            (false, 1.3, &[7], [true, false], false),
+            (false, 0.8, &[7], [true, false], true),
+            (false, 1.3, &[7, 8], curved, false),
         ];
-        for (adapts, ratio, sliding, is_first) in cases {
+        for (adapts, ratio, sliding, [first, second], is_first) in cases {
             let rule = CarrierRule { adapts, sliding };
-            assert_eq!(rule.chooses_second_of([7, 8], ["a", "b"], ratio), !is_first, "{adapts} {ratio} {sliding:?}");
-            assert_eq!(
-                rule.chooses_second_of([8, 7], ["b", "a"], ratio.recip()),
-                is_first,
-                "{adapts} {ratio} {sliding:?}"
-            );
+            let is_second = [
+                rule.chooses_second_of([7, 8], ["a", "b"], [first, second], ratio),
+                !rule.chooses_second_of([8, 7], ["b", "a"], [second, first], ratio.recip()),
+            ];
+            assert_eq!(is_second, [!is_first; 2], "{adapts} {ratio} {sliding:?} {first}");
         }
     }
 }

@@ -24,6 +24,12 @@ const PLANES: [(usize, usize, &str); 3] =
     [(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")];
 
 impl<const D: usize> RigidMotion<D> {
+    /// Return whether the motion has a rotation, up to rounding.
+    pub fn turns(&self) -> bool {
+        let largest = |weights: &[f64]| weights.iter().fold(0.0, |largest: f64, weight| largest.max(weight.abs()));
+        largest(&self.weights[3..]) > PART * largest(&self.weights)
+    }
+
     /// Return the displacement at a point.
     pub fn at(&self, x: &[f64; D]) -> [f64; D] {
         let mut u = std::array::from_fn(|c| self.weights[c]);

@@ -23,6 +23,15 @@ pub struct Solved {
     pub failure: Option<String>,
 }
 
+/// A load on all dofs of a body, as the dofs of a state see it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ReducedLoad {
+    /// The right-hand side of [`Body::solve`] with the same effect.
+    pub force: Vec<f64>,
+    /// Work of the load while the state does not change: r_I' K_II^-1 r_I with the load r_I on eliminated dofs I; zero if there are none.
+    pub work: f64,
+}
+
 /// Counters of the work of a body so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct BodyCounts {
@@ -130,9 +139,9 @@ pub trait Body {
         Ok(false)
     }
 
-    /// Return the right-hand side r of [`Body::solve`] that has the same effect as a load on all dofs. What acts on supports is left out.
-    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
-        Ok(self.states().reduce(load))
+    /// Return a load on all dofs as a force on a state. What acts on supports is left out.
+    fn reduce(&mut self, load: &[f64]) -> Result<ReducedLoad> {
+        Ok(ReducedLoad { force: self.states().reduce(load), work: 0.0 })
     }
 
     /// Return the displacements of the owned and ghost nodes of this rank for a state, without the motion that supports impose.

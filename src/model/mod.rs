@@ -11,7 +11,7 @@ pub mod linear;
 pub mod rigid;
 pub mod states;
 
-pub use body::{Body, BodyCounts, Energy, Joint, Loads, Local, Solved};
+pub use body::{Body, BodyCounts, Energy, Joint, Loads, Local, ReducedLoad, Solved};
 pub use field::Field;
 pub use layer::Layer;
 pub use linear::LinearStep;

@@ -68,19 +68,23 @@ pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> V
     warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(discrete.model.pairs.iter().filter_map(|pair| sliding_on_each_other(discrete, pair)));
+    warnings.extend(discrete.model.pairs.iter().filter_map(|pair| resisted_by_normals(discrete, pair)));
     warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.contacts));
     warnings
 }
 
-/// Return the warning of a pair whose bodies can both move along their surfaces. The normals are those of one of them, and resist the other one.
-fn sliding_on_each_other(discrete: &Discrete, pair: &ContactPair) -> Option<String> {
+/// Return the warning of a pair whose second body can move along its own surface, while the normals are those of the first one, which resist that.
+fn resisted_by_normals(discrete: &Discrete, pair: &ContactPair) -> Option<String> {
     let [a, b] = pair.bodies.map(|body| &discrete.bodies[body]);
-    (a.removed_modes.slides && b.removed_modes.slides).then(|| {
+    let way = if a.removed_modes.slides {
+        "hold the motion by a support or a weak spring"
+    } else {
+        "make the facets there as fine as those of the other body, or take order = 2"
+    };
+    b.removed_modes.slides.then(|| {
         format!(
-            "bodies {} and {}: both can turn or slide along their surfaces, and the normals of {0} resist that of {1}: pressures depend on the node at which \
-             {1} is fixed; hold its motion by a support or a weak spring",
-            a.name, b.name
+            "body {}: it can turn or slide along its surface, and the normals of `{}` resist that: pressures depend on the node at which it is fixed; {way}",
+            b.name, pair.surfaces[0]
         )
     })
 }

