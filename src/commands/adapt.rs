@@ -81,6 +81,8 @@ struct Best {
     error: f64,
     /// Its relative error in the energy norm.
     energy: f64,
+    /// Whether its error is a guess. A larger error of a finer mesh is then no sign that this one is better.
+    is_guess: bool,
     /// Its number, from 1 on.
     round: usize,
     /// The view of the sizes that it follows.
@@ -313,7 +315,11 @@ impl AdaptiveRun {
         }
         // coarse meshes may miss a singularity of the pressure: on the first mesh that resolves it the estimated error of pressures grows,
         // while that in energy falls
-        if self.best.as_ref().is_some_and(|best| best.error <= error && best.energy <= estimate.energy) {
+        if self
+            .best
+            .as_ref()
+            .is_some_and(|best| !best.is_guess && best.error <= error && best.energy <= estimate.energy)
+        {
             return self.follow_best();
         }
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
@@ -331,7 +337,8 @@ impl AdaptiveRun {
             return self.end_with_best(error);
         }
         let (round, view, tables) = (self.rounds.len(), self.sizes(), contact_tables(done));
-        self.best = Some(Best { error, energy: estimate.energy, round, view, next, tables, worse: 0 });
+        let (energy, is_guess) = (estimate.energy, estimate.is_guess());
+        self.best = Some(Best { error, energy, is_guess, round, view, next, tables, worse: 0 });
         self.go_from_best()
     }
 

@@ -1,10 +1,9 @@
-//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, extrapolated and checked
-//! by the earlier one.
+//! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, checked by the earlier one.
 
 use super::interpolate::{DAMPED, L2Norms, PointTree, Squares, Weights, clamped_mean, mean};
 use crate::contact::ContactPair;
 use crate::discretize::Discrete;
-use crate::estimate::{Estimate, SAFETY};
+use crate::estimate::Estimate;
 use crate::output::ContactTable;
 
 /// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for each pair.
@@ -48,8 +47,6 @@ pub struct EstimatedSolution {
     pressure: Vec<f64>,
     /// Relative error of the normal displacements.
     displacement: f64,
-    /// Squared energy error of all bodies and layers.
-    energy: f64,
     /// The solution, one table for each pair.
     tables: Vec<ContactTable>,
 }
@@ -57,17 +54,10 @@ pub struct EstimatedSolution {
 impl EstimatedSolution {
     /// Return the errors of an estimate together with its solution.
     pub fn new(estimate: &Estimate, tables: Vec<ContactTable>) -> Self {
-        Self {
-            pressure: estimate.pressure.clone(),
-            displacement: estimate.displacement,
-            energy: estimate.squared_energy(),
-            tables,
-        }
+        Self { pressure: estimate.pressure.clone(), displacement: estimate.displacement, tables }
     }
 
     /// Correct the estimate of the next mesh, whose solution is `tables`, by the difference of both solutions.
-    ///
-    /// The error of the displacements becomes the geometric mean of the estimate and of the extrapolated error.
     ///
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
     /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
@@ -79,9 +69,6 @@ impl EstimatedSolution {
         let norms = norms(&self.tables, tables);
         for (i, error) in estimate.pressure.iter_mut().enumerate() {
             *error *= excess(&norms.pressure[i], *error, self.pressure[i]);
-        }
-        if let Some(extrapolated) = extrapolated(&norms.displacement, self.energy, estimate.squared_energy()) {
-            estimate.displacement = (estimate.displacement * extrapolated).sqrt();
         }
         estimate.displacement *= excess(&norms.displacement, estimate.displacement, self.displacement);
     }
@@ -98,16 +85,6 @@ fn bodies(table: &ContactTable) -> [&str; 2] {
 fn excess(norms: &L2Norms, new: f64, old: f64) -> f64 {
     let most = new * norms.new + old * norms.old;
     if most > 0.0 && norms.difference.is_finite() { (norms.difference / most).max(1.0) } else { 1.0 }
-}
-
-/// Return the relative error of displacements extrapolated from two meshes with the squared energy errors `old` and `new`, with the factor
-/// `SAFETY`. It is none if the energy error did not fall.
-///
-/// Loads do the work eta^2 on the error of the displacements u_h. If they err by the same shape on both meshes, by eta^2 times it,
-/// u - u_h = (u_h - u_h') eta^2/(eta'^2 - eta^2): Richardson's extrapolation with eta^2 in the place of h^p (Roache 1994).
-fn extrapolated(norms: &L2Norms, old: f64, new: f64) -> Option<f64> {
-    let change = norms.difference / norms.new;
-    (new < old && change.is_finite()).then(|| SAFETY * change * new / (old - new))
 }
 
 /// Norms of the solutions on two meshes and of their difference.
@@ -149,33 +126,19 @@ mod tests {
         assert_eq!([excess(&norms(0.1), 0.0, 0.0), excess(&norms(f64::NAN), 0.1, 0.1)], [1.0, 1.0]);
     }
 
-    /// Two meshes, the later one with a quarter of the squared energy error: a third of the difference is left.
+    /// The solutions differ by 0.1/1.1 of the later one. Errors that explain this stay, and those that do not are raised by the same factor.
     #[test]
-    fn displacements_are_extrapolated_by_the_energy_error() {
-        let norms = L2Norms { difference: 0.3, old: 0.7, new: 1.0 };
-        assert!((extrapolated(&norms, 4.0, 1.0).expect("a smaller error") - SAFETY * 0.1).abs() < 1e-15);
-        assert_eq!(extrapolated(&norms, 1.0, 1.0), None);
-        let tables = || vec![table(5, 1.0)];
-        // The displacement of the later mesh after a correction by an earlier one with this error. The solutions differ by 0.1/1.1 of the later one.
+    fn errors_explain_the_difference_of_two_meshes() {
         let corrected = |of_earlier: f64| {
-            let estimate = |displacement: f64, bodies: f64| Estimate {
-                displacement,
-                bodies: vec![bodies],
-                layers: vec![0.5],
-                pressure: vec![0.1],
-                ..Estimate::default()
-            };
-            let earlier = EstimatedSolution::new(&estimate(of_earlier, 3.5), tables());
-            let mut later = estimate(0.09, 0.5);
-            earlier.correct(&[table(5, 1.1)], &mut later);
+            let estimate = |displacement: f64| Estimate { displacement, pressure: vec![0.1], ..Estimate::default() };
+            let mut later = estimate(0.05);
+            EstimatedSolution::new(&estimate(of_earlier), vec![table(5, 1.0)]).correct(&[table(5, 1.1)], &mut later);
             assert_eq!(later.pressure, [0.1]);
             later.displacement
         };
-        let mean = (0.09 * SAFETY * 0.1 / 1.1 / 3.0f64).sqrt();
-        assert!((corrected(0.06) - mean).abs() < 1e-12, "{} {mean}", corrected(0.06));
-        // An error of 0.02 and the mean do not explain the difference.
-        let raised = mean * 0.1 / (mean * 1.1 + 0.02);
-        assert!((corrected(0.02) - raised).abs() < 1e-12 && raised > mean, "{} {raised}", corrected(0.02));
+        assert_eq!(corrected(0.06), 0.05);
+        let raised = 0.05 * 0.1 / (0.05 * 1.1 + 0.02);
+        assert!((corrected(0.02) - raised).abs() < 1e-12, "{} {raised}", corrected(0.02));
     }
 
     /// A grid of n x n points on the unit square, with pressures and displacements that are linear functions, times a factor.

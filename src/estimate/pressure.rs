@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
 /// factor is usual for errors extrapolated from three meshes (Roache 1994).
-pub const SAFETY: f64 = 1.25;
+pub(super) const SAFETY: f64 = 1.25;
 
 /// A reason why the estimated error of a pair's pressures is a guess, since the mesh does not show how they vary, and a place.
 #[derive(Debug, Clone, Copy)]
