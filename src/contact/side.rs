@@ -94,14 +94,6 @@ impl<'a, const D: usize> Side<'a, D> {
         total / self.facets.count().max(1) as f64
     }
 
-    /// Return how much the surface turns: one minus the length of the mean of its normals, from zero on a flat surface to one on a closed one.
-    pub fn turning(&self) -> f64 {
-        let mut sum = [0.0; D];
-        let areas = (0..self.facets.count()).map(|i| self.area(i));
-        let total: f64 = areas.inspect(|area| sum = std::array::from_fn(|c| sum[c] + area[c])).map(length).sum();
-        1.0 - length(sum) / total
-    }
-
     /// Return the outer normal times the length (area) at the middle of facet `i`.
     pub fn area(&self, i: usize) -> [f64; D] {
         let x = self.facets.coordinates(i, self.space);
