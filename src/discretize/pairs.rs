@@ -218,7 +218,7 @@ impl CarrierRule<'_> {
 
     /// Return whether the second of two candidates carries the contact points.
     ///
-    /// It is the one of the only sliding body, else the one with finer facets, else that of the last body by name. Coarser facets that are straight
+    /// It is the one of the only sliding body, else the one with finer facets, else that of the first body by name. Coarser facets that are straight
     /// do not follow a curved surface well enough for the points of a sliding body.
     fn prefers_second(self, candidates: [Candidate; 2]) -> bool {
         let [first, second] = &candidates;
@@ -229,7 +229,7 @@ impl CarrierRule<'_> {
             [true, false] => false,
             _ if !self.adapts && is_finer[1] => true,
             _ if !self.adapts && is_finer[0] => false,
-            _ => first.name <= second.name,
+            _ => first.name >= second.name,
         }
     }
 }
@@ -460,8 +460,8 @@ mod tests {
     #[test]
     fn the_side_of_the_contact_points_is_that_of_the_scene() {
         let of = |name| Candidate { slides: false, is_straight: false, size: 1.0, name };
-        let (a, b) = (of("a"), of("b"));
-        // the first of each two carries
+        let (a, b) = (of("b"), of("a"));
+        // the first of each two carries; among equals that is b, the first by name
         let cases = [
             (false, b, a),
             (false, b, Candidate { size: 0.95, ..a }),

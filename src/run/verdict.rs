@@ -148,9 +148,10 @@ fn inaccurate(Inaccuracy { reported, found, whose }: &Inaccuracy, model: &Model)
         }
     };
     // a body with few digits, such as a slender one under a force that is tiny beside the others, has such an error with any solver
-    let accept = match found {
-        found if *found < ACCEPTABLE => format!(", or accept it (--set method.stop.residual={})", sci(2.0 * found, 0)),
-        _ => String::new(),
+    let accept = if *found < ACCEPTABLE {
+        format!(", or accept it (--set method.stop.residual={})", sci(2.0 * found, 0))
+    } else {
+        String::new()
     };
     format!(
         "{what}: the relative error is {} at least, where the run saw {}: leave options of the inner solver (-ksp_..., -pc_..., -mat_...) and \
