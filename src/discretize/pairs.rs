@@ -460,17 +460,17 @@ mod tests {
     #[test]
     fn the_side_of_the_contact_points_is_that_of_the_scene() {
         let of = |name| Candidate { slides: false, is_straight: false, size: 1.0, name };
-        let (a, b) = (of("b"), of("a"));
-        // the first of each two carries; among equals that is b, the first by name
+        let (early, late) = (of("a"), of("b"));
+        // the first of each two carries
         let cases = [
-            (false, b, a),
-            (false, b, Candidate { size: 0.95, ..a }),
-            (false, Candidate { size: 0.8, ..a }, b),
-            (true, b, Candidate { size: 0.8, ..a }),
-            (false, Candidate { slides: true, size: 2.0, ..a }, b),
-            (true, Candidate { slides: true, ..a }, b),
-            (false, b, Candidate { slides: true, is_straight: true, size: 2.0, ..a }),
-            (false, Candidate { slides: true, size: 0.8, ..a }, Candidate { slides: true, ..b }),
+            (false, early, late),
+            (false, early, Candidate { size: 0.95, ..late }),
+            (false, Candidate { size: 0.8, ..late }, early),
+            (true, early, Candidate { size: 0.8, ..late }),
+            (false, Candidate { slides: true, size: 2.0, ..late }, early),
+            (true, Candidate { slides: true, ..late }, early),
+            (false, early, Candidate { slides: true, is_straight: true, size: 2.0, ..late }),
+            (false, Candidate { slides: true, size: 0.8, ..late }, Candidate { slides: true, ..early }),
         ];
         for (number, (adapts, carrier, other)) in cases.into_iter().enumerate() {
             let rule = CarrierRule { adapts, sliding: &[] };
