@@ -175,8 +175,10 @@ fn named<'a, const D: usize>(
     Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], names, pieces })
 }
 
-/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points: errors are those of a mesh of its size. Facets
-/// of one nominal size stay below it, since a mesher makes them fit the lengths of boundaries.
+/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points, since errors are those of a mesh of its size: on rings
+/// whose facets are as 3 to 4, the error of the pressure is 0.011 if the finer side carries and 0.034 if the coarser one does
+/// (`rings_of_quadrangles_have_lames_pressure`). A mesher divides a length L into L/h facets, rounded to an integer, which changes their size by at
+/// most half of 1/N for N facets: two surfaces of ten facets or more of one nominal size stay below the ratio.
 const FINER: f64 = 1.1;
 
 /// The rule by which one of two surfaces carries the contact points of their pair, whatever their order in the scene.

@@ -508,7 +508,7 @@ fn springs_that_only_hold() {
     for (soft, stiff) in soft.iter().zip(stiff) {
         assert!((soft / stiff - 1.0).abs() < 1e-3, "{soft} {stiff}");
     }
-    assert!(stiff[2] < 1e-2 && stiff[1] < stiff[0], "{stiff:?}");
+    assert!(stiff[2] < 1e-2 && stiff[1] < 2e-2, "{stiff:?}");
     // a fifth more on one side, which springs carry: the body moves by it, far more than the mesh misses
     let (_, loaded) = pressed("12*exp(-4*(x - 0.5)^2)", "1");
     assert!(10.0 * loaded[0] < stiff[0] && 10.0 * loaded[2] < stiff[2], "{loaded:?} {stiff:?}");
