@@ -132,24 +132,24 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Return the errors of the displacement.
     ///
-    /// The discrete solution is the best approximation. If the recovered displacement is exact, its distance from any discrete
-    /// displacement bounds the error. The nodal interpolant is closer than the discrete solution where quadratic elements meet a
-    /// singular one. The quadrature of linear elements is too coarse for the energy of their interpolant.
+    /// The discrete solution u_h is the best approximation. If the recovered displacement is exact, its distance from any discrete displacement
+    /// bounds the error. It misses the singular part of a solution, and is then too far from u_h in some cells and from its nodal interpolant in
+    /// others, so that the nearer one counts in each cell. The quadrature of linear elements is too coarse for the energy of their interpolant.
     ///
     /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except where the solution is
     /// singular. The missing work is done by a multiple, at most one, of `Recovery::softening`. The argument `work_on_missed` is f'b, the work
     /// of the pressures of contacts on b. It is a fifth of eta^2 with linear elements under a contact of a few cells, and small with quadratic
     /// ones. Other loads act where b is small.
     pub fn errors(&self, work_on_missed: f64) -> Errors {
-        let of_solution = self.energy_errors();
         let (of_interpolant, mut load) = self.interpolation_error();
-        let total = |cells: &[f64]| cells.iter().sum::<f64>();
-        let is_closer = self.space.order == Order::P2 && total(&of_interpolant) < total(&of_solution);
-        let cells = if is_closer { of_interpolant } else { of_solution };
+        let mut cells = self.energy_errors();
+        if self.space.order == Order::P2 {
+            cells.iter_mut().zip(&of_interpolant).for_each(|(error, nearer)| *error = error.min(*nearer));
+        }
         let softening = self.softening(&cells);
         let work = dot(&softening, self.displacement);
         if work > 0.0 {
-            let lacking = (total(&cells) - work_on_missed - dot(&load, self.displacement)) / work;
+            let lacking = (cells.iter().sum::<f64>() - work_on_missed - dot(&load, self.displacement)) / work;
             axpy(lacking.clamp(0.0, 1.0), &softening, &mut load);
         }
         let strips = self.add_strip(&mut load);
