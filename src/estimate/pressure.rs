@@ -86,8 +86,10 @@ impl PressureErrors {
     }
 }
 
-/// Return the sum of the compliances 1/E* of the bodies of a pair. Times the size of a facet over pi it is their compliance to a pressure that changes its sign within the facet. It is that
-/// of the springs of two half-spaces in series, for a wave as long as the facet.
+/// Return the sum of the compliances 1/E* of the bodies of a pair.
+///
+/// Times the size of a facet over pi it is their compliance to a pressure that changes its sign within the facet. It is that of the springs of two
+/// half-spaces in series, for a wave as long as the facet.
 pub(super) fn softness(model: &Model, pair: usize) -> f64 {
     model.pairs[pair].bodies.iter().map(|&body| 1.0 / model.bodies[body].modulus).sum::<f64>()
 }
