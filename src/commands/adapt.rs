@@ -333,7 +333,10 @@ impl AdaptiveRun {
         // where the script bounds the sizes, no smaller ones give the missing cells: GROWTH bounds what is tried
         next.refine(excess.clamp(1.0, GROWTH).min(most / next.cells));
         if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {
-            self.limit = Some(format!("a mesh has {cells} cells: allow more (adapt.cells)"));
+            let most = goal.cells;
+            self.limit = Some(format!(
+                "a mesh has {cells} cells, and the next one needs more than {most}: allow more (adapt.cells)"
+            ));
             return self.end_with_best(error);
         }
         let (round, view, tables) = (self.rounds.len(), self.sizes(), contact_tables(done));

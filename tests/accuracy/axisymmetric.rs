@@ -357,15 +357,18 @@ fn hertz() {
 /// Meshes adapted to an error follow the estimate to the edge of the contact.
 #[test]
 fn hertz_on_an_adapted_mesh() {
-    let run = solved(case("hertz-sphere"), &["adapt.error=0.02"]);
-    assert!(run.number("discretization_error/pressure/0") < 0.02);
+    // a title of its own: otherwise the run would begin with the mesh on which an earlier one has ended
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let run = solved(case("hertz-sphere"), &["adapt.error=0.02", &format!("title=\"{now}\"")]);
+    let estimated = run.number("discretization_error/pressure/0");
+    assert!(estimated < 0.02);
     let table = run.contact();
     let of = |value: &dyn Fn(f64, f64) -> f64| -> f64 {
         (0..table.rows()).map(|q| table["weight"][q] * value(table["x"][q], table["pressure"][q]).powi(2)).sum()
     };
     let exact = |r: f64| 279.83 * (1.0 - r * r).max(0.0).sqrt();
     let error = (of(&|r, p| p - exact(r)) / of(&|r, _| exact(r))).sqrt();
-    assert!(error < 0.02, "{error}");
+    assert!((0.7..2.0).contains(&(estimated / error)), "{estimated} {error}");
 }
 
 /// A soft layer between stiff spheres: p = k (delta - r^2/(2 R)).
