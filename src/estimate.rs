@@ -1,7 +1,7 @@
 //! The estimated difference of the discrete solution from the exact one: in bodies, layers and pressures.
 //!
 //! A smoother displacement is recovered from the discrete one. The difference of their stresses, cell by cell, is the error in
-//! the energy norm. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
+//! the energy norm; in cells of quadratic elements, that of the recovered displacement from its nodal interpolant where this is smaller. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
 //! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
 
 mod held;

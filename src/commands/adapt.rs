@@ -333,16 +333,19 @@ impl AdaptiveRun {
         // where the script bounds the sizes, no smaller ones give the missing cells: GROWTH bounds what is tried
         next.refine(excess.clamp(1.0, GROWTH).min(most / next.cells));
         if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {
-            let most = goal.cells;
-            self.limit = Some(format!(
-                "a mesh has {cells} cells, and the next one needs more than {most}: allow more (adapt.cells)"
-            ));
-            return self.end_with_best(error);
+            return self.end_at_cells(cells, goal.cells, error);
         }
         let (round, view, tables) = (self.rounds.len(), self.sizes(), contact_tables(done));
         let (energy, is_guess) = (estimate.energy, estimate.is_guess());
         self.best = Some(Best { error, energy, is_guess, round, view, next, tables, worse: 0 });
         self.go_from_best()
+    }
+
+    /// End the adaptation because the next mesh would have more cells than allowed.
+    fn end_at_cells(&mut self, cells: f64, allowed: usize, error: f64) -> bool {
+        let needed = format!("a mesh has {cells} cells, and the next one needs more than {allowed}");
+        self.limit = Some(needed + ": allow more (adapt.cells)");
+        self.end_with_best(error)
     }
 
     /// After a mesh that is worse than the best one, let another mesh with more cells follow the best one, or end the run.

@@ -27,10 +27,10 @@ use std::collections::VecDeque;
 /// Relative error of a correction.
 const HALF: f64 = 0.5;
 
-/// Relative error above which the first linear step from states near the solution does not end. Displacements are zero before it, and the first
-/// iterations of a solver leave them so far from the laws that [`Forcing`] would take them for settled, with all points closed. On the last adapted
-/// meshes of a bearing cap and of a fishplate 2 steps follow, instead of 10 and 6. With 0.03 and 0.01 the cap takes 3 and 2, and more iterations.
-/// Spheres, flanges, a T-slot nut and a clamp take as many steps as without this limit.
+/// Relative error above which the first linear step from the states of another solution does not end. Displacements are zero before it, and the
+/// first iterations of a solver leave them so far from the laws that [`Forcing`] would take them for settled, with all points closed. The last adapted
+/// meshes of a bearing cap and of a fishplate take 2 steps, instead of 10 and 6. With 0.03 and 0.01 the cap takes 3 and 2 steps, and more
+/// iterations. Spheres, flanges, a T-slot nut and a clamp take as many steps as without this limit.
 const NEAR: f64 = 0.1;
 
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
@@ -62,7 +62,7 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, begi
 /// The states of the layers from which the first linear step is taken.
 pub(super) struct FirstStates {
     pub states: Layer,
-    /// Whether they are near the solution, as those of the solution on another mesh.
+    /// Whether they are those of another solution, while the displacements are still at rest.
     pub are_near: bool,
 }
 
@@ -76,7 +76,7 @@ struct Newton<'n, 'r> {
     u: Field,
     /// States of the layers from which the next linear step is taken.
     states: Layer,
-    /// Whether these states are near the solution, while the displacements are not.
+    /// Whether these states are those of another solution, while the displacements are still at rest.
     are_near: bool,
     /// Present while roundoff leaves too large an error of the linear step, so that the next step is a correction: it takes the same states once
     /// more. It watches what corrections gain.

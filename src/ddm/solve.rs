@@ -157,13 +157,14 @@ impl Run<'_> {
         };
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
         let states = first_states(self.model, &begin, &rigid);
-        let are_near = matches!(begin, InitialGuess::Pressure(_));
+        let are_of_a_solution = matches!(begin, InitialGuess::Pressure(_) | InitialGuess::Continue(_));
         let is_free = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
         // an estimate of the discretisation's error needs whole displacements, not their difference from an origin
         if is_free && self.balance.is_none() {
             self.origin = DisplacementOrigin::take(self.model, &rigid.amounts);
         }
         let resumed = self.resume(begin);
+        let are_near = are_of_a_solution && resumed.is_none();
         match method {
             Method::Newton(linear) => {
                 let start = |origin: &mut DisplacementOrigin| std::mem::take(&mut origin.rest);

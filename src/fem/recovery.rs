@@ -132,9 +132,11 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Return the errors of the displacement.
     ///
-    /// The discrete solution u_h is the best approximation. If the recovered displacement is exact, its distance from any discrete displacement
-    /// bounds the error. It misses the singular part of a solution, and is then too far from u_h in some cells and from its nodal interpolant in
-    /// others, so that the nearer one counts in each cell. The quadrature of linear elements is too coarse for the energy of their interpolant.
+    /// If the recovered displacement u* is exact, its distance from any one discrete displacement bounds the error, since the discrete solution u_h
+    /// is the best approximation. Where the solution is singular, u* misses the singular part: it is too far from u_h in some cells, and from its
+    /// nodal interpolant in others. With quadratic elements the smaller of both counts in each cell. That is no bound; on parts with known
+    /// energies it is 0.9 to 1.8 times the squared error (docs/theory.md). The quadrature of linear elements is too coarse for the energy of their
+    /// interpolant.
     ///
     /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except where the solution is
     /// singular. The missing work is done by a multiple, at most one, of `Recovery::softening`. The argument `work_on_missed` is f'b, the work

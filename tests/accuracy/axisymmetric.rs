@@ -354,14 +354,14 @@ fn hertz() {
     }
 }
 
-/// Meshes adapted to an error follow the estimate to the edge of the contact.
+/// Meshes adapted to an error follow the estimate to the edge of the contact, and it is 0.7 to 2 times the true error there.
 #[test]
 fn hertz_on_an_adapted_mesh() {
     // a title of its own: otherwise the run would begin with the mesh on which an earlier one has ended
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
     let run = solved(case("hertz-sphere"), &["adapt.error=0.02", &format!("title=\"{now}\"")]);
     let estimated = run.number("discretization_error/pressure/0");
-    assert!(estimated < 0.02);
+    assert!(estimated < 0.02, "{estimated}");
     let table = run.contact();
     let of = |value: &dyn Fn(f64, f64) -> f64| -> f64 {
         (0..table.rows()).map(|q| table["weight"][q] * value(table["x"][q], table["pressure"][q]).powi(2)).sum()

@@ -46,8 +46,7 @@ fn difference(coarse: &Table, fine: &Table, columns: &[&str]) -> f64 {
     f64::sqrt(apart / all)
 }
 
-/// The error of a singular corner reaches the displacements of the contact. (The squared energy error, which bounds it from above, is 7 and 10 times the
-/// truth here.)
+/// The error of a singular corner reaches the displacements of the contact.
 #[test]
 fn displacements_of_a_bolt() {
     let scene = bolt();
@@ -88,8 +87,8 @@ fn displacements_of_a_dovetail() {
     let exact = difference(&run.contact(), &fine, &["u_n_groove", "u_n_tongue"]);
     let estimated = run.number("discretization_error/displacement");
     assert!((0.7..2.0).contains(&(estimated / exact)), "{estimated} {exact}");
-    // F1 is half of the squared energy error above its least value, and nearly half of the energy below zero. The ratio is 1.73 if cells at
-    // corners have the distance of the recovered displacement from the discrete one, instead of that from the nearer one of two.
+    // F1 is half of the squared energy error above its least value, and nearly half of the energy below zero. The ratio is 1.73 if one of both
+    // distances of the recovered displacement, from the discrete solution or from the interpolant, counts in all cells of a body.
     let finer = solve(&scene, &["--set", "mesh.set.h=0.5"]).converged();
     let squared = |run: &Run| run.number("discretization_error/energy").powi(2);
     let fallen = (run.number("F1") - finer.number("F1")) / finer.number("F1").abs();
