@@ -36,11 +36,17 @@ const NEAR: f64 = 0.1;
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
 const UNSEEN: f64 = 0.01;
 
-/// Iterate from displacements and layer states until a rule ends the run.
-pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, begin: FirstStates) -> Result<LoopEnd> {
-    let FirstStates { states, are_near } = begin;
+/// Iterate from displacements and layer states until a rule ends the run. `is_near` is whether the states are those of another solution, while the
+/// displacements are still at rest.
+pub(super) fn iterate(
+    run: &mut Run,
+    linear: &mut dyn LinearStep,
+    u: Field,
+    states: Layer,
+    is_near: bool,
+) -> Result<LoopEnd> {
     let (unit, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
-    let mut newton = Newton { run, linear, unit, tolerance, u, states, are_near, correction: None, best: None };
+    let mut newton = Newton { run, linear, unit, tolerance, u, states, is_near, correction: None, best: None };
     loop {
         let step = match newton.linear_step()? {
             Ok(step) => step,
@@ -59,13 +65,6 @@ pub(super) fn iterate(run: &mut Run, linear: &mut dyn LinearStep, u: Field, begi
     }
 }
 
-/// The states of the layers from which the first linear step is taken.
-pub(super) struct FirstStates {
-    pub states: Layer,
-    /// Whether they are those of another solution, while the displacements are still at rest.
-    pub are_near: bool,
-}
-
 /// A run of Newton's method under way.
 struct Newton<'n, 'r> {
     run: &'n mut Run<'r>,
@@ -77,7 +76,7 @@ struct Newton<'n, 'r> {
     /// States of the layers from which the next linear step is taken.
     states: Layer,
     /// Whether these states are those of another solution, while the displacements are still at rest.
-    are_near: bool,
+    is_near: bool,
     /// Present while roundoff leaves too large an error of the linear step, so that the next step is a correction: it takes the same states once
     /// more. It watches what corrections gain.
     correction: Option<Stagnation>,
@@ -136,7 +135,7 @@ impl Newton<'_, '_> {
         let (residual, _) = residual(model, &self.u, &model.forces(&states.linear(&compression)));
         let rho = self.run.memory.progress.slopes(model, &self.unit, states);
         let scale = (self.tolerance, &self.run.scale);
-        let limit = if std::mem::take(&mut self.are_near) { NEAR } else { 1.0 };
+        let limit = if std::mem::take(&mut self.is_near) { NEAR } else { 1.0 };
         let roughest = limit.min(self.linear.roughest());
         let mut forcing = Forcing::new(states, compression, &rho, scale, roughest);
         let is_correction = self.correction.is_some();

@@ -1,7 +1,7 @@
 //! A run from its start to its result, by either loop. The start is given by the scene, found by itself, or left by another run.
 
 use super::bound::{OffLaws, ROUNDING, Reached, Scale, compression_roundoff, pressure_roundoff, roundoff_safety};
-use super::newton::{FirstStates, resisting};
+use super::newton::resisting;
 use super::robin::{Acceleration, Forecast};
 use super::run::{LoopEnd, Memory, Observer, Row, Run, rounding};
 use super::start::{self, RigidStart};
@@ -157,19 +157,19 @@ impl Run<'_> {
         };
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
         let states = first_states(self.model, &begin, &rigid);
-        let are_of_a_solution = matches!(begin, InitialGuess::Pressure(_) | InitialGuess::Continue(_));
+        let has_states = matches!(begin, InitialGuess::Pressure(_) | InitialGuess::Continue(_));
         let is_free = self.model.bodies.iter().any(|slot| !slot.motions.is_empty());
         // an estimate of the discretisation's error needs whole displacements, not their difference from an origin
         if is_free && self.balance.is_none() {
             self.origin = DisplacementOrigin::take(self.model, &rigid.amounts);
         }
         let resumed = self.resume(begin);
-        let are_near = are_of_a_solution && resumed.is_none();
+        let is_near = has_states && resumed.is_none();
         match method {
             Method::Newton(linear) => {
                 let start = |origin: &mut DisplacementOrigin| std::mem::take(&mut origin.rest);
                 let u = resumed.or_else(|| self.origin.as_mut().map(start)).unwrap_or_else(|| Field::rest(self.model));
-                newton::iterate(self, &mut **linear, u, FirstStates { states, are_near })
+                newton::iterate(self, &mut **linear, u, states, is_near)
             }
             Method::Sweeps { acceleration, coefficient, linear } => {
                 if let Some(origin) = &self.origin {

@@ -9,7 +9,8 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
-/// factor is usual for errors extrapolated from three meshes (Roache 1994).
+/// factor is usual for errors extrapolated from three meshes (Roache 1994). With it, most estimates on the parts of docs/theory.md are 0.7 to 2
+/// times the true errors; without it they would be 0.56 to 1.6 times.
 pub(super) const SAFETY: f64 = 1.25;
 
 /// A reason why the estimated error of a pair's pressures is a guess, since the mesh does not show how they vary, and a place.

@@ -232,7 +232,8 @@ fn overlap_of_facets(pair: &ContactPair, Chords { sagitta, deepest, mean }: Chor
     let mean = mean.map_or(String::new(), |mean| format!(" and {} on the mean", sci(mean, 2)));
     format!(
         "{} - {}: straight facets leave their curved surfaces by up to {}, and the overlap is {} at most{mean}: pressures are those of \
-         facets; take order = 2 or a finer mesh; if the true surfaces have no clearance, write touching = true, with their own overlap as a negative `gap`",
+         facets; take order = 2 or a finer mesh; if the true surfaces have no clearance, write touching = true, with their own overlap as a \
+         negative `gap`",
         pair.surfaces[0],
         pair.surfaces[1],
         sci(sagitta, 2),

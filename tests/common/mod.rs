@@ -325,6 +325,12 @@ impl AsRef<Path> for Scene {
     }
 }
 
+/// The nanoseconds since 1970, for a title that no other run has: an adaptation begins with the mesh on which an earlier one of the same scene
+/// has ended.
+pub fn nanoseconds() -> u128 {
+    std::time::UNIX_EPOCH.elapsed().expect("a clock").as_nanos()
+}
+
 /// The scene of a case, with a path of its script that holds from everywhere.
 pub fn text_of(name: &str) -> String {
     let path = case(name);

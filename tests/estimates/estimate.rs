@@ -1,6 +1,6 @@
 //! Estimated errors against true ones, and the stop that they allow.
 
-use crate::common::{Run, Scene, Table, case, root, solve, solve_on};
+use crate::common::{Run, Scene, Table, case, nanoseconds, root, solve, solve_on};
 use std::f64::consts::PI;
 
 /// Sets of both bodies' order and of the number of elements, with the estimate.
@@ -318,7 +318,7 @@ fn adapted_meshes() {
     for (x, p) in [(0.5, 9.35518), (2.0, 10.77811), (2.5, 13.96683), (3.0, 26.80042)] {
         assert!((quadratic(&better, x) / p - 1.0).abs() < 5e-5, "p({x}) = {}", quadratic(&better, x));
     }
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let now = nanoseconds();
     let mut sets = sets(2, 8);
     // the title is part of what an adaptation is remembered by: this one is new
     sets.extend(["method={}".to_owned(), "adapt.error=1e-3".to_owned(), format!("title={now} adapted")]);
@@ -340,7 +340,7 @@ fn adapted_meshes() {
 #[test]
 fn adapted_meshes_in_space() {
     let better = solve_with(case("groove"), &[&sets(2, 64)[..], &["method={}".to_owned()]].concat()).contact();
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let now = nanoseconds();
     let mut sets = sets(1, 4);
     sets.extend(["method={}".to_owned(), "adapt.error=1e-2".to_owned(), format!("title={now} in space")]);
     let run = solve_with(case("groove3d"), &sets);
@@ -396,7 +396,7 @@ fn errors_of_displacements_are_relative_to_the_tables() {
 /// Each mesh but the second has at least 1.8 times the cells of the one before: what Gmsh does not make of the predicted cells is asked for again.
 #[test]
 fn adapted_meshes_of_a_flange() {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let now = nanoseconds();
     let sets = |more: &[&str]| -> Vec<String> {
         let own = [format!("title={now} {}", more.len()), "adapt.error=2e-2".to_owned()];
         own.into_iter().chain(more.iter().map(|&set| set.to_owned())).collect()

@@ -1,6 +1,6 @@
 //! Load steps: each is the solution of its share of the loads, and no body is made or factored anew for it.
 
-use crate::common::{Run, Scene, case, distance, root, solve, solve_on, winkler};
+use crate::common::{Run, Scene, case, distance, nanoseconds, root, solve, solve_on, winkler};
 
 fn groove(method: &str, more: &[&str]) -> Run {
     let method = format!("method={method}");
@@ -139,7 +139,7 @@ fn steps_on_two_ranks() {
 /// run with its share of the loads on that mesh, which `winkler mesh` writes.
 #[test]
 fn steps_run_on_the_mesh_of_the_largest_one() {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let now = nanoseconds();
     let graded = root().join("meshes/groove-held/graded.toml");
     let title = format!("title={now} steps");
     let adapted = ["--tolerance", "2e-3", "--set", "mesh.set.n=1", "--set", &title];
@@ -186,7 +186,7 @@ fn steps_run_on_the_mesh_of_the_largest_one() {
 /// Load steps on the last of a few meshes that do not reach the error: the best one is written, and said to be so.
 #[test]
 fn steps_on_a_mesh_that_is_not_fine_enough() {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).expect("a time").as_nanos();
+    let now = nanoseconds();
     let (graded, title) = (root().join("meshes/groove-held/graded.toml"), format!("title={now} coarse"));
     let sets = ["adapt.error=1e-5", "adapt.rounds=2", "mesh.set.n=1", "method.steps=[0.5,1]", &title];
     let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
