@@ -1,11 +1,8 @@
-//! The items of private modules that integration tests, examples and fuzz targets use. They change without notice.
+//! The items of private modules that integration tests and examples use. They change without notice.
 
 pub use crate::interrupt::Interrupt;
 pub use crate::linalg::bounds;
-
-#[cfg(feature = "cli")]
 pub use crate::commands::checkpoint::settings_digest;
-#[cfg(feature = "cli")]
 pub use crate::report::save;
 
 pub mod contact {

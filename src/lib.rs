@@ -1,8 +1,8 @@
 //! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
 //!
 //! Programs use [`api`] (a scene built in Rust, solved, read as arrays) and [`petsc`] (the binding, useful alone). The errors of
-//! both are in [`error`]. The feature `cli`, which is on by default, is the command line. Other modules are private. The feature
-//! `internals` shows some of their items to the tests; these items change without notice.
+//! both are in [`error`]; [`cli`] is the command line. Other modules are private. `internals`, which rustdoc does not show, has those of their
+//! items that the tests use; these items change without notice.
 //!
 //! Data flows one way: scene file -> `scene::Scene`, made of the types in `problem` -> `mesh::Mesh` -> `fem` bodies and `contact` pairs ->
 //! `model::Model` -> sweeps of `robin` -> `ddm::Outcome` -> `run::report`. The loops are those of `ddm`.
@@ -10,13 +10,9 @@
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
 #![warn(missing_docs)]
-// without the command line, what only its commands use is not used
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
 pub mod api;
-#[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "cli")]
 mod commands;
 mod contact;
 mod data;
@@ -28,7 +24,7 @@ mod exchange;
 mod expression;
 mod fem;
 mod file;
-#[cfg(feature = "internals")]
+#[doc(hidden)]
 pub mod internals;
 mod interrupt;
 mod linalg;
@@ -39,7 +35,6 @@ mod parallel;
 #[allow(unsafe_code)]
 pub mod petsc;
 mod problem;
-#[cfg(feature = "cli")]
 mod report;
 mod robin;
 mod run;

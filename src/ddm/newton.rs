@@ -12,13 +12,13 @@
 //! shortened, the laws are smoothed for a while ([`Path`](super::progress::Path)).
 
 use super::bound::{Reached, Scale, compression_roundoff, contact_energy, surface_energy};
-use super::progress::Equilibrium;
+use super::progress::{Equilibrium, SHORTEST};
 use super::run::{FallbackIterate, LoopEnd, Measured, Run};
 use super::start;
 use super::stop::{Stagnation, Status};
 use crate::error::Result;
 use crate::model::Model;
-use crate::model::field::{Field, residual};
+use crate::model::field::{Field, LineEnergy, residual};
 use crate::model::layer::{Layer, meeting_slopes, surface_slopes};
 use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, System, Trial};
 use crate::model::rigid::Motions;
@@ -35,6 +35,13 @@ const NEAR: f64 = 0.1;
 
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
 const UNSEEN: f64 = 0.01;
+
+/// Distance from 1 of the length of a descent within which Newton's method for F1 takes whole steps. 0.2 is far inside its neighbourhood of fast
+/// convergence, where lengths tend to 1.
+const WHOLE: f64 = 0.2;
+
+/// Accuracy of the search for the least F1 along a descent, relative to its slope at the start: as that of the start.
+const SEARCH: f64 = 1e-3;
 
 /// Iterate from displacements and layer states until a rule ends the run. `is_near` is whether the states are those of another solution, while the
 /// displacements are still at rest.
@@ -53,6 +60,9 @@ pub(super) fn iterate(
             Err(failure) => return Ok(newton.end(Status::InnerSolver(failure), None)),
         };
         let part = newton.step_length(&step);
+        if part.is_lost && newton.descend()? {
+            continue;
+        }
         let iterate = newton.advance(step, part);
         let measures = newton.measure(&iterate)?;
         if let Some(status) = newton.check_termination(&iterate, &measures)? {
@@ -90,6 +100,8 @@ struct PartialStep {
     length: f64,
     /// Pressures at the end of the whole step, n.
     whole_pressure: Vec<f64>,
+    /// Whether no part of the step comes nearer to the laws, so that the least one is taken.
+    is_lost: bool,
 }
 
 /// The result of a step: displacements and pressures in equilibrium, and the states on the laws that belong to them.
@@ -153,16 +165,58 @@ impl Newton<'_, '_> {
         let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
         let whole_pressure = self.states.linear(&whole);
         if self.correction.is_some() {
-            return PartialStep { length: 1.0, whole_pressure };
+            return PartialStep { length: 1.0, whole_pressure, is_lost: false };
         }
         let roundoff = compression_roundoff(model, &self.u.trace);
         let ends = [[&before[..], &roundoff], [&whole, &whole_pressure]];
         let length = progress.step_length(model, &self.unit, &self.states, ends);
-        PartialStep { length, whole_pressure }
+        PartialStep { length: length.unwrap_or(SHORTEST), whole_pressure, is_lost: length.is_none() }
+    }
+
+    /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
+    /// fell; then the next step begins from the states at the new compressions.
+    ///
+    /// The distance from the laws falls along no step whose tangents nearly vanish, as where a law saturates or hardly anything holds a body. F1 is convex,
+    /// and a step of Newton's method always descends. The least F1 may be at a tiny part of the step, which halving would not find.
+    fn descend(&mut self) -> Result<bool> {
+        let start = self.u.clone();
+        for _ in 0..self.run.stop.iterations {
+            let Some(length) = self.descent_step()? else {
+                self.u = start;
+                return Ok(false);
+            };
+            if length == 0.0 || (length - 1.0).abs() <= WHOLE {
+                break;
+            }
+        }
+        self.states = Layer::at(self.run.model, &self.u.trace);
+        self.run.memory.progress.forget_pressure();
+        Ok(true)
+    }
+
+    /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length; none if its linear system
+    /// is not solved, or F1 falls without end.
+    fn descent_step(&mut self) -> Result<Option<f64>> {
+        let model = &mut *self.run.model;
+        let layer = Layer::at(model, &self.u.trace);
+        let springs = resisting(model, layer.springs(model));
+        let (residual, _) = residual(model, &self.u, &layer.force);
+        let roughest = self.linear.roughest();
+        let mut enough = |_: &Model, trial: &Trial| trial.is_within(roughest);
+        let system =
+            System { model: &mut *model, places: &layer, springs: &springs, residual: &residual, enough: &mut enough };
+        let Ok(step) = self.linear.solve(system)? else { return Ok(None) };
+        let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field).minimize(SEARCH) else {
+            return Ok(None);
+        };
+        self.u.add(length, &step.field);
+        self.u.retrace(model);
+        Ok(Some(length))
     }
 
     /// Take this part of a step, and resolve the laws at its end.
-    fn advance(&mut self, mut step: LinearSolution, PartialStep { length, whole_pressure }: PartialStep) -> StepResult {
+    fn advance(&mut self, mut step: LinearSolution, part: PartialStep) -> StepResult {
+        let PartialStep { length, whole_pressure, .. } = part;
         let (model, progress) = (&*self.run.model, &mut self.run.memory.progress);
         step.field.scale(length);
         self.u.add(1.0, &step.field);

@@ -34,6 +34,12 @@ pub(super) struct Progress {
 /// (docs/methods.md).
 const HALVINGS: i32 = 7;
 
+/// Length of a step that comes nearer to the laws at no tried length, where F1 cannot fall either.
+pub(super) const SHORTEST: f64 = 1.0 / 128.0;
+
+/// Share of a step's length by which the squared distance from the laws must fall (Armijo).
+const FALLS: f64 = 1e-4;
+
 impl Progress {
     /// Return the stiffnesses with which the bodies answered the last step, n, of meeting slopes `unit`, n.
     pub fn answers(&self, model: &Model, unit: &[f64]) -> Vec<f64> {
@@ -74,17 +80,17 @@ impl Progress {
         }
     }
 
-    /// Return the length of a step from compressions `from`, known but for their `roundoff`, to the state (c, p), n each: the part of the way that comes no
-    /// farther from the laws with the smoothing of `states`, from which the step is taken. Meeting slopes are `unit`.
+    /// Return the length of a step from compressions `from`, known but for their `roundoff`, to the state (c, p), n each: the part of the way that comes
+    /// nearer to the laws with the smoothing of `states`, from which the step is taken. Return none if no part does. Meeting slopes are `unit`.
     pub fn step_length(
         &mut self,
         model: &Model,
         unit: &[f64],
         states: &Layer,
         [[from, roundoff], [c, p]]: [[&[f64]; 2]; 2],
-    ) -> f64 {
+    ) -> Option<f64> {
         if self.pressure.is_empty() {
-            return 1.0;
+            return Some(1.0);
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
         self.observe(model, unit, &change(from, c), &change(&self.pressure, p));
@@ -95,9 +101,14 @@ impl Progress {
         };
         let here = off(0.0);
         let mut lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
-        let length = lengths.find(|&t| off(t) <= here).unwrap_or(0.5f64.powi(HALVINGS));
-        self.path.note(length, !states.smoothing.is_empty());
+        let length = lengths.find(|&t| off(t) <= (1.0 - FALLS * t) * here);
+        self.path.note(length.unwrap_or(SHORTEST), !states.smoothing.is_empty());
         length
+    }
+
+    /// Forget the pressures of the iterate, so that the next step is taken whole.
+    pub fn forget_pressure(&mut self) {
+        self.pressure.clear();
     }
 
     /// Return the pressures this part of the way to `pressure`, n, which are those of the iterate from now on.
@@ -210,7 +221,7 @@ mod tests {
     use super::*;
     use crate::model::sample::two_pairs;
 
-    /// Points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of it, one away from the laws almost
+    /// Points with p = 4 c and p = c^2, n = 4: a step to the laws goes all the way, one that goes far beyond a part of it, one away from the laws
     /// none of it.
     #[test]
     fn a_step_goes_as_far_as_it_comes_nearer() {
@@ -223,20 +234,20 @@ mod tests {
         let begin = || Progress { pressure: start.to_vec(), ..Progress::default() };
         let mut progress = Progress::default();
         // the first step has no pressures to begin with
-        assert_eq!(length(&mut progress, &rho, &exact, &[9.0; 4], &[0.0; 4]), 1.0);
+        assert_eq!(length(&mut progress, &rho, &exact, &[9.0; 4], &[0.0; 4]), Some(1.0));
         assert_eq!(progress.go(1.0, start.to_vec()), start);
         // the second point is on p = 4 c then
-        assert_eq!(length(&mut progress, &rho, &exact, &[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0]), 1.0);
+        assert_eq!(length(&mut progress, &rho, &exact, &[0.5, 0.75, 1.0, 1.0], &[2.0, 3.0, 1.0, 1.0]), Some(1.0));
         // from p = 4 to p = -4 where the law has 6
         let (to, pressure) = ([0.5, 1.5, 1.0, 1.0], [2.0, -4.0, 1.0, 1.0]);
-        assert_eq!(length(&mut begin(), &rho, &exact, &to, &pressure), 0.25);
+        assert_eq!(length(&mut begin(), &rho, &exact, &to, &pressure), Some(0.25));
         // points without stiffness on either side, whose compression may be exact, have none
-        assert_eq!(length(&mut begin(), &[f64::INFINITY, 0.5, 0.25, 3.0], &exact, &to, &pressure), 0.25);
+        assert_eq!(length(&mut begin(), &[f64::INFINITY, 0.5, 0.25, 3.0], &exact, &to, &pressure), Some(0.25));
         // no distance is left beyond compressions known to -+ 100
-        assert_eq!(length(&mut begin(), &rho, &[1e2; 4], &to, &pressure), 1.0);
+        assert_eq!(length(&mut begin(), &rho, &[1e2; 4], &to, &pressure), Some(1.0));
         assert_eq!(begin().go(0.25, pressure.to_vec()), [2.0, 2.0, 1.0, 1.0]);
         let away = length(&mut begin(), &rho, &exact, &[0.5, -9.0, 1.0, 1.0], &[2.0, 99.0, 1.0, 1.0]);
-        assert_eq!(away, 0.5f64.powi(7));
+        assert_eq!(away, None);
     }
 
     /// What a pair's points answered together, beside their own stiffness; nothing counts as a millionth. With smoothed laws, the geometric mean of both

@@ -32,13 +32,10 @@ pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
 pub use load::{Loaded, MeshOrigin, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
-#[cfg(feature = "internals")]
 pub use msh::{MeshProducer, parse};
-#[cfg(feature = "internals")]
 pub use script::unstructured;
 pub use script::view;
 pub use simplex::EDGES;
-#[cfg(feature = "internals")]
 pub use trust::breach;
 
 use crate::linalg::{bounds, pad};

@@ -28,7 +28,6 @@ pub enum MeshProducer {
 ///
 /// # Errors
 /// The input is not a mesh. The error names the file and the line.
-#[cfg(feature = "internals")]
 pub fn parse<const D: usize>(path: &Path, bytes: &[u8], maker: MeshProducer) -> Result<Mesh<D>> {
     read(path, Box::new(std::io::Cursor::new(bytes)), maker)
 }

@@ -5,23 +5,19 @@
 
 pub mod fields;
 pub mod folder;
-#[cfg(feature = "cli")]
 pub mod plot;
 pub mod report;
 pub mod tables;
-#[cfg(feature = "cli")]
 pub mod terminal;
 
 pub use fields::{BodyField, CellKind, Encoding, UnstructuredGrid};
 pub use folder::{Checksums, Folder, make_folder, safe_name, write_whole};
-#[cfg(feature = "cli")]
 pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
     LookReport, PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, busiest, warning_lines,
 };
 pub use tables::{ContactTable, HistoryWriter, PairRow, RowFile, StepTable};
-#[cfg(feature = "cli")]
 pub use terminal::IterationTable;
 
 use crate::error::{Error, Result};
@@ -82,7 +78,6 @@ pub fn trimmed(text: &str) -> &str {
 }
 
 /// Format an integer in superscript digits, for powers of ten.
-#[cfg(feature = "cli")]
 pub(super) fn superscript(value: i32) -> String {
     value
         .to_string()
@@ -123,7 +118,6 @@ mod tests {
     }
 
     #[test]
-    #[cfg(feature = "cli")]
     fn superscripts() {
         assert_eq!(superscript(-1203), "⁻¹²⁰³");
         assert_eq!(superscript(456_789), "⁴⁵⁶⁷⁸⁹");

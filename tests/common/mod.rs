@@ -1,7 +1,7 @@
-//! Runs the program as a user does, in a folder of its own, and reads what it wrote.
-#![allow(dead_code)] // not every test program uses all of it
+//! Runs the program as a user does, in a folder of its own, and reads what it wrote; or solves a scene by the library ([`here`]).
 
 pub mod alone;
+pub mod here;
 pub mod series;
 pub mod shapes;
 
@@ -349,13 +349,19 @@ pub struct Table {
 impl Table {
     /// Reads a file.
     pub fn read(path: &Path) -> Self {
-        let mut file = csv::Reader::from_path(path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()));
+        let file = File::open(path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()));
+        Self::of(file, &path.display().to_string())
+    }
+
+    /// Reads text; `name` stands in messages.
+    pub fn of(text: impl std::io::Read, name: &str) -> Self {
+        let mut file = csv::Reader::from_reader(text);
         let names: Vec<String> = file.headers().expect("a header").iter().map(String::from).collect();
         let mut columns = vec![Vec::new(); names.len()];
         for row in file.records() {
             for (column, field) in columns.iter_mut().zip(&row.expect("rows as long as the header")) {
                 let number = if field.is_empty() { Ok(f64::NAN) } else { field.parse() };
-                column.push(number.unwrap_or_else(|_| panic!("{}: `{field}` is no number", path.display())));
+                column.push(number.unwrap_or_else(|_| panic!("{name}: `{field}` is no number")));
             }
         }
         Self { names, columns }

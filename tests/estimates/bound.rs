@@ -1,6 +1,6 @@
 //! The bound of Newton's error by duality, against the true error: never below it, and hardly above it once it is one.
 
-use crate::common::alone::{alone, expect_success};
+use crate::common::here::with_session;
 use std::path::Path;
 use winkler::api::Silent;
 use winkler::api::load as load_scene;
@@ -134,10 +134,7 @@ fn steps(session: &Session, case: &str, more: &[&str], law: Option<&str>) -> Vec
 /// quadratic; and on curved surfaces in space, two pairs at once, and bodies of revolution.
 #[test]
 fn bounds_hold_and_are_sharp() {
-    expect_success(alone("bound::bounds_hold_and_are_sharp", 0, &[], || {
-        compare(&Session::start(&[])?);
-        Ok(())
-    }));
+    with_session(compare);
 }
 
 /// Compare bounds and errors of all steps of all cases.

@@ -1,6 +1,6 @@
 //! The library as a program of one's own uses it: the examples, scenes built in Rust and what is wrong with some, the features.
 
-use crate::common::alone::{alone, expect_success};
+use crate::common::here::with_session;
 use crate::common::{case, example, output, root};
 use std::process::Command;
 use std::time::Duration;
@@ -107,15 +107,12 @@ impl Observer for Watching {
 
 impl Recorder for Watching {}
 
-/// One test for all that needs PETSc: a process has one session.
 #[test]
 fn scenes_are_solved_or_refused() {
-    expect_success(alone("library::scenes_are_solved_or_refused", 0, &[], || {
-        let session = Session::start(&[])?;
-        solves(&session);
-        refuses(&session);
-        Ok(())
-    }));
+    with_session(|session| {
+        solves(session);
+        refuses(session);
+    });
 }
 
 /// Displacements, pressures, forces and what an observer sees.

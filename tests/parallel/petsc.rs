@@ -46,7 +46,7 @@ fn residual(matrix: &Matrix, b: &[f64], x: &[f64]) -> Result<f64> {
 #[cfg(target_env = "gnu")]
 #[test]
 fn large_arrays_lie_apart_from_the_heap() {
-    let output = alone("petsc::large_arrays_lie_apart_from_the_heap", 0, &[], || {
+    let output = alone("parallel::petsc::large_arrays_lie_apart_from_the_heap", 0, &[], || {
         let session = Session::start(&[])?;
         chain(&session, 2)?;
         // SAFETY: the C library counts its arrays; it is the one of this target.
@@ -69,7 +69,7 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
         ("lu", "-ksp_type cg -pc_type lu -pc_factor_mat_solver_type petsc"),
     ] {
         let environment = [("WINKLER_WORDS", line)];
-        let output = alone("petsc::a_failed_factorisation_is_a_reason_and_not_the_end", 0, &environment, || {
+        let output = alone("parallel::petsc::a_failed_factorisation_is_a_reason_and_not_the_end", 0, &environment, || {
             let line = std::env::var("WINKLER_WORDS").unwrap_or_default();
             let session = Session::start(&words(&line))?;
             let mut matrix = chain(&session, 2)?;
@@ -104,7 +104,7 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
 
 #[test]
 fn preonly_never_solves_with_an_old_factor() {
-    expect_success(alone("petsc::preonly_never_solves_with_an_old_factor", 0, &[], || {
+    expect_success(alone("parallel::petsc::preonly_never_solves_with_an_old_factor", 0, &[], || {
         let line = "-ksp_type preonly -pc_type cholesky -ksp_reuse_preconditioner -in_ksp_type preonly -in_pc_type bjacobi \
                     -in_sub_ksp_reuse_preconditioner -cg_ksp_type cg -cg_pc_type cholesky -cg_ksp_rtol 1e-12";
         let session = Session::start(&words(line))?;
@@ -129,7 +129,7 @@ fn preonly_never_solves_with_an_old_factor() {
 
 #[test]
 fn options_that_change_the_matrix_are_refused() {
-    expect_success(alone("petsc::options_that_change_the_matrix_are_refused", 0, &[], || {
+    expect_success(alone("parallel::petsc::options_that_change_the_matrix_are_refused", 0, &[], || {
         let line = "-a_ksp_diagonal_scale -b_pc_type lu -b_pc_factor_in_place -c_pc_type eisenstat -c_ksp_type cg \
                     -c_ksp_initial_guess_nonzero -d_pc_type nosuch";
         let session = Session::start(&words(line))?;
@@ -150,7 +150,7 @@ fn options_that_change_the_matrix_are_refused() {
 
 #[test]
 fn a_solver_keeps_its_matrix_and_the_session() {
-    expect_success(alone("petsc::a_solver_keeps_its_matrix_and_the_session", 0, &[], || {
+    expect_success(alone("parallel::petsc::a_solver_keeps_its_matrix_and_the_session", 0, &[], || {
         let session = Session::start(&words("-ksp_type cg -pc_type none -ksp_rtol 1e-12"))?;
         let matrix = chain(&session, 1000)?;
         let ksp = solver(&session, "", &matrix)?;
@@ -173,7 +173,7 @@ fn options_come_from_line_file_and_environment() {
     std::fs::write(&file, "# a comment\n-pc_type sor\n-ksp_rtol 1e-3\n").expect("a file");
     let file = file.to_str().expect("a plain path");
     let environment = [("PETSC_OPTIONS", "-ksp_max_it 7"), ("WINKLER_FILE", file)];
-    expect_success(alone("petsc::options_come_from_line_file_and_environment", 0, &environment, || {
+    expect_success(alone("parallel::petsc::options_come_from_line_file_and_environment", 0, &environment, || {
         let file = std::env::var("WINKLER_FILE").unwrap_or_default();
         let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
         let (options, upper) = (session.options(), UserOptions::read(&session)?.of("upper"));
@@ -190,7 +190,7 @@ fn options_come_from_line_file_and_environment() {
 
 #[test]
 fn a_missing_options_file_is_reported_in_petscs_words() {
-    expect_success(alone("petsc::a_missing_options_file_is_reported_in_petscs_words", 0, &[], || {
+    expect_success(alone("parallel::petsc::a_missing_options_file_is_reported_in_petscs_words", 0, &[], || {
         let error = Session::start(&words("-options_file nosuch.opt")).err().expect("no such file");
         // the sentence around the name differs between versions
         assert!(error.render(false).contains("nosuch.opt"), "{error}");
@@ -202,7 +202,7 @@ fn a_missing_options_file_is_reported_in_petscs_words() {
 #[test]
 fn settings_of_open_mpi_by_the_user_are_kept() {
     let environment = [("OMPI_MCA_btl", "self,tcp")];
-    expect_success(alone("petsc::settings_of_open_mpi_by_the_user_are_kept", 0, &environment, || {
+    expect_success(alone("parallel::petsc::settings_of_open_mpi_by_the_user_are_kept", 0, &environment, || {
         let _session = Session::start(&[])?;
         assert_eq!(std::env::var("OMPI_MCA_btl").as_deref(), Ok("self,tcp"));
         assert!(std::env::var_os("OMPI_MCA_pml").is_none());
@@ -212,7 +212,7 @@ fn settings_of_open_mpi_by_the_user_are_kept() {
 
 #[test]
 fn an_option_read_on_one_rank_is_read() {
-    expect_success(alone("petsc::an_option_read_on_one_rank_is_read", 2, &[], || {
+    expect_success(alone("parallel::petsc::an_option_read_on_one_rank_is_read", 2, &[], || {
         let line = "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
         let session = Session::start(&words(line))?;
         let bodies = ["upper", "lower"];
@@ -241,7 +241,7 @@ fn an_option_read_on_one_rank_is_read() {
 
 #[test]
 fn a_panic_on_one_rank_ends_the_others() {
-    let test = "petsc::a_panic_on_one_rank_ends_the_others";
+    let test = "parallel::petsc::a_panic_on_one_rank_ends_the_others";
     let start = Instant::now();
     let output = alone(test, 2, &[], || {
         use mpi::traits::CommunicatorCollectives;
@@ -289,7 +289,7 @@ fn petsc_waits_till_it_is_needed() {
         assert_eq!(options.left()?.len(), 1);
         options.clear("-slip")
     };
-    expect_success(alone("petsc::petsc_waits_till_it_is_needed", 0, &[], inside));
+    expect_success(alone("parallel::petsc::petsc_waits_till_it_is_needed", 0, &[], inside));
 }
 
 /// Options in the environment are PETSc's to read: then it does not wait.
@@ -302,7 +302,7 @@ fn petsc_starts_at_once_where_it_has_options() {
         session.options().mark_used("-up_ksp_type")
     };
     let environment = [("PETSC_OPTIONS", "-up_ksp_type cg")];
-    expect_success(alone("petsc::petsc_starts_at_once_where_it_has_options", 0, &environment, inside));
+    expect_success(alone("parallel::petsc::petsc_starts_at_once_where_it_has_options", 0, &environment, inside));
 }
 
 /// One rank that needs PETSc before the others would wait for them for ever.
@@ -313,7 +313,7 @@ fn several_ranks_start_petsc_together() {
         assert!(session.size() == 2 && session.petsc_version().is_some());
         Ok(())
     };
-    expect_success(alone("petsc::several_ranks_start_petsc_together", 2, &[], inside));
+    expect_success(alone("parallel::petsc::several_ranks_start_petsc_together", 2, &[], inside));
 }
 
 /// Lower triangle of two uncoupled square grids of unit springs, one for each dof of a node: held by springs on one side, `side`
@@ -338,7 +338,7 @@ fn grids(side: usize) -> Vec<(usize, usize, f64)> {
 #[test]
 fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
     let output =
-        alone("petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
+        alone("parallel::petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
             let options = ["-asked_mat_mumps_icntl_7", "1", "-own_mat_mumps_icntl_7", "0"];
             let session = Session::start(&options.map(String::from))?;
             // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
@@ -404,7 +404,7 @@ fn a_matrix_of_several_ranks() {
         }
         Ok(())
     };
-    expect_success(alone("petsc::a_matrix_of_several_ranks", 3, &[], inside));
+    expect_success(alone("parallel::petsc::a_matrix_of_several_ranks", 3, &[], inside));
 }
 
 /// Rows of a sheet of `side` by `side` nodes with two dofs each, held at its rim: springs between neighbours, a thousand times as stiff where
@@ -473,7 +473,7 @@ fn processes_share_an_exact_solve() {
         Ok(())
     };
     for ranks in [2, 3, 5] {
-        let Some(output) = alone("petsc::processes_share_an_exact_solve", ranks, &[], inside) else { return };
+        let Some(output) = alone("parallel::petsc::processes_share_an_exact_solve", ranks, &[], inside) else { return };
         expect_success(Some(output));
     }
 }

@@ -1,7 +1,7 @@
 //! What all random scenes of the wider box share: materials, loads, layers and gaps, and the text of the scene file.
 
-use crate::laws;
-use crate::random::Random;
+use super::laws;
+use super::random::Random;
 use std::fmt::Write;
 
 /// Materials of the bodies and orders of their elements.

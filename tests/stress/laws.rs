@@ -1,6 +1,6 @@
 //! Random laws of layers with a given tangent at a given pressure.
 
-use crate::random::Random;
+use super::random::Random;
 use std::fmt::Write;
 
 /// A law as a value of the key `layer`, and how far the layer closes at the pressure.

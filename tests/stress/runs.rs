@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // the example and the test each use their own part
 
-use crate::scenes::{Case, Expect};
+use super::scenes::{Case, Expect};
 use std::path::Path;
 use winkler::api::Silent;
 use winkler::api::load as load_scene;

@@ -2,9 +2,9 @@
 
 #![allow(dead_code)] // the example and the test each use their own part
 
-use crate::builder::{Bodies, Holds, on};
-use crate::laws::Law;
-use crate::random::Random;
+use super::builder::{Bodies, Holds, on};
+use super::laws::Law;
+use super::random::Random;
 use std::fmt::Write;
 use std::path::Path;
 

@@ -1,8 +1,8 @@
 //! Random scenes of slender bodies: leaves, plates, frames and hoops, from 1:5 to 1:200.
 
-use crate::builder::{Holds, SceneBuilder, on};
-use crate::random::Random;
-use crate::scenes::{Case, Expect};
+use super::builder::{Holds, SceneBuilder, on};
+use super::random::Random;
+use super::scenes::{Case, Expect};
 use std::path::Path;
 
 /// What a scene is made of.

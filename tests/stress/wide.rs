@@ -1,8 +1,8 @@
 //! Random scenes of the wider box: bodies in space, many bodies, curved contacts, small bodies, walls, springs, all laws, given starts.
 
-use crate::builder::{Holds, SceneBuilder, on};
-use crate::random::Random;
-use crate::scenes::{Case, Expect};
+use super::builder::{Holds, SceneBuilder, on};
+use super::random::Random;
+use super::scenes::{Case, Expect};
 use std::path::Path;
 
 /// What a scene is made of.

@@ -22,7 +22,6 @@ pub use forms::LinearLaw;
 #[cfg(test)]
 pub use forms::{Cubic, Exponential, Power};
 pub use make::{OwnLaws, make};
-#[cfg(feature = "internals")]
 pub use table::Table;
 
 use std::rc::Rc;

@@ -1,25 +1,24 @@
 //! Readers on damaged files: bytes of small valid files of each format are changed at random. A reader gives a mesh that keeps its
-//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed. `scripts/fuzz` runs this
-//! test, too, with more of them.
+//! promises, or an error with words; it never panics. `WINKLER_MUTATIONS` sets the number of files of each seed.
 
 use crate::mesh::{Asked, Duty, Mesh, MeshProducer, abaqus, foreign, nastran, parse};
 use std::path::Path;
 
 /// Valid files: their names tell which reader they are for.
 const SEEDS: [(&str, &[u8]); 13] = [
-    ("text2.msh", include_bytes!("../../../fuzz/seeds/msh/text2.msh")),
-    ("text2q.msh", include_bytes!("../../../fuzz/seeds/msh/text2q.msh")),
-    ("text3.msh", include_bytes!("../../../fuzz/seeds/msh/text3.msh")),
-    ("binary2.msh", include_bytes!("../../../fuzz/seeds/msh/binary2.msh")),
-    ("binary3.msh", include_bytes!("../../../fuzz/seeds/msh/binary3.msh")),
-    ("old2.msh", include_bytes!("../../../fuzz/seeds/msh/old2.msh")),
-    ("old2q.msh", include_bytes!("../../../fuzz/seeds/msh/old2q.msh")),
-    ("old3.msh", include_bytes!("../../../fuzz/seeds/msh/old3.msh")),
-    ("old3q.msh", include_bytes!("../../../fuzz/seeds/msh/old3q.msh")),
-    ("first2.msh", include_bytes!("../../../fuzz/seeds/msh/first2.msh")),
-    ("blocks.inp", include_bytes!("../../../fuzz/seeds/inp/blocks.inp")),
-    ("wedge.bdf", include_bytes!("../../../fuzz/seeds/bdf/wedge.bdf")),
-    ("boxes.unv", include_bytes!("../../../fuzz/seeds/unv/boxes.unv")),
+    ("text2.msh", include_bytes!("seeds/text2.msh")),
+    ("text2q.msh", include_bytes!("seeds/text2q.msh")),
+    ("text3.msh", include_bytes!("seeds/text3.msh")),
+    ("binary2.msh", include_bytes!("seeds/binary2.msh")),
+    ("binary3.msh", include_bytes!("seeds/binary3.msh")),
+    ("old2.msh", include_bytes!("seeds/old2.msh")),
+    ("old2q.msh", include_bytes!("seeds/old2q.msh")),
+    ("old3.msh", include_bytes!("seeds/old3.msh")),
+    ("old3q.msh", include_bytes!("seeds/old3q.msh")),
+    ("first2.msh", include_bytes!("seeds/first2.msh")),
+    ("blocks.inp", include_bytes!("seeds/blocks.inp")),
+    ("wedge.bdf", include_bytes!("seeds/wedge.bdf")),
+    ("boxes.unv", include_bytes!("seeds/boxes.unv")),
 ];
 
 /// Number of changed files of each seed: half a second for all.

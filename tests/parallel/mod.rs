@@ -1,8 +1,5 @@
 //! Several ranks, and the binding of PETSc.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod mpi;
 mod petsc;
 mod ranks;

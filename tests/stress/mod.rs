@@ -8,8 +8,9 @@ mod scenes;
 mod slender;
 mod wide;
 
-use runs::{Answer, Recipe, Verdict};
-use scenes::{Case, Expect};
+use self::runs::{Answer, Recipe, Verdict};
+use self::scenes::{Case, Expect};
+use crate::common::here::with_session;
 use std::path::Path;
 use winkler::petsc::Session;
 
@@ -24,17 +25,13 @@ const SCENES: usize = 24;
 const WIDE: u64 = 100;
 const SLENDER: u64 = 100;
 
-/// Runs scenes, all in one session, as a process has but one.
-struct Bench {
-    session: Session,
+/// Runs scenes in the session.
+struct Bench<'s> {
+    session: &'s Session,
     folder: tempfile::TempDir,
 }
 
-impl Bench {
-    fn start() -> Self {
-        let session = Session::start(&[]).expect("one session in this process");
-        Self { session, folder: tempfile::tempdir().expect("a temporary folder") }
-    }
+impl Bench<'_> {
 
     /// What methods make of a scene, and the scene in words.
     fn run(&self, seed: u64, index: usize, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
@@ -45,10 +42,10 @@ impl Bench {
     fn solve(&self, case: Case, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
         let path = self.folder.path().join("scene.toml");
         std::fs::write(&path, &case.text).expect("a scene can be written");
-        let reference = runs::reference(&self.session, &path, &case).expect("a session that lives");
+        let reference = runs::reference(self.session, &path, &case).expect("a session that lives");
         let by = |name: &&str| {
             let recipe = Recipe::new(name, &case);
-            let answer = runs::by_method(&self.session, &path, &recipe).expect("a session that lives");
+            let answer = runs::by_method(self.session, &path, &recipe).expect("a session that lives");
             (runs::judge(&case, &reference, &answer), answer)
         };
         (methods.iter().map(by).collect(), case.line.clone())
@@ -57,9 +54,11 @@ impl Bench {
 
 #[test]
 fn random_scenes() {
-    let bench = Bench::start();
-    scenes_are_solved_by_default(&bench);
-    no_method_claims_what_it_has_not(&bench);
+    with_session(|session| {
+        let bench = Bench { session, folder: tempfile::tempdir().expect("a temporary folder") };
+        scenes_are_solved_by_default(&bench);
+        no_method_claims_what_it_has_not(&bench);
+    });
 }
 
 /// Default settings converge on the scenes of a series that have a solution, agree with Newton's method, and say so when there is none.

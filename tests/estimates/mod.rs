@@ -1,8 +1,5 @@
 //! Estimated errors and bounds against true errors.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod bound;
 mod effectivity;
 mod estimate;

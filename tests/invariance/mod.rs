@@ -4,9 +4,10 @@ mod cases;
 mod change;
 mod judge;
 
-use cases::CASES;
-use change::Change;
-use judge::{Answer, Case, KINDS, Kind};
+use self::cases::CASES;
+use self::change::Change;
+use self::judge::{Answer, Case, KINDS, Kind};
+use crate::common::here::with_session;
 use std::path::Path;
 use winkler::api::{MeshSource, Order, Session, solve};
 use winkler::internals::Interrupt;
@@ -34,20 +35,23 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/meshes"))
 }
 
-/// One test, as a process has one session.
 #[test]
 fn answers_are_the_same_everywhere() {
-    let session = Session::start(&[]).expect("one session in this process");
+    with_session(compare);
+}
+
+/// Compare the answers of the tested cases with those of their changes.
+fn compare(session: &Session) {
     for case in &CASES {
         let tested = TESTED.iter().find(|(scene, _)| *scene == case.scene);
         let kinds = tested.into_iter().flat_map(|(_, kinds)| kinds.iter());
         let kinds: Vec<&Kind> = kinds.filter_map(|name| KINDS.iter().find(|kind| kind.name == *name)).collect();
         assert_eq!(kinds.len(), tested.map_or(0, |(_, kinds)| kinds.len()), "a kind of {} does not exist", case.scene);
         if !kinds.is_empty() {
-            check(&session, case, &kinds);
+            check(session, case, &kinds);
         }
     }
-    two_pairs_far_from_each_other(&session);
+    two_pairs_far_from_each_other(session);
 }
 
 fn check(session: &Session, case: &Case, kinds: &[&Kind]) {

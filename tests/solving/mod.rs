@@ -1,8 +1,5 @@
 //! Methods and solvers: one answer by each of them, and the work that each may take.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod condensed;
 mod counters;
 mod forecast;

@@ -1,8 +1,5 @@
 //! Answers against closed forms and known solutions.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod axisymmetric;
 mod cases;
 mod elasticity;

@@ -1,8 +1,5 @@
 //! Meshes, shapes and surfaces: what is read, what is refused, and what lies opposite what.
 
-#[path = "../common/mod.rs"]
-mod common;
-
 mod curved;
 mod ends;
 mod fits;
