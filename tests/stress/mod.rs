@@ -4,6 +4,7 @@ mod builder;
 mod laws;
 mod random;
 mod runs;
+mod saturating;
 mod scenes;
 mod slender;
 mod wide;
@@ -143,6 +144,23 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");
     assert!(answer.residual <= 1e-8 && answer.message.contains("lacks balance"), "{}", answer.message);
+}
+
+/// Layers that saturate: wherever Newton's method begins, it ends with the pressures that balance the load.
+#[test]
+fn layers_that_saturate() {
+    with_session(|session| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("scene.toml");
+        for index in 0..60 {
+            let case = saturating::scene(1, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+            std::fs::write(&path, &case.text).expect("a scene can be written");
+            let answer = runs::by_method(session, &path, &Recipe::new("auto", &case)).expect("a session that lives");
+            let carried = answer.force.iter().sum::<f64>() / case.carried.expect("a load");
+            let is_right = answer.status == "converged" && (carried - 1.0).abs() < 1e-6;
+            assert!(is_right && answer.iterations <= 30, "{}: {carried}, {}", answer.message, case.line);
+        }
+    });
 }
 
 /// All numbers that follow a word in a scene.
