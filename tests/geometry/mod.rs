@@ -10,4 +10,5 @@ mod patterns;
 mod pieces;
 mod quadratic;
 mod round;
+mod segments;
 mod surfaces;

@@ -94,21 +94,6 @@ fn shells_and_man_know_the_commands() {
     assert_eq!(winkler(&["man", "/dev/null/man"]).code, 6);
 }
 
-#[test]
-fn colours_are_asked_for() {
-    let coloured = |words: &[&str], variable: Option<(&str, &str)>| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_winkler"));
-        environment(&mut command);
-        command.args(words).arg("mesh").arg("none.toml").envs(variable);
-        let (_, _, complaint) = output(command, Duration::from_secs(60));
-        assert!(complaint.contains("none.toml"), "{complaint}");
-        complaint.contains('\u{1b}')
-    };
-    assert!(!coloured(&[], None) && coloured(&["--color", "always"], None));
-    assert!(coloured(&[], Some(("CLICOLOR_FORCE", "1"))));
-    assert!(!coloured(&["--color", "never"], Some(("CLICOLOR_FORCE", "1"))));
-}
-
 /// With `-q` a run that is solved says where its results are; one that is not says so, too. Warnings stay.
 #[test]
 fn quiet_runs_say_what_matters() {
@@ -150,40 +135,6 @@ fn check_names_the_solvers_of_a_run() {
         let solvers = facts["bodies"].as_array().expect("bodies").iter().map(|body| body["solver"].clone());
         assert_eq!(solvers.collect::<Vec<_>>(), solve(scene, &words).solvers(), "{solver}");
     }
-}
-
-/// With `-v` standard error has the decisions and the PETSc options of each body, typed ones and the program's own.
-#[test]
-fn verbose_runs_say_what_was_decided() {
-    let words = ["--set", "mesh.set.n=4", "--method", "robin", "--set", "solver=mumps", "-upper_ksp_type", "cg"];
-    let usual = solve(case("groove"), &words);
-    let run = solve(case("groove"), &[&words[..], &["-v"]].concat());
-    let without = |text: &str| text.lines().filter(|line| !line.contains(" s")).map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(without(&run.stdout).len(), without(&usual.stdout).len(), "what comes out is the same");
-    assert!(usual.stderr.is_empty(), "{}", usual.stderr);
-    for part in ["decided", "method: robin", "until increment <=", "inner solver: ", "points on `", "body lower: "] {
-        assert!(run.stderr.contains(part), "no `{part}` in\n{}", run.stderr);
-    }
-    let options = |body: &str| {
-        let begin = format!("  PETSc options of {body}: ");
-        run.stderr.lines().find_map(|line| line.strip_prefix(&begin)).unwrap_or_default().to_owned()
-    };
-    assert!(options("upper").contains("-upper_ksp_type cg"), "{}", run.stderr);
-    assert!(options("lower").contains("-lower_pc_type cholesky"), "{}", run.stderr);
-    assert!(!options("lower").contains("upper"), "{}", run.stderr);
-}
-
-#[test]
-fn help_has_examples_and_petsc_options() {
-    for command in ["solve", "check", "sweep", "bench"] {
-        let help = winkler(&[command, "--help"]);
-        assert!(help.code == 0 && help.stdout.contains("Examples:\n  winkler "), "{}", help.said());
-    }
-    let help = winkler(&["solve", "--help"]).stdout;
-    assert!(help.contains("-upper_ksp_type cg") && help.contains("-newton_pc_type"), "{help}");
-    // options of the program with one dash look like PETSc's
-    let slip = winkler(&["solve", "scene.toml", "-verbose"]);
-    assert!(slip.code == 2 && slip.stderr.contains("did you mean --verbose?"), "{}", slip.said());
 }
 
 /// A run that would take hours, ended when its test ends.

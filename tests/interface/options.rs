@@ -54,34 +54,6 @@ fn options_reach_all_bodies_or_one() {
     }
 }
 
-/// The line that ends a run must not name a solver that did not run.
-#[test]
-fn the_terminal_names_the_solver_that_ran() {
-    let run = groove("-ksp_type cg -pc_type hypre").converged();
-    assert!(!run.stdout.contains("mumps"), "{}", run.stdout);
-    let run = groove("").converged();
-    assert!(run.stdout.contains("mumps"), "{}", run.stdout);
-}
-
-#[test]
-fn every_solver_ends_at_the_same_answer() {
-    let direct = tight("").contact();
-    let all = [
-        "-upper_ksp_type cg -lower_pc_type gamg",
-        "-ksp_type cg -pc_type hypre",
-        // the residual is exact whatever the inner solve
-        "-ksp_type cg -pc_type hypre -ksp_rtol 0.03",
-        "-ksp_type preonly -pc_type icc",
-        // neither a stale factor nor a stale preconditioner changes the answer
-        "-ksp_reuse_preconditioner",
-        "-ksp_type cg -ksp_reuse_preconditioner",
-    ];
-    for options in all {
-        let run = tight(options);
-        assert!(distance(&run.contact()["pressure"], &direct["pressure"]) < 1e-6, "{options}");
-    }
-}
-
 /// preonly never runs on a stale factor: the history is the same to rounding.
 /// What is typed for the matrix of all bodies reaches it, whatever the program would have chosen for them, and by `auto`, too.
 #[test]
@@ -102,13 +74,6 @@ fn preonly_factors_anew_although_reuse_is_requested() {
     let (fresh, reused) = (tight("--set solver=mumps"), tight("-ksp_reuse_preconditioner"));
     assert_eq!(fresh.count("iterations"), reused.count("iterations"));
     assert_eq!(fresh.history()["residual"], reused.history()["residual"]);
-}
-
-/// With CG a stale preconditioner is the user's good right: then nothing is factored again, and the counter says so.
-#[test]
-fn a_preconditioner_that_is_reused_is_counted_once() {
-    let run = tight("-ksp_type cg -ksp_reuse_preconditioner");
-    assert_eq!(run.count("factorizations"), 2, "the factors of the start serve all sweeps");
 }
 
 #[test]
@@ -310,17 +275,6 @@ fn options_that_look_change_nothing() {
     }
 }
 
-#[test]
-fn flags_of_the_program_are_none_of_petscs_business() {
-    let run = groove("-options_left --json -ksp_type cg").converged();
-    let table = run.stdout.split("Option Table entries").nth(1).unwrap_or_else(|| panic!("no table\n{}", run.stdout));
-    assert!(table.contains("-ksp_type cg"), "{table}");
-    assert!(run.stdout.contains("There are no unused options"), "{}", run.stdout);
-    for own in ["-o ", "--set", "-json", "mesh.set.n", "signal_handler", "results"] {
-        assert!(!table.contains(own), "{own}\n{table}");
-    }
-}
-
 /// PETSc's own list has what no solver has read on any rank, where it is asked for.
 #[test]
 fn petsc_lists_what_is_left() {
@@ -331,15 +285,6 @@ fn petsc_lists_what_is_left() {
         assert!(run.stdout.contains("left: name:-pc_sor_its value: 2"), "{ranks}: {}", run.stdout);
         let run = solve_on(ranks, case("groove"), &[&SCENE[..], &words[1..]].concat()).converged();
         assert!(!run.stdout.contains("not used!") && run.warnings().contains("-pc_sor_its"), "{ranks}: {}", run.stdout);
-    }
-}
-
-#[test]
-fn help_is_shown_without_a_scene() {
-    for word in ["--help", "-h", "-help"] {
-        let run = winkler(&[word]);
-        assert_eq!(run.code, 0, "{word}: {}", run.said());
-        assert!(run.stdout.contains("Usage: winkler"), "{word}: {}", run.said());
     }
 }
 

@@ -8,7 +8,6 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use winkler::api::{BodyField, CellKind};
 use winkler::error::Kind;
 
 fn page(folder: &Path) -> String {
@@ -339,51 +338,4 @@ fn damaged_results_are_not_shown() {
         }
         assert!(page().expect("a page") == good);
     }
-}
-
-#[test]
-fn a_hundred_thousand_triangles_take_less_than_five_megabytes() {
-    // a slab of cubes of six tetrahedra each
-    let n = 157;
-    let at = |i: usize, j: usize, k: usize| (i + (n + 1) * (j + (n + 1) * k)) as u32;
-    let points: Vec<[f64; 3]> = (0..2 * (n + 1) * (n + 1))
-        .map(|p| [p % (n + 1), p / (n + 1) % (n + 1), p / (n + 1) / (n + 1)].map(|c| c as f64))
-        .collect();
-    let ways = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
-    let mut connectivity = Vec::new();
-    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-        for way in ways {
-            let mut corner = [i, j, 0];
-            connectivity.push(at(i, j, 0));
-            for axis in way {
-                corner[axis] += 1;
-                connectivity.push(at(corner[0], corner[1], corner[2]));
-            }
-        }
-    }
-    let wave = |x: &[f64; 3]| [(0.1 * x[0]).sin(), (0.13 * x[1]).cos(), (0.07 * x[0] * x[1]).sin()];
-    let displacement: Vec<[f64; 3]> = points.iter().map(wave).collect();
-    let field = BodyField {
-        name: "slab".into(),
-        von_mises: displacement.iter().map(|u| 1.0 + u[2]).collect(),
-        stress: vec![[0.0; 6]; points.len()],
-        principal: displacement.clone(),
-        points,
-        cell: CellKind::Tetra,
-        connectivity,
-        displacement,
-    };
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut file = fs::File::create(folder.path().join("slab.vtu")).expect("a file");
-    field.write(Default::default(), &mut file).expect("a grid");
-    let report = json!({
-        "title": "slab", "status": "converged", "message": "", "settings": { "dimension": 3, "body": [], "contact": [] }, "pairs": [],
-        "bodies": [{ "name": "slab" }], "files": ["slab.vtu"], "times": { "total": 1.0 }, "inner_times": {},
-    });
-    fs::write(folder.path().join("report.json"), report.to_string()).expect("a report");
-    winkler::internals::save(folder.path(), None).expect("a page");
-    let page = page(folder.path());
-    let count = triangles(&view(&page)["bodies"][0]);
-    assert_eq!(count, 4 * n * n + 8 * n);
-    assert!((99_000..105_000).contains(&count) && page.len() < 5_000_000, "{count} triangles, {} bytes", page.len());
 }

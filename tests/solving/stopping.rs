@@ -320,73 +320,6 @@ fn memory_ends_with_a_message() {
     assert!(reports > 0);
 }
 
-/// A stack of two blocks under a share of its loads.
-fn stack_under(share: f64) -> Scene {
-    let geo = root().join("meshes/stack/stack.geo").display().to_string();
-    let block = |name: &str, fix: &str| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0.3\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
-        )
-    };
-    Scene::new(format!(
-        "dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}\
-         load = [{{ on = \"b1_right\", pressure = {} }}]\n{}[[contact]]\nbetween = [\"b1_top\", \"b2_bottom\"]\n\
-         gap = 0.002\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
-        block("b1", "{ on = \"b1_bottom\", y = 0 }"),
-        0.3 * share,
-        block("b2", &format!("{{ on = \"b2_top\", y = {} }}", -0.02 * share))
-    ))
-}
-
-/// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper
-/// block is carried by its supports as one.
-#[test]
-fn an_interrupted_load_step_has_its_share_of_the_loads() {
-    let method =
-        |steps: &str, most: usize| format!("method={{gamma=1e-6, {steps} stop={{residual=1e-15, iterations={most}}}}}");
-    for solver in ["solver=condensed", "solver=mumps"] {
-        let (whole, endless) = (stack_under(1.0), method("steps=[0.5, 1],", 100_000_000));
-        let mut run = Working::start(&words(&whole.path, &["--set", &endless, "--set", solver]), 1);
-        run.until_rows(5);
-        run.signal("TERM");
-        let (status, scratch, said) = run.end();
-        assert_eq!(status.code(), Some(143), "{said}");
-        let folder = scratch.path().join("results");
-        let report = report(&folder);
-        let most = report["iterations"].as_u64().expect("a number") as usize;
-        let half = solve(stack_under(0.5), &["--set", &method("", most), "--set", solver]);
-        let table = |folder: &Path| -> Vec<f64> {
-            let text = fs::read_to_string(folder.join("contact-b1-b2.csv")).expect("a table");
-            text.lines().skip(1).flat_map(|line| line.split(',')).map(|word| word.parse().expect("a number")).collect()
-        };
-        let (ours, theirs) = (table(&folder), table(&half.folder));
-        assert!(
-            ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-9 * y.abs().max(1e-3)),
-            "{ours:?}\n{theirs:?}"
-        );
-        let balance = |report: &Value, body: usize| report["bodies"][body]["balance"].to_string();
-        for body in 0..2 {
-            let stress = |report: &Value| report["bodies"][body]["max_von_mises"].as_f64().expect("a number");
-            assert!((stress(&report) / stress(&half.report) - 1.0).abs() < 1e-9, "{report}");
-            for (part, at) in [("loads", ""), ("contacts", ""), ("supports", "/0"), ("supports", "/1")] {
-                for c in 0..2 {
-                    let of = |report: &Value| {
-                        let path = format!("/bodies/{body}/balance/{part}{at}/force/{c}");
-                        report.pointer(&path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {path}"))
-                    };
-                    let (x, y) = (of(&report), of(&half.report));
-                    assert!(
-                        (x - y).abs() < 1e-9,
-                        "{x} {y}\n{}\n{}",
-                        balance(&report, body),
-                        balance(&half.report, body)
-                    );
-                }
-            }
-        }
-    }
-}
-
 /// An interrupted run has a checkpoint, which any number of ranks can take; one that is solved has none left.
 #[test]
 fn an_interrupted_run_goes_on_with_other_ranks() {
@@ -420,46 +353,6 @@ fn an_interrupted_run_goes_on_with_other_ranks() {
         assert_eq!(again.count("iterations"), done + 20);
         assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-9);
     }
-}
-
-/// A run that ends in a later direction of its loads goes on there, with the rows of all steps before.
-#[test]
-fn a_history_goes_on_in_its_step() {
-    let text = text_of("groove")
-        .replace("on = \"lower_face\", pressure = 10", "on = \"lower_face\", pressure = 10, path = \"low\"");
-    assert!(text.contains("path"));
-    let scene = Scene::new(text.split_once("[method]").expect("a method").0);
-    fs::write(scene.path.with_file_name("path.csv"), "low,factor\n0,0\n1,1\n0.5,1\n1,0.5\n").expect("a table");
-    let method = |most: usize| {
-        let stop = format!("stop={{residual=1e-12,iterations={most}}}");
-        format!("method={{name=\"robin\",gamma=1e-4,steps={{table=\"path.csv\"}},{stop}}}")
-    };
-    let endless = ["--set", &method(100_000_000), "--set", "mesh.set.n=8"];
-    let mut run = Working::start(&words(&scene.path, &endless), 1);
-    run.until_rows(8);
-    run.signal("TERM");
-    let (status, scratch, said) = run.end();
-    assert_eq!(status.code(), Some(143), "{said}");
-    let stopped = report(&scratch.path().join("results"));
-    let rows = |folder: &Path| -> Vec<String> {
-        let text = fs::read_to_string(folder.join("steps.csv")).expect("a table of steps");
-        text.lines().map(str::to_owned).collect()
-    };
-    let before = rows(&scratch.path().join("results"));
-    assert_eq!([stopped["steps"].as_array().map(Vec::len), Some(before.len())], [Some(2), Some(3)], "{stopped}");
-    assert!(before[2].contains("interrupted"), "{before:?}");
-    let done = stopped["iterations"].as_u64().expect("a number") as usize;
-    let limited = ["--set", &method(done + 3), "--set", "mesh.set.n=8"];
-    let (again, whole) = (restart(&scratch, 2, &scene.path, &limited), solve(&scene, &limited));
-    let (ours, theirs) = (rows(&again.folder), rows(&whole.folder));
-    assert_eq!((ours.len(), &ours[1]), (5, &before[1]));
-    assert!(ours[2..].iter().all(|row| row.contains("iteration-limit")), "{ours:?}");
-    for (ours, theirs) in ours[1..].iter().zip(&theirs[1..]) {
-        let numbers = |row: &str| row.split(',').filter_map(|word| word.parse::<f64>().ok()).collect::<Vec<_>>();
-        let (ours, theirs) = (numbers(ours), numbers(theirs));
-        assert!(ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-8), "{ours:?}\n{theirs:?}");
-    }
-    assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-8);
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod slender;
 mod wide;
 
 use self::runs::{Answer, Recipe, Verdict};
-use self::scenes::{Case, Expect};
+use self::scenes::Case;
 use crate::common::here::with_session;
 use std::path::Path;
 use winkler::petsc::Session;
@@ -33,7 +33,6 @@ struct Bench<'s> {
 }
 
 impl Bench<'_> {
-
     /// What methods make of a scene, and the scene in words.
     fn run(&self, seed: u64, index: usize, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
         self.solve(scenes::scene(seed, index, Path::new(env!("CARGO_MANIFEST_DIR"))), methods)
@@ -145,6 +144,7 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     assert_eq!(answer.status, "iteration-limit");
     assert!(answer.residual <= 1e-8 && answer.message.contains("lacks balance"), "{}", answer.message);
 }
+<<<<<<< HEAD
 
 /// Layers that saturate: wherever Newton's method begins, it ends with the pressures that balance the load.
 #[test]
@@ -264,3 +264,5 @@ fn slender_scenes_fill_the_box() {
     }
     some("no load", &|case| case.expect == Expect::Gauge);
 }
+=======
+>>>>>>> 910544fcc2a300b9080ce82b8c403aafe4e0f3f6
