@@ -146,11 +146,6 @@ impl Run {
         self.table("history.csv")
     }
 
-    /// Runs a command that writes its results to `folder`.
-    pub fn of(command: Command, folder: &Path) -> Self {
-        end_of(command, TempDir::new().expect("a temporary folder"), folder.to_owned())
-    }
-
     /// The run itself, which must have ended with status `converged`.
     pub fn converged(self) -> Self {
         assert_eq!((self.code, self.report["status"].as_str()), (0, Some("converged")), "{}", self.said());
@@ -223,10 +218,19 @@ fn program(ranks: usize) -> Command {
     command
 }
 
+/// Removes what MPI sets where this process has a session, and a launcher would take for its own.
+pub fn without_session(command: &mut Command) -> &mut Command {
+    let is_of_mpi = |name: &str| ["OMPI_", "ORTE_", "PMIX_", "PRTE_"].iter().any(|start| name.starts_with(start));
+    for (name, _) in std::env::vars().filter(|(name, _)| is_of_mpi(name)) {
+        command.env_remove(name);
+    }
+    command
+}
+
 /// Sets what tests need: Open MPI as root, ranks that share cores, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
 /// options from outside.
 pub fn environment(command: &mut Command) {
-    command
+    without_session(command)
         .envs(CROWDED)
         // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
         .envs(UNBOUND)
@@ -241,10 +245,6 @@ pub fn environment(command: &mut Command) {
 
 fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     command.current_dir(scratch.path());
-    end_of(command, scratch, folder)
-}
-
-fn end_of(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     // launchers that start at the same moment get into each other's way in a common folder
     command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
     let (status, stdout, stderr) = output(command, patience());

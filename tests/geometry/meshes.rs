@@ -299,31 +299,6 @@ fn no_mesh_of_other_inputs_comes_from_the_cache() {
     assert!(checked.stdout.contains("is meshed anew in each run, since it uses `Rand`"), "{}", checked.said());
 }
 
-/// What another user may have put into a cache is no answer to this scene, and nothing is written there.
-#[test]
-fn a_cache_of_others_is_not_used() {
-    use std::os::unix::fs::{PermissionsExt, chown};
-    let script = Script::new("n = 2;");
-    let (cache, own) = (script.path("cache"), script.path("home/.cache/winkler"));
-    let mesh = || script.mesh(&cache, &[]).0;
-    let count = |folder: &Path| std::fs::read_dir(folder).map_or(0, |entries| entries.count());
-    assert_eq!([mesh(), mesh()], [false, true]);
-    let file = std::fs::read_dir(&cache).expect("a cache").next().expect("a mesh").expect("a mesh").path();
-    let allow = |path: &Path, mode| std::fs::set_permissions(path, PermissionsExt::from_mode(mode)).expect("ours");
-    allow(&cache, 0o777);
-    assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
-    allow(&cache, 0o755);
-    assert!(mesh());
-    // only root gives files away
-    if chown(&file, Some(54_321), None).is_err() {
-        return;
-    }
-    assert_eq!([mesh(), mesh()], [false, true], "their file is replaced by ours");
-    chown(&cache, Some(54_321), None).expect("given away");
-    std::fs::remove_dir_all(&own).expect("removed");
-    assert_eq!(([mesh(), mesh()], count(&cache), count(&own)), ([false, true], 1, 1));
-}
-
 /// The login node of a cluster meshes, and nodes without Gmsh solve. Where there is a Gmsh, no mesh of another one is taken.
 #[test]
 fn a_cached_mesh_serves_without_gmsh() {
@@ -356,25 +331,6 @@ fn a_cached_mesh_serves_without_gmsh() {
     assert!(script.mesh(&cache, &none).0);
     script.write("a.geo", &format!("n = 4;{SQUARES}"));
     assert_eq!(script.ended(&cache, &none).0, Some(4));
-}
-
-/// Without a home, or with one that takes no files, meshes are kept in a folder of this user among the temporary ones. Others cannot write
-/// there, whatever the umask.
-#[test]
-fn without_a_home_meshes_are_kept_among_temporary_files() {
-    use std::os::unix::fs::{MetadataExt, PermissionsExt};
-    let script = Script::new("n = 3;");
-    script.write("file", "");
-    let temporary = script.path("tmp");
-    std::fs::create_dir(&temporary).expect("a folder");
-    let [temporary, file] = [temporary, script.path("file/home")].map(|path| path.display().to_string());
-    for (home, origin) in [("", (false, 32)), (&file, (true, 32)), ("/nonexistent/home", (true, 32))] {
-        assert_eq!(script.mesh(Path::new(""), &[("HOME", home), ("TMPDIR", &temporary)]), origin, "{home}");
-    }
-    let made = std::fs::read_dir(&temporary).expect("a folder").next().expect("a cache").expect("a cache");
-    let data = made.metadata().expect("a folder");
-    assert_eq!(made.file_name().to_string_lossy(), format!("winkler-{}", data.uid()));
-    assert_eq!(data.permissions().mode() & 0o022, 0);
 }
 
 /// A bar of two squares in format 2.2, with these names, and with the tags of its six elements.

@@ -1,6 +1,6 @@
-//! The page of a run and single pictures, made from files alone.
+//! The page of a run.
 
-use crate::common::{Run, case, output, solve, winkler};
+use crate::common::{case, output, solve};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
@@ -8,7 +8,6 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
-use winkler::error::Kind;
 
 fn page(folder: &Path) -> String {
     fs::read_to_string(folder.join("report.html")).expect("report.html")
@@ -104,34 +103,6 @@ fn a_plane_run_has_a_page_of_its_own() {
         // the script has drawn
         assert!(dom.contains("<output>× ") && dom.contains("<span style=\"background"), "the view is not drawn");
     }
-    single_pictures_are_drawn(&run);
-}
-
-/// Each single picture of a plane run says what it shows.
-fn single_pictures_are_drawn(run: &Run) {
-    let folder = run.folder.to_str().expect("a name");
-    for (what, words) in [
-        ("stress", "von Mises stress, MPa"),
-        ("displacement", "displacement, cm"),
-        ("pressure", "contact pressure, MPa"),
-        ("convergence", "residual"),
-    ] {
-        let drawn = winkler(&["plot", folder, what]);
-        assert_eq!(drawn.code, 0, "{}", drawn.said());
-        let svg = fs::read_to_string(drawn.stdout.trim()).expect("a picture");
-        assert!(
-            svg.starts_with("<svg")
-                && svg.contains(words)
-                && svg.to_lowercase().contains("fill=\"white\"") | svg.contains("#FFFFFF"),
-            "{what}"
-        );
-        if what == "stress" {
-            // both bodies, from the first colour to the last
-            assert_eq!(svg.matches("<title>").count(), 2);
-            assert!(svg.contains("<title>upper</title>") && svg.contains("displacements ×"));
-            assert!(svg.contains("fill=\"#440154\" d=\"M") && svg.contains("fill=\"#fee825\" d=\"M"), "all colours");
-        }
-    }
 }
 
 #[test]
@@ -155,187 +126,5 @@ fn bodies_in_space_are_their_surfaces() {
             assert!(dom.contains("<output>× "), "the view is not drawn");
             assert!(dom.contains("<span style=\"background"), "no colours");
         }
-    }
-}
-
-#[test]
-fn without_fields_the_page_says_how_to_get_them() {
-    let run = solve(case("patch-3d"), &[]).converged();
-    let folder = run.folder.to_str().expect("a name");
-    let out = run.folder.join("elsewhere.html");
-    let made = winkler(&["report", folder, "-o", out.to_str().expect("a name")]);
-    assert_eq!((made.code, made.stdout.trim()), (0, out.to_str().expect("a name")), "{}", made.said());
-    let text = fs::read_to_string(&out).expect("a page");
-    assert!(text.contains("<code>--vtu --report</code>") && !text.contains("id=\"view\""));
-    // a map of the pressure from the table
-    let points = run.contact().rows();
-    let map =
-        text.split("<figure class=\"map\">").nth(1).and_then(|rest| rest.split("</figure>").next()).expect("a map");
-    assert_eq!(map.matches('M').count(), points);
-    refused(&winkler(&["plot", folder, "stress"]), 6, &["no fields", "--vtu"]);
-}
-
-/// One message with these words, and this exit code.
-fn refused(run: &Run, code: i32, words: &[&str]) {
-    assert_eq!(run.code, code, "{}", run.said());
-    words.iter().for_each(|word| assert!(run.stderr.contains(word), "no `{word}`\n{}", run.said()));
-}
-
-/// The picture of bodies in space has the triangles that face the viewer: of two boxes three faces each, from the first colour to the last.
-#[test]
-fn bodies_in_space_and_contact_surfaces_are_drawn() {
-    let run = solve(case("patch-3d"), &["--vtu"]).converged();
-    let folder = run.folder.to_str().expect("a name");
-    let drawn = winkler(&["plot", folder, "displacement"]);
-    assert_eq!(drawn.code, 0, "{}", drawn.said());
-    let svg = fs::read_to_string(drawn.stdout.trim()).expect("a picture");
-    let fills: Vec<&str> = svg.split("<path fill=\"").skip(1).map(|rest| &rest[..7]).collect();
-    let different: std::collections::BTreeSet<&str> = fills.iter().copied().collect();
-    // twelve bands on three faces of different brightness, each of which has some of them
-    assert!((13..=36).contains(&different.len()), "{different:?}");
-    assert!(svg.contains("displacements ×"));
-    // the pressure on the facets of the joint, the same everywhere: all of it in the last colour
-    let drawn = winkler(&["plot", folder, "pressure"]);
-    let svg = fs::read_to_string(drawn.stdout.trim()).expect("a picture");
-    assert!(svg.contains("fill=\"#fee825\" d=\"M") && !svg.contains(">open<"), "{svg}");
-}
-
-/// The curve of contact over force has a mark for each load step, and an area in space is called one, in tables too.
-#[test]
-fn contact_over_force() {
-    let sets =
-        ["--set", "mesh.set.n=4", "--set", "method.steps=3", "--set", "output.vtu=false", "--set", "units=mm, MPa"];
-    for (name, column) in [("groove-held", "contact_length"), ("rough", "contact_area")] {
-        let run = solve(case(name), &sets).converged();
-        let header = fs::read_to_string(run.folder.join("steps.csv")).expect("steps.csv");
-        assert!(
-            header.lines().next().is_some_and(|header| header.contains(&format!(",{column} lower-upper,"))),
-            "{header}"
-        );
-        let steps = run.report["steps"].as_array().expect("steps");
-        assert_eq!(steps[2]["pairs"][0][column], run.report["pairs"][0][column]);
-        let folder = run.folder.to_str().expect("a name");
-        assert_eq!(winkler(&["plot", folder, "area"]).code, 0);
-        assert_eq!(winkler(&["report", folder]).code, 0);
-        let page = fs::read_to_string(run.folder.join("report.html")).expect("a page");
-        assert!(page.contains("<h2>Load steps</h2>") && page.contains("contact force, N"), "{name}");
-        // in the plane for each length of thickness
-        assert_eq!(page.contains("contact force, N/mm"), name == "groove-held");
-        let drawn = fs::read_to_string(run.folder.join("area.svg")).expect("a picture");
-        assert_eq!(drawn.matches("<polygon").count(), 3, "{name}");
-        assert!(drawn.contains("contact force") && drawn.contains(&column.replace("contact_", "")), "{name}");
-        assert_eq!(winkler(&["plot", folder, "force"]).code, 0);
-        let drawn = fs::read_to_string(run.folder.join("force.svg")).expect("a picture");
-        assert!(drawn.contains("contact force") && drawn.contains("approach"), "{name}");
-    }
-    let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
-    refused(&winkler(&["plot", run.folder.to_str().expect("a name"), "area"]), 6, &["no load steps", "method.steps"]);
-}
-
-#[test]
-fn what_cannot_be_shown_is_refused() {
-    let run = solve(case("patch-3d"), &["--vtu"]).converged();
-    let folder = run.folder.to_str().expect("a name").to_owned();
-    refused(&winkler(&["report"]), 2, &["DIR"]);
-    refused(&winkler(&["report", "nowhere"]), 6, &["nowhere", "report.json", "winkler solve"]);
-    refused(&winkler(&["report", &folder, "-o", "no/page.html"]), 6, &["no/page.html"]);
-    refused(&winkler(&["plot", &folder, "stres"]), 2, &["`stres`", "did you mean `stress`?"]);
-    refused(&winkler(&["plot", &folder, "pressure", "-o", "p.png"]), 2, &["p.png", "rsvg-convert"]);
-    refused(&winkler(&["plot", &folder, "pressure", "-o", "no/p.svg"]), 6, &["no/p.svg"]);
-    refused(&winkler(&["plot", "nowhere", "pressure"]), 6, &["report.json"]);
-    // of a run without sums
-    fs::remove_file(run.folder.join("SHA256SUMS")).expect("sums");
-    let broken = |name: &str, text: &str, words: &[&str]| {
-        let path = run.folder.join(name);
-        let before = fs::read(&path).expect("a file");
-        fs::write(&path, text).expect("a file");
-        refused(&winkler(&["report", &folder]), 6, words);
-        assert!(!run.folder.join("report.html").exists());
-        fs::write(&path, before).expect("a file");
-    };
-    broken("lower.vtu", "<VTKFile", &["lower.vtu", "--vtu"]);
-    broken("lower.vtu", "", &["lower.vtu"]);
-    broken("report.json", "{", &["report.json", "no report"]);
-    broken("report.json", "{}", &["report.json", "`status`"]);
-    broken("history.csv", "a,b\n1\n", &["history.csv", "table"]);
-    let name = "contact-lower-upper.csv";
-    broken(name, "x,y\n1,2,3\n", &[name]);
-    assert_eq!(winkler(&["report", &folder]).code, 0);
-}
-
-/// Numbers that look like chance, the same in every run.
-struct Chance(u64);
-
-impl Chance {
-    fn below(&mut self, end: usize) -> usize {
-        // Knuth's MMIX
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % end
-    }
-}
-
-/// A file with something wrong: a bit, a byte, a piece that is missing, or the end.
-fn damaged(whole: &[u8], chance: &mut Chance) -> Vec<u8> {
-    let (mut bytes, at) = (whole.to_vec(), chance.below(whole.len()));
-    match chance.below(4) {
-        0 => bytes[at] ^= 1 << chance.below(8),
-        1 => bytes[at] = b"0123456789-.e,<>/=AZ\0\xff"[chance.below(22)],
-        2 => bytes.truncate(at),
-        _ => drop(bytes.drain(at..(at + 1 + chance.below(40)).min(whole.len()))),
-    }
-    bytes
-}
-
-/// Files of a run that are not what it wrote make no page, or the same one: a page with other numbers would be believed.
-#[test]
-fn damaged_results_are_not_shown() {
-    let small = ["--set", "mesh.set.n=2", "--vtu"];
-    let plane = solve(case("groove-held"), &["--method", "newton", small[0], small[1], small[2]]).converged();
-    let space = solve(case("patch-3d"), &["--vtu", "--set", "output.compress=false"]).converged();
-    let mut chance = Chance(1);
-    for run in [&plane, &space] {
-        let page = || winkler::internals::save(&run.folder, None).map(|path| fs::read(path).expect("a page"));
-        let good = page().expect("a page");
-        let read = ["report.json", "history.csv", "contacts.csv", "contact-lower-upper.csv", "SHA256SUMS"];
-        let fields = ["lower.vtu", "upper.vtu", "contact-lower-upper.vtu"];
-        let mut check = |names: &[&str], times: usize| {
-            let mut refused = 0;
-            for name in names {
-                let path = run.folder.join(name);
-                let whole = fs::read(&path).expect("a file");
-                for _ in 0..times {
-                    fs::write(&path, damaged(&whole, &mut chance)).expect("a file");
-                    match page() {
-                        Ok(found) => assert!(found == good, "{name} with other numbers"),
-                        Err(error) => {
-                            assert!(error.message().contains(name) && error.kind() == Kind::File, "{name}: {error}");
-                            refused += 1;
-                        }
-                    }
-                }
-                fs::write(&path, whole).expect("a file");
-            }
-            refused
-        };
-        // some pages are the same since nothing was changed, or what they do not show
-        let all = read.len() + fields.len();
-        assert!(check(&[&read[..], &fields].concat(), 25) > 20 * all);
-        // fields have sums of their own where they are compressed; without sums nothing may crash
-        fs::remove_file(run.folder.join("SHA256SUMS")).expect("sums");
-        if std::ptr::eq(run, &plane) {
-            assert!(check(&fields, 150) > 250);
-        } else {
-            for name in fields {
-                let path = run.folder.join(name);
-                let whole = fs::read(&path).expect("a file");
-                for _ in 0..100 {
-                    fs::write(&path, damaged(&whole, &mut chance)).expect("a file");
-                    // what cannot be known is shown
-                    let _ = page();
-                }
-                fs::write(&path, whole).expect("a file");
-            }
-        }
-        assert!(page().expect("a page") == good);
     }
 }

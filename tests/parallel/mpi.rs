@@ -1,6 +1,6 @@
 //! Several ranks give what one gives.
 
-use crate::common::{Run, Scene, WINKLER, apart, case, root, solve, solve_on, text_of, winkler_on};
+use crate::common::{Run, Scene, apart, case, solve, solve_on, text_of};
 use std::fs;
 
 #[test]
@@ -117,32 +117,4 @@ fn ranks_that_read_other_scenes_data_or_tables_are_refused() {
     // one that is refused alone is as ever
     let wrong = [Scene::new(text.as_str()), Scene::new(text.replace("pressure = 10", "presure = 10"))];
     refused(&solve(&wrong), 3, &["did you mean `pressure`?"]);
-}
-
-/// Every rank compares its command line with those of the others before it does anything, also one that would end at once.
-#[test]
-fn ranks_with_other_words_are_refused() {
-    let scene = case("groove").display().to_string();
-    let first = ["solve", scene.as_str(), "--set", "mesh.set.n=4"];
-    let others: [&[&str]; 5] = [
-        &["check", &scene],
-        &["--help"],
-        &["solve", "--no-such-option"],
-        &["solve", &scene, "--set", "mesh.set.n=4", "-ksp_type", "cg"],
-        &["schema"],
-    ];
-    for (number, other) in others.into_iter().enumerate() {
-        let [one, two] = if number % 2 == 0 { [&first[..], other] } else { [other, &first[..]] };
-        let run = winkler_on(2, &[one, &[":", "-n", "1", WINKLER], two].concat());
-        refused(&run, 2, &["different command lines", "ranks 0, 1: ", "rank 2: "]);
-    }
-    let petsc = apart([root(); 2], &["PETSC_OPTIONS=-ksp_type cg"], &first);
-    refused(&petsc, 5, &["different values of PETSC_OPTIONS", "rank 0: nothing", "rank 1: -ksp_type cg"]);
-    let version = winkler_on(2, &["--version"]);
-    assert_eq!((version.code, version.stdout.lines().count()), (0, 1), "{}", version.said());
-    // what one rank refuses all refuse, in the words of the first
-    let wrong = winkler_on(2, &["solve", "--no-such-option"]);
-    assert_eq!((wrong.code, wrong.stderr.matches("error: ").count()), (2, 1), "{}", wrong.said());
-    let mesh = winkler_on(2, &["mesh", &scene]);
-    assert_eq!((mesh.code, mesh.stdout.matches("body lower").count()), (0, 1), "{}", mesh.said());
 }

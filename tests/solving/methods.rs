@@ -41,7 +41,7 @@ fn any_power_law_takes_few_steps() {
             for b in ["1e-12", "1e-7", "1e-5", "2e-4", "1e-2"] {
                 for a in ["0.02", "0.1", "0.3", "1"] {
                     let sets = [&format!("contact.0.layer.power={{B={b}, a={a}}}"), &format!("method.start={start}")];
-                    let run = solve(plain(scene), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
+                    let run = solve_here(plain(scene), &sets.each_ref().map(|set| set.as_str()));
                     // p'(c) times the rounding of c is 1e-8 of p and more
                     let rounded = b == "1e-12" && a != "1";
                     let steps = run.count("iterations");

@@ -1,9 +1,9 @@
 //! What a run keeps when a signal, a kill or a full disk ends it.
 
-use crate::common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of, winkler};
+use crate::common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of};
 use serde_json::Value;
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -56,10 +56,6 @@ impl Working {
         command.stdin(Stdio::null()).stdout(file("out")).stderr(file("err"));
         let child = Guard(command.spawn().expect("the program"));
         Self { child, scratch }
-    }
-
-    fn results(&self) -> PathBuf {
-        self.scratch.path().join("results")
     }
 
     /// Waits until something is there.
@@ -168,54 +164,6 @@ fn a_signal_ends_a_run_with_its_results() {
     }
 }
 
-#[test]
-fn a_snapshot_is_written_and_the_run_goes_on() {
-    let mut run = Working::start(&words(&case("groove"), &ENDLESS), 1);
-    run.until_rows(3);
-    let mut reached = 0;
-    for _ in 0..2 {
-        let path = run.results().join("report.json");
-        let _ = fs::remove_file(&path);
-        run.signal("USR1");
-        // the report is written before what is larger, and again behind it
-        let files = || serde_json::from_slice::<Value>(&fs::read(&path).unwrap_or_default()).unwrap_or_default();
-        run.until("the snapshot", |_| files()["files"].as_array().is_some_and(|files| files.len() >= 6));
-        run.until_rows(reached + 3);
-        let report = report(&run.results());
-        assert_eq!(report["status"], "running");
-        let now = report["iterations"].as_u64().expect("a number") as usize;
-        assert!(now > reached);
-        reached = now;
-        // a second one has no names of its own
-        assert_eq!(report["files"].as_array().map(Vec::len), Some(6), "{}", report["files"]);
-    }
-    run.signal("TERM");
-    let (status, scratch, said) = run.end();
-    assert_eq!(status.code(), Some(143), "{said}");
-    let report = report(&scratch.path().join("results"));
-    assert!(report["iterations"].as_u64().is_some_and(|now| now as usize > reached));
-}
-
-/// A run that pauses at each iterate takes the same steps, to the last digit, also where the laws have a barrier meanwhile.
-#[test]
-fn pauses_change_nothing() {
-    let sets = [
-        "mesh.set.n=7",
-        "body.0.order=2",
-        "body.1.order=2",
-        "method={name=\"newton\", start={normal=3e-4}}",
-        "contact.0.layer={linear={stiffness=1e9}}",
-    ];
-    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-    let whole = solve(case("groove"), &args);
-    let paused = solve(case("groove"), &[&args[..], &["--checkpoint", "1e-9"]].concat());
-    let table = |run: &Run| fs::read_to_string(run.folder.join("contact-lower-upper.csv")).expect("a table");
-    assert_eq!(table(&paused), table(&whole));
-    for name in ["status", "iterations", "residual", "F1"] {
-        assert_eq!(paused.report[name], whole.report[name], "{name}");
-    }
-}
-
 /// A solve that never ends hears one signal, and ends by the second.
 #[test]
 fn a_second_signal_ends_at_once() {
@@ -292,34 +240,6 @@ fn a_killed_rank_ends_all() {
     assert!(killed > 0);
 }
 
-/// Less and less memory: a run that does not get what it wants says so, with its code, and never hangs.
-#[test]
-fn memory_ends_with_a_message() {
-    let scene = case("patch-3d");
-    // makes the mesh, which Gmsh cannot with so little
-    let mut command = Command::new(crate::common::WINKLER);
-    environment(&mut command);
-    command.arg("check").arg(&scene).args(["--set", "mesh.set={nl=24,nu=24}"]);
-    assert!(output(command, Duration::from_secs(60)).0.success());
-    let mut reports = 0;
-    for megabytes in (60..400).step_by(20) {
-        let mut command = Command::new("sh");
-        environment(&mut command);
-        let line = format!("ulimit -v {megabytes}000; exec \"$@\"");
-        command.args(["-c", &line, "sh", crate::common::WINKLER, "check"]).arg(&scene);
-        command.args(["--set", "mesh.set={nl=24,nu=24}"]).env("OPENBLAS_NUM_THREADS", "1");
-        let (status, _, said) = output(command, Duration::from_secs(60));
-        if said.contains("out of memory") {
-            assert!(status.code() == Some(5) && said.matches("error:").count() == 1, "{megabytes}: {said}");
-            reports += 1;
-        } else if reports > 0 {
-            assert!(status.success(), "{megabytes}: {said}");
-            break;
-        }
-    }
-    assert!(reports > 0);
-}
-
 /// An interrupted run has a checkpoint, which any number of ranks can take; one that is solved has none left.
 #[test]
 fn an_interrupted_run_goes_on_with_other_ranks() {
@@ -393,67 +313,6 @@ fn a_checkpoint_of_something_else_is_refused() {
     refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "cannot read");
 }
 
-/// Meshes with as many nodes, cells and contact points, and data of the same name, are others: whatever differs between them is refused, on any
-/// number of ranks, and what is the same goes on, wherever it lies.
-#[test]
-fn a_checkpoint_of_a_mesh_or_data_of_equal_counts_is_refused() {
-    let made = winkler(&["mesh", case("groove").to_str().expect("a path"), "--set", "mesh.set.n=8", "-o", "a.msh"]);
-    assert_eq!(made.code, 0, "{}", made.said());
-    let folder = TempDir::new().expect("a folder");
-    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).expect("a file");
-    let mesh = fs::read(made.folder.join("a.msh")).expect("a mesh");
-    let data = |most: &str| format!("0,0\n8,{most}\n");
-    let text = text_of("groove");
-    let line = |key: &str| text.lines().find(|line| line.starts_with(key)).expect(key).to_owned();
-    let text = text.replace(&line("mesh ="), "mesh = \"a.msh\"").replace(&line("gap ="), "gap = \"rough(x)\"");
-    let scene = folder.path().join("scene.toml");
-    write("a.msh", &mesh);
-    write("rough.csv", data("1e-4").as_bytes());
-    write("scene.toml", (text + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n").as_bytes());
-    let mut run = Working::start(&words(&scene, &ENDLESS), 1);
-    run.until_rows(2);
-    run.signal("INT");
-    let (_, scratch, said) = run.end();
-    let done = report(&scratch.path().join("results"))["iterations"].as_u64().expect(&said);
-    let limit = format!("method.stop={{residual=1e-12,iterations={}}}", done + 2);
-    let again = |ranks: usize| restart(&scratch, ranks, &scene, &["--set", "method.gamma=1e-6", "--set", &limit]);
-    let refused = |what: &str| {
-        for ranks in [1, 2] {
-            let run = again(ranks);
-            assert!(run.code == 3 && run.stderr.contains(&format!("is of another {what}")), "{}", run.said());
-        }
-    };
-    write("rough.csv", data("2e-4").as_bytes());
-    refused("scene");
-    write("rough.csv", data("1e-4").as_bytes());
-    // one coordinate of a node inside a body
-    let moved = moved_inside(&folder.path().join("a.msh"), &mesh);
-    write("a.msh", &moved);
-    refused("mesh");
-    write("a.msh", &mesh);
-    for ranks in [1, 2] {
-        assert_eq!(again(ranks).count("iterations"), done as usize + 2);
-    }
-}
-
-/// The mesh, in which numbers have eight bytes, with a node inside a body a little aside.
-fn moved_inside(path: &Path, bytes: &[u8]) -> Vec<u8> {
-    let mesh = winkler::internals::mesh::parse::<2>(path, bytes, winkler::internals::mesh::MeshProducer::User)
-        .expect("a mesh");
-    let on_surfaces: Vec<u32> =
-        mesh.groups.iter().filter(|group| group.dimension < 2).flat_map(|group| group.connectivity.clone()).collect();
-    let inside = |point: &usize| {
-        let [x, y] = mesh.points[*point];
-        !on_surfaces.contains(&(*point as u32)) && (1.0..3.0).contains(&x) && (0.3..0.7).contains(&y)
-    };
-    let [x, y] = mesh.points[(0..mesh.points.len()).find(inside).expect("a node inside")];
-    let place = [x.to_le_bytes(), y.to_le_bytes()].concat();
-    let at = bytes.windows(16).position(|window| window == place).expect("its coordinates");
-    let mut moved = bytes.to_vec();
-    moved[at..at + 8].copy_from_slice(&(x + 1e-3).to_le_bytes());
-    moved
-}
-
 /// A script that sleeps: while Gmsh works a signal ends it, and nothing is left in the cache.
 #[test]
 fn a_signal_ends_gmsh() {
@@ -506,36 +365,6 @@ fn a_sweep_that_is_ended_has_its_rows() {
     assert_eq!(lines.len(), 2, "{text}");
     assert!(lines[0].starts_with("0.6,converged") && lines[1].starts_with("1e-7,interrupted"), "{text}");
     assert!(scratch.path().join("results/pressure.svg").exists());
-}
-
-/// Files may have 40 kB: what is small is written, and the code tells of what is not.
-#[test]
-fn a_full_disk_takes_fields_and_not_results() {
-    let limited = |blocks: usize, scene: &Path, args: &[&str], cache: Option<&Path>| {
-        let folder = TempDir::new().expect("a temporary folder");
-        let mut command = Command::new("sh");
-        let script = format!("ulimit -f {blocks}; exec \"$@\"");
-        command.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_winkler"), "solve"]).arg(scene);
-        command.arg("-o").arg(folder.path()).args(args).current_dir(folder.path());
-        environment(&mut command);
-        command.envs(cache.map(|cache| ("WINKLER_CACHE", cache)));
-        let (status, stdout, stderr) = output(command, Duration::from_secs(60));
-        (status.code(), folder, stdout, stderr)
-    };
-    // its mesh is in the cache then; a block of `ulimit` has 512 or 1024 bytes
-    solve(case("groove"), &[]).converged();
-    let (code, folder, stdout, stderr) = limited(60, &case("groove"), &["--vtu", "--json"], None);
-    assert_eq!(code, Some(6), "{stderr}");
-    assert!(stderr.contains("lower.vtu"), "{stderr}");
-    let report = report(folder.path());
-    assert_eq!(report["status"], "converged");
-    assert_eq!(serde_json::from_str::<Value>(&stdout).expect("JSON")["status"], "converged");
-    assert!(folder.path().join("contact-lower-upper.csv").exists() && folder.path().join("pressure.svg").exists());
-    let cache = TempDir::new().expect("a temporary folder");
-    let (code, _, _, stderr) = limited(20, &case("groove"), &[], Some(cache.path()));
-    assert_eq!(code, Some(6), "{stderr}");
-    assert!(stderr.contains(&cache.path().display().to_string()) && stderr.contains("ulimit"), "{stderr}");
-    assert_eq!(fs::read_dir(cache.path()).expect("a folder").count(), 0);
 }
 
 #[test]
