@@ -258,7 +258,10 @@ impl Newton<'_, '_> {
         let (rest, energy) = residual(run.model, &self.u, &run.model.forces(&iterate.pressure));
         let measured = run.measure(energy, &Layer::new(run.model, iterate.compression.clone()), self.linear);
         let strain = measured.strain;
-        let reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
+        let mut reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
+        if step.is_exact {
+            reached.verify(measured.unbalanced);
+        }
         let is_enough = run.is_enough(&reached);
         let is_complete = is_enough || run.is_at_roundoff(&reached, &self.u, resolved, strain);
         let mut measures = Measures { measured, reached, is_complete, is_roundoff: false };

@@ -120,11 +120,48 @@ pub fn all<const D: usize>(
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
-    let mut opposite = Vec::new();
-    for SurfacePair { entry, bodies, names, pieces } in found {
-        opposite.extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece, rule)));
+    let mut contacts = Vec::new();
+    for surfaces in found {
+        contacts.extend(assemble(scene, cut, parts, fine, rule, surfaces)?);
     }
-    opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
+    auto::all_find_some(&scene.auto, contacts.iter().map(|contact: &Contact<D>| contact.facts.origin.entry))?;
+    Ok(contacts)
+}
+
+/// Return the pairs of two surfaces. A piece of them whose facets have no common piece with the normals and the carrier of its own is left out;
+/// surfaces with names must keep one.
+///
+/// # Errors
+/// Surfaces with names do not face each other. A law or a gap has no value somewhere.
+fn assemble<const D: usize>(
+    scene: &Scene,
+    cut: Cut<D>,
+    parts: &[SceneBody<D>],
+    fine: bool,
+    rule: CarrierRule,
+    surfaces: SurfacePair<D>,
+) -> Result<Vec<Contact<D>>> {
+    let SurfacePair { entry, bodies, names, pieces } = surfaces;
+    let (mut contacts, mut left_out, count): (Vec<Contact<D>>, _, _) = (Vec::new(), [0; 2], pieces.len());
+    for (number, piece) in pieces.into_iter().enumerate() {
+        let all: [usize; 2] = std::array::from_fn(|side| piece.facets[side].count() + piece.idle[side]);
+        let is_needed = matches!(entry, ContactEntry::Named(_)) && contacts.is_empty() && number + 1 == count;
+        match Opposite::new(entry, scene, parts, bodies, names, piece, rule).assemble(
+            &scene.laws,
+            cut,
+            fine,
+            is_needed,
+        )? {
+            Some(contact) => contacts.push(contact),
+            None => left_out = [0, 1].map(|side| left_out[side] + all[side]),
+        }
+    }
+    if let (ContactEntry::Named(_), Some(ContactFacts { idle, swapped, .. })) =
+        (entry, contacts.first_mut().map(|c| &mut c.facts))
+    {
+        *idle += left_out[usize::from(*swapped)];
+    }
+    Ok(contacts)
 }
 
 /// Return the pairs of the two surfaces that a contact names: one, or several where they have edges.
@@ -277,8 +314,9 @@ impl<'a, const D: usize> Opposite<'a, D> {
         Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, idle: idle[usize::from(swapped)], far, reach }
     }
 
-    /// Assemble the pair, and its integration points if `fine` requests them.
-    fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
+    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces have no common piece, unless the pair is
+    /// needed.
+    fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool, is_needed: bool) -> Result<Option<Contact<D>>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
@@ -286,8 +324,10 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let Self { origin, spec, bodies, a, b, swapped, idle, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
-        let refuse = |fault| refuse(&spec, fault, || why(&a, &b, cut, &spec));
-        let mut pair = contact::assemble(&a, &b, bodies, &common, &gap, &law).map_err(refuse)?;
+        let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
+            Err(Fault::NoPartner) if !is_needed => return Ok(None),
+            assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut, &spec)))?,
+        };
         pair.surfaces = spec.between.each_ref().map(|name| name.value.clone());
         if swapped {
             pair.surfaces.swap(0, 1);
@@ -310,7 +350,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
         let ends =
             spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
-        Ok(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } })
+        Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } }))
     }
 }
 

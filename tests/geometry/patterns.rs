@@ -551,3 +551,14 @@ Physical Curve(\"axis\") = {3}; Physical Curve(\"plate_axis\") = {13,17}; Physic
     assert!((pressure / (1000.0 / std::f64::consts::PI) - 1.0).abs() < 0.05, "{pressure}");
     assert_eq!(forecast(FIT, rings), serde_json::Value::Null);
 }
+
+/// Two grains of a tessellation: a pair of faces that the search has found has no common piece with the normals of its own, and is left out.
+#[test]
+fn found_pairs_without_a_common_piece_are_left_out() {
+    let text = "dimension = 3\nmesh = \"part.geo\"
+[[body]]\nname = \"grain_*\"\nyoung = 1e4\npoisson = 0.3
+[[contact]]\nbetween = \"auto\"\ndistance = 0.01\nlayer = { linear = { stiffness = 1e9 } }\n";
+    let scene = beside(include_str!("shapes/grains.geo"), text);
+    let check = crate::common::winkler(&["check", scene.path.to_str().expect("a path")]);
+    assert!(check.code == 0 && check.stdout.matches("contact grain_16 - grain_17").count() == 1, "{}", check.said());
+}

@@ -212,6 +212,25 @@ fn options_that_spoil_solves_are_found_out() {
     assert!(found_out > 1, "{found_out}");
 }
 
+/// A factorisation that is replaced by the pivots of another matrix solves nothing, and no error is reported as if it did.
+#[test]
+fn a_factorisation_that_is_none_bounds_nothing() {
+    let run = solve(
+        case("groove-held"),
+        &["--set", "mesh.set.n=6", "--set", "method={}", "-pc_type", "cholesky", "-mat_mumps_cntl_4", "1e6"],
+    );
+    let peak = solve(case("groove-held"), &["--set", "mesh.set.n=6", "--set", "method={}"])
+        .converged()
+        .number("pairs/0/peak_pressure");
+    let off = (run.number("pairs/0/peak_pressure") / peak - 1.0).abs();
+    assert!(run.report["error_bound"].is_null(), "{}", run.said());
+    assert!(
+        off < 1e-6 || run.code == 1 && run.report["error_estimate"].as_f64().is_none_or(|error| error > 1e-3),
+        "{off:e} {}",
+        run.said()
+    );
+}
+
 /// An inaccurate result with three digits tells the tolerance that accepts it.
 #[test]
 fn an_inaccurate_result_tells_what_accepts_it() {
@@ -285,6 +304,26 @@ fn options_that_cannot_end_well_are_refused() {
     // in the folder of results, which is not there before
     let run = groove("-log_view :results/log.txt").converged();
     assert!(fs::read_to_string(run.folder.join("log.txt")).expect("a log").contains("Performance Summary"));
+}
+
+/// PETSc's `mg` has as many levels as the program interpolates between, or is refused.
+#[test]
+fn multigrid_has_no_levels_that_nobody_made() {
+    let peak = groove("").number("pairs/0/peak_pressure");
+    for order in [1, 2] {
+        let orders = format!("--set body.0.order={order} --set body.1.order={order}");
+        let same = |options: &str| groove(&format!("{options} {orders}"));
+        for options in
+            ["-pc_type mg", "-upper_pc_type mg -lower_ksp_type cg -lower_pc_type icc", "-pc_type mg -pc_mg_levels 1"]
+        {
+            let found = same(options).converged().number("pairs/0/peak_pressure");
+            assert!((found / peak - 1.0).abs() < 0.2, "{options}: {found} {peak}");
+        }
+        for options in ["-ksp_type cg -pc_type mg -pc_mg_levels 3", "-newton_pc_type mg -newton_pc_mg_levels 3"] {
+            let run = same(options);
+            assert!(run.code == 5 && run.stderr.contains("multigrid `mg` has 3 levels"), "{options}: {}", run.said());
+        }
+    }
 }
 
 /// Quadratic elements have a level of their own: half of the iterations, fewer with each, for the same pressures. What is typed for hypre
