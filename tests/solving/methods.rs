@@ -91,7 +91,7 @@ fn inexact_steps_are_as_many_as_exact_ones() {
             let (solver, layer) =
                 (format!("solver={solver}"), format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}"));
             let sets = ["body.0.order=1", "body.1.order=1", "method={}", &solver, &layer];
-            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+            solve_here(case("hertz-sphere"), &sets).converged()
         };
         let (inexact, exact) = (run("hypre"), run("condensed"));
         assert_eq!(inexact.count("iterations"), exact.count("iterations"), "{stiffness}");
@@ -109,7 +109,7 @@ fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
             let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
             let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
             let sets = [&orders[0], &orders[1], "method={}", "solver=hypre", &layer];
-            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+            solve_here(case("hertz-sphere"), &sets).converged()
         };
         let (soft, rigid) = (run("1e4"), run("1e9"));
         assert_eq!((soft.count("patches"), soft.count("factorizations")), (0, 1));
@@ -142,7 +142,7 @@ fn many_bodies_under_stiff_layers_have_a_definite_preconditioner() {
         let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
         let run = |solver: &str| {
             let sets = [solver, &layer, "output.plots=false", "output.pairs=all"];
-            solve(case("blocks"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+            solve_here(case("blocks"), &sets).converged()
         };
         let [multigrid, direct] = ["solver=hypre", "solver=mumps"].map(run);
         assert!(multigrid.count("inner_iterations") <= 50, "{}", multigrid.said());
