@@ -318,7 +318,9 @@ fn multigrid_has_no_levels_that_nobody_made() {
             let found = same(options).converged().number("pairs/0/peak_pressure");
             assert!((found / peak - 1.0).abs() < 0.2, "{options}: {found} {peak}");
         }
-        for options in ["-ksp_type cg -pc_type mg -pc_mg_levels 3", "-newton_pc_type mg -newton_pc_mg_levels 3"] {
+        for options in
+            ["-ksp_type cg -pc_type mg -pc_mg_levels 3", "--method newton -newton_pc_type mg -newton_pc_mg_levels 3"]
+        {
             let run = same(options);
             assert!(run.code == 5 && run.stderr.contains("multigrid `mg` has 3 levels"), "{options}: {}", run.said());
         }
