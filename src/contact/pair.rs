@@ -52,6 +52,8 @@ pub struct ContactPair {
     pub moment: [Vec<[f64; 3]>; 2],
     /// Surface of each side at the points, n each.
     pub surface: [Vec<OwnSurface>; 2],
+    /// Largest angle by which errors of coordinates turn the normals of a side.
+    pub tilt: f64,
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// What `weight` measures: `"length"`, or in space and for bodies of revolution `"area"`.
@@ -220,6 +222,7 @@ pub fn assemble<const D: usize>(
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
         surface: [Vec::new(), Vec::new()],
+        tilt: a.tilt().max(b.tilt()),
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,

@@ -100,9 +100,15 @@ impl<'a, const D: usize> Side<'a, D> {
         area_vector(self.facets.order, &x, &[1.0 / D as f64; D])
     }
 
-    /// Return the largest rounding error of a coordinate of the surface's nodes.
+    /// Return the largest error of a coordinate of the surface's nodes: that of the digits of the mesh, or rounding.
     pub fn rounding(&self) -> f64 {
-        datum::rounding(&self.space.datum, self.facets.nodes.iter().map(|&node| &self.space.nodes[node as usize]))
+        let nodes = self.facets.nodes.iter().map(|&node| &self.space.nodes[node as usize]);
+        datum::rounding(&self.space.datum, nodes).max(self.space.uncertainty)
+    }
+
+    /// Return the largest angle by which errors of coordinates turn a normal.
+    pub fn tilt(&self) -> f64 {
+        self.facets.tilt(self.space, self.rounding())
     }
 
     /// Return the rounding error of a distance between this side and its partner: that of the coordinates of both sides, along

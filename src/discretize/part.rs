@@ -1,10 +1,10 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
-use super::approach::Outer;
+use super::approach::{LoadForces, Outer};
 use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
-use crate::contact::{self, Side};
+use crate::contact::Side;
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
@@ -232,16 +232,19 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(nodes.into_iter().map(|node| (node, each)).collect())
     }
 
-    /// Return the sum of the nodal forces of a load of the scene at its full value. It is zero if the surface is rigid.
+    /// Return the nodal forces of a load of the scene at its full value. A force on a rigid surface is spread over its area.
     ///
     /// # Errors
     /// See [`SceneBody::load`].
-    pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
-        let mut sum = [0.0; 3];
-        for (_, force) in self.on_surface(spec, 1.0, mesh, Subdivision::Whole)?.iter() {
-            contact::add(&mut sum, self.space.net_force(force));
-        }
-        Ok(sum)
+    fn load_forces(&self, load: &Load, mesh: &Mesh<D>) -> Result<LoadForces> {
+        let spread = match &load.kind {
+            LoadKind::Force { total, rigid: true } | LoadKind::Turning { force: total, .. } => {
+                LoadKind::Force { total: *total, rigid: false }
+            }
+            _ => return Ok(LoadForces::new(self.on_surface(load, 1.0, mesh, Subdivision::Whole)?.iter())),
+        };
+        let load = Load { kind: spread, ..load.clone() };
+        Ok(LoadForces::new(self.on_surface(&load, 1.0, mesh, Subdivision::Whole)?.iter()))
     }
 
     /// Return the forces on rigid surfaces, at few nodes of each.
@@ -461,8 +464,8 @@ pub fn parts<'a, const D: usize>(
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
         let mut part = SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
-        let resultant = |load: &_| part.resultant(load, mesh);
-        part.facts.outer = Outer::new(spec, &part.space, mesh, &resultant)?;
+        let loaded = spec.load.iter().map(|load| part.load_forces(load, mesh)).collect::<Result<_>>()?;
+        part.facts.outer = Outer::new(spec, &part.space, mesh, loaded)?;
         part.check_held(&checked.parts, mesh)?;
         parts.push(part);
     }

@@ -1,7 +1,7 @@
 //! Boundary facets of a body: their search in its cells, their orientation and their normals.
 
 use super::space::Space;
-use super::{cross, element, minus, pad, unit};
+use super::{cross, element, length, minus, pad, unit};
 use crate::linalg::dot;
 use crate::mesh::Group;
 use crate::problem::order::Order;
@@ -143,6 +143,21 @@ impl<const D: usize> Facets<D> {
             (0..D).map(move |at| unit(area_vector(self.order, &x, &element::place(D, at)[..D])))
         };
         (0..self.count()).flat_map(normals).collect()
+    }
+
+    /// Return the largest angle by which errors of coordinates turn the normal of a facet: those of two nodes, along and against
+    /// the normal, over the least height of the facet. At a corner of a quadratic facet, the weights of the nodes in a tangent are
+    /// 3, 4 and 1 instead of 1 and 1.
+    pub fn tilt(&self, space: &Space<D>, error: f64) -> f64 {
+        let height = |i: usize| {
+            let x = &self.coordinates(i, space)[..D];
+            let edges = (0..D).map(|k| length(minus(x[k], x[(k + 1) % D])));
+            let longest = edges.fold(0.0, f64::max);
+            if D == 2 { longest } else { 2.0 * length(area_vector(Order::P1, x, &[1.0 / D as f64; D])) / longest }
+        };
+        let least = (0..self.count()).map(height).fold(f64::INFINITY, f64::min);
+        let weights = if self.order == Order::P1 { 2.0 } else { 8.0 };
+        weights * (D as f64).sqrt() * error / least
     }
 
     /// Return the facets for which `keep` holds, in their order.
