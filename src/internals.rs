@@ -1,8 +1,8 @@
 //! The items of private modules that integration tests and examples use. They change without notice.
 
+pub use crate::commands::checkpoint::settings_digest;
 pub use crate::interrupt::Interrupt;
 pub use crate::linalg::bounds;
-pub use crate::commands::checkpoint::settings_digest;
 pub use crate::report::save;
 
 pub mod contact {

@@ -69,30 +69,31 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
         ("lu", "-ksp_type cg -pc_type lu -pc_factor_mat_solver_type petsc"),
     ] {
         let environment = [("WINKLER_WORDS", line)];
-        let output = alone("parallel::petsc::a_failed_factorisation_is_a_reason_and_not_the_end", 0, &environment, || {
-            let line = std::env::var("WINKLER_WORDS").unwrap_or_default();
-            let session = Session::start(&words(&line))?;
-            let mut matrix = chain(&session, 2)?;
-            // 1 -1 -1 1 is singular.
-            matrix.update(|values| values.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]))?;
-            let ksp = solver(&session, "", &matrix)?;
-            ksp.set_up()?;
-            assert!(ksp.failure().is_some());
-            let (b, mut x) = ([1.0, 1.0], [0.0; 2]);
-            let solved = ksp.solve(&b, &mut x)?;
-            println!("REASON {}", solved.reason);
-            assert!(
-                solved.reason.to_string().starts_with("the preconditioner could not be made: "),
-                "{}",
-                solved.reason
-            );
-            // Repaired, it works again.
-            matrix.update(|values| values.copy_from_slice(&[2.0, -1.0, -1.0, 2.0]))?;
-            assert!(ksp.solve(&b, &mut x)?.reason.converged());
-            assert_eq!(ksp.failure(), None);
-            assert!(residual(&matrix, &b, &x)? < 1e-12);
-            Ok(())
-        });
+        let output =
+            alone("parallel::petsc::a_failed_factorisation_is_a_reason_and_not_the_end", 0, &environment, || {
+                let line = std::env::var("WINKLER_WORDS").unwrap_or_default();
+                let session = Session::start(&words(&line))?;
+                let mut matrix = chain(&session, 2)?;
+                // 1 -1 -1 1 is singular.
+                matrix.update(|values| values.copy_from_slice(&[1.0, -1.0, -1.0, 1.0]))?;
+                let ksp = solver(&session, "", &matrix)?;
+                ksp.set_up()?;
+                assert!(ksp.failure().is_some());
+                let (b, mut x) = ([1.0, 1.0], [0.0; 2]);
+                let solved = ksp.solve(&b, &mut x)?;
+                println!("REASON {}", solved.reason);
+                assert!(
+                    solved.reason.to_string().starts_with("the preconditioner could not be made: "),
+                    "{}",
+                    solved.reason
+                );
+                // Repaired, it works again.
+                matrix.update(|values| values.copy_from_slice(&[2.0, -1.0, -1.0, 2.0]))?;
+                assert!(ksp.solve(&b, &mut x)?.reason.converged());
+                assert_eq!(ksp.failure(), None);
+                assert!(residual(&matrix, &b, &x)? < 1e-12);
+                Ok(())
+            });
         if output.is_none() {
             return;
         }
@@ -337,8 +338,11 @@ fn grids(side: usize) -> Vec<(usize, usize, f64)> {
 /// side of a grid opposite to the held one, moved as a whole, feels `side` springs in a row for each of its nodes.
 #[test]
 fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
-    let output =
-        alone("parallel::petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement", 0, &[], || {
+    let output = alone(
+        "parallel::petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement",
+        0,
+        &[],
+        || {
             let options = ["-asked_mat_mumps_icntl_7", "1", "-own_mat_mumps_icntl_7", "0"];
             let session = Session::start(&options.map(String::from))?;
             // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
@@ -354,7 +358,8 @@ fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
                 }
             }
             Ok(())
-        });
+        },
+    );
     expect_success(output);
 }
 

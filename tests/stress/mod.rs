@@ -32,7 +32,6 @@ struct Bench<'s> {
 }
 
 impl Bench<'_> {
-
     /// What methods make of a scene, and the scene in words.
     fn run(&self, seed: u64, index: usize, methods: &[&str]) -> (Vec<(Verdict, Answer)>, String) {
         self.solve(scenes::scene(seed, index, Path::new(env!("CARGO_MANIFEST_DIR"))), methods)
