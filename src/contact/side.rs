@@ -1,14 +1,19 @@
-//! One contact surface of a body: facets with averaged nodal normals, its smooth faces, and the order of nodes along it.
+//! One contact surface of a body: its facets, its nodes with their normals and curvatures, its smooth faces, and the order of nodes along it.
 
+use super::mirror::Mirrors;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, bounds, dot};
 use crate::mesh::datum;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Difference between the unit normal of a facet and the mean normal beyond which the facets form an edge.
 ///
 /// It is half of the angle between chords that leave their arc by 3 % of its radius, the worst polygon that is taken for round.
 const EDGE: f64 = 0.245;
+
+/// Difference of unit normals on a facet up to which the facet is flat. Decks with seven digits, on parts a hundred times as large as
+/// their facets, have normals to 1e-5.
+const FLAT: f64 = 1e-5;
 
 /// One contact surface of a body.
 #[derive(Debug, Clone)]
@@ -23,65 +28,122 @@ pub struct Side<'a, const D: usize> {
     pub prescribed: &'a HashMap<usize, f64>,
     /// Dofs of nodes with rotated axes and of tied nodes.
     pub frame: &'a Frame<D>,
-    /// Outer unit normal at each node of the surface: the mean over the facets around it.
-    pub normals: HashMap<u32, [f64; D]>,
+    /// Planes of symmetry at the end of the surface.
+    pub mirrors: Mirrors<D>,
+    /// The nodes of the surface on its smooth faces, in the order of the nodes.
+    pub nodes: Vec<FaceNode<D>>,
+    /// Index in `nodes` of each node of each facet, in the order of `facets.nodes`.
+    pub corners: Vec<u32>,
+}
+
+/// A node of a surface on one of its smooth faces. A node at an edge occurs once for each face that meets there.
+#[derive(Debug, Clone, Copy)]
+pub struct FaceNode<const D: usize> {
+    /// The node of the body.
+    pub node: u32,
+    /// Outer unit normal: the mean over the facets of the face around the node, and their mirror images.
+    pub normal: [f64; D],
+    /// Unit vector along which compressions are measured: the own normal, or the one made of the normals of both sides
+    /// ([`Side::towards`]).
+    pub direction: [f64; D],
+    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around. At an edge the
+    /// difference is that of the faces.
+    pub curvature: f64,
 }
 
 impl<'a, const D: usize> Side<'a, D> {
-    /// Compute the nodal normals of a surface.
+    /// Compute the nodal normals and curvatures of a surface. Facets around a node that turn by no more than `edge` degrees are of one face.
     pub fn new(
         name: &'a str,
         space: &'a Space<D>,
         facets: Facets<D>,
         prescribed: &'a HashMap<usize, f64>,
         frame: &'a Frame<D>,
+        edge: f64,
     ) -> Self {
-        let mut normals: HashMap<u32, [f64; D]> = HashMap::new();
-        let places = element::nodes::<D>(facets.order);
-        for i in 0..facets.count() {
-            let x = facets.coordinates(i, space);
-            for (l, &node) in places.iter().zip(facets.facet(i)) {
-                let area = area_vector(facets.order, &x, l);
-                let sum = normals.entry(node).or_insert([0.0; D]);
-                (0..D).for_each(|c| sum[c] += area[c]);
+        let mirrors = Mirrors::new(space, &facets, prescribed, frame);
+        let least = edge.to_radians().cos() - ROUNDING;
+        let (mut nodes, mut corners) = (Vec::new(), vec![0; facets.nodes.len()]);
+        for (node, around) in areas_around(space, &facets) {
+            for face in smooth(&around, least) {
+                let mut normal = [0.0; D];
+                for &(corner, area) in &face {
+                    corners[corner] = nodes.len() as u32;
+                    (0..D).for_each(|c| normal[c] += area[c]);
+                }
+                let normal = unit(mirrors.mean(space, node, normal, least));
+                nodes.push(FaceNode { node, normal, direction: normal, curvature: 0.0 });
             }
         }
-        for (&node, normal) in &mut normals {
-            // A surface of revolution continues beyond the axis as its mirror image.
-            if space.on_axis(node) && normal[1] != 0.0 {
-                normal[0] = 0.0;
+        let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
+        side.bend();
+        side
+    }
+
+    /// Compute the curvature of the surface at each node.
+    fn bend(&mut self) {
+        // the largest difference of the normals of faces that meet at a node
+        let mut at_edge = vec![0.0_f64; self.nodes.len()];
+        for i in 1..self.nodes.len() {
+            for j in (0..i).rev().take_while(|&j| self.nodes[j].node == self.nodes[i].node) {
+                let turn = length(minus(self.nodes[i].normal, self.nodes[j].normal));
+                [i, j].into_iter().for_each(|k| at_edge[k] = at_edge[k].max(turn));
             }
-            *normal = unit(*normal);
         }
-        Self { name, space, facets, prescribed, frame, normals }
+        for i in 0..self.facets.count() {
+            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
+            let mut curvature: f64 = 0.0;
+            for k in 0..on.len() {
+                for l in 0..k {
+                    let [p, q] = [on[k], on[l]].map(|corner| corner as usize);
+                    let turn =
+                        length(minus(self.nodes[p].normal, self.nodes[q].normal)).max(at_edge[p]).max(at_edge[q]);
+                    curvature = curvature.max(if turn > FLAT { turn / length(minus(x[k], x[l])) } else { 0.0 });
+                }
+            }
+            for corner in on {
+                let largest = &mut self.nodes[corner as usize].curvature;
+                *largest = largest.max(curvature);
+            }
+        }
+    }
+
+    /// Return the indices in `nodes` of the nodes of facet `i`.
+    pub fn on_facet(&self, i: usize) -> &[u32] {
+        &self.corners[i * self.facets.stride..(i + 1) * self.facets.stride]
+    }
+
+    /// Return the nodes of facet `i`.
+    pub fn facet_nodes(&self, i: usize) -> impl Iterator<Item = &FaceNode<D>> {
+        self.on_facet(i).iter().map(|&corner| &self.nodes[corner as usize])
     }
 
     /// Return the surface of the facets that `keep` marks, with their own normals.
-    pub fn only(&self, keep: &[bool]) -> Self {
-        Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame)
+    pub fn only(&self, keep: &[bool], edge: f64) -> Self {
+        Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame, edge)
     }
 
     /// Return the uncertainty of the normal near each node: the largest difference between the unit normals of facets and
     /// nodes, over all nodes that share a facet with it. Edges do not count. Where the surface is flat, the result is the
     /// rounding of the normals.
-    pub fn spread(&self) -> HashMap<u32, f64> {
+    pub fn spread(&self) -> Vec<f64> {
         let (places, rounding) = (element::nodes::<D>(self.facets.order), self.rounding());
-        let mut at_node: HashMap<u32, f64> = HashMap::new();
+        let mut at_node = vec![0.0_f64; self.nodes.len()];
         for i in 0..self.facets.count() {
             let x = self.facets.coordinates(i, self.space);
-            for (l, node) in places.iter().zip(self.facets.facet(i)) {
-                let (area, mean) = (area_vector(self.facets.order, &x, l), self.normals[node]);
+            for (l, &corner) in places.iter().zip(self.on_facet(i)) {
+                let (area, mean) = (area_vector(self.facets.order, &x, l), self.nodes[corner as usize].normal);
                 let difference = length(minus(unit(area), mean));
                 let least = f64::EPSILON + 2.0 * rounding / length(area).powf(1.0 / (D - 1) as f64);
-                let largest = at_node.entry(*node).or_default();
+                let largest = &mut at_node[corner as usize];
                 *largest = largest.max(least).max(if difference < EDGE { difference } else { 0.0 });
             }
         }
-        let mut spread: HashMap<u32, f64> = HashMap::new();
-        for nodes in (0..self.facets.count()).map(|i| self.facets.facet(i)) {
-            let on_facet = nodes.iter().map(|node| at_node[node]).fold(0.0, f64::max);
-            for node in nodes {
-                let largest = spread.entry(*node).or_default();
+        let mut spread = vec![0.0_f64; self.nodes.len()];
+        for corners in (0..self.facets.count()).map(|i| self.on_facet(i)) {
+            let on_facet = corners.iter().map(|&corner| at_node[corner as usize]).fold(0.0, f64::max);
+            for &corner in corners {
+                let largest = &mut spread[corner as usize];
                 *largest = largest.max(on_facet);
             }
         }
@@ -126,6 +188,32 @@ impl<'a, const D: usize> Side<'a, D> {
     pub fn bounds(&self, i: usize) -> [[f64; D]; 2] {
         bounds(self.facets.coordinates(i, self.space))
     }
+}
+
+/// Return the facets around each node: the index of the node in `facets.nodes`, and the outer normal there times the size of the facet.
+fn areas_around<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> BTreeMap<u32, Vec<(usize, [f64; D])>> {
+    let mut around: BTreeMap<u32, Vec<(usize, [f64; D])>> = BTreeMap::new();
+    let places = element::nodes::<D>(facets.order);
+    for i in 0..facets.count() {
+        let x = facets.coordinates(i, space);
+        for (k, (l, &node)) in places.iter().zip(facets.facet(i)).enumerate() {
+            around.entry(node).or_default().push((i * facets.stride + k, area_vector(facets.order, &x, l)));
+        }
+    }
+    around
+}
+
+/// Divide the facets around a node into faces, within which neighbours turn by an angle with the cosine `least` or more.
+fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(usize, [f64; D])>> {
+    let normals: Vec<[f64; D]> = around.iter().map(|&(_, area)| unit(area)).collect();
+    let mut joined = DisjointSets::new(around.len());
+    for i in 1..around.len() {
+        (0..i).filter(|&j| dot(&normals[i], &normals[j]) >= least).for_each(|j| joined.join(i as u32, j as u32));
+    }
+    let (count, face) = joined.classes();
+    let mut faces = vec![Vec::new(); count];
+    around.iter().zip(face).for_each(|(&facet, face)| faces[face as usize].push(facet));
+    faces
 }
 
 /// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of
@@ -193,25 +281,32 @@ fn normals_at_vertices<const D: usize>(side: &Side<D>) -> HashMap<u32, Vec<(usiz
     around
 }
 
-/// Sort surface nodes for plots. In the plane they follow the curve, and each chain begins at the end with the smaller
-/// coordinates. In space they are sorted by coordinates.
+/// Sort nodes of a surface for plots, given by their indices. In the plane they follow the curve, and each chain begins at the end with
+/// the smaller coordinates. In space they are sorted by coordinates.
 pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut nodes: Vec<u32> = nodes.collect();
-    let at = |node: u32| side.space.nodes[node as usize];
-    nodes.sort_by(|&m, &n| {
-        let (x, y) = (at(m), at(n));
-        (0..D).map(|c| x[c].total_cmp(&y[c])).find(|o| o.is_ne()).unwrap_or(m.cmp(&n))
+    let at = |i: u32| side.space.nodes[side.nodes[i as usize].node as usize];
+    nodes.sort_by(|&i, &j| {
+        let (x, y) = (at(i), at(j));
+        (0..D).map(|c| x[c].total_cmp(&y[c])).find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
     });
     if D != 2 {
         return nodes;
     }
     let mut neighbours: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut link = |i: u32, j: u32| {
+        neighbours.entry(i).or_default().push(j);
+        neighbours.entry(j).or_default().push(i);
+    };
     for i in 0..side.facets.count() {
-        let facet = side.facets.facet(i);
-        let chain = if facet.len() == 3 { vec![facet[0], facet[2], facet[1]] } else { facet.to_vec() };
-        for link in chain.windows(2) {
-            neighbours.entry(link[0]).or_default().push(link[1]);
-            neighbours.entry(link[1]).or_default().push(link[0]);
+        let on = side.on_facet(i);
+        let chain = if on.len() == 3 { vec![on[0], on[2], on[1]] } else { on.to_vec() };
+        chain.windows(2).for_each(|ends| link(ends[0], ends[1]));
+    }
+    // the curve goes on round an edge, where a node occurs once for each face
+    for (i, ends) in (0u32..).zip(side.nodes.windows(2)) {
+        if ends[0].node == ends[1].node {
+            link(i, i + 1);
         }
     }
     let wanted: HashSet<u32> = nodes.iter().copied().collect();

@@ -51,7 +51,7 @@ pub fn find<'a, const D: usize>(
         return Ok(Vec::new());
     }
     let whole: Vec<Side<D>> =
-        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary())).collect();
+        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
         let found = meeting(rules, cut, &whole, &possible);
@@ -118,7 +118,7 @@ fn meeting<'a, const D: usize>(
 ) -> SurfacePair<'a, D> {
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
-        Side::new(name, space, possible.near[k].clone(), prescribed, frame)
+        Side::new(name, space, possible.near[k].clone(), prescribed, frame, rules[possible.rule].contact.edge)
     };
     let (spec, a, b) = (&rules[possible.rule].contact, near(0), near(1));
     let reach = Reach::between(&a, &b, spec.angle, spec.distance);
@@ -257,7 +257,7 @@ impl<'a, const D: usize> FaceSplit<'a, D> {
         for face in 0..faces[0].count {
             let is_own: Vec<bool> = faces[0].of_facet.iter().map(|&of| of == face).collect();
             let own: Vec<usize> = (0..is_own.len()).filter(|&i| is_own[i]).collect();
-            let common = cut(&sides[0].only(&is_own), sides[1], reach);
+            let common = cut(&sides[0].only(&is_own, edge), sides[1], reach);
             for (i, j) in common.far() {
                 far[0].extend(sides[0].facets.facet(own[i]));
                 far[1].extend(sides[1].facets.facet(j));

@@ -150,7 +150,7 @@ fn named<'a, const D: usize>(
             .help("contact of a body with itself is out of scope; make two bodies of it"));
     }
     let names = spec.between.each_ref().map(|name| name.value.as_str());
-    let sides = [parts[first].side(names[0], on_first), parts[second].side(names[1], on_second)];
+    let sides = [parts[first].side(names[0], on_first, spec.edge), parts[second].side(names[1], on_second, spec.edge)];
     let is_smooth = |side: &Side<D>| {
         let all = vec![true; side.facets.count()];
         !SmoothFaces::new(side, spec.edge).meet(side, &all)
@@ -266,8 +266,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let origin = PairOrigin::new(entry, names, piece.face);
         let spec = origin.spec(scene);
         let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
-        let first = parts[bodies[0]].side(names[0], on_first);
-        let second = parts[bodies[1]].side(names[1], on_second);
+        let first = parts[bodies[0]].side(names[0], on_first, spec.edge);
+        let second = parts[bodies[1]].side(names[1], on_second, spec.edge);
         let swapped = rule.chooses_second(parts, bodies, [&first, &second]);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
@@ -278,8 +278,11 @@ impl<'a, const D: usize> Opposite<'a, D> {
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them.
-    fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
+    fn assemble(mut self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
+        if self.a.towards(&self.b, &common) {
+            common = cut(&self.a, &self.b, &self.reach);
+        }
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }

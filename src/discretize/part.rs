@@ -63,9 +63,9 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         self.held.frame.dof(dof, |node| self.at(motion, node))
     }
 
-    /// Return a contact surface of the body.
-    pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>) -> Side<'s, D> {
-        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame)
+    /// Return a contact surface of the body, with edges where facets turn by more than `edge` degrees.
+    pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>, edge: f64) -> Side<'s, D> {
+        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame, edge)
     }
 
     /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
