@@ -68,6 +68,11 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame)
     }
 
+    /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity differs between cells.
+    pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
+        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.space.cells_at(facets) }
+    }
+
     /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
     /// motion.
     pub fn products(

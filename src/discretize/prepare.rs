@@ -86,14 +86,8 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     factory: &mut F,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, Whole<'a, D>)> {
     let mesh = &verified.mesh;
-    let mut placed = Placed::new(scene, verified, specs, cut, keep, &[])?;
-    let sliding = placed.sliding();
-    if placed.pairs.iter().any(|pair| pair.bodies.map(|body| sliding.contains(&body)) == [false, true]) {
-        // the normals of the other body resist the motion: the node at which it is fixed would have a reaction, and pressures would depend on it
-        drop(placed);
-        placed = Placed::new(scene, verified, specs, cut, keep, &sliding)?;
-    }
-    let Placed { mut bodies, pairs, contacts, fine, fixed: Fixed { mechanisms, balanced } } = placed;
+    let Placed { mut bodies, pairs, contacts, fine, fixed: Fixed { mechanisms, balanced } } =
+        Placed::new(scene, verified, specs, cut, keep)?;
     bodies.iter_mut().for_each(Unassembled::support);
     let plan = plan(&bodies, factory)?;
     let partitions = partitions(&bodies, &pairs, factory, ranks);
@@ -121,22 +115,15 @@ struct Placed<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> Placed<'a, D> {
-    /// Make the bodies and the pairs. The bodies `sliding`, which can move along their own contact surfaces, carry the contact points.
+    /// Make the bodies and the pairs.
     ///
     /// # Errors
     /// The scene contradicts its mesh.
-    fn new(
-        scene: &Scene,
-        verified: &Verified<D>,
-        specs: &'a [BodySpec],
-        cut: Cut<D>,
-        keep: bool,
-        sliding: &[usize],
-    ) -> Result<Self> {
+    fn new(scene: &Scene, verified: &Verified<D>, specs: &'a [BodySpec], cut: Cut<D>, keep: bool) -> Result<Self> {
         let mesh = &verified.mesh;
         let parts = parts(scene, verified, specs)?;
         let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-        for found in pairs::all(scene, mesh, cut, &parts, keep, sliding)? {
+        for found in pairs::all(scene, mesh, cut, &parts, keep)? {
             pairs.push(found.pair);
             contacts.push(found.facts);
             fine.extend(found.fine);
@@ -144,11 +131,6 @@ impl<'a, const D: usize> Placed<'a, D> {
         let mut bodies = Unassembled::all(parts, &pairs, mesh)?;
         let fixed = mechanism::fix(&mut bodies, &pairs, mesh);
         Ok(Self { bodies, pairs, contacts, fine, fixed })
-    }
-
-    /// Return the bodies that can move along their own contact surfaces.
-    fn sliding(&self) -> Vec<usize> {
-        (0..self.bodies.len()).filter(|&body| self.bodies[body].removed_modes.slides).collect()
     }
 }
 

@@ -68,25 +68,8 @@ pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> V
     warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(discrete.model.pairs.iter().filter_map(|pair| resisted_by_normals(discrete, pair)));
     warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.contacts));
     warnings
-}
-
-/// Return the warning of a pair whose second body can move along its own surface, while the normals are those of the first one, which resist that.
-fn resisted_by_normals(discrete: &Discrete, pair: &ContactPair) -> Option<String> {
-    let [a, b] = pair.bodies.map(|body| &discrete.bodies[body]);
-    let way = if a.removed_modes.slides {
-        "hold the motion by a support or a weak spring"
-    } else {
-        "make the facets there as fine as those of the other body, or take order = 2"
-    };
-    b.removed_modes.slides.then(|| {
-        format!(
-            "body {}: it can turn or slide along its surface, and the normals of `{}` resist that: pressures depend on the node at which it is fixed; {way}",
-            b.name, pair.surfaces[0]
-        )
-    })
 }
 
 /// Return the warning of elements that were split, if any.
@@ -148,8 +131,8 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
             warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
         }
         let change = estimate.sides[i];
-        // a body that moves along its own surface stands at any place of this motion, which the normals of the other body would resist
-        let is_free = discrete.bodies[pair.bodies[0]].removed_modes.slides;
+        // a body that moves along its own surface stands at any place of this motion
+        let is_free = pair.bodies.iter().any(|&body| discrete.bodies[body].removed_modes.slides);
         if !is_free && change > estimate.pressure[i].max(ONE_SIDED) {
             warnings.push(format!(
                 "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
