@@ -3,6 +3,7 @@
 mod approach;
 mod assembler;
 mod auto;
+mod carrier;
 mod distribute;
 mod local;
 mod mechanism;
@@ -30,6 +31,7 @@ use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::linalg::axpy;
 use crate::model::{Local, Mechanism, Model};
+use crate::problem::contact::Carrier;
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
 use assembler::Assembler;
@@ -144,6 +146,11 @@ fn impose(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
 }
 
 impl Discrete {
+    /// Return which surface carries the contact points of each pair.
+    pub fn carriers(&self) -> Vec<Carrier> {
+        self.model.pairs.iter().zip(&self.contacts).map(|(pair, contact)| contact.carrier(pair.bodies)).collect()
+    }
+
     /// Return the sides of pair `i` in the order of the scene.
     pub fn sides(&self, i: usize) -> [usize; 2] {
         if self.contacts[i].swapped { [1, 0] } else { [0, 1] }

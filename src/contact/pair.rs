@@ -52,8 +52,6 @@ pub struct ContactPair {
     /// Moment of the entries of each row about the origin of the scene. The contact moment on a side follows as the force
     /// does from `resultant`.
     pub moment: [Vec<[f64; 3]>; 2],
-    /// Surface of each side at the points, n each.
-    pub surface: [Vec<OwnSurface>; 2],
     /// Largest angle by which errors of coordinates turn the normals of a side.
     pub tilt: f64,
     /// Whether the points run along curves in their order (plane problems).
@@ -81,30 +79,6 @@ fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
 /// Return what stands for the law of a pair from another rank until it is made.
 fn no_law() -> Rc<dyn LayerLaw> {
     Rc::new(LinearLaw { stiffness: 0.0 })
-}
-
-/// The surface of one side around a contact point: means over the nodes of the side, weighted by their shares in the point.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub struct OwnSurface {
-    /// Mean position, measured from the datum of the mesh.
-    pub at: [f64; 3],
-    /// Mean of the outer unit normals.
-    pub normal: [f64; 3],
-    /// Mean of [`Side::spread`], the uncertainty of the normals.
-    pub spread: f64,
-}
-
-impl OwnSurface {
-    fn mean<const D: usize>(side: &Side<D>, shares: &[(u32, f64)], spread: &[f64]) -> Self {
-        let mut mean = Self::default();
-        for &(index, share) in shares {
-            let at = &side.nodes[index as usize];
-            add(&mut mean.at, pad(side.space.nodes[at.node as usize].map(|x| share * x)));
-            add(&mut mean.normal, pad(at.normal.map(|n| share * n)));
-            mean.spread += share.abs() * spread[index as usize];
-        }
-        mean
-    }
 }
 
 /// The pieces of a pair that are lost because the search for their points failed.
@@ -227,7 +201,6 @@ pub fn assemble<const D: usize>(
         nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
-        surface: [Vec::new(), Vec::new()],
         tilt: a.tilt().max(b.tilt()),
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
@@ -236,10 +209,8 @@ pub fn assemble<const D: usize>(
         cover,
     };
     for (index, side) in [a, b].into_iter().enumerate() {
-        let spread = side.spread();
         for (q, point) in points.iter().enumerate() {
             let shares = point.shares(index);
-            pair.surface[index].push(OwnSurface::mean(side, &shares, &spread));
             push_rows(&mut pair, index, side, of_nodes(side, &shares), nodes[q].direction);
         }
     }

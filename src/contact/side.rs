@@ -6,15 +6,6 @@ use crate::linalg::{DisjointSets, bounds, dot};
 use crate::mesh::datum;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Difference between the unit normal of a facet and the mean normal beyond which the facets form an edge.
-///
-/// It is half of the angle between chords that leave their arc by 3 % of its radius, the worst polygon that is taken for round.
-const EDGE: f64 = 0.245;
-
-/// Difference of unit normals on a facet up to which the facet is flat. Decks with seven digits, on parts a hundred times as large as
-/// their facets, have normals to 1e-5.
-const FLAT: f64 = 1e-5;
-
 /// One contact surface of a body.
 #[derive(Debug, Clone)]
 pub struct Side<'a, const D: usize> {
@@ -76,12 +67,39 @@ impl<'a, const D: usize> Side<'a, D> {
             }
         }
         let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
+        side.flatten(edge);
         side.bend();
         side
     }
 
+    /// Give the nodes of each flat face one normal, where coordinates have fewer digits than doubles. A face is flat if its normals
+    /// differ from their mean by no more than errors of coordinates allow for.
+    fn flatten(&mut self, edge: f64) {
+        if self.space.uncertainty == 0.0 {
+            return;
+        }
+        let (faces, tilt) = (SmoothFaces::new(self, edge), self.tilt());
+        let mut mean = vec![[0.0; D]; faces.count];
+        for (i, &face) in faces.of_facet.iter().enumerate() {
+            let area = self.area(i);
+            (0..D).for_each(|c| mean[face][c] += area[c]);
+        }
+        let mean: Vec<[f64; D]> = mean.into_iter().map(unit).collect();
+        let mut flat = vec![true; faces.count];
+        for (i, &face) in faces.of_facet.iter().enumerate() {
+            flat[face] &= self.facet_nodes(i).all(|at| length(minus(at.normal, mean[face])) <= tilt);
+        }
+        for i in (0..faces.of_facet.len()).filter(|&i| flat[faces.of_facet[i]]) {
+            for corner in self.on_facet(i).to_vec() {
+                let at = &mut self.nodes[corner as usize];
+                (at.normal, at.direction) = (mean[faces.of_facet[i]], mean[faces.of_facet[i]]);
+            }
+        }
+    }
+
     /// Compute the curvature of the surface at each node.
     fn bend(&mut self) {
+        let flat = self.tilt().max(ROUNDING);
         // the largest difference of the normals of faces that meet at a node
         let mut at_edge = vec![0.0_f64; self.nodes.len()];
         for i in 1..self.nodes.len() {
@@ -98,7 +116,7 @@ impl<'a, const D: usize> Side<'a, D> {
                     let [p, q] = [on[k], on[l]].map(|corner| corner as usize);
                     let turn =
                         length(minus(self.nodes[p].normal, self.nodes[q].normal)).max(at_edge[p]).max(at_edge[q]);
-                    curvature = curvature.max(if turn > FLAT { turn / length(minus(x[k], x[l])) } else { 0.0 });
+                    curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
                 }
             }
             for corner in on {
@@ -121,33 +139,6 @@ impl<'a, const D: usize> Side<'a, D> {
     /// Return the surface of the facets that `keep` marks, with their own normals.
     pub fn only(&self, keep: &[bool], edge: f64) -> Self {
         Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame, edge)
-    }
-
-    /// Return the uncertainty of the normal near each node: the largest difference between the unit normals of facets and
-    /// nodes, over all nodes that share a facet with it. Edges do not count. Where the surface is flat, the result is the
-    /// rounding of the normals.
-    pub fn spread(&self) -> Vec<f64> {
-        let (places, rounding) = (element::nodes::<D>(self.facets.order), self.rounding());
-        let mut at_node = vec![0.0_f64; self.nodes.len()];
-        for i in 0..self.facets.count() {
-            let x = self.facets.coordinates(i, self.space);
-            for (l, &corner) in places.iter().zip(self.on_facet(i)) {
-                let (area, mean) = (area_vector(self.facets.order, &x, l), self.nodes[corner as usize].normal);
-                let difference = length(minus(unit(area), mean));
-                let least = f64::EPSILON + 2.0 * rounding / length(area).powf(1.0 / (D - 1) as f64);
-                let largest = &mut at_node[corner as usize];
-                *largest = largest.max(least).max(if difference < EDGE { difference } else { 0.0 });
-            }
-        }
-        let mut spread = vec![0.0_f64; self.nodes.len()];
-        for corners in (0..self.facets.count()).map(|i| self.on_facet(i)) {
-            let on_facet = corners.iter().map(|&corner| at_node[corner as usize]).fold(0.0, f64::max);
-            for &corner in corners {
-                let largest = &mut spread[corner as usize];
-                *largest = largest.max(on_facet);
-            }
-        }
-        spread
     }
 
     /// Return the mean length (area) of a facet.

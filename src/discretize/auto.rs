@@ -1,13 +1,14 @@
 //! Pairs of smooth faces: surfaces are split where one of them has an edge, and boundary facets of different bodies that face each other
 //! within a distance are found by rules of the scene.
 
+use super::carrier;
 use super::part::SceneBody;
 use super::patterns::{pattern, tie};
 use crate::contact::pieces::{BoxTree, Cut, Reach};
 use crate::contact::{Side, SmoothFaces};
 use crate::error::{Error, Place, Result, few};
 use crate::fem::{Facets, unit};
-use crate::problem::contact::AutoContact;
+use crate::problem::contact::{AutoContact, Carrier};
 use crate::problem::pattern::Rank;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -29,6 +30,8 @@ pub struct SurfacePair<'a, const D: usize> {
     pub bodies: [usize; 2],
     /// Names of the surfaces; those of the bodies if the pair was found.
     pub names: [&'a str; 2],
+    /// Whether the second surface carries the contact points.
+    pub swapped: bool,
     /// The pairs: one, or several where surfaces have edges.
     pub pieces: Vec<PairPart<D>>,
 }
@@ -46,6 +49,7 @@ pub fn find<'a, const D: usize>(
     cut: Cut<D>,
     parts: &'a [SceneBody<D>],
     named: &HashSet<[usize; 2]>,
+    carriers: &[Carrier],
 ) -> Result<Vec<SurfacePair<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
@@ -54,7 +58,7 @@ pub fn find<'a, const D: usize>(
         parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
-        let found = meeting(rules, cut, &whole, &possible);
+        let mut found = meeting(rules, cut, &whole, &possible);
         if found.pieces.is_empty() {
             continue;
         }
@@ -63,6 +67,8 @@ pub fn find<'a, const D: usize>(
             let [(own, _), (other, place)] = [possible.rule, other].map(|number| title(&rules[number]));
             return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
         }
+        let table = rules[possible.rule].contact.table;
+        found.swapped = carrier::is_second(parts, possible.bodies, possible.near.each_ref(), table, carriers);
         all.push(found);
     }
     all_find_some(rules, &all)?;
@@ -125,7 +131,7 @@ fn meeting<'a, const D: usize>(
     let mut pieces = FaceSplit::new([&a, &b], spec.edge, cut, &reach).into_pieces();
     pieces.sort_by_key(|piece| piece.face);
     let names = possible.bodies.map(|body| whole[body].name);
-    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, pieces }
+    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, swapped: false, pieces }
 }
 
 /// Check that every rule found a pair.

@@ -68,6 +68,11 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame, edge)
     }
 
+    /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity differs between cells.
+    pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
+        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.space.cells_at(facets) }
+    }
+
     /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
     /// motion.
     pub fn products(
@@ -161,16 +166,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         let (mut missed, load) = (all(Subdivision::Halves)?, all(Subdivision::Whole)?);
         axpy(-1.0, &load, &mut missed);
         Ok(missed)
-    }
-
-    /// Return the nodal forces of loads on surfaces that the quadrature misses.
-    ///
-    /// # Errors
-    /// See [`SceneBody::load`].
-    pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let whole: NodalForces<D> =
-            self.on_surfaces(mesh, Subdivision::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
-        Ok(self.on_surfaces(mesh, Subdivision::Halves)?.and(whole))
     }
 
     /// Return the nodal forces of all loads on surfaces that are not rigid.

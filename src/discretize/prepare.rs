@@ -86,7 +86,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mesh = &verified.mesh;
     let parts = parts(scene, verified, specs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    for found in pairs::all(scene, mesh, cut, &parts, keep, &[])? {
+    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
         pairs.push(found.pair);
         contacts.push(found.facts);
         fine.extend(found.fine);

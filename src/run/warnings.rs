@@ -11,7 +11,8 @@ use crate::error::few;
 use crate::estimate::{Cause, Estimate};
 use crate::linalg::diagonal;
 use crate::model::Mechanism;
-use crate::output::sci;
+use crate::output::report::readable;
+use crate::output::{BalanceReport, sci};
 use crate::petsc::{Schur, Session, has_metis};
 use crate::problem::LayerSpec;
 use std::collections::BTreeMap;
@@ -92,6 +93,23 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
         None => "there is no solution".to_owned(),
     };
     format!("{who}: nothing holds {together} {motion}, and {loads}: {end}")
+}
+
+/// Relative error of forces that no run promises to undercut.
+const DIGITS: f64 = 1e-8;
+
+/// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error of the result.
+pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<String> {
+    let others = balance.supports.iter().chain(&balance.springs).chain(&balance.rigid);
+    let all = [&balance.loads, &balance.contacts].into_iter().chain(others);
+    let [x, y, z] = [0, 1, 2].map(|c| readable(-all.clone().map(|part| part.force[c]).sum::<f64>(), 6));
+    (balance.force_imbalance > error.max(DIGITS)).then(|| {
+        format!(
+            "body {name}: the nodes at which it is fixed carry a force of ({x}, {y}, {z}), {} of all forces on it: a support or a weak spring \
+             should carry it",
+            sci(balance.force_imbalance, 1)
+        )
+    })
 }
 
 /// Least change of the pressures with the side of the normals that is worth a warning: one per cent.
