@@ -3,6 +3,7 @@
 mod approach;
 mod assembler;
 mod auto;
+mod carrier;
 mod distribute;
 mod local;
 mod mechanism;
@@ -19,7 +20,6 @@ mod verify;
 
 pub use assembler::{Assembled, Factory, Outline};
 pub use local::BodyInfo;
-pub use mechanism::Balanced;
 pub use pairs::ContactInfo;
 pub use patterns::point;
 pub use post::{ForceBalance, Unbalanced};
@@ -31,6 +31,7 @@ use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::linalg::axpy;
 use crate::model::{Local, Mechanism, Model};
+use crate::problem::contact::Carrier;
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
 use assembler::Assembler;
@@ -47,10 +48,8 @@ pub struct Discrete {
     pub bodies: Vec<BodyInfo>,
     /// Origin of each pair in the scene.
     pub contacts: Vec<ContactInfo>,
-    /// Free motions of several bodies together.
+    /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
-    /// Loads that were balanced.
-    pub balanced: Vec<Balanced>,
     /// Trace (2n) of the rigid motions that supports impose on bodies. Layer states, and so the traces of iterates, are relative
     /// to them.
     pub imposed: Vec<f64>,
@@ -93,7 +92,7 @@ where
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, balanced, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, fine, plan } = shared;
     let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
@@ -116,17 +115,7 @@ where
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
     let imposed = impose(&mut model, &imposed);
-    Ok(Discrete {
-        model,
-        bodies: infos,
-        contacts,
-        mechanisms,
-        balanced,
-        imposed,
-        meshes,
-        assemblies,
-        assemblies_avoided,
-    })
+    Ok(Discrete { model, bodies: infos, contacts, mechanisms, imposed, meshes, assemblies, assemblies_avoided })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
@@ -157,6 +146,11 @@ fn impose(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
 }
 
 impl Discrete {
+    /// Return which surface carries the contact points of each pair.
+    pub fn carriers(&self) -> Vec<Carrier> {
+        self.model.pairs.iter().zip(&self.contacts).map(|(pair, contact)| contact.carrier(pair.bodies)).collect()
+    }
+
     /// Return the sides of pair `i` in the order of the scene.
     pub fn sides(&self, i: usize) -> [usize; 2] {
         if self.contacts[i].swapped { [1, 0] } else { [0, 1] }

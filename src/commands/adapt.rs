@@ -115,11 +115,12 @@ impl AdaptiveRun {
         if plan.adapts() {
             Rc::make_mut(&mut plan.scene).estimate = true;
         }
+        let own = if plan.adapts() { Some(plan.keep_carriers(session, interrupt, clock)?) } else { None };
         if let Some(head) = plan.resumed.as_ref().map(|checkpoint| checkpoint.head.clone()) {
             plan.resume(&head);
-        } else if plan.adapts() {
+        } else if let Some(own) = own {
             plan.defer_steps();
-            plan.begin_coarse(session, interrupt, clock)?;
+            plan.begin_coarse(session, &own)?;
         } else if is_nested {
             plan.begin_nested(session, interrupt, clock)?;
         }
@@ -160,15 +161,19 @@ impl AdaptiveRun {
         }
     }
 
-    /// Begin an adaptation with the mesh that an earlier adaptation ended with, or with a coarse one.
-    fn begin_coarse(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
+    /// Build the scene on its own mesh, and let the surfaces that carry contact points there carry them on all meshes.
+    fn keep_carriers(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
+        let built = run::build(session, self.scene.clone(), interrupt, clock)?;
+        Rc::make_mut(&mut self.scene).carriers = built.discrete.carriers();
+        Ok(built)
+    }
+
+    /// Begin an adaptation with the mesh that an earlier adaptation ended with, or with a coarse one. `own` is the scene on its own mesh.
+    fn begin_coarse(&mut self, session: &Session, own: &Built) -> Result<()> {
         // the cache of another rank may have other sizes
-        let mut view = broadcast(&Ranks::new(session), || Ok(recall(&self.purpose, true)))?;
-        if view.is_none() {
-            let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
-            view = sized(session, &self.scene, coarse, interrupt, clock)?;
-        }
-        follow(Rc::make_mut(&mut self.scene), view);
+        let earlier = broadcast(&Ranks::new(session), || Ok(recall(&self.purpose, true)))?;
+        let coarse = |meshes: &dyn Meshes, bodies| sizes::coarse(meshes, bodies, FIRST_CELLS * bodies);
+        follow(Rc::make_mut(&mut self.scene), earlier.or_else(|| sized(own, coarse)));
         Ok(())
     }
 
@@ -176,7 +181,8 @@ impl AdaptiveRun {
     fn begin_nested(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<()> {
         let mut coarse = Scene::clone(&self.scene);
         coarse.estimate = true;
-        let view = sized(session, &coarse, |meshes, bodies| sizes::scaled(meshes, bodies, 2.0), interrupt, clock)?;
+        let own = run::build(session, coarse.clone(), interrupt, clock)?;
+        let view = sized(&own, |meshes, bodies| sizes::scaled(meshes, bodies, 2.0));
         coarse.method.stop.balanced = true;
         follow(&mut coarse, view);
         self.finer = Some(std::mem::replace(&mut self.scene, Rc::new(coarse)));
@@ -329,7 +335,8 @@ impl AdaptiveRun {
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
         let most = goal.cells as f64 * excess;
-        let mut next = sizes::wanted(&**meshes, model, estimate, Aim { share, more: GROWTH, most });
+        let layer = &done.outcome.layer;
+        let mut next = sizes::wanted(&**meshes, model, layer, estimate, Aim { share, more: GROWTH, most });
         // where the script bounds the sizes, no smaller ones give the missing cells: GROWTH bounds what is tried
         next.refine(excess.clamp(1.0, GROWTH).min(most / next.cells));
         if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {
@@ -428,17 +435,10 @@ fn contact_tables(done: &Done) -> Vec<ContactTable> {
     (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
 }
 
-/// Build the scene on its own mesh, and return the view of the sizes that `sizing` makes of the meshes and the number of bodies.
-fn sized(
-    session: &Session,
-    scene: &Scene,
-    sizing: fn(&dyn Meshes, usize) -> Sizes,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Option<String>> {
-    let built = run::build(session, scene.clone(), interrupt, clock)?;
+/// Return the view of the sizes that `sizing` makes of the meshes of a problem and the number of its bodies.
+fn sized(built: &Built, sizing: impl Fn(&dyn Meshes, usize) -> Sizes) -> Option<String> {
     let bodies = built.discrete.bodies.len();
-    Ok(built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies))))
+    built.discrete.meshes.as_ref().map(|meshes| view(&sizing(&**meshes, bodies)))
 }
 
 fn view(sizes: &Sizes) -> String {

@@ -6,7 +6,7 @@
 use super::basis::{Carriers, PressureBasis};
 use super::pair::{ContactPair, Coverage, Left};
 use super::pieces::{IntegrationPoint, Intersection, WHOLE};
-use super::side::Side;
+use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
 use crate::fem::{Facets, element, length, minus, unit};
 use crate::linalg::{Csr, dot};
@@ -109,8 +109,10 @@ impl<const D: usize> Fine<D> {
             false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover);
+        let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
+        let direction = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.direction);
         let of_point = |point: &IntegrationPoint<D>| FinePoint {
-            weight: point.weight,
+            weight: point.weight * dot(&normal_a(point), &direction(point)),
             gap: gap_at(a, point, rounding, gap) - rise_of_both(point),
             facet: point.facet_a,
             along: point.at_a[0],
@@ -120,9 +122,8 @@ impl<const D: usize> Fine<D> {
             is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].left == Left::Nothing,
             nearest: 0,
         };
-        let normal = |point: &IntegrationPoint<D>| normal_at(a, point.facet_a, &point.at_a);
         let tilt = |point: &IntegrationPoint<D>| {
-            let (n_a, n_b) = (normal(point), normal_at(b, point.facet_b, &point.at_b));
+            let (n_a, n_b) = (normal_a(point), vector_at(b, point.facet_b, &point.at_b, |at| at.normal));
             std::array::from_fn(|c| n_a[c] + n_b[c])
         };
         let mut points = FinePoints {
@@ -134,7 +135,7 @@ impl<const D: usize> Fine<D> {
         points.push_rows(a, b, shared, pair);
         Self {
             points,
-            normal: shared.iter().map(normal).collect(),
+            normal: shared.iter().map(direction).collect(),
             tilt: shared.iter().map(tilt).collect(),
             near: Projections::new(a, b, common, pair, (!touching).then_some(gap)),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
@@ -151,13 +152,13 @@ impl FinePoints {
         shared: &[IntegrationPoint<D>],
         pair: &ContactPair,
     ) {
-        let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+        let point_of = pair.point_of(a.nodes.len());
         let mut each = self.each.iter_mut();
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
-            let nodes = a.facets.facet(chunk[0].facet_a);
+            let nodes = a.on_facet(chunk[0].facet_a);
             let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets);
             let row = |values: [f64; element::MOST]| {
-                let of_point = |(node, value): (&u32, f64)| point_of.get(node).map(|&q| (q, value));
+                let of_point = |(node, value): (&u32, f64)| point_of[*node as usize].map(|q| (q, value));
                 let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
                 let mut row: Vec<(usize, f64)> = entries.collect();
                 row.sort_unstable_by_key(|entry| entry.0);
@@ -195,10 +196,13 @@ fn size_under<const D: usize>(a: &Side<D>, point: &IntegrationPoint<D>) -> f64 {
     (sides * length(a.area(point.facet_a))).powf(1.0 / sides)
 }
 
-/// Return the unit normal of a side at barycentric coordinates `l` of a facet, interpolated between the vertices of the facet.
-fn normal_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D]) -> [f64; D] {
-    let nodes = side.facets.facet(facet);
-    unit(std::array::from_fn(|c| (0..D).map(|k| l[k] * side.normals[&nodes[k]][c]).sum()))
+/// Return a unit vector of the nodes of a side at barycentric coordinates `l` of a facet, interpolated between the vertices of the facet.
+fn vector_at<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D], of: fn(&FaceNode<D>) -> [f64; D]) -> [f64; D] {
+    let mut sum = [0.0; D];
+    for (at, l) in side.facet_nodes(facet).zip(l) {
+        (0..D).for_each(|c| sum[c] += l * of(at)[c]);
+    }
+    unit(sum)
 }
 
 /// The projections of the contact points of a pair to side b, one entry a point.
@@ -255,11 +259,11 @@ fn nearest_facets<const D: usize>(
     pair: &ContactPair,
     position: impl Fn(usize) -> [f64; D],
 ) -> Vec<usize> {
-    let point_of: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+    let point_of = pair.point_of(a.nodes.len());
     let mut nearest = vec![(f64::INFINITY, 0); pair.len()];
     for point in &common.points {
         let from = a.facets.point(point.facet_a, a.space, &point.at_a);
-        for q in a.facets.facet(point.facet_a).iter().filter_map(|node| point_of.get(node).copied()) {
+        for q in a.on_facet(point.facet_a).iter().filter_map(|&node| point_of[node as usize]) {
             let distance = length(minus(position(q), from));
             if distance < nearest[q].0 {
                 nearest[q] = (distance, point.facet_b);
@@ -294,7 +298,7 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
         return 0.0;
     }
     let x = side.facets.coordinates(facet, side.space);
-    let normals: Vec<[f64; D]> = side.facets.facet(facet).iter().map(|node| side.normals[node]).collect();
+    let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
     let mut rise = 0.0;
     for i in 0..D {
         for j in i + 1..D {
@@ -303,10 +307,6 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
     }
     rise
 }
-
-/// Sine below which a direction counts as constrained, and above whose complement as free. Planes of symmetry are known to
-/// rounding where facets are flat; a facet of a circle is inclined by half of its turn, which has the sine 0.26 with twelve facets.
-const INCLINED: f64 = 0.3;
 
 /// Return, for each facet of side a, whether it lies at a rim, where the pressure may be singular, since one of the surfaces ends there.
 /// `cover` is the coverage of these facets.
@@ -335,34 +335,9 @@ fn is_at_rim<const D: usize>(side: &Side<D>, facets: &HashMap<[u32; D], Vec<usiz
     side.facets.edges(i).into_iter().any(|edge| facets[&edge].len() == 1 && !is_mirrored(side, i, edge))
 }
 
-/// Return whether the surface goes on beyond an edge of facet `i` as its mirror image: all nodes of the edge lie on an axis of revolution, or
-/// supports hold the direction that leaves the facet there, but not its normal.
+/// Return whether the surface goes on beyond an edge of facet `i` as its mirror image, on an axis of revolution or a plane of symmetry.
 fn is_mirrored<const D: usize>(side: &Side<D>, i: usize, edge: [u32; D]) -> bool {
-    let nodes = || edge[..D - 1].iter().copied();
-    if nodes().all(|node| side.space.on_axis(node)) {
-        return true;
-    }
-    let normal = unit(side.area(i));
-    let Some(&opposite) = side.facets.facet(i)[..D].iter().find(|node| !edge.contains(node)) else { return false };
-    let at = |node: u32| side.space.nodes[node as usize];
-    let mut outwards = minus(at(edge[0]), at(opposite));
-    let mut remove = |axis: [f64; D]| {
-        let part = dot(&outwards, &axis);
-        (0..D).for_each(|c| outwards[c] -= part * axis[c]);
-    };
-    remove(normal);
-    if D == 3 {
-        remove(unit(minus(at(edge[1]), at(edge[0]))));
-    }
-    let outwards = unit(outwards);
-    nodes().all(|node| held(side, node, outwards) >= 1.0 - INCLINED && held(side, node, normal) <= INCLINED)
-}
-
-/// Return the length of the part of a unit vector along which supports hold a node.
-fn held<const D: usize>(side: &Side<D>, node: u32, direction: [f64; D]) -> f64 {
-    let held = side.frame.force(node, direction).flat_map(|(node, components)| {
-        let dofs = (0..D).zip(components);
-        dofs.filter(move |(c, _)| side.prescribed.contains_key(&(D * node as usize + c)))
-    });
-    held.map(|(_, component)| component * component).sum::<f64>().sqrt()
+    let nodes: Vec<(u32, [f64; D])> =
+        side.facet_nodes(i).filter(|at| edge[..D - 1].contains(&at.node)).map(|at| (at.node, at.normal)).collect();
+    nodes.iter().all(|(node, _)| side.space.on_axis(*node)) || side.mirrors.continue_beyond(&nodes)
 }

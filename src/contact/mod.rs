@@ -6,6 +6,8 @@
 mod basis;
 mod fine;
 pub mod law;
+mod mirror;
+mod normal;
 mod pair;
 pub mod pieces;
 mod review;

@@ -3,14 +3,14 @@
 use super::basis::{Carriers, PressureBasis};
 use super::law::{LayerLaw, LinearLaw};
 use super::pieces::{Intersection, Refused, WHOLE};
-use super::side::{Side, along};
+use super::side::{FaceNode, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
 use crate::fem::{area_vector, cross, length, pad};
-use crate::linalg::Csr;
+use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
@@ -28,11 +28,13 @@ pub struct ContactPair {
     pub bodies: [usize; 2],
     /// Node of side a that each point belongs to, n.
     pub nodes: Vec<u32>,
+    /// Index of each point among the nodes of side a on its faces ([`Side::nodes`]), n.
+    pub on_side: Vec<u32>,
     /// Positions of the points on side a in the scene, n.
     pub position: Vec<[f64; 3]>,
-    /// omega_q > 0, a length in the plane, else an area (in bodies of revolution that of a ring), n.
+    /// omega_q > 0, the length in the plane, else the area (in bodies of revolution that of a ring) across the normal, n.
     pub weight: Vec<f64>,
-    /// Unit normals from side a to side b, n.
+    /// Unit normals from side a to side b, made of those of both sides, n.
     pub normal: Vec<[f64; 3]>,
     /// Initial gap d_q along the normal, n: the distance of the meshes plus the gap that the scene adds.
     pub gap: Vec<f64>,
@@ -50,8 +52,8 @@ pub struct ContactPair {
     /// Moment of the entries of each row about the origin of the scene. The contact moment on a side follows as the force
     /// does from `resultant`.
     pub moment: [Vec<[f64; 3]>; 2],
-    /// Surface of each side at the points, n each.
-    pub surface: [Vec<OwnSurface>; 2],
+    /// Largest angle by which errors of coordinates turn the normals of a side.
+    pub tilt: f64,
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// What `weight` measures: `"length"`, or in space and for bodies of revolution `"area"`.
@@ -77,30 +79,6 @@ fn measure<'de, R: Deserializer<'de>>(from: R) -> Result<Measure, R::Error> {
 /// Return what stands for the law of a pair from another rank until it is made.
 fn no_law() -> Rc<dyn LayerLaw> {
     Rc::new(LinearLaw { stiffness: 0.0 })
-}
-
-/// The surface of one side around a contact point: means over the nodes of the side, weighted by their shares in the point.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub struct OwnSurface {
-    /// Mean position, measured from the datum of the mesh.
-    pub at: [f64; 3],
-    /// Mean of the outer unit normals.
-    pub normal: [f64; 3],
-    /// Mean of [`Side::spread`], the uncertainty of the normals.
-    pub spread: f64,
-}
-
-impl OwnSurface {
-    fn mean<const D: usize>(side: &Side<D>, shares: &[(u32, f64)], spread: &HashMap<u32, f64>) -> Self {
-        let mut mean = Self::default();
-        for (node, share) in shares {
-            let (x, normal) = (side.space.nodes[*node as usize], side.normals[node]);
-            add(&mut mean.at, pad(x.map(|x| share * x)));
-            add(&mut mean.normal, pad(normal.map(|n| share * n)));
-            mean.spread += share.abs() * spread[node];
-        }
-        mean
-    }
 }
 
 /// The pieces of a pair that are lost because the search for their points failed.
@@ -144,7 +122,7 @@ pub enum Fault {
 /// A function from the contact points of a pair to its law.
 pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
-/// Integrate over common pieces. Return the integrals of each node that carries a point, and the coverage of each facet of side a.
+/// Integrate over common pieces. Return the integrals of each node (on a face) that carries a point, and the coverage of each facet of side a.
 ///
 /// Contact points are the nodes of side a with the dual basis diag(int phi) M^-1 phi of the covered part of each facet, where
 /// phi are the shape functions and M is their mass matrix. On quadratic triangles they are the mid-edges with the dual basis
@@ -159,13 +137,13 @@ fn integrate<const D: usize>(
     let mut carriers = vec![None; a.facets.count()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let facet = chunk[0].facet_a;
-        let nodes = a.facets.facet(facet);
+        let nodes = a.on_facet(facet);
         let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets);
         carriers[facet] = Some(basis.carriers());
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let psi = element::values(b.facets.order, &point.at_b);
-            let others = b.facets.facet(point.facet_b);
+            let others = b.on_facet(point.facet_b);
             for (i, &node) in nodes.iter().enumerate() {
                 let mu = point.weight * basis.value(i, &phi, &point.at_a);
                 if mu == 0.0 {
@@ -199,27 +177,31 @@ pub fn assemble<const D: usize>(
 ) -> Result<ContactPair, Fault> {
     let (points, cover) = integrate(a, b, common);
     let tiny = 1e-12 * points.values().map(|point| point.weight).fold(0.0, f64::max);
-    let nodes = along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&n, _)| n));
-    if nodes.is_empty() {
+    let on_side = along(a, points.iter().filter(|(_, p)| p.weight > tiny).map(|(&at, _)| at));
+    if on_side.is_empty() {
         return Err(Fault::NoPartner);
     }
-    let points: Vec<&Accumulator> = nodes.iter().map(|node| &points[node]).collect();
+    let points: Vec<&Accumulator> = on_side.iter().map(|at| &points[at]).collect();
+    let nodes: Vec<&FaceNode<D>> = on_side.iter().map(|&at| &a.nodes[at as usize]).collect();
+    // a pressure acts on the area across its direction, on either side
+    let across = |(point, at): (&&Accumulator, &&FaceNode<D>)| point.weight * dot(&at.normal, &at.direction);
     let position: Vec<[f64; 3]> = points.iter().map(|point| point.position(a)).collect();
     let law = law(&position).map_err(Fault::Law)?;
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
-        weight: points.iter().map(|point| point.weight).collect(),
-        normal: nodes.iter().map(|node| pad(a.normals[node])).collect(),
+        weight: points.iter().zip(&nodes).map(across).collect(),
+        normal: nodes.iter().map(|at| pad(at.direction)).collect(),
         gap: gaps(a, &points, &position, gap)?,
-        nodes,
+        nodes: nodes.iter().map(|at| at.node).collect(),
+        on_side,
         position,
         prescribed: [Vec::new(), Vec::new()],
         rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
-        surface: [Vec::new(), Vec::new()],
+        tilt: a.tilt().max(b.tilt()),
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,
@@ -227,11 +209,9 @@ pub fn assemble<const D: usize>(
         cover,
     };
     for (index, side) in [a, b].into_iter().enumerate() {
-        let spread = side.spread();
         for (q, point) in points.iter().enumerate() {
-            let (shares, normal) = (point.shares(index), a.normals[&pair.nodes[q]]);
-            pair.surface[index].push(OwnSurface::mean(side, &shares, &spread));
-            push_rows(&mut pair, index, side, shares, normal);
+            let shares = point.shares(index);
+            push_rows(&mut pair, index, side, of_nodes(side, &shares), nodes[q].direction);
         }
     }
     Ok(pair)
@@ -257,6 +237,13 @@ fn gaps<const D: usize>(
         if own.is_finite() { Ok(distance + own) } else { Err(Fault::Gap(x)) }
     };
     points.iter().zip(position).map(gap).collect()
+}
+
+/// Return the shares of the nodes of a body in a point, from those of nodes on faces.
+fn of_nodes<const D: usize>(side: &Side<D>, shares: &[(u32, f64)]) -> BTreeMap<u32, f64> {
+    let mut sums = BTreeMap::new();
+    shares.iter().for_each(|&(at, share)| *sums.entry(side.nodes[at as usize].node).or_default() += share);
+    sums
 }
 
 /// Append the rows of a contact point for one side of a pair. `index` is 0 for side a and 1 for side b, `shares` holds the
@@ -314,7 +301,7 @@ const NOISE: f64 = 1e-9;
 struct Accumulator {
     weight: f64,
     gap: f64,
-    /// Integrals of mu_q times the shape function of each node, for side a and side b.
+    /// Integrals of mu_q times the shape function of each node on a face, for side a and side b.
     sides: [BTreeMap<u32, f64>; 2],
 }
 
@@ -335,7 +322,8 @@ impl Accumulator {
     /// Return the position of the contact point on side a in the scene.
     fn position<const D: usize>(&self, a: &Side<D>) -> [f64; 3] {
         let shares = self.shares(0);
-        let mean = |c: usize| shares.iter().map(|&(n, share)| share * a.space.nodes[n as usize][c]).sum();
+        let x = |at: u32| &a.space.nodes[a.nodes[at as usize].node as usize];
+        let mean = |c: usize| shares.iter().map(|&(at, share)| share * x(at)[c]).sum();
         a.space.in_scene(std::array::from_fn(mean))
     }
 }
@@ -344,6 +332,13 @@ impl ContactPair {
     /// Return the number of contact points.
     pub fn len(&self) -> usize {
         self.weight.len()
+    }
+
+    /// Return the contact point of each of the `count` nodes of side a on its faces, if it is one.
+    pub fn point_of(&self, count: usize) -> Vec<Option<usize>> {
+        let mut of = vec![None; count];
+        self.on_side.iter().enumerate().for_each(|(q, &at)| of[at as usize] = Some(q));
+        of
     }
 
     /// Return the number of facets of side a without a partner.

@@ -42,11 +42,11 @@ impl Chords {
         if deepest <= 0.0 || most - least <= UNIFORM * deepest {
             return None;
         }
-        let overlapping = pair.nodes.iter().zip(&pair.gap).filter(|(_, gap)| **gap < 0.0).map(|(&node, _)| node);
+        let overlapping = pair.on_side.iter().zip(&pair.gap).filter(|(_, gap)| **gap < 0.0).map(|(&at, _)| at);
         let overlapping: HashSet<u32> = overlapping.collect();
         let mut facets = [HashSet::new(), HashSet::new()];
         for point in &common.points {
-            if a.facets.facet(point.facet_a).iter().any(|node| overlapping.contains(node)) {
+            if a.on_facet(point.facet_a).iter().any(|at| overlapping.contains(at)) {
                 facets[0].insert(point.facet_a);
                 facets[1].insert(point.facet_b);
             }
@@ -75,7 +75,7 @@ fn largest_sagitta<const D: usize>(side: &Side<D>, facets: &HashSet<usize>) -> f
         if !element::is_straight(&x, D) {
             continue;
         }
-        let normals: Vec<[f64; D]> = side.facets.facet(facet)[..D].iter().map(|node| side.normals[node]).collect();
+        let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
         for i in 0..D {
             for j in i + 1..D {
                 largest = largest.max(0.125 * dot(&minus(normals[j], normals[i]), &minus(x[j], x[i])).abs());

@@ -1,14 +1,10 @@
-//! One contact surface of a body: facets with averaged nodal normals, its smooth faces, and the order of nodes along it.
+//! One contact surface of a body: its facets, its nodes with their normals and curvatures, its smooth faces, and the order of nodes along it.
 
+use super::mirror::Mirrors;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, bounds, dot};
 use crate::mesh::datum;
-use std::collections::{HashMap, HashSet};
-
-/// Difference between the unit normal of a facet and the mean normal beyond which the facets form an edge.
-///
-/// It is half of the angle between chords that leave their arc by 3 % of its radius, the worst polygon that is taken for round.
-const EDGE: f64 = 0.245;
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// One contact surface of a body.
 #[derive(Debug, Clone)]
@@ -23,69 +19,126 @@ pub struct Side<'a, const D: usize> {
     pub prescribed: &'a HashMap<usize, f64>,
     /// Dofs of nodes with rotated axes and of tied nodes.
     pub frame: &'a Frame<D>,
-    /// Outer unit normal at each node of the surface: the mean over the facets around it.
-    pub normals: HashMap<u32, [f64; D]>,
+    /// Planes of symmetry at the end of the surface.
+    pub mirrors: Mirrors<D>,
+    /// The nodes of the surface on its smooth faces, in the order of the nodes.
+    pub nodes: Vec<FaceNode<D>>,
+    /// Index in `nodes` of each node of each facet, in the order of `facets.nodes`.
+    pub corners: Vec<u32>,
+}
+
+/// A node of a surface on one of its smooth faces. A node at an edge occurs once for each face that meets there.
+#[derive(Debug, Clone, Copy)]
+pub struct FaceNode<const D: usize> {
+    /// The node of the body.
+    pub node: u32,
+    /// Outer unit normal: the mean over the facets of the face around the node, and their mirror images.
+    pub normal: [f64; D],
+    /// Unit vector along which compressions are measured: the own normal, or the one made of the normals of both sides
+    /// ([`Side::towards`]).
+    pub direction: [f64; D],
+    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around. At an edge the
+    /// difference is that of the faces.
+    pub curvature: f64,
 }
 
 impl<'a, const D: usize> Side<'a, D> {
-    /// Compute the nodal normals of a surface.
+    /// Compute the nodal normals and curvatures of a surface. Facets around a node that turn by no more than `edge` degrees are of one face.
     pub fn new(
         name: &'a str,
         space: &'a Space<D>,
         facets: Facets<D>,
         prescribed: &'a HashMap<usize, f64>,
         frame: &'a Frame<D>,
+        edge: f64,
     ) -> Self {
-        let mut normals: HashMap<u32, [f64; D]> = HashMap::new();
-        let places = element::nodes::<D>(facets.order);
-        for i in 0..facets.count() {
-            let x = facets.coordinates(i, space);
-            for (l, &node) in places.iter().zip(facets.facet(i)) {
-                let area = area_vector(facets.order, &x, l);
-                let sum = normals.entry(node).or_insert([0.0; D]);
-                (0..D).for_each(|c| sum[c] += area[c]);
+        let mirrors = Mirrors::new(space, &facets, prescribed, frame);
+        let least = edge.to_radians().cos() - ROUNDING;
+        let (mut nodes, mut corners) = (Vec::new(), vec![0; facets.nodes.len()]);
+        for (node, around) in areas_around(space, &facets) {
+            for face in smooth(&around, least) {
+                let mut normal = [0.0; D];
+                for &(corner, area) in &face {
+                    corners[corner] = nodes.len() as u32;
+                    (0..D).for_each(|c| normal[c] += area[c]);
+                }
+                let normal = unit(mirrors.mean(space, node, normal, least));
+                nodes.push(FaceNode { node, normal, direction: normal, curvature: 0.0 });
             }
         }
-        for (&node, normal) in &mut normals {
-            // A surface of revolution continues beyond the axis as its mirror image.
-            if space.on_axis(node) && normal[1] != 0.0 {
-                normal[0] = 0.0;
-            }
-            *normal = unit(*normal);
+        let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
+        side.flatten(edge);
+        side.bend();
+        side
+    }
+
+    /// Give the nodes of each flat face one normal, where coordinates have fewer digits than doubles. A face is flat if its normals
+    /// differ from their mean by no more than errors of coordinates allow for.
+    fn flatten(&mut self, edge: f64) {
+        if self.space.uncertainty == 0.0 {
+            return;
         }
-        Self { name, space, facets, prescribed, frame, normals }
+        let (faces, tilt) = (SmoothFaces::new(self, edge), self.tilt());
+        let mut mean = vec![[0.0; D]; faces.count];
+        for (i, &face) in faces.of_facet.iter().enumerate() {
+            let area = self.area(i);
+            (0..D).for_each(|c| mean[face][c] += area[c]);
+        }
+        let mean: Vec<[f64; D]> = mean.into_iter().map(unit).collect();
+        let mut flat = vec![true; faces.count];
+        for (i, &face) in faces.of_facet.iter().enumerate() {
+            flat[face] &= self.facet_nodes(i).all(|at| length(minus(at.normal, mean[face])) <= tilt);
+        }
+        for i in (0..faces.of_facet.len()).filter(|&i| flat[faces.of_facet[i]]) {
+            for corner in self.on_facet(i).to_vec() {
+                let at = &mut self.nodes[corner as usize];
+                (at.normal, at.direction) = (mean[faces.of_facet[i]], mean[faces.of_facet[i]]);
+            }
+        }
+    }
+
+    /// Compute the curvature of the surface at each node.
+    fn bend(&mut self) {
+        let flat = self.tilt().max(ROUNDING);
+        // the largest difference of the normals of faces that meet at a node
+        let mut at_edge = vec![0.0_f64; self.nodes.len()];
+        for i in 1..self.nodes.len() {
+            for j in (0..i).rev().take_while(|&j| self.nodes[j].node == self.nodes[i].node) {
+                let turn = length(minus(self.nodes[i].normal, self.nodes[j].normal));
+                [i, j].into_iter().for_each(|k| at_edge[k] = at_edge[k].max(turn));
+            }
+        }
+        for i in 0..self.facets.count() {
+            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
+            let mut curvature: f64 = 0.0;
+            for k in 0..on.len() {
+                for l in 0..k {
+                    let [p, q] = [on[k], on[l]].map(|corner| corner as usize);
+                    let turn =
+                        length(minus(self.nodes[p].normal, self.nodes[q].normal)).max(at_edge[p]).max(at_edge[q]);
+                    curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
+                }
+            }
+            for corner in on {
+                let largest = &mut self.nodes[corner as usize].curvature;
+                *largest = largest.max(curvature);
+            }
+        }
+    }
+
+    /// Return the indices in `nodes` of the nodes of facet `i`.
+    pub fn on_facet(&self, i: usize) -> &[u32] {
+        &self.corners[i * self.facets.stride..(i + 1) * self.facets.stride]
+    }
+
+    /// Return the nodes of facet `i`.
+    pub fn facet_nodes(&self, i: usize) -> impl Iterator<Item = &FaceNode<D>> {
+        self.on_facet(i).iter().map(|&corner| &self.nodes[corner as usize])
     }
 
     /// Return the surface of the facets that `keep` marks, with their own normals.
-    pub fn only(&self, keep: &[bool]) -> Self {
-        Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame)
-    }
-
-    /// Return the uncertainty of the normal near each node: the largest difference between the unit normals of facets and
-    /// nodes, over all nodes that share a facet with it. Edges do not count. Where the surface is flat, the result is the
-    /// rounding of the normals.
-    pub fn spread(&self) -> HashMap<u32, f64> {
-        let (places, rounding) = (element::nodes::<D>(self.facets.order), self.rounding());
-        let mut at_node: HashMap<u32, f64> = HashMap::new();
-        for i in 0..self.facets.count() {
-            let x = self.facets.coordinates(i, self.space);
-            for (l, node) in places.iter().zip(self.facets.facet(i)) {
-                let (area, mean) = (area_vector(self.facets.order, &x, l), self.normals[node]);
-                let difference = length(minus(unit(area), mean));
-                let least = f64::EPSILON + 2.0 * rounding / length(area).powf(1.0 / (D - 1) as f64);
-                let largest = at_node.entry(*node).or_default();
-                *largest = largest.max(least).max(if difference < EDGE { difference } else { 0.0 });
-            }
-        }
-        let mut spread: HashMap<u32, f64> = HashMap::new();
-        for nodes in (0..self.facets.count()).map(|i| self.facets.facet(i)) {
-            let on_facet = nodes.iter().map(|node| at_node[node]).fold(0.0, f64::max);
-            for node in nodes {
-                let largest = spread.entry(*node).or_default();
-                *largest = largest.max(on_facet);
-            }
-        }
-        spread
+    pub fn only(&self, keep: &[bool], edge: f64) -> Self {
+        Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame, edge)
     }
 
     /// Return the mean length (area) of a facet.
@@ -100,9 +153,15 @@ impl<'a, const D: usize> Side<'a, D> {
         area_vector(self.facets.order, &x, &[1.0 / D as f64; D])
     }
 
-    /// Return the largest rounding error of a coordinate of the surface's nodes.
+    /// Return the largest error of a coordinate of the surface's nodes: that of the digits of the mesh, or rounding.
     pub fn rounding(&self) -> f64 {
-        datum::rounding(&self.space.datum, self.facets.nodes.iter().map(|&node| &self.space.nodes[node as usize]))
+        let nodes = self.facets.nodes.iter().map(|&node| &self.space.nodes[node as usize]);
+        datum::rounding(&self.space.datum, nodes).max(self.space.uncertainty)
+    }
+
+    /// Return the largest angle by which errors of coordinates turn a normal.
+    pub fn tilt(&self) -> f64 {
+        self.facets.tilt(self.space, self.rounding())
     }
 
     /// Return the rounding error of a distance between this side and its partner: that of the coordinates of both sides, along
@@ -120,6 +179,32 @@ impl<'a, const D: usize> Side<'a, D> {
     pub fn bounds(&self, i: usize) -> [[f64; D]; 2] {
         bounds(self.facets.coordinates(i, self.space))
     }
+}
+
+/// Return the facets around each node: the index of the node in `facets.nodes`, and the outer normal there times the size of the facet.
+fn areas_around<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> BTreeMap<u32, Vec<(usize, [f64; D])>> {
+    let mut around: BTreeMap<u32, Vec<(usize, [f64; D])>> = BTreeMap::new();
+    let places = element::nodes::<D>(facets.order);
+    for i in 0..facets.count() {
+        let x = facets.coordinates(i, space);
+        for (k, (l, &node)) in places.iter().zip(facets.facet(i)).enumerate() {
+            around.entry(node).or_default().push((i * facets.stride + k, area_vector(facets.order, &x, l)));
+        }
+    }
+    around
+}
+
+/// Divide the facets around a node into faces, within which neighbours turn by an angle with the cosine `least` or more.
+fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(usize, [f64; D])>> {
+    let normals: Vec<[f64; D]> = around.iter().map(|&(_, area)| unit(area)).collect();
+    let mut joined = DisjointSets::new(around.len());
+    for i in 1..around.len() {
+        (0..i).filter(|&j| dot(&normals[i], &normals[j]) >= least).for_each(|j| joined.join(i as u32, j as u32));
+    }
+    let (count, face) = joined.classes();
+    let mut faces = vec![Vec::new(); count];
+    around.iter().zip(face).for_each(|(&facet, face)| faces[face as usize].push(facet));
+    faces
 }
 
 /// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of
@@ -187,25 +272,32 @@ fn normals_at_vertices<const D: usize>(side: &Side<D>) -> HashMap<u32, Vec<(usiz
     around
 }
 
-/// Sort surface nodes for plots. In the plane they follow the curve, and each chain begins at the end with the smaller
-/// coordinates. In space they are sorted by coordinates.
+/// Sort nodes of a surface for plots, given by their indices. In the plane they follow the curve, and each chain begins at the end with
+/// the smaller coordinates. In space they are sorted by coordinates.
 pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -> Vec<u32> {
     let mut nodes: Vec<u32> = nodes.collect();
-    let at = |node: u32| side.space.nodes[node as usize];
-    nodes.sort_by(|&m, &n| {
-        let (x, y) = (at(m), at(n));
-        (0..D).map(|c| x[c].total_cmp(&y[c])).find(|o| o.is_ne()).unwrap_or(m.cmp(&n))
+    let at = |i: u32| side.space.nodes[side.nodes[i as usize].node as usize];
+    nodes.sort_by(|&i, &j| {
+        let (x, y) = (at(i), at(j));
+        (0..D).map(|c| x[c].total_cmp(&y[c])).find(|o| o.is_ne()).unwrap_or(i.cmp(&j))
     });
     if D != 2 {
         return nodes;
     }
     let mut neighbours: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut link = |i: u32, j: u32| {
+        neighbours.entry(i).or_default().push(j);
+        neighbours.entry(j).or_default().push(i);
+    };
     for i in 0..side.facets.count() {
-        let facet = side.facets.facet(i);
-        let chain = if facet.len() == 3 { vec![facet[0], facet[2], facet[1]] } else { facet.to_vec() };
-        for link in chain.windows(2) {
-            neighbours.entry(link[0]).or_default().push(link[1]);
-            neighbours.entry(link[1]).or_default().push(link[0]);
+        let on = side.on_facet(i);
+        let chain = if on.len() == 3 { vec![on[0], on[2], on[1]] } else { on.to_vec() };
+        chain.windows(2).for_each(|ends| link(ends[0], ends[1]));
+    }
+    // the curve goes on round an edge, where a node occurs once for each face
+    for (i, ends) in (0u32..).zip(side.nodes.windows(2)) {
+        if ends[0].node == ends[1].node {
+            link(i, i + 1);
         }
     }
     let wanted: HashSet<u32> = nodes.iter().copied().collect();

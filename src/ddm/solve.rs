@@ -404,11 +404,11 @@ pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>
 /// Return the automatic start. If no method can find a solution, return the reason: a motion that nothing resists, or loads that push a body off
 /// for ever.
 fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
-    if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
-        return Err(Status::Underconstrained(moved));
-    }
     if let Some(mechanism) = &model.mechanism {
         return Err(Status::Mechanism(mechanism.clone()));
+    }
+    if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
+        return Err(Status::Underconstrained(moved));
     }
     start::find(model, None).map_err(|moving| Status::Unbounded { moving })
 }

@@ -1,13 +1,14 @@
-//! The motion of a body relative to its contact: the mean displacement of where the body is loaded or constrained.
+//! The motion of a body relative to its contact: the displacement of the support that moves it, or the one that is conjugate to its
+//! load, or the mean displacement of where it is constrained.
 
-use super::patterns::{find_group, load_dimensions};
+use super::patterns::find_group;
 use super::supports::axis_vector;
 use crate::contact::add;
 use crate::error::Result;
 use crate::fem::{Facets, NodalForces, Space, Subdivision, assemble, length, pad, place, surface};
 use crate::linalg::dot;
 use crate::mesh::Mesh;
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind};
+use crate::problem::body::{BodySpec, SpringKind};
 use serde::{Deserialize, Serialize};
 
 /// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is included.
@@ -36,10 +37,10 @@ impl NodeWeights {
     }
 }
 
-/// A surface or a set of nodes on which the body is loaded or constrained.
+/// A surface or a set of nodes on which the body is constrained.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct BoundarySet {
-    /// Unit vectors: the direction of the force, or the constrained directions.
+    /// Unit vectors: the constrained directions.
     directions: Vec<[f64; 3]>,
     /// Integrals of the shape functions of nodes over the surface; 1 for each node if there is no surface.
     weights: NodeWeights,
@@ -66,10 +67,48 @@ impl BoundarySet {
     }
 }
 
-/// The places where a body is loaded, and where it is constrained.
+/// The nodal forces of a load at its full value.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LoadForces {
+    /// Forces at the nodes of this rank.
+    forces: Vec<(u32, [f64; 3])>,
+    /// Sum of the forces at all nodes.
+    net: [f64; 3],
+    /// Sum of their magnitudes.
+    size: f64,
+}
+
+impl LoadForces {
+    /// Take the forces at all nodes.
+    pub fn new<const D: usize>(forces: impl Iterator<Item = (u32, [f64; D])>) -> Self {
+        let forces: Vec<_> = forces.map(|(node, force)| (node, pad(force))).collect();
+        let mut net = [0.0; 3];
+        forces.iter().for_each(|(_, force)| add(&mut net, *force));
+        Self { net, size: forces.iter().map(|(_, force)| length(*force)).sum(), forces }
+    }
+
+    fn on(&self, nodes: &[u32]) -> Self {
+        let here = |(node, force): &(u32, [f64; 3])| Some((place(nodes, *node)?, *force));
+        Self { forces: self.forces.iter().filter_map(here).collect(), ..*self }
+    }
+
+    /// Return the weights of the mean displacement along `n` on which the load works, or `None` if the load does not push along
+    /// it. A moment and a pressure all around have no sum.
+    fn along(&self, n: [f64; 3]) -> Option<NodeWeights> {
+        let net = dot(&self.net, &n);
+        let of_nodes = self.forces.iter().map(|(node, force)| (*node, net.signum() * dot(force, &n)));
+        (net.abs() >= ALONG * self.size && net != 0.0)
+            .then(|| NodeWeights { of_nodes: of_nodes.collect(), total: net.abs() })
+    }
+}
+
+/// The places where a body is moved, loaded, and constrained.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Outer {
-    loaded: Vec<BoundarySet>,
+    /// Supports that prescribe displacements other than zero.
+    moved: Vec<BoundarySet>,
+    /// Loads on surfaces and points.
+    loaded: Vec<LoadForces>,
     held: Vec<BoundarySet>,
     /// Integrals of the shape functions over the body, if it has no loads, supports or springs.
     whole: NodeWeights,
@@ -77,8 +116,8 @@ pub struct Outer {
 }
 
 impl Outer {
-    /// Find the places where a body is loaded and constrained. `resultant` returns the sum of a load. The whole body is used if
-    /// it has no loads, supports or springs.
+    /// Find the places where a body is constrained. `loaded` holds its loads on surfaces and points. The whole body is used if it
+    /// has no loads, supports or springs.
     ///
     /// # Errors
     /// A group is missing.
@@ -86,22 +125,19 @@ impl Outer {
         spec: &BodySpec,
         space: &Space<D>,
         mesh: &Mesh<D>,
-        resultant: &dyn Fn(&Load) -> Result<[f64; 3]>,
+        loaded: Vec<LoadForces>,
     ) -> Result<Self> {
-        let mut outer = Self { nodes: space.nodes.len(), ..Self::default() };
-        for load in &spec.load {
-            let group = find_group(mesh, &load.on, load_dimensions::<D>(&load.kind), "load")?;
-            let force = match load.kind {
-                LoadKind::Force { total, .. } | LoadKind::Turning { force: total, .. } => total,
-                _ => resultant(load)?,
-            };
-            outer.loaded.push(BoundarySet::new(space, group, normalized(force).into_iter().collect()));
-        }
+        let mut outer = Self { loaded, nodes: space.nodes.len(), ..Self::default() };
         for fix in &spec.fix {
             let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
-            let components = (0..D).filter(|&c| fix.value[c].is_some()).map(axis_vector);
-            let normal = fix.normal.as_ref().and_then(|_| normal(space, group));
-            outer.held.push(BoundarySet::new(space, group, components.chain(normal).collect()));
+            let components = || (0..D).filter_map(|c| Some((axis_vector(c), fix.value[c].as_ref()?)));
+            let along = fix.normal.as_ref().and_then(|value| Some((normal(space, group)?, value)));
+            let all: Vec<_> = components().chain(along).collect();
+            let moved: Vec<_> = all.iter().filter(|(_, value)| !value.is_zero()).map(|(n, _)| *n).collect();
+            if !moved.is_empty() {
+                outer.moved.push(BoundarySet::new(space, group, moved));
+            }
+            outer.held.push(BoundarySet::new(space, group, all.into_iter().map(|(n, _)| n).collect()));
         }
         for spring in &spec.spring {
             let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
@@ -120,18 +156,28 @@ impl Outer {
     /// Restrict the places to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     pub fn on(&self, nodes: &[u32]) -> Self {
         let on = |places: &[BoundarySet]| places.iter().map(|place| place.on(nodes)).collect();
-        Self { loaded: on(&self.loaded), held: on(&self.held), whole: self.whole.on(nodes), nodes: self.nodes }
+        Self {
+            moved: on(&self.moved),
+            loaded: self.loaded.iter().map(|load| load.on(nodes)).collect(),
+            held: on(&self.held),
+            whole: self.whole.on(nodes),
+            nodes: self.nodes,
+        }
     }
 
-    /// Return the contribution of owned nodes to the mean displacement, from the displacements `u` of the nodes of this rank. The
-    /// mean is over all surfaces with loads along `direction`. Without them it is over supports and springs that constrain this
-    /// direction, and without these over the whole body.
+    /// Return the contribution of owned nodes to the displacement of the body, from the displacements `u` of the nodes of this
+    /// rank. It is the mean over the supports that move the body along `direction`, without them the one on which the loads along
+    /// it work, else the mean over supports and springs that constrain this direction, and without these over the whole body.
     pub fn mean<const D: usize>(&self, u: &[f64], own: &[bool], direction: [f64; 3]) -> [f64; 3] {
         let chosen = |places: &[BoundarySet]| {
             let along = || places.iter().filter(|place| place.acts_along(direction));
             let surfaces = along().any(|place| place.has_area);
             let chosen = along().filter(|place| place.has_area || !surfaces);
             mean::<D>(u, own, chosen.map(|place| &place.weights))
+        };
+        let loaded = || {
+            let along: Vec<_> = self.loaded.iter().filter_map(|load| load.along(direction)).collect();
+            mean::<D>(u, own, along.iter())
         };
         let of_nodes = || {
             let own = (0..).zip(own).filter(|(_, own)| **own).map(|(node, _)| (node, 1.0));
@@ -141,7 +187,7 @@ impl Outer {
             let whole = Some(self.whole.clone()).filter(|whole| whole.total > 0.0);
             mean::<D>(u, own, [&whole.unwrap_or_else(of_nodes)].into_iter())
         };
-        chosen(&self.loaded).or_else(|| chosen(&self.held)).or_else(whole).unwrap_or_default()
+        chosen(&self.moved).or_else(loaded).or_else(|| chosen(&self.held)).or_else(whole).unwrap_or_default()
     }
 }
 

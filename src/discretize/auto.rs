@@ -1,13 +1,14 @@
 //! Pairs of smooth faces: surfaces are split where one of them has an edge, and boundary facets of different bodies that face each other
 //! within a distance are found by rules of the scene.
 
+use super::carrier;
 use super::part::SceneBody;
 use super::patterns::{pattern, tie};
 use crate::contact::pieces::{BoxTree, Cut, Reach};
 use crate::contact::{Side, SmoothFaces};
 use crate::error::{Error, Place, Result, few};
 use crate::fem::{Facets, unit};
-use crate::problem::contact::AutoContact;
+use crate::problem::contact::{AutoContact, Carrier};
 use crate::problem::pattern::Rank;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -29,6 +30,8 @@ pub struct SurfacePair<'a, const D: usize> {
     pub bodies: [usize; 2],
     /// Names of the surfaces; those of the bodies if the pair was found.
     pub names: [&'a str; 2],
+    /// Whether the second surface carries the contact points.
+    pub swapped: bool,
     /// The pairs: one, or several where surfaces have edges.
     pub pieces: Vec<PairPart<D>>,
 }
@@ -46,15 +49,16 @@ pub fn find<'a, const D: usize>(
     cut: Cut<D>,
     parts: &'a [SceneBody<D>],
     named: &HashSet<[usize; 2]>,
+    carriers: &[Carrier],
 ) -> Result<Vec<SurfacePair<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
     }
     let whole: Vec<Side<D>> =
-        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary())).collect();
+        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
-        let found = meeting(rules, cut, &whole, &possible);
+        let mut found = meeting(rules, cut, &whole, &possible);
         if found.pieces.is_empty() {
             continue;
         }
@@ -63,6 +67,8 @@ pub fn find<'a, const D: usize>(
             let [(own, _), (other, place)] = [possible.rule, other].map(|number| title(&rules[number]));
             return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
         }
+        let table = rules[possible.rule].contact.table;
+        found.swapped = carrier::is_second(parts, possible.bodies, possible.near.each_ref(), table, carriers);
         all.push(found);
     }
     Ok(all)
@@ -117,14 +123,14 @@ fn meeting<'a, const D: usize>(
 ) -> SurfacePair<'a, D> {
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
-        Side::new(name, space, possible.near[k].clone(), prescribed, frame)
+        Side::new(name, space, possible.near[k].clone(), prescribed, frame, rules[possible.rule].contact.edge)
     };
     let (spec, a, b) = (&rules[possible.rule].contact, near(0), near(1));
     let reach = Reach::between(&a, &b, spec.angle, spec.distance);
     let mut pieces = FaceSplit::new([&a, &b], spec.edge, cut, &reach).into_pieces();
     pieces.sort_by_key(|piece| piece.face);
     let names = possible.bodies.map(|body| whole[body].name);
-    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, pieces }
+    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, swapped: false, pieces }
 }
 
 /// Check that every rule found a pair among the `found` ones.
@@ -256,7 +262,7 @@ impl<'a, const D: usize> FaceSplit<'a, D> {
         for face in 0..faces[0].count {
             let is_own: Vec<bool> = faces[0].of_facet.iter().map(|&of| of == face).collect();
             let own: Vec<usize> = (0..is_own.len()).filter(|&i| is_own[i]).collect();
-            let common = cut(&sides[0].only(&is_own), sides[1], reach);
+            let common = cut(&sides[0].only(&is_own, edge), sides[1], reach);
             for (i, j) in common.far() {
                 far[0].extend(sides[0].facets.facet(own[i]));
                 far[1].extend(sides[1].facets.facet(j));

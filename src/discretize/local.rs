@@ -4,7 +4,7 @@ use super::distribute::{Partition, Share};
 use super::part::BodyFacts;
 use super::post::Post;
 use super::supports::{Constraints, axis_vector};
-use super::unassembled::{NO_WORK, RemovedModes, Supported, Unassembled, Unconstrained};
+use super::unassembled::{NO_WORK, Supported, Unassembled, Unconstrained};
 use crate::contact::{self, ContactPair};
 use crate::exchange::Plain;
 use crate::fem::{self, NodalBlock, NodalForces, NodeGraph, Space, place};
@@ -36,8 +36,6 @@ pub struct BodyInfo {
     pub left_by_supports: Vec<String>,
     /// Names of the rigid motions that no contact row can resist either.
     pub left_by_all: Vec<String>,
-    /// Rigid motions that only the mesh resists.
-    pub removed_modes: RemovedModes,
     /// Warning for the user about the elasticity.
     pub warning: Option<String>,
     /// Stiffness of the body against a uniform contact pressure, per area. It is the modulus over the depth, which is the area
@@ -229,7 +227,6 @@ impl<const D: usize> Unassembled<'_, D> {
             supported: part.held.supported(),
             left_by_supports: unconstrained.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: unconstrained.unresisted.iter().map(|(name, _)| name.clone()).collect(),
-            removed_modes: self.removed_modes.clone(),
             warning: part.locking(plane),
             stiffness: if is_held { modulus / depth } else { 0.0 },
             load,

@@ -29,6 +29,9 @@ pub trait Meshes {
     /// Return the integration points of a pair.
     fn points(&self, pair: usize) -> &FinePoints;
 
+    /// Return the vertices of the facet at an integration point of a side of a pair, with the barycentric coordinates of the point.
+    fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)>;
+
     /// Return the cells of a body.
     fn cells(&self, body: usize) -> BodyCells;
 
@@ -128,6 +131,11 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn points(&self, pair: usize) -> &FinePoints {
         &self.fine[pair].points
+    }
+
+    fn vertices(&self, pair: usize, side: usize, point: usize) -> Vec<(u32, f64)> {
+        let on = &self.fine[pair].sides[side];
+        on.facets.facet(on.facet[point]).iter().copied().zip(on.at[point]).collect()
     }
 
     fn cells(&self, body: usize) -> BodyCells {

@@ -2,6 +2,7 @@
 //! each other.
 
 use super::auto::{self, ContactEntry, FaceSplit, PairPart, SurfacePair};
+use super::carrier;
 use super::part::SceneBody;
 use super::patterns::{Owners, find_group, point};
 use super::surface::ContactSurface;
@@ -12,8 +13,7 @@ use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, unit};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
-use crate::problem::contact::{ContactSpec, Overlap};
-use crate::problem::order::Order;
+use crate::problem::contact::{Carrier, ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -65,6 +65,14 @@ pub struct ContactInfo {
     pub surface: ContactSurface,
 }
 
+impl ContactInfo {
+    /// Return which surface carries the points of a pair with these bodies, the carrier's first.
+    pub fn carrier(&self, [a, b]: [usize; 2]) -> Carrier {
+        let bodies = if self.swapped { [b, a] } else { [a, b] };
+        Carrier { table: self.spec.table, bodies, is_second: self.swapped }
+    }
+}
+
 /// The entry of the scene that a pair comes from.
 #[derive(Serialize, Deserialize)]
 struct PairOrigin {
@@ -98,7 +106,7 @@ impl PairOrigin {
 }
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests
-/// integration points. The bodies `sliding` can move along their own contact surfaces.
+/// integration points.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
@@ -108,21 +116,20 @@ pub fn all<const D: usize>(
     cut: Cut<D>,
     parts: &[SceneBody<D>],
     fine: bool,
-    sliding: &[usize],
 ) -> Result<Vec<Contact<D>>> {
     let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
-    let rule = CarrierRule { adapts: scene.adapt.is_some(), sliding };
     let named = scene.contacts.iter().enumerate();
-    let mut found =
-        named.map(|named| self::named(named, mesh, cut, &owners, parts, rule)).collect::<Result<Vec<_>>>()?;
+    let mut found = named
+        .map(|named| self::named(named, mesh, cut, &owners, parts, &scene.carriers))
+        .collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
-    found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
+    found.extend(auto::find(&scene.auto, cut, parts, &taken, &scene.carriers)?);
     let mut contacts = Vec::new();
     for surfaces in found {
-        contacts.extend(assemble(scene, cut, parts, fine, rule, surfaces)?);
+        contacts.extend(assemble(scene, cut, parts, fine, surfaces)?);
     }
     auto::all_find_some(&scene.auto, contacts.iter().map(|contact: &Contact<D>| contact.facts.origin.entry))?;
     Ok(contacts)
@@ -138,15 +145,14 @@ fn assemble<const D: usize>(
     cut: Cut<D>,
     parts: &[SceneBody<D>],
     fine: bool,
-    rule: CarrierRule,
     surfaces: SurfacePair<D>,
 ) -> Result<Vec<Contact<D>>> {
-    let SurfacePair { entry, bodies, names, pieces } = surfaces;
+    let SurfacePair { entry, bodies, names, swapped, pieces } = surfaces;
     let (mut contacts, mut left_out, count): (Vec<Contact<D>>, _, _) = (Vec::new(), [0; 2], pieces.len());
     for (number, piece) in pieces.into_iter().enumerate() {
         let all: [usize; 2] = std::array::from_fn(|side| piece.facets[side].count() + piece.idle[side]);
         let is_needed = matches!(entry, ContactEntry::Named(_)) && contacts.is_empty() && number + 1 == count;
-        match Opposite::new(entry, scene, parts, bodies, names, piece, rule).assemble(
+        match Opposite::new(entry, scene, parts, bodies, names, piece, swapped).assemble(
             &scene.laws,
             cut,
             fine,
@@ -174,7 +180,7 @@ fn named<'a, const D: usize>(
     cut: Cut<D>,
     owners: &Owners,
     parts: &[SceneBody<D>],
-    rule: CarrierRule,
+    carriers: &[Carrier],
 ) -> Result<SurfacePair<'a, D>> {
     let surface = |k: usize| {
         let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
@@ -187,15 +193,16 @@ fn named<'a, const D: usize>(
             .help("contact of a body with itself is out of scope; make two bodies of it"));
     }
     let names = spec.between.each_ref().map(|name| name.value.as_str());
-    let sides = [parts[first].side(names[0], on_first), parts[second].side(names[1], on_second)];
+    let sides = [parts[first].side(names[0], on_first, spec.edge), parts[second].side(names[1], on_second, spec.edge)];
     let is_smooth = |side: &Side<D>| {
         let all = vec![true; side.facets.count()];
         !SmoothFaces::new(side, spec.edge).meet(side, &all)
     };
+    let bodies = [first, second];
+    let swapped = carrier::is_second(parts, bodies, sides.each_ref().map(|side| &side.facets), spec.table, carriers);
     let mut pieces = Vec::new();
     if !sides.iter().all(is_smooth) {
         // The side with the contact points is projected onto the other, so that the order of the names changes nothing.
-        let swapped = rule.chooses_second(parts, [first, second], [&sides[0], &sides[1]]);
         let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
         let reach = Reach::between(a, b, spec.angle, spec.distance);
         pieces = FaceSplit::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
@@ -209,68 +216,7 @@ fn named<'a, const D: usize>(
         let facets = sides.map(|side| side.facets);
         pieces.push(PairPart { facets, face: [None; 2], idle: [0; 2], far: Default::default() });
     }
-    Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], names, pieces })
-}
-
-/// Ratio of the sizes of facets above which the finer of two surfaces carries the contact points, since errors are those of a mesh of its size: on rings
-/// whose facets are as 3 to 4, the error of the pressure is 0.011 if the finer side carries and 0.034 if the coarser one does
-/// (`rings_of_quadrangles_have_lames_pressure`). A mesher divides a length L into L/h facets, rounded to an integer, which changes their size by at
-/// most half of 1/N for N facets: two surfaces of ten facets or more of one nominal size stay below the ratio.
-const FINER: f64 = 1.1;
-
-/// The rule by which one of two surfaces carries the contact points of their pair, whatever their order in the scene.
-///
-/// Compressions are measured along the normals of that side, and those of the other side give other pressures on curved surfaces that
-/// slide. So the side must not change from one mesh of a scene to the next.
-#[derive(Clone, Copy)]
-struct CarrierRule<'a> {
-    /// Whether meshes are adapted. Their sizes have no say then.
-    adapts: bool,
-    /// Bodies that can move along their own contact surfaces, such as rollers. Only their own normals leave such a motion free.
-    sliding: &'a [usize],
-}
-
-/// What decides whether a surface carries the contact points of its pair.
-#[derive(Clone, Copy)]
-struct Candidate<'a> {
-    /// Whether its body can move along it.
-    slides: bool,
-    /// Whether its facets are straight.
-    is_straight: bool,
-    /// Mean size of its facets, a length.
-    size: f64,
-    /// Name of its body.
-    name: &'a str,
-}
-
-impl CarrierRule<'_> {
-    /// Return whether the second of two surfaces of these bodies carries the contact points.
-    fn chooses_second<const D: usize>(self, parts: &[SceneBody<D>], bodies: [usize; 2], sides: [&Side<D>; 2]) -> bool {
-        let candidate = |k: usize| Candidate {
-            slides: self.sliding.contains(&bodies[k]),
-            is_straight: sides[k].facets.order == Order::P1,
-            size: sides[k].mean_measure().powf(1.0 / (D - 1) as f64),
-            name: &parts[bodies[k]].spec.name.value,
-        };
-        self.prefers_second([candidate(0), candidate(1)])
-    }
-
-    /// Return whether the second of two candidates carries the contact points.
-    ///
-    /// It is the one of the only sliding body, else the one with finer facets, else that of the first body by name. Coarser facets that are straight
-    /// do not follow a curved surface well enough for the points of a sliding body.
-    fn prefers_second(self, candidates: [Candidate; 2]) -> bool {
-        let [first, second] = &candidates;
-        let is_finer = [FINER * first.size < second.size, FINER * second.size < first.size];
-        let slides = |k: usize| candidates[k].slides && !(candidates[k].is_straight && is_finer[1 - k]);
-        match [slides(0), slides(1)] {
-            [false, true] => true,
-            [true, false] => false,
-            _ if !self.adapts && is_finer[1] => true,
-            _ if !self.adapts && is_finer[0] => false,
-            _ => first.name >= second.name,
-        }
-    }
+    Ok(SurfacePair { entry: ContactEntry::Named(number), bodies, names, swapped, pieces })
 }
 
 /// Two surfaces that are to be a pair.
@@ -298,14 +244,13 @@ impl<'a, const D: usize> Opposite<'a, D> {
         bodies: [usize; 2],
         names: [&'a str; 2],
         piece: PairPart<D>,
-        rule: CarrierRule,
+        swapped: bool,
     ) -> Self {
         let origin = PairOrigin::new(entry, names, piece.face);
         let spec = origin.spec(scene);
         let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
-        let first = parts[bodies[0]].side(names[0], on_first);
-        let second = parts[bodies[1]].side(names[1], on_second);
-        let swapped = rule.chooses_second(parts, bodies, [&first, &second]);
+        let first = parts[bodies[0]].side(names[0], on_first, spec.edge);
+        let second = parts[bodies[1]].side(names[1], on_second, spec.edge);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
@@ -316,8 +261,11 @@ impl<'a, const D: usize> Opposite<'a, D> {
 
     /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces have no common piece, unless the pair is
     /// needed.
-    fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool, is_needed: bool) -> Result<Option<Contact<D>>> {
+    fn assemble(mut self, laws: &OwnLaws, cut: Cut<D>, fine: bool, is_needed: bool) -> Result<Option<Contact<D>>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
+        if self.a.towards(&self.b, &common) {
+            common = cut(&self.a, &self.b, &self.reach);
+        }
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
@@ -492,32 +440,4 @@ fn closest<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
     let (ours, others) = (normals(a), normals(b));
     let facing = |n: &[f64; D]| others.iter().map(|m| -dot(n, m)).fold(-1.0, f64::max);
     ours.iter().map(facing).fold(-1.0, f64::max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The side of the contact points does not depend on the order of the surfaces, and not on sizes that are alike or adapted.
-    #[test]
-    fn the_side_of_the_contact_points_is_that_of_the_scene() {
-        let of = |name| Candidate { slides: false, is_straight: false, size: 1.0, name };
-        let (early, late) = (of("a"), of("b"));
-        // the first of each two carries
-        let cases = [
-            (false, early, late),
-            (false, early, Candidate { size: 0.95, ..late }),
-            (false, Candidate { size: 0.8, ..late }, early),
-            (true, early, Candidate { size: 0.8, ..late }),
-            (false, Candidate { slides: true, size: 2.0, ..late }, early),
-            (true, Candidate { slides: true, ..late }, early),
-            (false, early, Candidate { slides: true, is_straight: true, size: 2.0, ..late }),
-            (false, Candidate { slides: true, size: 0.8, ..late }, Candidate { slides: true, ..early }),
-        ];
-        for (number, (adapts, carrier, other)) in cases.into_iter().enumerate() {
-            let rule = CarrierRule { adapts, sliding: &[] };
-            assert!(!rule.prefers_second([carrier, other]), "case {number}");
-            assert!(rule.prefers_second([other, carrier]), "case {number}, exchanged");
-        }
-    }
 }

@@ -1,10 +1,10 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
-use super::approach::Outer;
+use super::approach::{LoadForces, Outer};
 use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
-use crate::contact::{self, Side};
+use crate::contact::Side;
 use crate::error::{Error, Result, shown};
 use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
@@ -63,9 +63,14 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         self.held.frame.dof(dof, |node| self.at(motion, node))
     }
 
-    /// Return a contact surface of the body.
-    pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>) -> Side<'s, D> {
-        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame)
+    /// Return a contact surface of the body, with edges where facets turn by more than `edge` degrees.
+    pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>, edge: f64) -> Side<'s, D> {
+        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame, edge)
+    }
+
+    /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity differs between cells.
+    pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
+        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.space.cells_at(facets) }
     }
 
     /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
@@ -163,16 +168,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(missed)
     }
 
-    /// Return the nodal forces of loads on surfaces that the quadrature misses.
-    ///
-    /// # Errors
-    /// See [`SceneBody::load`].
-    pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let whole: NodalForces<D> =
-            self.on_surfaces(mesh, Subdivision::Whole)?.iter().map(|(node, force)| (node, force.map(|f| -f))).collect();
-        Ok(self.on_surfaces(mesh, Subdivision::Halves)?.and(whole))
-    }
-
     /// Return the nodal forces of all loads on surfaces that are not rigid.
     fn on_surfaces(&self, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
         let mut load = NodalForces::default();
@@ -232,16 +227,19 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(nodes.into_iter().map(|node| (node, each)).collect())
     }
 
-    /// Return the sum of the nodal forces of a load of the scene at its full value. It is zero if the surface is rigid.
+    /// Return the nodal forces of a load of the scene at its full value. A force on a rigid surface is spread over its area.
     ///
     /// # Errors
     /// See [`SceneBody::load`].
-    pub fn resultant(&self, spec: &Load, mesh: &Mesh<D>) -> Result<[f64; 3]> {
-        let mut sum = [0.0; 3];
-        for (_, force) in self.on_surface(spec, 1.0, mesh, Subdivision::Whole)?.iter() {
-            contact::add(&mut sum, self.space.net_force(force));
-        }
-        Ok(sum)
+    fn load_forces(&self, load: &Load, mesh: &Mesh<D>) -> Result<LoadForces> {
+        let spread = match &load.kind {
+            LoadKind::Force { total, rigid: true } | LoadKind::Turning { force: total, .. } => {
+                LoadKind::Force { total: *total, rigid: false }
+            }
+            _ => return Ok(LoadForces::new(self.on_surface(load, 1.0, mesh, Subdivision::Whole)?.iter())),
+        };
+        let load = Load { kind: spread, ..load.clone() };
+        Ok(LoadForces::new(self.on_surface(&load, 1.0, mesh, Subdivision::Whole)?.iter()))
     }
 
     /// Return the forces on rigid surfaces, at few nodes of each.
@@ -461,8 +459,8 @@ pub fn parts<'a, const D: usize>(
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
         let mut part = SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
-        let resultant = |load: &_| part.resultant(load, mesh);
-        part.facts.outer = Outer::new(spec, &part.space, mesh, &resultant)?;
+        let loaded = spec.load.iter().map(|load| part.load_forces(load, mesh)).collect::<Result<_>>()?;
+        part.facts.outer = Outer::new(spec, &part.space, mesh, loaded)?;
         part.check_held(&checked.parts, mesh)?;
         parts.push(part);
     }

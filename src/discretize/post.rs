@@ -22,6 +22,9 @@ pub trait Post {
     /// Return the largest strain in the cells that this rank writes. `bent` is as in [`Post::field`].
     fn strain(&self, bent: &[f64]) -> Strained;
 
+    /// Return the integral of the rotation vector (x, y, z) over the cells that this rank writes.
+    fn rotation(&self, v: &[f64]) -> [f64; 3];
+
     /// Return the forces on the owned nodes under the forces omega p of the contact rows of the body.
     fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance;
 
@@ -173,6 +176,10 @@ impl<const D: usize> Post for OnPart<D> {
 
     fn strain(&self, bent: &[f64]) -> Strained {
         displacement::largest_strain(&self.space, self.owned(), &self.nodal(bent))
+    }
+
+    fn rotation(&self, v: &[f64]) -> [f64; 3] {
+        displacement::rotation(&self.space, self.owned(), &self.nodal(v))
     }
 
     /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.

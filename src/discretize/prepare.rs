@@ -5,7 +5,7 @@
 use super::assembler::{Factory, Outline};
 use super::distribute::Partition;
 use super::local::{LocalBody, SharedBody};
-use super::mechanism::{self, Balanced, Fixed};
+use super::mechanism;
 use super::pairs::{self, ContactFacts};
 use super::part::parts;
 use super::unassembled::Unassembled;
@@ -30,10 +30,8 @@ pub struct ReplicatedProblem<const D: usize, P> {
     pub pairs: Vec<ContactPair>,
     /// Origin of each pair.
     pub contacts: Vec<ContactFacts>,
-    /// Free motions of several bodies together.
+    /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
-    /// Loads that were balanced.
-    pub balanced: Vec<Balanced>,
     /// Integration points of each pair, if meshes are kept.
     pub fine: Vec<contact::Fine<D>>,
     /// Choice of solvers.
@@ -86,14 +84,15 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     factory: &mut F,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, Whole<'a, D>)> {
     let mesh = &verified.mesh;
-    let mut placed = Placed::new(scene, verified, specs, cut, keep, &[])?;
-    let sliding = placed.sliding();
-    if placed.pairs.iter().any(|pair| pair.bodies.map(|body| sliding.contains(&body)) == [false, true]) {
-        // the normals of the other body resist the motion: the node at which it is fixed would have a reaction, and pressures would depend on it
-        drop(placed);
-        placed = Placed::new(scene, verified, specs, cut, keep, &sliding)?;
+    let parts = parts(scene, verified, specs)?;
+    let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
+    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
+        pairs.push(found.pair);
+        contacts.push(found.facts);
+        fine.extend(found.fine);
     }
-    let Placed { mut bodies, pairs, contacts, fine, fixed: Fixed { mechanisms, balanced } } = placed;
+    let mut bodies = Unassembled::all(parts, &pairs, mesh)?;
+    let mechanisms = mechanism::fix(&mut bodies, &pairs);
     bodies.iter_mut().for_each(Unassembled::support);
     let plan = plan(&bodies, factory)?;
     let partitions = partitions(&bodies, &pairs, factory, ranks);
@@ -107,49 +106,8 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, balanced, fine, plan };
+    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, fine, plan };
     Ok((shared, Whole { bodies, partitions, keep }))
-}
-
-/// The bodies and pairs of a scene, with all rigid motions that nothing resists fixed.
-struct Placed<'a, const D: usize> {
-    bodies: Vec<Unassembled<'a, D>>,
-    pairs: Vec<ContactPair>,
-    contacts: Vec<ContactFacts>,
-    fine: Vec<contact::Fine<D>>,
-    fixed: Fixed,
-}
-
-impl<'a, const D: usize> Placed<'a, D> {
-    /// Make the bodies and the pairs. The bodies `sliding`, which can move along their own contact surfaces, carry the contact points.
-    ///
-    /// # Errors
-    /// The scene contradicts its mesh.
-    fn new(
-        scene: &Scene,
-        verified: &Verified<D>,
-        specs: &'a [BodySpec],
-        cut: Cut<D>,
-        keep: bool,
-        sliding: &[usize],
-    ) -> Result<Self> {
-        let mesh = &verified.mesh;
-        let parts = parts(scene, verified, specs)?;
-        let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-        for found in pairs::all(scene, mesh, cut, &parts, keep, sliding)? {
-            pairs.push(found.pair);
-            contacts.push(found.facts);
-            fine.extend(found.fine);
-        }
-        let mut bodies = Unassembled::all(parts, &pairs, mesh)?;
-        let fixed = mechanism::fix(&mut bodies, &pairs, mesh);
-        Ok(Self { bodies, pairs, contacts, fine, fixed })
-    }
-
-    /// Return the bodies that can move along their own contact surfaces.
-    fn sliding(&self) -> Vec<usize> {
-        (0..self.bodies.len()).filter(|&body| self.bodies[body].removed_modes.slides).collect()
-    }
 }
 
 /// Return the factory's plan of the solvers of all bodies.

@@ -5,7 +5,9 @@ use super::patterns::{FieldValues, earlier, find_group, not_on_body, of_body, po
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
-use crate::fem::{Facets, Frame, Levers, NodalBlock, NodalForces, Space, Subdivision, cross, place, surface};
+use crate::fem::{
+    Facets, Frame, Levers, NodalBlock, NodalForces, Space, Subdivision, cross, length, minus, place, surface,
+};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec};
@@ -300,7 +302,8 @@ fn plane<const D: usize>(space: &Space<D>, group: &Group, name: &str, place: &Pl
     let sum = normals.iter().fold([0.0; D], |sum: [f64; D], n| std::array::from_fn(|c| sum[c] + n[c]));
     let size = dot(&sum, &sum).sqrt();
     let mean = sum.map(|s| s / size);
-    let bent = |n: &[f64; D]| (0..D).map(|c| (n[c] - mean[c]).powi(2)).sum::<f64>().sqrt() > 1e-6;
+    let uncertain = facets.tilt(space, space.uncertainty).max(1e-6);
+    let bent = |n: &[f64; D]| length(minus(*n, mean)) > uncertain;
     if !size.is_normal() || normals.iter().any(bent) {
         return Err(Error::scene(place, format!("`{name}` is no plane, so it has no one normal to hold"))
             .help("give each plane a physical group and a support of its own, or hold components: x = 0"));

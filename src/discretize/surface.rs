@@ -29,7 +29,7 @@ pub struct ContactSurface {
 impl ContactSurface {
     /// Collect the facets of side a. Facets without a partner have no values.
     pub fn new<const D: usize>(a: &Side<D>, pair: &ContactPair) -> Self {
-        let of_node: HashMap<u32, usize> = pair.nodes.iter().enumerate().map(|(q, &node)| (node, q)).collect();
+        let point_of = pair.point_of(a.nodes.len());
         let order = a.facets.order;
         let places = element::nodes::<D>(order);
         let mut surface = Self {
@@ -49,22 +49,22 @@ impl ContactSurface {
         let mut number: HashMap<u32, u32> = HashMap::new();
         let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();
         for (facet, cover) in pair.cover.iter().enumerate() {
-            let nodes = a.facets.facet(facet);
+            let nodes = a.on_facet(facet);
             surface.cover.push(cover.share);
             surface.left.push(cover.left as u8 as f64);
             for (place, node) in places.iter().zip(nodes) {
                 let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
                 if at as usize == surface.points.len() {
-                    surface.points.push(a.space.in_scene(a.space.nodes[*node as usize]));
+                    surface.points.push(a.space.in_scene(a.space.nodes[a.nodes[*node as usize].node as usize]));
                     sums.push((0.0, BTreeMap::new()));
                 }
                 let Some(carriers) = cover.carriers else { continue };
                 let (facets, sum) = &mut sums[at as usize];
                 *facets += 1.0;
                 for (shape, of) in carriers.interpolation(order, place).iter().zip(nodes) {
-                    let source = of_node.get(of).filter(|_| *shape != 0.0);
-                    source.into_iter().for_each(|&q| *sum.entry(q).or_insert(0.0) += shape);
+                    let source = point_of[*of as usize].filter(|_| *shape != 0.0);
+                    source.into_iter().for_each(|q| *sum.entry(q).or_insert(0.0) += shape);
                 }
             }
         }
@@ -74,7 +74,7 @@ impl ContactSurface {
             .map(|(facets, sum)| sum.into_iter().map(|(q, share)| (q, share / facets)).collect())
             .collect();
         for (node, &at) in &number {
-            if let Some(&q) = of_node.get(node) {
+            if let Some(q) = point_of[*node as usize] {
                 surface.sources[at as usize] = vec![(q, 1.0)];
             }
         }

@@ -36,8 +36,6 @@ pub struct Unassembled<'a, const D: usize> {
     pub load: NodalForces<D>,
     /// Rigid motions that supports and springs leave at present.
     pub unconstrained: Unconstrained<D>,
-    /// Rigid motions that only the mesh resists.
-    pub removed_modes: RemovedModes,
     /// Displacements that the supports prescribe.
     pub supported: Supported<D>,
     /// Coupling of nodes by K, once it was requested.
@@ -68,17 +66,6 @@ pub struct Unconstrained<const D: usize> {
     pub unresisted: Vec<(String, DVector<f64>)>,
 }
 
-/// The rigid motions of a body that neither supports nor smooth surfaces resist, by name.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct RemovedModes {
-    /// Motions without work of the loads, which are fixed at one node each.
-    pub fixed: Vec<String>,
-    /// Motions on which loads work. Only the facets of the mesh resist them.
-    pub spinning: Vec<String>,
-    /// Whether some of these motions are along the body's own curved surface, so that normals of other bodies would resist them.
-    pub slides: bool,
-}
-
 /// The displacements that supports prescribe.
 #[derive(Clone, Default, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
@@ -100,8 +87,8 @@ pub struct OnDofs {
 
 /// A dof that can be fixed against a motion.
 pub struct FixableDof {
-    dof: usize,
-    /// Magnitude of the motion there.
+    pub dof: usize,
+    /// Displacement of the dof in the motion.
     pub size: f64,
 }
 
@@ -136,7 +123,6 @@ impl<'a, const D: usize> Unassembled<'a, D> {
             part,
             segments,
             unconstrained: Unconstrained::default(),
-            removed_modes: RemovedModes::default(),
             supported: Supported::default(),
             graph: OnceCell::new(),
             owner: 0,
@@ -206,14 +192,13 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
         let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.held.prescribed.contains_key(dof);
         let all = (0..self.part.space.dofs()).filter(is_free);
-        let sizes = all.map(|dof| FixableDof { dof, size: self.part.dof_of(motion, dof).abs() });
-        sizes.max_by(|a, b| a.size.total_cmp(&b.size)).filter(|found| found.size > 1e-3)
+        let sizes = all.map(|dof| FixableDof { dof, size: self.part.dof_of(motion, dof) });
+        sizes.max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())).filter(|found| found.size.abs() > 1e-3)
     }
 
-    /// Fix a dof.
+    /// Fix a dof. The motions of the body are not found anew.
     pub fn fix(&mut self, found: &FixableDof) {
         self.part.held.prescribed.insert(found.dof, 0.0);
-        self.find_motions();
     }
 
     /// Find the displacements that the supports prescribe.

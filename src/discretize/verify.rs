@@ -72,8 +72,9 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     mesh.sort_cells();
     // The radius of a body of revolution is measured from its axis.
     mesh.measure_nearby(std::array::from_fn(|c| c > 0 || scene.plane != Plane::Axisymmetric));
+    let solid = if scene.plane == Plane::Axisymmetric { mesh.close_axis() } else { None };
     patterns::split(scene, &mut mesh)?;
-    let notes = to_surfaces(scene, &mut mesh)?;
+    let notes = to_surfaces(scene, &mut mesh)?.into_iter().chain(solid).collect();
     let lying = patterns::lying(scene, &mesh)?;
     let bodies = patterns::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();

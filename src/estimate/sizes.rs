@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! limit    on curved boundaries a size is at most TURN times the radius of curvature
+//! join     surfaces have one size where they touch
 //! grade    sizes of nodes that an edge connects differ by at most GROWTH times its length
 //! cover    the boundary gets a layer of cells outside, as thick as facets may lie below a curved boundary
 //! ```
@@ -13,7 +14,7 @@ use super::Estimate;
 use crate::discretize::meshes::{BodyCells, Meshes};
 use crate::fem::{cross, length, minus, unit};
 use crate::linalg::dot;
-use crate::model::Model;
+use crate::model::{Layer, Model};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -50,7 +51,7 @@ pub struct Aim {
 /// Let p be the degree of the elements and D the dimension. With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2,
 /// and s^-D cells take its place. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the
 /// new mesh then has nearly the same error.
-pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim) -> Sizes {
+pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
     let bodies = model.bodies.len();
     let counts = counts(meshes, bodies);
@@ -86,12 +87,12 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, estimate: &Estimate, aim: Aim)
     }
     let level = low.exp();
     let size = |cell: usize, size: f64| size * ratio(level, all[cell]);
-    gather(meshes, &counts, size).within(most)
+    gather(meshes, &counts, &touching(meshes, model, layer), size).within(most)
 }
 
 /// Return sizes that are `factor` times those of the meshes.
 pub fn scaled(meshes: &dyn Meshes, bodies: usize, factor: f64) -> Sizes {
-    gather(meshes, &counts(meshes, bodies), |_, size| factor * size)
+    gather(meshes, &counts(meshes, bodies), &[], |_, size| factor * size)
 }
 
 /// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would have about
@@ -100,7 +101,7 @@ pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {
     let power = meshes.cells(0).stride as f64 - 1.0;
     let volume: f64 = (0..bodies).flat_map(|body| meshes.cells(body).sizes).map(|size| size.powf(power)).sum::<f64>();
     let least = (volume / cells as f64).powf(1.0 / power);
-    gather(meshes, &counts(meshes, bodies), |_, size| size.max(least))
+    gather(meshes, &counts(meshes, bodies), &[], |_, size| size.max(least))
 }
 
 /// Return the number of cells of each body.
@@ -108,14 +109,57 @@ fn counts(meshes: &dyn Meshes, bodies: usize) -> Vec<usize> {
     (0..bodies).map(|body| meshes.cells(body).sizes.len()).collect()
 }
 
+/// A point where two surfaces touch.
+struct Touching {
+    bodies: [usize; 2],
+    /// Vertices of the facet of each surface there, with the barycentric coordinates of the point.
+    vertices: [Vec<(u32, f64)>; 2],
+}
+
+/// Return the integration points of all pairs that are under pressure.
+fn touching(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<Touching> {
+    let mut all = Vec::new();
+    for (index, pair) in model.pairs.iter().enumerate() {
+        let (points, pressure) = (meshes.points(index), &layer.pressure[model.range(index)]);
+        for g in 0..points.each.len() {
+            if points.interpolation.row(g).any(|(q, _)| pressure[q] > 0.0) {
+                let vertices = [0, 1].map(|side| meshes.vertices(index, side, g));
+                all.push(Touching { bodies: pair.bodies, vertices });
+            }
+        }
+    }
+    all
+}
+
+/// Give surfaces the smaller of their two sizes where they touch.
+///
+/// A stiff body has hardly any error of its own. Its coarse facets would still make the gap of the surface, and the means over them, inexact
+/// for a soft partner.
+fn join(bodies: &[BodyCells], sizes: &mut [Vec<f64>], touching: &[Touching]) {
+    let size = |point: &Touching, side: usize| -> f64 {
+        point.vertices[side].iter().map(|&(node, l)| l * sizes[point.bodies[side]][node as usize]).sum()
+    };
+    let smaller: Vec<f64> = touching.iter().map(|point| size(point, 0).min(size(point, 1))).collect();
+    for (point, smaller) in touching.iter().zip(smaller) {
+        for (&body, vertices) in point.bodies.iter().zip(&point.vertices) {
+            let nodes = &bodies[body].nodes;
+            let at: [f64; 3] =
+                std::array::from_fn(|c| vertices.iter().map(|&(node, l)| l * nodes[node as usize][c]).sum());
+            for &(node, _) in vertices {
+                let most = smaller + GROWTH * length(minus(nodes[node as usize], at));
+                let size = &mut sizes[body][node as usize];
+                *size = size.min(most);
+            }
+        }
+    }
+}
+
 /// Return the field of the sizes that `wanted` returns for each cell. Its arguments are the index of the cell, counted over all
-/// bodies, and the present size of the cell.
-fn gather(meshes: &dyn Meshes, counts: &[usize], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
-    let mut field = Sizes { stride: 0, corners: Vec::new(), sizes: Vec::new(), cells: 0.0 };
-    let mut first = 0;
-    for (body, &count) in counts.iter().enumerate() {
-        let of_body = meshes.cells(body);
-        field.stride = of_body.stride;
+/// bodies, and the present size of the cell. Surfaces get one size at the points where they are `touching`.
+fn gather(meshes: &dyn Meshes, counts: &[usize], touching: &[Touching], wanted: impl Fn(usize, f64) -> f64) -> Sizes {
+    let bodies: Vec<BodyCells> = (0..counts.len()).map(|body| meshes.cells(body)).collect();
+    let (mut first, mut sizes) = (0, Vec::new());
+    for (of_body, &count) in bodies.iter().zip(counts) {
         // This is the geometric mean over the cells around each corner.
         let mut logs = vec![(0.0, 0.0); of_body.nodes.len()];
         for (index, corners) in of_body.corners.chunks_exact(of_body.stride).enumerate() {
@@ -125,17 +169,23 @@ fn gather(meshes: &dyn Meshes, counts: &[usize], wanted: impl Fn(usize, f64) -> 
                 *count += 1.0;
             }
         }
-        let mut sizes: Vec<f64> = logs.into_iter().map(|(sum, count): (f64, f64)| (sum / count).exp()).collect();
-        smooth(&of_body, &mut sizes);
+        let mut of_nodes: Vec<f64> = logs.into_iter().map(|(sum, count): (f64, f64)| (sum / count).exp()).collect();
+        smooth(of_body, &mut of_nodes);
+        sizes.push(of_nodes);
+        first += count;
+    }
+    join(&bodies, &mut sizes, touching);
+    let mut field = Sizes { stride: bodies[0].stride, corners: Vec::new(), sizes: Vec::new(), cells: 0.0 };
+    for (of_body, sizes) in bodies.iter().zip(&mut sizes) {
+        grade(of_body, sizes);
         for (corners, old) in of_body.corners.chunks_exact(of_body.stride).zip(&of_body.sizes) {
             let power = of_body.stride as f64 - 1.0;
             let share = |&node: &u32| (old / sizes[node as usize]).powf(power) / of_body.stride as f64;
             field.cells += corners.iter().map(share).sum::<f64>();
         }
-        let (corners, sizes) = simplices(&of_body, &sizes);
+        let (corners, sizes) = simplices(of_body, sizes);
         field.corners.extend(corners);
         field.sizes.extend(sizes);
-        first += count;
     }
     field
 }

@@ -86,6 +86,22 @@ impl Strained {
     }
 }
 
+/// Return the integral over some cells of the rotation vector (x, y, z) of the displacement `u`, one entry a dof. It is zero in a body of
+/// revolution, which does not turn.
+pub fn rotation<const D: usize>(space: &Space<D>, cells: impl Iterator<Item = usize>, u: &[f64]) -> [f64; 3] {
+    let centre = [1.0 / (D + 1) as f64; 4];
+    let mut sum = [0.0; 3];
+    for index in cells.filter(|_| !space.axisymmetric) {
+        let Some(point) = space.point(index, &space.cell_nodes(index), &centre[..=D], 1.0) else { continue };
+        let h = point.slope(u).h;
+        for (axis, sum) in sum.iter_mut().enumerate() {
+            let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+            *sum += if i < D && j < D { 0.5 * point.weight * (h[j][i] - h[i][j]) } else { 0.0 };
+        }
+    }
+    sum
+}
+
 /// Return the largest strain at the centres of some cells of a space for the displacement `u`, one entry a dof.
 ///
 /// At its centre a linear element has its mean strain. The value at a singular corner is therefore that of a cell and is not

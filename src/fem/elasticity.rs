@@ -103,6 +103,18 @@ impl Elasticity {
         }
     }
 
+    /// Return Young's modulus in a cell at a point, for an anisotropic material the mean of its moduli along x, y and z.
+    ///
+    /// # Errors
+    /// As [`Elasticity::at`].
+    pub fn young(&self, cell: usize, x: [f64; 3]) -> Result<f64, Flaw> {
+        let spec = &self.regions[self.region(cell)].spec;
+        match &spec.constants {
+            Constants::Isotropic { young, .. } => Ok(young.eval(x)),
+            _ => tensor(spec, x, self.plane).map(|tensor| tensor.young()),
+        }
+    }
+
     /// Return the moduli along x, y, z ([`Tensor::moduli`]) in a cell at a point.
     ///
     /// # Errors
@@ -332,6 +344,11 @@ impl Tensor {
         }
         let unit = |i: usize| if i < 3 { 1.0 } else { f64::sqrt(2.0) };
         Matrix6::from_fn(|i, j| unit(i) * unit(j) * self.0[i][j]).symmetric_eigenvalues().min()
+    }
+
+    /// Return the mean of Young's moduli along x, y and z.
+    fn young(&self) -> f64 {
+        self.matrix().try_inverse().map_or(f64::NAN, |s| (0..3).map(|i| 1.0 / s[(i, i)]).sum::<f64>() / 3.0)
     }
 
     /// Return the stiffness against uniaxial stress along x, y and z of a body that is constrained in one direction across it, as
@@ -638,6 +655,7 @@ mod tests {
         let strain = c.moduli(2, Plane::Strain);
         assert!((strain[0] * (1.0 / e1 - nu13 * nu13 * e3 / e1 / e1) - 1.0).abs() < 1e-12);
         assert!((strain[1] * (1.0 / e2 - nu23 * nu23 * e3 / e2 / e2) - 1.0).abs() < 1e-12);
+        assert!((c.young() / ((e1 + e2 + e3) / 3.0) - 1.0).abs() < 1e-12);
         let stress = c.moduli(2, Plane::Stress);
         assert!((stress[0] / e1 - 1.0).abs() < 1e-12 && (stress[1] / e2 - 1.0).abs() < 1e-12 && stress[2] == 0.0);
     }

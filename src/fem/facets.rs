@@ -1,7 +1,7 @@
 //! Boundary facets of a body: their search in its cells, their orientation and their normals.
 
 use super::space::Space;
-use super::{cross, element, minus, pad, unit};
+use super::{cross, element, length, minus, pad, unit};
 use crate::linalg::dot;
 use crate::mesh::Group;
 use crate::problem::order::Order;
@@ -49,6 +49,19 @@ impl<const D: usize> Space<D> {
         self.facets_of(found.into_iter().flatten())
     }
 
+    /// Return the cell that each of these facets of the boundary bounds.
+    pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
+        let mut on_facets = vec![false; self.nodes.len()];
+        facets.nodes.iter().for_each(|&node| on_facets[node as usize] = true);
+        let mut cells: HashMap<[u32; D], usize> = HashMap::new();
+        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
+            if cell[..=D].iter().filter(|&&node| on_facets[node as usize]).count() >= D {
+                cells.extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), index)));
+            }
+        }
+        (0..facets.count()).map(|i| cells[&key(facets.facet(i))]).collect()
+    }
+
     /// Return all facets that bound one cell only, oriented outwards.
     pub fn boundary(&self) -> Facets<D> {
         self.facets_of(self.lone_facets())
@@ -56,16 +69,35 @@ impl<const D: usize> Space<D> {
 
     /// Return the same facets, each as its cell and the local vertex opposite to it.
     pub fn lone_facets(&self) -> impl Iterator<Item = (usize, usize)> + use<D> {
+        let faces = self.faces();
+        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
+        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
+        places.sort_unstable();
+        places.into_iter().map(Self::place)
+    }
+
+    /// Return the facets between two cells, each as both cells and the local vertices opposite to it.
+    pub fn inner_facets(&self) -> impl Iterator<Item = [(usize, usize); 2]> + use<D> {
+        let faces = self.faces();
+        let inner = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 2);
+        let places: Vec<[u32; 2]> = inner.map(|group| [group[0].1, group[1].1]).collect();
+        places.into_iter().map(|places| places.map(Self::place))
+    }
+
+    /// Return the faces of all cells, sorted by their nodes, each with its number: that of its cell and of the opposite vertex in one.
+    fn faces(&self) -> Vec<([u32; D], u32)> {
         let mut faces: Vec<([u32; D], u32)> = Vec::with_capacity(self.cell_count() * (D + 1));
         for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
             faces
                 .extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), (index * (D + 1) + opposite) as u32)));
         }
         faces.sort_unstable();
-        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
-        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
-        places.sort_unstable();
-        places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1)))
+        faces
+    }
+
+    /// Return the cell of a face and the opposite vertex from the number of the face.
+    fn place(number: u32) -> (usize, usize) {
+        (number as usize / (D + 1), number as usize % (D + 1))
     }
 
     /// Return the facets that are given as a cell and the local vertex opposite to the facet, oriented out of the cell.
@@ -143,6 +175,21 @@ impl<const D: usize> Facets<D> {
             (0..D).map(move |at| unit(area_vector(self.order, &x, &element::place(D, at)[..D])))
         };
         (0..self.count()).flat_map(normals).collect()
+    }
+
+    /// Return the largest angle by which errors of coordinates turn the normal of a facet: those of two nodes, along and against
+    /// the normal, over the least height of the facet. At a corner of a quadratic facet, the weights of the nodes in a tangent are
+    /// 3, 4 and 1 instead of 1 and 1.
+    pub fn tilt(&self, space: &Space<D>, error: f64) -> f64 {
+        let height = |i: usize| {
+            let x = &self.coordinates(i, space)[..D];
+            let edges = (0..D).map(|k| length(minus(x[k], x[(k + 1) % D])));
+            let longest = edges.fold(0.0, f64::max);
+            if D == 2 { longest } else { 2.0 * length(area_vector(Order::P1, x, &[1.0 / D as f64; D])) / longest }
+        };
+        let least = (0..self.count()).map(height).fold(f64::INFINITY, f64::min);
+        let weights = if self.order == Order::P1 { 2.0 } else { 8.0 };
+        weights * (D as f64).sqrt() * error / least
     }
 
     /// Return the facets for which `keep` holds, in their order.

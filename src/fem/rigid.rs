@@ -1,8 +1,9 @@
 //! Rigid motions of a body, and those that its supports leave unconstrained.
 
 use super::assemble::NodalBlock;
+use super::length;
 use crate::exchange::Plain;
-use crate::linalg::{Blocks, PART, TOLERANCE, Total, around, bounds, dot, pad};
+use crate::linalg::{Blocks, TOLERANCE, Total, around, bounds, dot, pad};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain")]
 pub struct RigidMotion<const D: usize> {
-    /// Name such as "translation along y", "rotation", or a combination of them.
+    /// Name such as "translation along y" or "rotation".
     pub name: String,
     centre: [f64; D],
     /// Largest distance along an axis from the centre, by which rotations are divided.
@@ -24,10 +25,36 @@ const PLANES: [(usize, usize, &str); 3] =
     [(1, 2, "rotation about x"), (2, 0, "rotation about y"), (0, 1, "rotation about z")];
 
 impl<const D: usize> RigidMotion<D> {
-    /// Return whether the motion has a rotation, up to rounding.
-    pub fn turns(&self) -> bool {
-        let largest = |weights: &[f64]| weights.iter().fold(0.0, |largest: f64, weight| largest.max(weight.abs()));
-        largest(&self.weights[3..]) > PART * largest(&self.weights)
+    /// Return the motion in words, up to a thousandth of it: a translation along a direction, or a rotation. A rotation with a
+    /// translation is one about another axis.
+    pub fn in_words(&self) -> String {
+        let (kind, v) = self.kind();
+        let largest = v.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or_default();
+        let parts = v.map(|part| (part * largest.signum() / length(v) * 1e3).round() / 1e3 + 0.0);
+        let axis = (0..3).find(|&c| parts[c] == 1.0).map(|c| ["x", "y", "z"][c].to_owned());
+        let direction = axis.unwrap_or_else(|| {
+            let parts: Vec<String> = parts[..D].iter().map(ToString::to_string).collect();
+            format!("({})", parts.join(","))
+        });
+        if D == 2 && kind == TURN { "rotation".to_owned() } else { format!("{kind} {direction}") }
+    }
+
+    /// Return what of a support would hold the motion.
+    pub fn support(&self) -> &'static str {
+        let (kind, v) = self.kind();
+        let most = (0..3).max_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs())).unwrap_or(0);
+        if kind == TURN { "beside the axis of the rotation" } else { ["with x = 0", "with y = 0", "with z = 0"][most] }
+    }
+
+    /// Return whether the motion is a translation or a rotation, with the vector of either.
+    fn kind(&self) -> (&'static str, [f64; 3]) {
+        let [along, about] = [0, 3].map(|first| std::array::from_fn(|c| self.weights[first + c]));
+        if length(about) > SMALL * length(along) { (TURN, about) } else { ("translation along", along) }
+    }
+
+    /// Return the largest weight.
+    fn largest(&self) -> f64 {
+        self.weights.iter().fold(f64::MIN_POSITIVE, |largest, weight| largest.max(weight.abs()))
     }
 
     /// Return the displacement at a point.
@@ -44,6 +71,56 @@ impl<const D: usize> RigidMotion<D> {
     pub fn nodal(&self, points: impl Iterator<Item = [f64; D]>) -> Vec<f64> {
         points.flat_map(|x| self.at(&x)).collect()
     }
+}
+
+/// The first words on a rotation.
+const TURN: &str = "rotation about";
+
+/// Share of a motion below which a part of it is not mentioned.
+const SMALL: f64 = 1e-3;
+
+/// Return other combinations of motions about the same centre, and of the vectors that go with them, in which translations are apart
+/// from rotations, and both are along axes where these are among them. Translations come first.
+pub fn apart<const D: usize>(span: Vec<(RigidMotion<D>, DVector<f64>)>) -> Vec<(RigidMotion<D>, DVector<f64>)> {
+    let mut span = span;
+    let mut done = 0;
+    for k in [3, 4, 5, 0, 1, 2] {
+        let size = |row: &(RigidMotion<D>, DVector<f64>)| row.0.weights[k].abs() / row.0.largest();
+        let pivot = (done..span.len()).max_by(|&i, &j| size(&span[i]).total_cmp(&size(&span[j])));
+        let Some(pivot) = pivot.filter(|&i| size(&span[i]) > SMALL) else { continue };
+        span.swap(done, pivot);
+        let (mut motion, vector) = span[done].clone();
+        let scale = motion.weights[k].recip();
+        motion.weights = motion.weights.map(|weight| scale * weight);
+        span[done] = (motion.clone(), scale * vector);
+        for row in (0..span.len()).filter(|&row| row != done) {
+            let amount = span[row].0.weights[k];
+            let change = amount * &span[done].1;
+            span[row].1 -= change;
+            span[row].0.weights.iter_mut().zip(motion.weights).for_each(|(own, weight)| *own -= amount * weight);
+        }
+        done += 1;
+    }
+    span.sort_by_key(|(motion, _)| motion.kind().0 == TURN);
+    span
+}
+
+/// Return motions in one phrase: `translation along x and y and rotation about z`.
+pub fn listed(names: &[&str]) -> String {
+    let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
+    for name in names {
+        let (kind, direction) = name.rsplit_once(' ').unwrap_or((name, ""));
+        match kinds.last_mut() {
+            Some((last, directions)) if *last == kind && !direction.is_empty() => directions.push(direction),
+            _ => kinds.push((kind, vec![direction])),
+        }
+    }
+    let phrase = |(kind, mut directions): (&str, Vec<&str>)| {
+        let last = directions.pop().unwrap_or_default();
+        let all = if directions.is_empty() { last.to_owned() } else { format!("{} and {last}", directions.join(", ")) };
+        format!("{kind} {all}").trim_end().to_owned()
+    };
+    kinds.into_iter().map(phrase).collect::<Vec<_>>().join(" and ")
 }
 
 /// The rigid motions of a free body at its dofs.
@@ -127,15 +204,12 @@ pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64
     sum(motions, &(weights / weights.amax()))
 }
 
-/// Return the weighted sum of motions about the same centre, named after the parts whose weights are not small.
+/// Return the weighted sum of motions about the same centre.
 pub fn sum<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
-    let largest = weights.amax();
-    let matters = |(_, weight): &(&RigidMotion<D>, &f64)| weight.abs() > PART * largest;
-    let name = motions.iter().zip(weights).filter(matters).map(|(motion, _)| motion.name.as_str());
-    let name = crate::error::joined(name);
     let sum = |k: usize| motions.iter().zip(weights).map(|(motion, weight)| weight * motion.weights[k]).sum();
     let (centre, size) = motions.first().map_or(([0.0; D], 1.0), |motion| (motion.centre, motion.size));
-    RigidMotion { name, centre, size, weights: std::array::from_fn(sum) }
+    let sum = RigidMotion { name: String::new(), centre, size, weights: std::array::from_fn(sum) };
+    RigidMotion { name: sum.in_words(), ..sum }
 }
 
 /// The number, the sum and the box of a set of points, on which the rigid motions of the points depend.

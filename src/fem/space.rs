@@ -10,9 +10,6 @@ use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::collections::HashSet;
 
-/// Share of the largest radius up to which a node lies on the axis of a body of revolution.
-const ON_AXIS: f64 = 1e-10;
-
 /// The nodes and cells of one body. Nodes are numbered in order of first appearance in the cells, so that neighbours in the mesh
 /// file stay neighbours in memory.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -24,6 +21,8 @@ pub struct Space<const D: usize> {
     pub nodes: Vec<[f64; D]>,
     /// The point of the scene from which coordinates are measured; see [`Mesh::datum`].
     pub datum: [f64; D],
+    /// See [`Mesh::uncertainty`].
+    pub uncertainty: f64,
     /// Nodes per cell.
     pub stride: usize,
     /// Nodes of the cells, `stride` per cell, numbered within the body in the local order of [`element`].
@@ -47,6 +46,7 @@ impl<const D: usize> Space<D> {
             order,
             nodes: Vec::new(),
             datum: mesh.datum,
+            uncertainty: mesh.uncertainty,
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
@@ -95,10 +95,8 @@ impl<const D: usize> Space<D> {
         }
     }
 
-    /// Turn the space into the meridian of a body of revolution. A radius that is rounding of the largest one becomes zero.
+    /// Turn the space into the meridian of a body of revolution.
     pub fn revolved(mut self) -> Self {
-        let largest = self.nodes.iter().fold(0.0, |max: f64, x| max.max(x[0].abs()));
-        self.nodes.iter_mut().filter(|x| x[0].abs() <= ON_AXIS * largest).for_each(|x| x[0] = 0.0);
         self.axisymmetric = true;
         self
     }

@@ -275,13 +275,8 @@ impl Factor {
         &self.left_out
     }
 
-    /// Return a basis of the kernel: entries (unknown, value) of each vector, the largest value one. The basis is reduced: each vector is zero at all
-    /// unknowns left out but its own. So pure motions are found as such.
-    pub fn kernel_entries(&self) -> &[Vec<(usize, f64)>] {
-        &self.kernel
-    }
-
-    /// Return the same basis as full vectors.
+    /// Return a basis of the kernel, with the largest entry one. The basis is reduced: each vector is zero at all unknowns left out but its own. So
+    /// pure motions are found as such.
     pub fn kernel(&self) -> Vec<DVector<f64>> {
         let whole = |entries: &Vec<(usize, f64)>| {
             let mut vector = DVector::zeros(self.count);
@@ -320,6 +315,11 @@ impl Blocks {
     /// Factor the matrix and find its kernel: see [`Factor`].
     pub fn factor(&self) -> Factor {
         Factor::new(self, unit_diagonal(self), TOLERANCE)
+    }
+
+    /// Return a basis of the combinations e of all unknowns with e'Ae <= `tolerance * e'e`, reduced as that of a [`Factor`].
+    pub fn kernel(&self, tolerance: f64) -> Vec<DVector<f64>> {
+        Factor::new(self, vec![1.0; self.unknowns()], tolerance).kernel()
     }
 
     /// Return a basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`. `full` is the entry of a motion that is fully
@@ -630,7 +630,7 @@ mod tests {
         // slides along its plane but for a rounding error; and that much is held in earnest
         spring(&mut matrix, 1.0, &[(6, vec![1.0, 1e-16])]);
         let factor = check(&matrix, 2 + 3 + 1 + 1, 1e-12);
-        let pure = factor.kernel_entries().iter().map(Vec::len).collect::<Vec<_>>();
+        let pure = factor.kernel.iter().map(Vec::len).collect::<Vec<_>>();
         assert_eq!(pure.iter().filter(|count| **count == 1).count(), 4, "{pure:?}");
         assert_eq!(pure.iter().filter(|count| **count == 2).count(), 3, "{pure:?}");
         spring(&mut matrix, 1.0, &[(6, vec![0.0, 1e-12])]);

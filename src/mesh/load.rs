@@ -70,6 +70,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
             Ok(Loaded::new(mesh, MeshOrigin::File, PathBuf::new(), String::new()))
         }
     }?;
+    loaded.mesh.find_uncertainty();
     loaded.mesh.straighten();
     Ok(loaded)
 }

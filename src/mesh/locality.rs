@@ -114,22 +114,15 @@ mod tests {
         let cell = |i: usize| {
             [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|x| [x[0] + i as f64, x[1], x[2]])
         };
-        let mut mesh = Mesh {
-            path: "line.msh".into(),
-            points: at.iter().flat_map(|&i| cell(i)).collect(),
-            datum: [0.0; 3],
-            order: Order::P1,
-            groups: vec![Group {
-                name: "body".into(),
-                dimension: 3,
-                stride: 4,
-                connectivity: (0..16).collect(),
-                tags: vec![7, 8, 9, 10],
-            }]
-            .into(),
-            split: 0,
-            straightened: 0,
+        let group = Group {
+            name: "body".into(),
+            dimension: 3,
+            stride: 4,
+            connectivity: (0..16).collect(),
+            tags: vec![7, 8, 9, 10],
         };
+        let points = at.iter().flat_map(|&i| cell(i)).collect();
+        let mut mesh = Mesh::new("line.msh".into(), points, Order::P1, vec![group].into());
         mesh.sort_cells();
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();
         assert_eq!(first, [0.0, 1.0, 2.0, 3.0]);

@@ -5,10 +5,12 @@
 //! Gmsh and cached, too. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
 
 mod abaqus;
+mod axis;
 mod cache;
 mod check;
 mod cursor;
 pub mod datum;
+mod digits;
 mod elements;
 mod foreign;
 mod frame;
@@ -64,6 +66,8 @@ pub struct Mesh<const D: usize> {
     /// The point of the scene from which coordinates are measured. It is the origin of the scene unless the mesh is far from it
     /// ([`Mesh::measure_nearby`]).
     pub datum: [f64; D],
+    /// Uncertainty of the coordinates beyond the rounding of doubles ([`digits`]).
+    pub uncertainty: f64,
     /// Order of all elements; points have none.
     pub order: Order,
     /// Named groups, in the order of the file.
@@ -77,7 +81,7 @@ pub struct Mesh<const D: usize> {
 impl<const D: usize> Mesh<D> {
     /// Return the mesh of these points and groups of simplices of one order, measured from the origin of the scene.
     pub fn new(path: PathBuf, points: Vec<[f64; D]>, order: Order, groups: Groups) -> Self {
-        Self { path, points, datum: [0.0; D], order, groups, split: 0, straightened: 0 }
+        Self { path, points, datum: [0.0; D], uncertainty: 0.0, order, groups, split: 0, straightened: 0 }
     }
 
     /// Return the group with this name, of any dimension.
@@ -102,6 +106,11 @@ impl<const D: usize> Mesh<D> {
         for x in &mut self.points {
             (0..D).for_each(|c| x[c] -= self.datum[c]);
         }
+    }
+
+    /// Find the uncertainty of the coordinates, which must be those of the file.
+    fn find_uncertainty(&mut self) {
+        self.uncertainty = digits::uncertainty(&self.points);
     }
 
     /// Drop the numbers of the elements in the file, which only messages of the checks need.

@@ -156,5 +156,5 @@ fn finish<const D: usize>(
     };
     let point = |x: [f64; 3]| std::array::from_fn(|k| x[k]);
     let points = groups::renumber(&mut groups).into_iter().map(|old| point(nodes.points[old as usize])).collect();
-    Ok(Mesh { path: path.to_owned(), points, datum: [0.0; D], order, groups: groups.into(), split, straightened: 0 })
+    Ok(Mesh { split, ..Mesh::new(path.to_owned(), points, order, groups.into()) })
 }

@@ -47,15 +47,19 @@ pub struct Motion {
     pub work: f64,
 }
 
-/// A motion of several bodies together that changes no gap and that nothing constrains.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// A motion of one body or of several bodies together that neither supports nor springs nor contact resist.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Mechanism {
     /// The bodies that it moves.
     pub bodies: Vec<usize>,
-    /// Its name.
+    /// Its name, or those of all such motions of these bodies.
     pub motion: String,
-    /// Work of the loads on it, as a share of the work that forces of their sizes could do.
+    /// Work of the loads on it, as a share of the work that forces of their sizes could do; zero if the run goes on.
     pub work: f64,
+    /// The part of a support that would hold the motion, if loads work on it.
+    pub support: String,
+    /// The work of the loads, as such a share, that was taken from them, if it is more than the digits of the mesh allow for.
+    pub balanced: f64,
     /// The body that was fixed at one node to remove the motion; `None` if loads do work on it, or if there is no suitable node outside the contact.
     pub fixed: Option<usize>,
 }

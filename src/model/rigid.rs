@@ -93,11 +93,6 @@ impl<'a> Motions<'a> {
         self.first[body]..self.first[body + 1]
     }
 
-    /// Return the body of a motion.
-    pub fn body_of(&self, motion: usize) -> usize {
-        self.first.partition_point(|&first| first <= motion) - 1
-    }
-
     /// Return a zero matrix with a row and column of blocks for each body.
     pub fn blocks(&self) -> Blocks {
         Blocks::new(&self.first.windows(2).map(|ends| ends[1] - ends[0]).collect::<Vec<usize>>())

@@ -83,6 +83,17 @@ pub struct AutoContact {
     pub contact: ContactSpec,
 }
 
+/// Which of two surfaces carries the contact points of their pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Carrier {
+    /// Number of the table of the contact in the scene.
+    pub table: usize,
+    /// Indices of the two bodies, in the order of the scene.
+    pub bodies: [usize; 2],
+    /// Whether it is the surface of the second body.
+    pub is_second: bool,
+}
+
 words! {
     /// What to do about surfaces that overlap before loading.
     pub enum Overlap "overlap" {

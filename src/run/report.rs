@@ -38,6 +38,13 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);
+    let digits = report.error_bound.or(report.error_estimate).unwrap_or(f64::INFINITY);
+    let fixed = discrete.mechanisms.iter().filter_map(|mechanism| mechanism.fixed);
+    let reactions = discrete.bodies.iter().zip(&balances).enumerate();
+    let reactions = reactions.filter(|(body, _)| fixed.clone().any(|of| of == *body));
+    report
+        .warnings
+        .extend(reactions.filter_map(|(_, (info, balance))| warnings::of_fixed(&info.name, balance, digits)));
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     if let Some(message) = lost_digits(done) {
         add_lost_digits(&mut report, message, &outcome.status);

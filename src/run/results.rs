@@ -57,6 +57,8 @@ struct Extremes {
     /// Bounding box of the points: least and largest coordinates.
     extent: [[f64; 3]; 2],
     strain: Strained,
+    /// Integral of the rotation vector over the part.
+    rotation: [f64; 3],
     /// Norms of the error and of the known displacements: L2, H1 seminorm, energy.
     norms: Option<[[f64; 3]; 2]>,
 }
@@ -71,6 +73,7 @@ impl Extremes {
             displacement: 0.0,
             extent: bounds([]),
             strain: Strained::NONE,
+            rotation: [0.0; 3],
             norms: None,
         };
         let Ok(recovered) = recovered else { return Self { von_mises: f64::NAN, ..extremes } };
@@ -86,6 +89,7 @@ impl Extremes {
         extremes.displacement = field.displacement.iter().map(|&u| length(u)).fold(0.0, f64::max);
         extremes.extent = bounds(field.points.iter().copied());
         extremes.strain = info.post().strain(&recovered.bent);
+        extremes.rotation = info.post().rotation(&recovered.state);
         extremes.norms = info.post().errors(&recovered.state);
         extremes
     }
@@ -100,9 +104,10 @@ impl Extremes {
         let displacement = self.displacement.max(other.displacement);
         let extent = around(self.extent, other.extent);
         let strain = self.strain.with(other.strain);
+        let rotation = [0, 1, 2].map(|c| self.rotation[c] + other.rotation[c]);
         // total_cmp orders NaN above all numbers, so that it survives
         let larger = if other.von_mises.total_cmp(&self.von_mises).is_gt() { other } else { self };
-        Self { principal: [low.min(least), high.max(largest)], displacement, extent, strain, norms, ..larger }
+        Self { principal: [low.min(least), high.max(largest)], displacement, extent, strain, rotation, norms, ..larger }
     }
 
     /// Write the extremes to the report of their body.
@@ -125,6 +130,10 @@ impl Extremes {
     }
 }
 
+/// Angle of the mean rotation of a body up to which displacements are small. A turn by it moves points across by a thousandth of their
+/// distance, and the normal of a surface by itself.
+const TURNED: f64 = 0.05;
+
 /// Displacements up to this fraction of the size of a body are small. A rotation by this angle changes lengths along and across by
 /// half a per cent.
 const SMALL: f64 = 0.1;
@@ -132,12 +141,16 @@ const SMALL: f64 = 0.1;
 /// Write largest stresses, displacements and errors of all bodies to their reports, null where there are none. Return warnings of
 /// displacements and strains that are too large for the theory. Collective.
 pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) -> Vec<String> {
-    let (mut moved, mut strained) = (Vec::new(), Vec::new());
+    let (mut moved, mut turned, mut strained) = (Vec::new(), Vec::new(), Vec::new());
     for (report, extremes) in reports.iter_mut().zip(gather(discrete, recovered)) {
         let Some(extremes) = extremes.filter(|extremes| extremes.von_mises.is_finite()) else { continue };
         extremes.fill(report);
         if extremes.is_moved_far() {
             moved.push(report.name.clone());
+        }
+        let angle = length(extremes.rotation) / extremes.strain.measure[1];
+        if angle > TURNED {
+            turned.push(format!("`{}` by {angle:.2}", report.name));
         }
         if extremes.strain.most > displacement::SMALL {
             strained.push(strain_in_words(&report.name, &extremes.strain));
@@ -150,6 +163,13 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
             few(moved).join(", ")
         )
     });
+    let turned = (!turned.is_empty()).then(|| {
+        format!(
+            "bodies turn by more than {TURNED} rad: {}. The theory is that of small turns: forces and pressures may be right, and \
+             displacements are not; hold them by a support or a weak spring",
+            few(turned).join(", ")
+        )
+    });
     let strained = (!strained.is_empty()).then(|| {
         format!(
             "strains of more than {} per cent: {}. Linear elasticity is the theory of small ones: look at the moduli, the loads and the units",
@@ -157,7 +177,7 @@ pub fn fill(discrete: &Discrete, recovered: &All, reports: &mut [BodyReport]) ->
             few(strained).join("; ")
         )
     });
-    moved.into_iter().chain(strained).collect()
+    moved.into_iter().chain(turned).chain(strained).collect()
 }
 
 /// Return the extremes of each body over all ranks, where a rank has any. Collective.

@@ -67,7 +67,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             format!("the iterates repeat every {period} iterations (seen in iteration {k}): try {other}")
         }
         Status::Underconstrained(Moved { body, name: motion }) => format!(
-            "body `{}`: nothing holds its {motion} in iteration {k}: neither a support nor the Robin zone; add a support, \
+            "body `{}`: neither a support nor a spring nor a closed contact holds its {motion} in iteration {k}: add a support, \
              or a start that closes the contact (method.start), or try {other}",
             name(body)
         ),
@@ -106,12 +106,13 @@ fn not_finite(body: &str, k: usize, other: &str) -> String {
     format!("body `{body}`: a number is not finite in iteration {k}: try a smaller start (method.start) or {other}")
 }
 
-/// Return the message on bodies whose common motion no gap resists, and on which loads work.
-fn unbalanced_mechanism(Mechanism { bodies, motion, work, .. }: &Mechanism, model: &Model) -> String {
+/// Return the message on a motion that nothing resists, and on which loads work.
+fn unbalanced_mechanism(Mechanism { bodies, motion, work, support, .. }: &Mechanism, model: &Model) -> String {
+    let names = in_words(bodies.iter().map(|body| &model.bodies[*body].name));
+    let (who, whose) = if bodies.len() == 1 { ("body", "its") } else { ("bodies", "them together in their") };
     format!(
-        "bodies {}: nothing holds them together in their {motion}, which changes no gap, and loads work on it ({} of what \
-         forces of their sizes could): add a support, or balance the loads",
-        in_words(bodies.iter().map(|body| &model.bodies[*body].name)),
+        "{who} {names}: neither a support nor a spring nor contact holds {whose} {motion}, and loads work on it ({} of what \
+         forces of their sizes could): add a support {support}, or balance the loads",
         sci(*work, 1)
     )
 }

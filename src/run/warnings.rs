@@ -6,12 +6,13 @@ use super::results::{coupling, peak};
 use super::stages::{Built, Done};
 use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, Left, LostPieces, UncoveredPoint};
-use crate::discretize::{Balanced, ContactInfo, Discrete, point};
+use crate::discretize::{ContactInfo, Discrete, point};
 use crate::error::few;
 use crate::estimate::{Cause, Estimate};
 use crate::linalg::diagonal;
 use crate::model::Mechanism;
-use crate::output::sci;
+use crate::output::report::readable;
+use crate::output::{BalanceReport, sci};
 use crate::petsc::{Schur, Session, has_metis};
 use crate::problem::LayerSpec;
 use std::collections::BTreeMap;
@@ -51,42 +52,10 @@ pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> V
             session.size()
         ));
     }
-    for body in discrete.bodies.iter().filter(|body| !body.removed_modes.fixed.is_empty()) {
-        let motions = body.removed_modes.fixed.join("; ");
-        warnings.push(format!(
-            "body {}: nothing holds its {motions}, and no load works on it: it is fixed at one node",
-            body.name
-        ));
-    }
-    for body in discrete.bodies.iter().filter(|body| !body.removed_modes.spinning.is_empty()) {
-        let motions = body.removed_modes.spinning.join("; ");
-        warnings.push(format!(
-            "body {}: only the facets of the mesh resist its {motions}, and loads work on it: its displacements mean nothing; hold it, or load it through its centre",
-            body.name
-        ));
-    }
-    warnings.extend(discrete.balanced.iter().map(|balanced| balanced_in_words(discrete, balanced)));
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(discrete.model.pairs.iter().filter_map(|pair| resisted_by_normals(discrete, pair)));
     warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.contacts));
     warnings
-}
-
-/// Return the warning of a pair whose second body can move along its own surface, while the normals are those of the first one, which resist that.
-fn resisted_by_normals(discrete: &Discrete, pair: &ContactPair) -> Option<String> {
-    let [a, b] = pair.bodies.map(|body| &discrete.bodies[body]);
-    let way = if a.removed_modes.slides {
-        "hold the motion by a support or a weak spring"
-    } else {
-        "make the facets there as fine as those of the other body, or take order = 2"
-    };
-    b.removed_modes.slides.then(|| {
-        format!(
-            "body {}: it can turn or slide along its surface, and the normals of `{}` resist that: pressures depend on the node at which it is fixed; {way}",
-            b.name, pair.surfaces[0]
-        )
-    })
 }
 
 /// Return the warning of elements that were split, if any.
@@ -101,28 +70,46 @@ pub fn made_straight(cells: usize) -> Option<String> {
     (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
 }
 
-/// Return the warning of loads that were balanced.
-fn balanced_in_words(discrete: &Discrete, Balanced { bodies, motion, share }: &Balanced) -> String {
-    let names = in_words(bodies.iter().map(|&body| &discrete.bodies[body].name));
-    format!(
-        "{} {names}: nothing holds {} in {motion}, and loads lack balance there by {} of what forces of their sizes could do: no more than facets \
-         and quadrature may miss of them, so that the loads were changed by that share to balance",
-        if bodies.len() == 1 { "body" } else { "bodies" },
-        if bodies.len() == 1 { "it" } else { "them" },
-        sci(*share, 1)
-    )
+/// Return the warning of motions that nothing resists.
+fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
+    let Mechanism { bodies, motion, work, balanced, fixed, .. } = mechanism;
+    let name = |body: usize| &discrete.bodies[body].name;
+    let (who, together) = match bodies[..] {
+        [body] => (format!("body {}", name(body)), "its"),
+        _ => (format!("bodies {}", in_words(bodies.iter().map(|&body| name(body)))), "them together in their"),
+    };
+    let loads = match *work {
+        0.0 if *balanced > 0.0 => format!(
+            "the loads lack balance there by {} of what forces of their sizes could do: they were changed by that share to balance",
+            sci(*balanced, 1)
+        ),
+        0.0 => "no load works on it".to_owned(),
+        _ => "loads work on it".to_owned(),
+    };
+    let end = match fixed {
+        Some(_) if bodies.len() == 1 => "it is fixed at one node".to_owned(),
+        Some(body) => format!("they are fixed at nodes of `{}`", name(*body)),
+        None if *work == 0.0 => "displacements are free up to it".to_owned(),
+        None => "there is no solution".to_owned(),
+    };
+    format!("{who}: nothing holds {together} {motion}, and {loads}: {end}")
 }
 
-/// Return the warning of a free motion of several bodies.
-fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
-    let name = |&body: &usize| &discrete.bodies[body].name;
-    let bodies = in_words(mechanism.bodies.iter().map(name));
-    let end = match mechanism.fixed.as_ref().map(name) {
-        Some(body) => format!("and no load works on it: they are fixed at nodes of `{body}`"),
-        None if mechanism.work == 0.0 => "and no load works on it: displacements are free up to it".to_owned(),
-        None => "and loads work on it: there is no solution".to_owned(),
-    };
-    format!("bodies {bodies}: nothing holds them together in their {}, {end}", mechanism.motion)
+/// Relative error of forces that no run promises to undercut.
+const DIGITS: f64 = 1e-8;
+
+/// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error of the result.
+pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<String> {
+    let others = balance.supports.iter().chain(&balance.springs).chain(&balance.rigid);
+    let all = [&balance.loads, &balance.contacts].into_iter().chain(others);
+    let [x, y, z] = [0, 1, 2].map(|c| readable(-all.clone().map(|part| part.force[c]).sum::<f64>(), 6));
+    (balance.force_imbalance > error.max(DIGITS)).then(|| {
+        format!(
+            "body {name}: the nodes at which it is fixed carry a force of ({x}, {y}, {z}), {} of all forces on it: a support or a weak spring \
+             should carry it",
+            sci(balance.force_imbalance, 1)
+        )
+    })
 }
 
 /// Least change of the pressures with the side of the normals that is worth a warning: one per cent.
@@ -148,9 +135,7 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
             warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
         }
         let change = estimate.sides[i];
-        // a body that moves along its own surface stands at any place of this motion, which the normals of the other body would resist
-        let is_free = discrete.bodies[pair.bodies[0]].removed_modes.slides;
-        if !is_free && change > estimate.pressure[i].max(ONE_SIDED) {
+        if change > estimate.pressure[i].max(ONE_SIDED) {
             warnings.push(format!(
                 "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
                  than by their estimated error: the surfaces slide or tilt too far for small displacements",

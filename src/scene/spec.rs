@@ -6,6 +6,7 @@ use crate::ddm::gamma::{GammaRule, OwnRules};
 use crate::error::{Located, Place, Result};
 use crate::file::digest;
 use crate::output::fields::Encoding;
+use crate::problem::contact::Carrier;
 use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, remove, table, word, words};
 use serde_json::{Value as Json, json};
@@ -61,6 +62,8 @@ keys! {
             pub contacts: Vec<ContactSpec> = Vec::new(),
             /// Rules that find pairs on the mesh, in the order of the file.
             pub auto: Vec<AutoContact> = Vec::new(),
+            /// The surfaces that carry contact points on an earlier mesh of the scene, and on this one, too.
+            pub carriers: Vec<Carrier> = Vec::new(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Runs the program as a user does, in a folder of its own, and reads what it wrote; or solves a scene by the library ([`here`]).
 
 pub mod alone;
+pub mod blocks;
 pub mod here;
 pub mod series;
 pub mod shapes;

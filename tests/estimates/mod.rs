@@ -1,6 +1,7 @@
 //! Estimated errors and bounds against true errors.
 
 mod bound;
+mod carrier;
 mod effectivity;
 mod estimate;
 mod parts;

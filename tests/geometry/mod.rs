@@ -1,6 +1,7 @@
 //! Meshes, shapes and surfaces: what is read, what is refused, and what lies opposite what.
 
 mod curved;
+mod digits;
 mod ends;
 mod fits;
 mod foreign;

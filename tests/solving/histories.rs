@@ -1,6 +1,7 @@
 //! Histories of loads by a table of factors, and what is written of each step.
 
-use crate::common::{Run, Scene, Table, case, distance, root, solve, text_of, winkler};
+use crate::common::blocks::Blocks;
+use crate::common::{Run, Scene, Table, case, distance, root, solve, solve_on, text_of, winkler};
 use std::fs;
 use std::path::Path;
 use vtkio::Vtk;
@@ -114,6 +115,34 @@ fn only_another_direction_makes_another_problem() {
     // and it may end below the full load
     near(run.number("pairs/0/force/0/1"), -28.0, 1e-6, "the last step");
     near(steps(&run.folder)["time"][2], 3.0, 0.0, "times are numbers of steps");
+}
+
+/// A moment has no resultant, so that it pushes nothing along any normal: the approach is that of the pressed face, however the
+/// blocks are turned.
+#[test]
+fn a_moment_does_not_push() {
+    let approach = |angle: f64| {
+        let (sine, cosine) = angle.sin_cos();
+        let mut mesh = Blocks::default();
+        let turn = |[x, y, _]: [f64; 3], low: f64| [cosine * x - sine * (y + low), sine * x + cosine * (y + low), 0.0];
+        mesh.add("lo", 2, 1, 5, |x| turn(x, 0.0));
+        mesh.add("up", 2, 1, 4, |x| turn(x, 1.0));
+        let scene = Scene::new(
+            "dimension = 2\nmesh = \"blocks.msh\"
+[[body]]\nname = \"lo\"\nyoung = 1000\npoisson = 0.3\nfix = [{ on = \"lo_low\", x = 0, y = 0 }]
+[[body]]\nname = \"up\"\nyoung = 1000\npoisson = 0.3
+load = [{ on = \"up_high\", pressure = 1 }, { on = \"up_side\", moment = 0.1 }]\nspring = [{ on = \"up_side\", stiffness = 1 }]
+[[contact]]\nbetween = [\"lo_high\", \"up_low\"]\nlayer = { linear = { stiffness = 1e4 } }\n",
+        );
+        let text = mesh.text(1, |x| x.to_string());
+        std::fs::write(scene.path.with_file_name("blocks.msh"), text).expect("a mesh");
+        solve(scene, &[]).converged().number("pairs/0/approach")
+    };
+    let upright = approach(0.0);
+    assert!((upright / 2e-3 - 1.0).abs() < 0.2, "{upright}");
+    for angle in [0.2, 1.0, 3.0] {
+        near(approach(angle) / upright, 1.0, 1e-9, "turned");
+    }
 }
 
 /// Two blocks of E = 100 and height 1, a layer of 300, a gap of 0.002: pressed by p their far faces approach by the gap and

@@ -11,7 +11,7 @@ mod space;
 pub use plane::in_plane;
 pub use space::in_space;
 
-use super::side::Side;
+use super::side::{FaceNode, Side};
 use crate::fem::{area_vector, element, length, minus, unit};
 use crate::linalg::{around, dot};
 use crate::problem::order::Order;
@@ -92,7 +92,7 @@ struct Facet<const D: usize> {
     x: Vec<[f64; D]>,
     /// Largest distance of a node from the first corner.
     size: f64,
-    /// Normals at the corners.
+    /// Directions at the corners along which the facet faces the other side: normals, unless they are made of those of both sides.
     normals: [[f64; D]; D],
     /// Outer unit normal in the middle.
     direction: [f64; D],
@@ -100,7 +100,7 @@ struct Facet<const D: usize> {
 
 impl<const D: usize> Facet<D> {
     fn of(side: &Side<D>, i: usize) -> Self {
-        let (order, nodes) = (side.facets.order, side.facets.facet(i));
+        let (order, on) = (side.facets.order, side.on_facet(i));
         let mut x = side.facets.coordinates(i, side.space);
         let from = x[0];
         x.iter_mut().for_each(|x| *x = minus(*x, from));
@@ -108,7 +108,7 @@ impl<const D: usize> Facet<D> {
             order,
             from,
             size: x.iter().map(|&x| length(x)).fold(0.0, f64::max),
-            normals: std::array::from_fn(|k| side.normals[&nodes[k]]),
+            normals: std::array::from_fn(|k| side.nodes[on[k] as usize].direction),
             direction: unit(area_vector(order, &x, &[1.0 / D as f64; D])),
             x,
         }
@@ -292,8 +292,8 @@ impl<const D: usize> BoxTree<D> {
     /// Return the facets whose boxes intersect the box of a prism. It extends from `below` behind facet `i` to `above` before it.
     fn within(&self, a: &Side<D>, i: usize, below: f64, above: f64) -> Vec<usize> {
         let [mut low, mut high] = a.bounds(i);
-        for &node in &a.facets.facet(i)[..D] {
-            let (x, n) = (a.space.nodes[node as usize], a.normals[&node]);
+        for at in a.facet_nodes(i).take(D) {
+            let (x, n) = (a.space.nodes[at.node as usize], at.direction);
             for c in 0..D {
                 for end in [x[c] - below * n[c], x[c] + above * n[c]] {
                     low[c] = low[c].min(end);
@@ -322,15 +322,15 @@ struct Rays<const D: usize> {
 
 impl<const D: usize> Rays<D> {
     fn from(a: &Side<D>, i: usize, length_of_rays: f64) -> Self {
-        let nodes = &a.facets.facet(i)[..D];
-        let mean = |value: &dyn Fn(u32) -> [f64; D]| -> [f64; D] {
-            std::array::from_fn(|c| nodes.iter().map(|&node| value(node)[c]).sum::<f64>() / D as f64)
+        let nodes: Vec<&FaceNode<D>> = a.facet_nodes(i).take(D).collect();
+        let mean = |value: &dyn Fn(&FaceNode<D>) -> [f64; D]| -> [f64; D] {
+            std::array::from_fn(|c| nodes.iter().map(|at| value(at)[c]).sum::<f64>() / D as f64)
         };
-        let axis = unit(mean(&|node| a.normals[&node]));
-        let differences = nodes.iter().map(|node| length(minus(a.normals[node], axis)));
+        let axis = unit(mean(&|at| at.direction));
+        let differences = nodes.iter().map(|at| length(minus(at.direction, axis)));
         let [low, high] = a.bounds(i);
         Self {
-            middle: mean(&|node| a.space.nodes[node as usize]),
+            middle: mean(&|at| a.space.nodes[at.node as usize]),
             axis,
             length: length_of_rays,
             radius: length(minus(high, low)),

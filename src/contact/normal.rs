@@ -1,0 +1,86 @@
+//! One normal at each point of a pair, made of the normals of both sides at places that face each other.
+//!
+//! Let n_a and -n_b be unit vectors from side a to side b, and let kappa_a and kappa_b be the curvatures of the surfaces. The direction is
+//!
+//! ```text
+//! n = unit(kappa_b n_a - kappa_a n_b)
+//! ```
+//!
+//! so that the less curved surface counts; two flats, and surfaces of equal curvature, give the plain mean (docs/theory.md, "The normals").
+
+use super::basis::PressureBasis;
+use super::pieces::Intersection;
+use super::side::{ROUNDING, Side};
+use crate::fem::{element, length, unit};
+use crate::problem::order::Order;
+
+/// The surface of side b that faces a node of side a: integrals of functions around the node.
+#[derive(Clone, Copy)]
+struct Facing<const D: usize> {
+    weight: f64,
+    normal: [f64; D],
+    curvature: f64,
+}
+
+impl<const D: usize> Side<'_, D> {
+    /// Replace the directions of this side by those made of both normals, where `common` are its common pieces with side b. Return whether
+    /// some have changed.
+    pub fn towards(&mut self, b: &Side<D>, common: &Intersection<D>) -> bool {
+        let mut changed = false;
+        for (at, facing) in facing(self, b, common).into_iter().enumerate() {
+            let Some(Facing { normal, curvature, .. }) = facing else { continue };
+            let own = &mut self.nodes[at];
+            let tilt: [f64; D] = std::array::from_fn(|c| own.normal[c] + normal[c]);
+            if length(tilt) <= ROUNDING {
+                continue;
+            }
+            let sum = own.curvature + curvature;
+            let weight = if sum > 0.0 { curvature / sum } else { 0.5 };
+            own.direction = unit(std::array::from_fn(|c| weight * own.normal[c] - (1.0 - weight) * normal[c]));
+            changed = true;
+        }
+        changed
+    }
+}
+
+/// Return the mean normal and curvature of side b before each node of side a, `None` where nothing faces a node.
+fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) -> Vec<Option<Facing<D>>> {
+    let none = Facing { weight: 0.0, normal: [0.0; D], curvature: 0.0 };
+    let mut sums = vec![none; a.nodes.len()];
+    for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
+        let on = a.on_facet(chunk[0].facet_a);
+        // The vertices, between which directions are interpolated, need not carry points; the nodes between them do so by their own functions.
+        let [vertices, all] = [(Order::P1, D), (a.facets.order, on.len())]
+            .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets));
+        for point in chunk {
+            let phi = element::values(a.facets.order, &point.at_a);
+            let (normal, curvature) = surface_at(b, point.facet_b, &point.at_b);
+            for (i, &at) in on.iter().enumerate() {
+                let value =
+                    if i < D { vertices.value(i, &point.at_a, &point.at_a) } else { all.value(i, &phi, &point.at_a) };
+                let (mu, sum) = (point.weight * value, &mut sums[at as usize]);
+                sum.weight += mu;
+                sum.curvature += mu * curvature;
+                (0..D).for_each(|c| sum.normal[c] += mu * normal[c]);
+            }
+        }
+    }
+    let mean = |sum: Facing<D>| {
+        (sum.weight > 0.0 && length(sum.normal) > 0.0).then(|| Facing {
+            weight: sum.weight,
+            normal: unit(sum.normal),
+            curvature: (sum.curvature / sum.weight).max(0.0),
+        })
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// Return the unit normal and the curvature of a side at barycentric coordinates of a facet.
+fn surface_at<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> ([f64; D], f64) {
+    let (mut normal, mut curvature) = ([0.0; D], 0.0);
+    for (node, phi) in side.facet_nodes(facet).zip(element::values(side.facets.order, at)) {
+        (0..D).for_each(|c| normal[c] += phi * node.normal[c]);
+        curvature += phi.abs() * node.curvature;
+    }
+    (unit(normal), curvature)
+}
