@@ -206,8 +206,8 @@ fn distance<const D: usize>(x: [f64; D], y: [f64; D]) -> f64 {
 
 /// The line of the normals of a side at a place of a facet.
 fn normal<const D: usize>(side: &Side<D>, facet: usize, l: &[f64; D]) -> [f64; D] {
-    let nodes = side.facets.facet(facet);
-    unit(std::array::from_fn(|c| (0..D).map(|k| l[k] * side.normals[&nodes[k]][c]).sum()))
+    let nodes: Vec<_> = side.facet_nodes(facet).collect();
+    unit(std::array::from_fn(|c| (0..D).map(|k| l[k] * nodes[k].direction[c]).sum()))
 }
 
 /// Distance at which a line meets a flat simplex.
@@ -262,7 +262,7 @@ fn check<const D: usize>(surfaces: &[Surface; 2], cut: Cut<D>, slack: f64) -> Re
     let spaces: [Space<D>; 2] =
         std::array::from_fn(|k| Space::new(&meshes[k], meshes[k].group("body").expect("a body"), surfaces[k].order));
     let sides: [Side<D>; 2] = std::array::from_fn(|k| {
-        Side::new("face", &spaces[k], spaces[k].facets(meshes[k].group("face").expect("a face")), &free, &frame)
+        Side::new("face", &spaces[k], spaces[k].facets(meshes[k].group("face").expect("a face")), &free, &frame, 180.0)
     });
     for (a, b) in [(&sides[0], &sides[1]), (&sides[1], &sides[0])] {
         let reach = Reach::between(a, b, 60.0, None);

@@ -1,7 +1,7 @@
 //! Histories of loads by a table of factors, and what is written of each step.
 
 use crate::common::blocks::Blocks;
-use crate::common::{Run, Scene, Table, case, distance, root, solve, solve_on, text_of, winkler};
+use crate::common::{Run, Scene, Table, case, distance, root, solve, text_of, winkler};
 use std::fs;
 use std::path::Path;
 use vtkio::Vtk;
