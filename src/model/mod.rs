@@ -298,7 +298,7 @@ pub(crate) mod sample {
             position: vec![[0.0; 3]; 2],
             weight: WEIGHT[2 * i..2 * i + 2].to_vec(),
             normal: vec![[0.0, 1.0, 0.0]; 2],
-            tilt: vec![0.0; 2],
+            tilt: 0.0,
             gap: vec![0.0; 2],
             prescribed: [vec![0.0; 2], vec![0.0; 2]],
             rows: [Csr::new(0), Csr::new(0)],
