@@ -10,7 +10,7 @@ use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, SmoothFaces, UncoveredPoint};
 use crate::error::{Error, Located, Result};
-use crate::fem::{Facets, unit};
+use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
@@ -132,7 +132,7 @@ pub fn all<const D: usize>(
         opposite
             .extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece, swapped)));
     }
-    opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
+    opposite.into_iter().map(|pair| pair.assemble(&scene.laws, parts, cut, fine)).collect()
 }
 
 /// Return the pairs of the two surfaces that a contact names: one, or several where they have edges.
@@ -225,7 +225,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them.
-    fn assemble(self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
+    fn assemble(self, laws: &OwnLaws, parts: &[SceneBody<D>], cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
@@ -251,7 +251,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
             pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
         }
         let surface = ContactSurface::new(&a, &pair);
-        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
+        let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
+        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
