@@ -10,7 +10,7 @@ use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, SmoothFaces, UncoveredPoint};
 use crate::error::{Error, Located, Result};
-use crate::fem::{Facets, unit};
+use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
@@ -154,6 +154,7 @@ fn assemble<const D: usize>(
         let is_needed = matches!(entry, ContactEntry::Named(_)) && contacts.is_empty() && number + 1 == count;
         match Opposite::new(entry, scene, parts, bodies, names, piece, swapped).assemble(
             &scene.laws,
+            parts,
             cut,
             fine,
             is_needed,
@@ -261,7 +262,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
 
     /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces have no common piece, unless the pair is
     /// needed.
-    fn assemble(mut self, laws: &OwnLaws, cut: Cut<D>, fine: bool, is_needed: bool) -> Result<Option<Contact<D>>> {
+    fn assemble(
+        mut self,
+        laws: &OwnLaws,
+        parts: &[SceneBody<D>],
+        cut: Cut<D>,
+        fine: bool,
+        is_needed: bool,
+    ) -> Result<Option<Contact<D>>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.a.towards(&self.b, &common) {
             common = cut(&self.a, &self.b, &self.reach);
@@ -292,7 +300,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
             pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
         }
         let surface = ContactSurface::new(&a, &pair);
-        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
+        let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
+        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };

@@ -32,9 +32,10 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
-    report
-        .warnings
-        .extend(too_large.into_iter().chain((0..model.pairs.len()).filter_map(|i| warnings::beyond_law(done, i))));
+    report.warnings.extend(too_large);
+    for i in 0..model.pairs.len() {
+        report.warnings.extend(warnings::beyond_law(done, i).into_iter().chain(warnings::by_chords(done, i)));
+    }
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);

@@ -645,6 +645,26 @@ fn pressures_at_a_rim_are_a_guess() {
     }
 }
 
+/// A punch on a hard layer has a large error at its rim whatever the mesh. The adaptation ends when all other pressures have the error that was asked
+/// for, and says what the rim costs; under a soft layer it goes on until the rim has it, too.
+#[test]
+fn an_adaptation_ends_when_only_a_sharp_end_is_left() {
+    let adapted = |stiffness: &str| {
+        let layer = format!("contact.0.layer.linear.stiffness={stiffness}");
+        let title = format!("title={}", nanoseconds());
+        solve(punch(PUNCH, "x = 0, y = -1e-3"), &["--tolerance", "2e-2", "--set", &layer, "--set", &title]).converged()
+    };
+    let (hard, soft) = (adapted("1e9"), adapted("1e4"));
+    assert!(hard.count("dofs") < 50_000, "{}", hard.said());
+    assert!(hard.warnings().contains("at a sharp end of the contact, and all others"), "{}", hard.said());
+    assert!(
+        hard.number("discretization_error/pressure/0") > 2e-2
+            && hard.number("discretization_error/displacement") < 2e-2
+    );
+    assert!(soft.number("discretization_error/pressure/0") <= 2e-2, "{}", soft.said());
+    assert!(!soft.warnings().contains("sharp end"), "{}", soft.said());
+}
+
 /// A round punch that slides far has other pressures by the normals of the block than by its own, and a warning says so; one that is pressed straight
 /// down has not.
 #[test]
