@@ -214,20 +214,13 @@ fn options_that_spoil_solves_are_found_out() {
 /// A factorisation that is replaced by the pivots of another matrix solves nothing, and no error is reported as if it did.
 #[test]
 fn a_factorisation_that_is_none_bounds_nothing() {
-    let run = solve(
-        case("groove-held"),
-        &["--set", "mesh.set.n=6", "--set", "method={}", "-pc_type", "cholesky", "-mat_mumps_cntl_4", "1e6"],
-    );
-    let peak = solve(case("groove-held"), &["--set", "mesh.set.n=6", "--set", "method={}"])
-        .converged()
-        .number("pairs/0/peak_pressure");
+    let coarse = ["--set", "mesh.set.n=6", "--set", "method={stop={residual=1e-8,iterations=40}}"];
+    let peak = solve(case("groove-held"), &coarse).converged().number("pairs/0/peak_pressure");
+    let run =
+        solve(case("groove-held"), &[&coarse[..], &["-pc_type", "cholesky", "-mat_mumps_cntl_4", "1e6"]].concat());
     let off = (run.number("pairs/0/peak_pressure") / peak - 1.0).abs();
-    assert!(run.report["error_bound"].is_null(), "{}", run.said());
-    assert!(
-        off < 1e-6 || run.code == 1 && run.report["error_estimate"].as_f64().is_none_or(|error| error > 1e-3),
-        "{off:e} {}",
-        run.said()
-    );
+    let is_told = run.code == 1 && run.report["error_estimate"].as_f64().is_none_or(|error| error > 0.1 * off);
+    assert!(run.report["error_bound"].is_null() && is_told, "{off:e} {}", run.said());
 }
 
 /// An inaccurate result with three digits tells the tolerance that accepts it.
