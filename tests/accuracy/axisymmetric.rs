@@ -391,10 +391,10 @@ fn normals_on_the_axis() {
         let space = space.revolved();
         let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
         let (free, frame) = (HashMap::new(), Frame::default());
-        let side = Side::new("inner_contact", &space, facets, &free, &frame);
-        let on_axis: Vec<_> = side.normals.iter().filter(|(node, _)| space.on_axis(**node)).collect();
+        let side = Side::new("inner_contact", &space, facets, &free, &frame, 180.0);
+        let on_axis: Vec<_> = side.nodes.iter().filter(|at| space.on_axis(at.node)).collect();
         assert_eq!(on_axis.len(), 1);
-        assert_eq!(*on_axis[0].1, [0.0, 1.0]);
+        assert_eq!(on_axis[0].normal, [0.0, 1.0]);
     }
 }
 

@@ -99,7 +99,7 @@ fn pair_on<const D: usize>(
         (0..2).map(|k| Space::new(mesh, mesh.group(bodies[k]).expect("a body"), order[k])).collect();
     let side = |k: usize| {
         let facets = spaces[k].facets(mesh.group(groups[k]).expect("a surface"));
-        Side::new(groups[k], &spaces[k], facets, &free, &frame)
+        Side::new(groups[k], &spaces[k], facets, &free, &frame, 40.0)
     };
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));

@@ -6,6 +6,7 @@ mod fits;
 mod foreign;
 mod gmsh;
 mod meshes;
+mod normals;
 mod patterns;
 mod pieces;
 mod quadratic;
