@@ -12,6 +12,7 @@ use super::basis::PressureBasis;
 use super::pieces::Intersection;
 use super::side::{ROUNDING, Side};
 use crate::fem::{element, length, unit};
+use crate::linalg::dot;
 use crate::problem::order::Order;
 
 /// The surface of side b that faces a node of side a: integrals of functions around the node.
@@ -31,12 +32,15 @@ impl<const D: usize> Side<'_, D> {
             let Some(Facing { normal, curvature, .. }) = facing else { continue };
             let own = &mut self.nodes[at];
             let tilt: [f64; D] = std::array::from_fn(|c| own.normal[c] + normal[c]);
-            if length(tilt) <= ROUNDING {
+            let faces = dot(&own.normal, &normal) < 0.0;
+            if !faces || length(tilt) <= ROUNDING {
                 continue;
             }
             let sum = own.curvature + curvature;
             let weight = if sum > 0.0 { curvature / sum } else { 0.5 };
-            own.direction = unit(std::array::from_fn(|c| weight * own.normal[c] - (1.0 - weight) * normal[c]));
+            let sum = std::array::from_fn(|c| weight * own.normal[c] - (1.0 - weight) * normal[c]);
+            own.direction = unit(self.mirrors.mean(self.space, own.node, sum, -1.0));
+            own.tilt = length(tilt);
             changed = true;
         }
         changed
@@ -72,15 +76,31 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
             curvature: (sum.curvature / sum.weight).max(0.0),
         })
     };
-    sums.into_iter().map(mean).collect()
+    let mut means: Vec<Option<Facing<D>>> = sums.into_iter().map(mean).collect();
+    spread(a, &mut means);
+    means
+}
+
+/// Give nodes that nothing faces the surface before the nearest nodes, facet by facet, so that directions do not jump where side b ends.
+fn spread<const D: usize>(a: &Side<D>, facing: &mut [Option<Facing<D>>]) {
+    loop {
+        let mut found: Vec<(u32, Facing<D>)> = Vec::new();
+        for on in (0..a.facets.count()).map(|i| a.on_facet(i)) {
+            let Some(known) = on.iter().find_map(|&at| facing[at as usize]) else { continue };
+            found.extend(on.iter().filter(|at| facing[**at as usize].is_none()).map(|&at| (at, known)));
+        }
+        if found.is_empty() {
+            return;
+        }
+        found.into_iter().for_each(|(at, known)| facing[at as usize] = Some(known));
+    }
 }
 
 /// Return the unit normal and the curvature of a side at barycentric coordinates of a facet.
 fn surface_at<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> ([f64; D], f64) {
-    let (mut normal, mut curvature) = ([0.0; D], 0.0);
+    let mut normal = [0.0; D];
     for (node, phi) in side.facet_nodes(facet).zip(element::values(side.facets.order, at)) {
         (0..D).for_each(|c| normal[c] += phi * node.normal[c]);
-        curvature += phi.abs() * node.curvature;
     }
-    (unit(normal), curvature)
+    (unit(normal), side.facet_nodes(facet).zip(at).map(|(node, l)| l * node.curvature).sum())
 }

@@ -30,12 +30,17 @@ pub struct ContactPair {
     pub nodes: Vec<u32>,
     /// Index of each point among the nodes of side a on its faces ([`Side::nodes`]), n.
     pub on_side: Vec<u32>,
+    /// Smooth face of side a on which each point lies, numbered from 1, n. Faces are in the order of the middles of their points by x, then
+    /// by y and z.
+    pub face: Vec<u32>,
     /// Positions of the points on side a in the scene, n.
     pub position: Vec<[f64; 3]>,
     /// omega_q > 0, the length in the plane, else the area (in bodies of revolution that of a ring) across the normal, n.
     pub weight: Vec<f64>,
     /// Unit normals from side a to side b, made of those of both sides, n.
     pub normal: Vec<[f64; 3]>,
+    /// Length of the sum of the outer unit normals of both sides, n: zero where they are opposite.
+    pub tilt: Vec<f64>,
     /// Initial gap d_q along the normal, n: the distance of the meshes plus the gap that the scene adds.
     pub gap: Vec<f64>,
     /// Contribution of prescribed displacements to the outer normal displacement of each side, n each.
@@ -53,7 +58,7 @@ pub struct ContactPair {
     /// does from `resultant`.
     pub moment: [Vec<[f64; 3]>; 2],
     /// Largest angle by which errors of coordinates turn the normals of a side.
-    pub tilt: f64,
+    pub uncertainty: f64,
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
     /// What `weight` measures: `"length"`, or in space and for bodies of revolution `"area"`.
@@ -192,8 +197,10 @@ pub fn assemble<const D: usize>(
         bodies,
         weight: points.iter().zip(&nodes).map(across).collect(),
         normal: nodes.iter().map(|at| pad(at.direction)).collect(),
+        tilt: nodes.iter().map(|at| at.tilt).collect(),
         gap: gaps(a, &points, &position, gap)?,
         nodes: nodes.iter().map(|at| at.node).collect(),
+        face: faces(a, &on_side, &points, &position),
         on_side,
         position,
         prescribed: [Vec::new(), Vec::new()],
@@ -201,7 +208,7 @@ pub fn assemble<const D: usize>(
         nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         resultant: [Vec::new(), Vec::new()],
         moment: [Vec::new(), Vec::new()],
-        tilt: a.tilt().max(b.tilt()),
+        uncertainty: a.tilt().max(b.tilt()),
         along_curve: D == 2,
         measure: if D == 2 && !a.space.axisymmetric { "length" } else { "area" },
         law,
@@ -215,6 +222,25 @@ pub fn assemble<const D: usize>(
         }
     }
     Ok(pair)
+}
+
+/// Return the number of the face of each contact point.
+///
+/// Middles that differ by less than a thousandth of the surface count as equal, so that numbers do not depend on the mesh.
+fn faces<const D: usize>(a: &Side<D>, on_side: &[u32], points: &[&Accumulator], position: &[[f64; 3]]) -> Vec<u32> {
+    let (face, [low, high]) = (a.faces(), a.extent());
+    let step = 1e-3 * (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max);
+    let mut middles: BTreeMap<u32, (f64, [f64; 3])> = BTreeMap::new();
+    for ((&at, point), x) in on_side.iter().zip(points).zip(position) {
+        let (weight, sum) = middles.entry(face[at as usize]).or_default();
+        *weight += point.weight;
+        add(sum, x.map(|x| point.weight * x));
+    }
+    let place = |(weight, sum): &(f64, [f64; 3])| sum.map(|sum| (sum / weight / step).round() as i64);
+    let mut order: Vec<(u32, [i64; 3])> = middles.iter().map(|(&face, middle)| (face, place(middle))).collect();
+    order.sort_by_key(|(face, place)| (*place, *face));
+    let number = |at: &u32| 1 + order.iter().position(|(of, _)| *of == face[*at as usize]).unwrap_or(0) as u32;
+    on_side.iter().map(number).collect()
 }
 
 /// Return the initial gap at each contact point: the mean distance of the meshes plus the scene's own gap.

@@ -29,8 +29,7 @@ impl Chords {
             let on = [(&rises[0][point.facet_a], &point.at_a), (&rises[1][point.facet_b], &point.at_b)];
             let height: f64 = on.iter().flat_map(|(rises, l)| rises.iter().zip(products(l))).map(|(r, l)| r * l).sum();
             on.iter().flat_map(|(rises, _)| *rises).for_each(|rise| sagitta = sagitta.max(0.25 * rise.abs()));
-            for (at, share) in
-                a.on_facet(point.facet_a).iter().zip(point.at_a.into_iter().chain(products(&point.at_a)))
+            for (at, share) in a.on_facet(point.facet_a).iter().zip(point.at_a.into_iter().chain(products(&point.at_a)))
             {
                 let sum = sums.entry(*at).or_default();
                 *sum = [sum[0] + point.weight * share * height, sum[1] + point.weight * share];

@@ -37,8 +37,9 @@ pub struct FaceNode<const D: usize> {
     /// Unit vector along which compressions are measured: the own normal, or the one made of the normals of both sides
     /// ([`Side::towards`]).
     pub direction: [f64; D],
-    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around. At an edge the
-    /// difference is that of the faces.
+    /// Length of the sum of the own normal and that of the other side before it, zero if they are opposite.
+    pub tilt: f64,
+    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
     pub curvature: f64,
 }
 
@@ -63,36 +64,36 @@ impl<'a, const D: usize> Side<'a, D> {
                     (0..D).for_each(|c| normal[c] += area[c]);
                 }
                 let normal = unit(mirrors.mean(space, node, normal, least));
-                nodes.push(FaceNode { node, normal, direction: normal, curvature: 0.0 });
+                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0 });
             }
         }
         let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
-        side.flatten(edge);
+        side.flatten();
         side.bend();
         side
     }
 
     /// Give the nodes of each flat face one normal, where coordinates have fewer digits than doubles. A face is flat if its normals
     /// differ from their mean by no more than errors of coordinates allow for.
-    fn flatten(&mut self, edge: f64) {
+    fn flatten(&mut self) {
         if self.space.uncertainty == 0.0 {
             return;
         }
-        let (faces, tilt) = (SmoothFaces::new(self, edge), self.tilt());
-        let mut mean = vec![[0.0; D]; faces.count];
-        for (i, &face) in faces.of_facet.iter().enumerate() {
-            let area = self.area(i);
-            (0..D).for_each(|c| mean[face][c] += area[c]);
+        let (faces, tilt) = (self.faces(), self.tilt());
+        let mut sums: HashMap<u32, [f64; D]> = HashMap::new();
+        for i in 0..self.facets.count() {
+            let (area, sum) = (self.area(i), sums.entry(faces[self.on_facet(i)[0] as usize]).or_insert([0.0; D]));
+            (0..D).for_each(|c| sum[c] += area[c]);
         }
-        let mean: Vec<[f64; D]> = mean.into_iter().map(unit).collect();
-        let mut flat = vec![true; faces.count];
-        for (i, &face) in faces.of_facet.iter().enumerate() {
-            flat[face] &= self.facet_nodes(i).all(|at| length(minus(at.normal, mean[face])) <= tilt);
+        let mut flat: HashMap<u32, [f64; D]> = sums.into_iter().map(|(face, sum)| (face, unit(sum))).collect();
+        for (at, face) in self.nodes.iter().zip(&faces) {
+            if flat.get(face).is_some_and(|mean| length(minus(at.normal, *mean)) > tilt) {
+                flat.remove(face);
+            }
         }
-        for i in (0..faces.of_facet.len()).filter(|&i| flat[faces.of_facet[i]]) {
-            for corner in self.on_facet(i).to_vec() {
-                let at = &mut self.nodes[corner as usize];
-                (at.normal, at.direction) = (mean[faces.of_facet[i]], mean[faces.of_facet[i]]);
+        for (at, face) in self.nodes.iter_mut().zip(&faces) {
+            if let Some(&mean) = flat.get(face) {
+                (at.normal, at.direction) = (mean, mean);
             }
         }
     }
@@ -100,22 +101,13 @@ impl<'a, const D: usize> Side<'a, D> {
     /// Compute the curvature of the surface at each node.
     fn bend(&mut self) {
         let flat = self.tilt().max(ROUNDING);
-        // the largest difference of the normals of faces that meet at a node
-        let mut at_edge = vec![0.0_f64; self.nodes.len()];
-        for i in 1..self.nodes.len() {
-            for j in (0..i).rev().take_while(|&j| self.nodes[j].node == self.nodes[i].node) {
-                let turn = length(minus(self.nodes[i].normal, self.nodes[j].normal));
-                [i, j].into_iter().for_each(|k| at_edge[k] = at_edge[k].max(turn));
-            }
-        }
         for i in 0..self.facets.count() {
             let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
             let mut curvature: f64 = 0.0;
             for k in 0..on.len() {
                 for l in 0..k {
-                    let [p, q] = [on[k], on[l]].map(|corner| corner as usize);
-                    let turn =
-                        length(minus(self.nodes[p].normal, self.nodes[q].normal)).max(at_edge[p]).max(at_edge[q]);
+                    let [p, q] = [on[k], on[l]].map(|corner| self.nodes[corner as usize].normal);
+                    let turn = length(minus(p, q));
                     curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
                 }
             }
@@ -136,9 +128,19 @@ impl<'a, const D: usize> Side<'a, D> {
         self.on_facet(i).iter().map(|&corner| &self.nodes[corner as usize])
     }
 
-    /// Return the surface of the facets that `keep` marks, with their own normals.
-    pub fn only(&self, keep: &[bool], edge: f64) -> Self {
-        Self::new(self.name, self.space, self.facets.only(keep), self.prescribed, self.frame, edge)
+    /// Return the surface of the facets that `keep` marks. Its nodes have the normals of the whole surface.
+    pub fn only(&self, keep: &[bool]) -> Self {
+        let kept = (0..keep.len()).filter(|&i| keep[i]).flat_map(|i| self.on_facet(i)).copied();
+        Self { facets: self.facets.only(keep), corners: kept.collect(), ..self.clone() }
+    }
+
+    /// Return the face of each node in `nodes`: facets with a common node on a face are of one face.
+    pub fn faces(&self) -> Vec<u32> {
+        let mut joined = DisjointSets::new(self.nodes.len());
+        for on in self.corners.chunks_exact(self.facets.stride) {
+            on.windows(2).for_each(|ends| joined.join(ends[0], ends[1]));
+        }
+        joined.classes().1
     }
 
     /// Return the mean length (area) of a facet.
@@ -210,67 +212,6 @@ fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(
 /// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of
 /// coordinates over its size; so a regular polygon that turns by just the angle of an edge is smooth.
 pub const ROUNDING: f64 = 1e-9;
-
-/// The smooth faces of a surface. Facets with a common vertex at which they turn by no more than the angle of an edge are of
-/// one face.
-#[derive(Debug, Clone)]
-pub struct SmoothFaces {
-    /// Face of each facet. Faces are numbered in the order of their first facets.
-    pub of_facet: Vec<usize>,
-    /// Number of faces.
-    pub count: usize,
-}
-
-impl SmoothFaces {
-    /// Find the faces of a surface between edges at which facets turn by more than `edge` degrees.
-    pub fn new<const D: usize>(side: &Side<D>, edge: f64) -> Self {
-        let least = edge.to_radians().cos() - ROUNDING;
-        let mut joined = DisjointSets::new(side.facets.count());
-        for around in normals_at_vertices(side).values() {
-            for (k, (facet, normal)) in around.iter().enumerate() {
-                for (other, other_normal) in &around[..k] {
-                    if dot(normal, other_normal) >= least {
-                        joined.join(*facet as u32, *other as u32);
-                    }
-                }
-            }
-        }
-        let (count, of_facet) = joined.classes();
-        Self { count, of_facet: of_facet.into_iter().map(|face| face as usize).collect() }
-    }
-
-    /// Return whether facets of different faces have a common vertex, and so meet at an edge. Only facets in `used` count.
-    pub fn meet<const D: usize>(&self, side: &Side<D>, used: &[bool]) -> bool {
-        let mut face_at: HashMap<u32, usize> = HashMap::new();
-        let facets = (0..side.facets.count()).filter(|&i| used[i]);
-        let mut vertices = facets.flat_map(|i| side.facets.facet(i)[..D].iter().map(move |&node| (node, i)));
-        vertices.any(|(node, i)| *face_at.entry(node).or_insert(self.of_facet[i]) != self.of_facet[i])
-    }
-
-    /// Return the middle of a face: the mean of the middles of its facets, weighted by their lengths (areas).
-    pub fn middle<const D: usize>(&self, side: &Side<D>, face: usize) -> [f64; D] {
-        let (mut sum, mut total) = ([0.0; D], 0.0);
-        for i in (0..self.of_facet.len()).filter(|&i| self.of_facet[i] == face) {
-            let (x, size) = (side.facets.coordinates(i, side.space), length(side.area(i)));
-            (0..D).for_each(|c| sum[c] += size * x[..D].iter().map(|x| x[c]).sum::<f64>() / D as f64);
-            total += size;
-        }
-        sum.map(|sum| sum / total)
-    }
-}
-
-/// Return the facets at each vertex, with their unit normals there.
-fn normals_at_vertices<const D: usize>(side: &Side<D>) -> HashMap<u32, Vec<(usize, [f64; D])>> {
-    let mut around: HashMap<u32, Vec<(usize, [f64; D])>> = HashMap::new();
-    let vertices = &element::nodes::<D>(side.facets.order)[..D];
-    for i in 0..side.facets.count() {
-        let x = side.facets.coordinates(i, side.space);
-        for (l, &node) in vertices.iter().zip(side.facets.facet(i)) {
-            around.entry(node).or_default().push((i, unit(area_vector(side.facets.order, &x, l))));
-        }
-    }
-    around
-}
 
 /// Sort nodes of a surface for plots, given by their indices. In the plane they follow the curve, and each chain begins at the end with
 /// the smaller coordinates. In space they are sorted by coordinates.

@@ -1,17 +1,15 @@
-//! Pairs of smooth faces: surfaces are split where one of them has an edge, and boundary facets of different bodies that face each other
-//! within a distance are found by rules of the scene.
+//! Pairs that rules of the scene find: boundary facets of different bodies that face each other within a distance.
 
-use super::carrier;
 use super::part::SceneBody;
 use super::patterns::{pattern, tie};
+use crate::contact::Side;
 use crate::contact::pieces::{BoxTree, Cut, Reach};
-use crate::contact::{Side, SmoothFaces};
 use crate::error::{Error, Place, Result, few};
 use crate::fem::{Facets, unit};
-use crate::problem::contact::{AutoContact, Carrier};
+use crate::problem::contact::AutoContact;
 use crate::problem::pattern::Rank;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashSet};
 
 /// A table of the scene.
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -22,18 +20,16 @@ pub enum ContactEntry {
     Found(usize),
 }
 
-/// Two surfaces that form pairs.
+/// Two surfaces that form a pair.
 pub struct SurfacePair<'a, const D: usize> {
     /// The table of the scene.
     pub entry: ContactEntry,
     /// Indices of the bodies.
     pub bodies: [usize; 2],
-    /// Names of the surfaces; those of the bodies if the pair was found.
-    pub names: [&'a str; 2],
-    /// Whether the second surface carries the contact points.
-    pub swapped: bool,
-    /// The pairs: one, or several where surfaces have edges.
-    pub pieces: Vec<PairPart<D>>,
+    /// The surfaces. If the pair was found, they have the names of their bodies.
+    pub sides: [Side<'a, D>; 2],
+    /// Nodes of the facets of both surfaces that face each other, but are too far apart, with or without pairs.
+    pub far: [BTreeSet<u32>; 2],
 }
 
 /// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
@@ -49,7 +45,6 @@ pub fn find<'a, const D: usize>(
     cut: Cut<D>,
     parts: &'a [SceneBody<D>],
     named: &HashSet<[usize; 2]>,
-    carriers: &[Carrier],
 ) -> Result<Vec<SurfacePair<'a, D>>> {
     if rules.is_empty() {
         return Ok(Vec::new());
@@ -58,8 +53,8 @@ pub fn find<'a, const D: usize>(
         parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
-        let mut found = meeting(rules, cut, &whole, &possible);
-        if found.pieces.is_empty() {
+        let found = meeting(rules, cut, &whole, &possible);
+        if found.sides[0].facets.count() == 0 {
             continue;
         }
         if let Some(other) = possible.other {
@@ -67,8 +62,6 @@ pub fn find<'a, const D: usize>(
             let [(own, _), (other, place)] = [possible.rule, other].map(|number| title(&rules[number]));
             return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
         }
-        let table = rules[possible.rule].contact.table;
-        found.swapped = carrier::is_second(parts, possible.bodies, possible.near.each_ref(), table, carriers);
         all.push(found);
     }
     Ok(all)
@@ -114,23 +107,31 @@ fn possible<const D: usize>(
     Ok(all)
 }
 
-/// Return the pairs that two possible bodies form, which are none if their facets have no common piece.
+/// Return the pair that two possible bodies form. Its surfaces have no facets if they have no common piece.
 fn meeting<'a, const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
     whole: &[Side<'a, D>],
     possible: &Possible<D>,
 ) -> SurfacePair<'a, D> {
+    let spec = &rules[possible.rule].contact;
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
-        Side::new(name, space, possible.near[k].clone(), prescribed, frame, rules[possible.rule].contact.edge)
+        Side::new(name, space, possible.near[k].clone(), prescribed, frame, spec.edge)
     };
-    let (spec, a, b) = (&rules[possible.rule].contact, near(0), near(1));
-    let reach = Reach::between(&a, &b, spec.angle, spec.distance);
-    let mut pieces = FaceSplit::new([&a, &b], spec.edge, cut, &reach).into_pieces();
-    pieces.sort_by_key(|piece| piece.face);
-    let names = possible.bodies.map(|body| whole[body].name);
-    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, swapped: false, pieces }
+    let [a, b] = [near(0), near(1)];
+    let common = cut(&a, &b, &Reach::between(&a, &b, spec.angle, spec.distance));
+    let mut far = [BTreeSet::new(), BTreeSet::new()];
+    for (i, j) in common.far() {
+        far[0].extend(a.facets.facet(i));
+        far[1].extend(b.facets.facet(j));
+    }
+    let mut used = [vec![false; a.facets.count()], vec![false; b.facets.count()]];
+    for point in &common.points {
+        (used[0][point.facet_a], used[1][point.facet_b]) = (true, true);
+    }
+    let sides = [a.only(&used[0]), b.only(&used[1])];
+    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, sides, far }
 }
 
 /// Check that every rule found a pair among the `found` ones.
@@ -209,145 +210,4 @@ fn candidates<const D: usize>(a: &Side<D>, b: &Side<D>, search: &BoxTree<D>, rea
         }
     }
     [a.facets.only(&keep[0]), b.facets.only(&keep[1])]
-}
-
-/// A part of two surfaces that becomes one pair.
-pub struct PairPart<const D: usize> {
-    /// Facets of both surfaces.
-    pub facets: [Facets<D>; 2],
-    /// Number of the face of each surface, from 1; `None` if no other face of the surface is in a pair.
-    pub face: [Option<usize>; 2],
-    /// Number of facets of each surface that belong to no pair. One piece of two surfaces counts them.
-    pub idle: [usize; 2],
-    /// Nodes of the facets of both surfaces that face each other, but are too far apart, with or without pairs.
-    pub far: [BTreeSet<u32>; 2],
-}
-
-impl<const D: usize> PairPart<D> {
-    /// Exchange the two surfaces.
-    pub fn swap(&mut self) {
-        self.facets.swap(0, 1);
-        self.face.swap(0, 1);
-        self.idle.swap(0, 1);
-        self.far.swap(0, 1);
-    }
-}
-
-/// Which facets of each of two surfaces are in a pair.
-type Used = [Vec<bool>; 2];
-
-/// Faces of two surfaces that become one pair.
-struct FaceGroup {
-    faces: [BTreeSet<usize>; 2],
-    used: Used,
-}
-
-/// Two surfaces with their faces, and the facets with common pieces for each two faces that have some.
-pub struct FaceSplit<'a, const D: usize> {
-    sides: [&'a Side<'a, D>; 2],
-    faces: [SmoothFaces; 2],
-    met: BTreeMap<[usize; 2], Used>,
-    /// Nodes of the facets of both surfaces that face each other, but are too far apart.
-    far: [BTreeSet<u32>; 2],
-}
-
-impl<'a, const D: usize> FaceSplit<'a, D> {
-    /// Find the faces of two surfaces between edges of more than `edge` degrees, and the facets of each two faces that have common
-    /// pieces. The normals of a face are those of its own facets, while all facets of the other surface take part, so that the
-    /// nearest one is the partner.
-    pub fn new(sides: [&'a Side<'a, D>; 2], edge: f64, cut: Cut<D>, reach: &Reach) -> Self {
-        let faces = sides.map(|side| SmoothFaces::new(side, edge));
-        let mut met: BTreeMap<[usize; 2], Used> = BTreeMap::new();
-        let mut far = [BTreeSet::new(), BTreeSet::new()];
-        for face in 0..faces[0].count {
-            let is_own: Vec<bool> = faces[0].of_facet.iter().map(|&of| of == face).collect();
-            let own: Vec<usize> = (0..is_own.len()).filter(|&i| is_own[i]).collect();
-            let common = cut(&sides[0].only(&is_own, edge), sides[1], reach);
-            for (i, j) in common.far() {
-                far[0].extend(sides[0].facets.facet(own[i]));
-                far[1].extend(sides[1].facets.facet(j));
-            }
-            for point in common.points {
-                let (i, j) = (own[point.facet_a], point.facet_b);
-                let none = || sides.map(|side| vec![false; side.facets.count()]);
-                let used = met.entry([face, faces[1].of_facet[j]]).or_insert_with(none);
-                (used[0][i], used[1][j]) = (true, true);
-            }
-        }
-        Self { sides, faces, met, far }
-    }
-
-    /// Return the pairs with the facets that have common pieces, and no others. The list is empty if nothing has common pieces.
-    pub fn into_pieces(self) -> Vec<PairPart<D>> {
-        let groups = self.groups();
-        groups.iter().map(|group| self.piece(group, groups.len() > 1)).collect()
-    }
-
-    /// Return the same pairs with all facets of their faces. A facet without a partner belongs to the first pair of its face.
-    pub fn into_whole_pieces(self) -> Vec<PairPart<D>> {
-        let mut groups = self.groups();
-        let mut taken = self.all_used();
-        for FaceGroup { faces, used } in &mut groups {
-            for side in 0..2 {
-                let of_facet = &self.faces[side].of_facet;
-                for i in (0..of_facet.len()).filter(|&i| faces[side].contains(&of_facet[i])) {
-                    used[side][i] |= !taken[side][i];
-                    taken[side][i] = true;
-                }
-            }
-        }
-        let mut pieces: Vec<PairPart<D>> = groups.iter().map(|group| self.piece(group, groups.len() > 1)).collect();
-        if let Some(first) = pieces.first_mut() {
-            first.idle = taken.map(|taken| taken.iter().filter(|taken| !**taken).count());
-        }
-        pieces
-    }
-
-    /// Return one group of all faces that meet, or one of each two faces if faces of a surface have an edge between them.
-    fn groups(&self) -> Vec<FaceGroup> {
-        let all = self.all_used();
-        let has_edge = |side: usize| self.faces[side].meet(self.sides[side], &all[side]);
-        if has_edge(0) || has_edge(1) {
-            let of_two = |(faces, used): (&[usize; 2], &Used)| FaceGroup {
-                faces: faces.map(|face| BTreeSet::from([face])),
-                used: used.clone(),
-            };
-            return self.met.iter().map(of_two).collect();
-        }
-        let faces = [0, 1].map(|side| self.met.keys().map(|faces| faces[side]).collect());
-        if self.met.is_empty() { Vec::new() } else { vec![FaceGroup { faces, used: all }] }
-    }
-
-    /// Return the facets of both surfaces that have common pieces.
-    fn all_used(&self) -> Used {
-        let of_side = |side: usize| {
-            let is_used = |i: usize| self.met.values().any(|used| used[side][i]);
-            (0..self.sides[side].facets.count()).map(is_used).collect()
-        };
-        [of_side(0), of_side(1)]
-    }
-
-    fn piece(&self, group: &FaceGroup, is_one_of_several: bool) -> PairPart<D> {
-        let facets = [0, 1].map(|side| self.sides[side].facets.only(&group.used[side]));
-        let number = |side: usize| {
-            let face = *group.faces[side].first().filter(|_| is_one_of_several)?;
-            self.number(side, face)
-        };
-        PairPart { facets, face: [number(0), number(1)], idle: [0, 0], far: self.far.clone() }
-    }
-
-    /// Return the number of a face among the faces of its surface that are in pairs, from 1; `None` if it is the only one. Faces are
-    /// in the order of their middles by x, then by y and z.
-    ///
-    /// Coordinates that differ by less than a thousandth of the surface count as equal, so that numbers do not depend on the mesh.
-    fn number(&self, side: usize, face: usize) -> Option<usize> {
-        let all: BTreeSet<usize> = self.met.keys().map(|faces| faces[side]).collect();
-        let [low, high] = self.sides[side].extent();
-        let size = (0..D).map(|c| high[c] - low[c]).fold(0.0, f64::max);
-        let place = |face: usize| {
-            let middle = self.faces[side].middle(self.sides[side], face);
-            ((0..D).map(|c| (1e3 * (middle[c] - low[c]) / size).round() as i64).collect::<Vec<_>>(), face)
-        };
-        (all.len() > 1).then(|| 1 + all.iter().filter(|&&other| place(other) < place(face)).count())
-    }
 }

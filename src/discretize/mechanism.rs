@@ -23,7 +23,7 @@ const LACKING: f64 = 1e-3;
 
 /// Find the motions that nothing resists. Fix those on which no load works.
 pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair]) -> Vec<Mechanism> {
-    let tilt = pairs.iter().map(|pair| pair.tilt).fold(0.0, f64::max);
+    let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
     let mut search = MechanismSearch { bodies, pairs, tilt, found: Vec::new() };
     for group in search.groups() {
         search.settle(search.as_one(&group));

@@ -1,14 +1,14 @@
 //! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two surfaces do not face
 //! each other.
 
-use super::auto::{self, ContactEntry, FaceSplit, PairPart, SurfacePair};
+use super::auto::{self, ContactEntry, SurfacePair};
 use super::carrier;
 use super::part::SceneBody;
 use super::patterns::{Owners, find_group, point};
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, SmoothFaces, UncoveredPoint};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, UncoveredPoint};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
@@ -33,7 +33,6 @@ pub struct Contact<const D: usize> {
 pub struct ContactFacts {
     origin: PairOrigin,
     swapped: bool,
-    idle: usize,
     chords: Option<Chords>,
     ends: Vec<UncoveredPoint>,
     surface: ContactSurface,
@@ -42,8 +41,8 @@ pub struct ContactFacts {
 impl ContactFacts {
     /// Return the facts of the pair, including its description in the scene.
     pub fn info(self, scene: &Scene) -> ContactInfo {
-        let Self { origin, swapped, idle, chords, ends, surface } = self;
-        ContactInfo { spec: origin.spec(scene), is_split: origin.is_split, swapped, idle, chords, ends, surface }
+        let Self { origin, swapped, chords, ends, surface } = self;
+        ContactInfo { spec: origin.spec(scene), swapped, chords, ends, surface }
     }
 }
 
@@ -51,10 +50,6 @@ impl ContactFacts {
 pub struct ContactInfo {
     /// Description in the scene. `between` names the bodies if the pair was found.
     pub spec: ContactSpec,
-    /// Whether the pair is one of several into which edges split two surfaces.
-    pub is_split: bool,
-    /// Number of facets of side a that belong to no pair, on faces beyond edges. One pair of two surfaces counts them.
-    pub idle: usize,
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
@@ -77,23 +72,11 @@ impl ContactInfo {
 #[derive(Serialize, Deserialize)]
 struct PairOrigin {
     entry: ContactEntry,
-    /// Names of the two surfaces, which are those of the bodies if the pair was found. A face of a split surface has its number behind
-    /// the name.
+    /// Names of the two surfaces, which are those of the bodies if the pair was found.
     names: [String; 2],
-    /// Whether the pair is one of several into which edges split two surfaces.
-    is_split: bool,
 }
 
 impl PairOrigin {
-    /// Describe a pair of faces of two surfaces with these names.
-    fn new(entry: ContactEntry, names: [&str; 2], face: [Option<usize>; 2]) -> Self {
-        let name = |side: usize| match face[side] {
-            Some(number) => format!("{}.{number}", names[side]),
-            None => names[side].to_owned(),
-        };
-        Self { entry, names: [name(0), name(1)], is_split: face != [None; 2] }
-    }
-
     /// Return the scene's description of the pair. `between` has the names of the pair.
     fn spec(&self, scene: &Scene) -> ContactSpec {
         let mut spec = match self.entry {
@@ -121,67 +104,27 @@ pub fn all<const D: usize>(
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
     let named = scene.contacts.iter().enumerate();
-    let mut found = named
-        .map(|named| self::named(named, mesh, cut, &owners, parts, &scene.carriers))
-        .collect::<Result<Vec<_>>>()?;
+    let mut found = named.map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
-    found.extend(auto::find(&scene.auto, cut, parts, &taken, &scene.carriers)?);
-    let mut contacts = Vec::new();
-    for surfaces in found {
-        contacts.extend(assemble(scene, cut, parts, fine, surfaces)?);
+    found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
+    let mut contacts: Vec<Contact<D>> = Vec::new();
+    for pair in found {
+        contacts.extend(Opposite::new(scene, parts, pair).assemble(&scene.laws, parts, cut, fine)?);
     }
-    auto::all_find_some(&scene.auto, contacts.iter().map(|contact: &Contact<D>| contact.facts.origin.entry))?;
+    auto::all_find_some(&scene.auto, contacts.iter().map(|contact| contact.facts.origin.entry))?;
     Ok(contacts)
 }
 
-/// Return the pairs of two surfaces. A piece of them whose facets have no common piece with the normals and the carrier of its own is left out;
-/// surfaces with names must keep one.
-///
-/// # Errors
-/// Surfaces with names do not face each other. A law or a gap has no value somewhere.
-fn assemble<const D: usize>(
-    scene: &Scene,
-    cut: Cut<D>,
-    parts: &[SceneBody<D>],
-    fine: bool,
-    surfaces: SurfacePair<D>,
-) -> Result<Vec<Contact<D>>> {
-    let SurfacePair { entry, bodies, names, swapped, pieces } = surfaces;
-    let (mut contacts, mut left_out, count): (Vec<Contact<D>>, _, _) = (Vec::new(), [0; 2], pieces.len());
-    for (number, piece) in pieces.into_iter().enumerate() {
-        let all: [usize; 2] = std::array::from_fn(|side| piece.facets[side].count() + piece.idle[side]);
-        let is_needed = matches!(entry, ContactEntry::Named(_)) && contacts.is_empty() && number + 1 == count;
-        match Opposite::new(entry, scene, parts, bodies, names, piece, swapped).assemble(
-            &scene.laws,
-            parts,
-            cut,
-            fine,
-            is_needed,
-        )? {
-            Some(contact) => contacts.push(contact),
-            None => left_out = [0, 1].map(|side| left_out[side] + all[side]),
-        }
-    }
-    if let (ContactEntry::Named(_), Some(ContactFacts { idle, swapped, .. })) =
-        (entry, contacts.first_mut().map(|c| &mut c.facts))
-    {
-        *idle += left_out[usize::from(*swapped)];
-    }
-    Ok(contacts)
-}
-
-/// Return the pairs of the two surfaces that a contact names: one, or several where they have edges.
+/// Return the pair of the two surfaces that a contact names.
 ///
 /// # Errors
 /// A surface is missing, or bounds no body or several. Both belong to one body.
 fn named<'a, const D: usize>(
     (number, spec): (usize, &'a ContactSpec),
     mesh: &Mesh<D>,
-    cut: Cut<D>,
     owners: &Owners,
-    parts: &[SceneBody<D>],
-    carriers: &[Carrier],
+    parts: &'a [SceneBody<D>],
 ) -> Result<SurfacePair<'a, D>> {
     let surface = |k: usize| {
         let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
@@ -195,29 +138,7 @@ fn named<'a, const D: usize>(
     }
     let names = spec.between.each_ref().map(|name| name.value.as_str());
     let sides = [parts[first].side(names[0], on_first, spec.edge), parts[second].side(names[1], on_second, spec.edge)];
-    let is_smooth = |side: &Side<D>| {
-        let all = vec![true; side.facets.count()];
-        !SmoothFaces::new(side, spec.edge).meet(side, &all)
-    };
-    let bodies = [first, second];
-    let swapped = carrier::is_second(parts, bodies, sides.each_ref().map(|side| &side.facets), spec.table, carriers);
-    let mut pieces = Vec::new();
-    if !sides.iter().all(is_smooth) {
-        // The side with the contact points is projected onto the other, so that the order of the names changes nothing.
-        let [a, b] = if swapped { [&sides[1], &sides[0]] } else { [&sides[0], &sides[1]] };
-        let reach = Reach::between(a, b, spec.angle, spec.distance);
-        pieces = FaceSplit::new([a, b], spec.edge, cut, &reach).into_whole_pieces();
-        if swapped {
-            pieces.iter_mut().for_each(PairPart::swap);
-        }
-        pieces.sort_by_key(|piece| piece.face);
-    }
-    // Surfaces without edges stay as they are, and so do those that do not face each other, which are refused later.
-    if pieces.is_empty() {
-        let facets = sides.map(|side| side.facets);
-        pieces.push(PairPart { facets, face: [None; 2], idle: [0; 2], far: Default::default() });
-    }
-    Ok(SurfacePair { entry: ContactEntry::Named(number), bodies, names, swapped, pieces })
+    Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], sides, far: Default::default() })
 }
 
 /// Two surfaces that are to be a pair.
@@ -229,46 +150,34 @@ struct Opposite<'a, const D: usize> {
     b: Side<'a, D>,
     /// Whether side a is the second of `spec.between`.
     swapped: bool,
-    /// Number of facets of side a that belong to no pair, counted in one pair of two surfaces.
-    idle: usize,
     /// Nodes of facets of side a that face side b, but are too far away.
     far: BTreeSet<u32>,
     reach: Reach,
 }
 
 impl<'a, const D: usize> Opposite<'a, D> {
-    /// Make the sides of a pair from a piece of two surfaces with these bodies and names.
-    fn new(
-        entry: ContactEntry,
-        scene: &Scene,
-        parts: &'a [SceneBody<D>],
-        bodies: [usize; 2],
-        names: [&'a str; 2],
-        piece: PairPart<D>,
-        swapped: bool,
-    ) -> Self {
-        let origin = PairOrigin::new(entry, names, piece.face);
+    /// Choose the side that carries the points.
+    fn new(scene: &Scene, parts: &[SceneBody<D>], pair: SurfacePair<'a, D>) -> Self {
+        let SurfacePair { entry, bodies, sides: [first, second], far: [far_first, far_second] } = pair;
+        let origin = PairOrigin { entry, names: [first.name.to_owned(), second.name.to_owned()] };
         let spec = origin.spec(scene);
-        let PairPart { facets: [on_first, on_second], idle, far: [far_first, far_second], .. } = piece;
-        let first = parts[bodies[0]].side(names[0], on_first, spec.edge);
-        let second = parts[bodies[1]].side(names[1], on_second, spec.edge);
+        let swapped = carrier::is_second(parts, bodies, [&first.facets, &second.facets], spec.table, &scene.carriers);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
         };
         let reach = Reach::between(&a, &b, spec.angle, spec.distance);
-        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, idle: idle[usize::from(swapped)], far, reach }
+        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, far, reach }
     }
 
-    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces have no common piece, unless the pair is
-    /// needed.
+    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair that was found have no common
+    /// piece.
     fn assemble(
         mut self,
         laws: &OwnLaws,
         parts: &[SceneBody<D>],
         cut: Cut<D>,
         fine: bool,
-        is_needed: bool,
     ) -> Result<Option<Contact<D>>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.a.towards(&self.b, &common) {
@@ -277,11 +186,11 @@ impl<'a, const D: usize> Opposite<'a, D> {
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
-        let Self { origin, spec, bodies, a, b, swapped, idle, far, .. } = self;
+        let Self { origin, spec, bodies, a, b, swapped, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
-            Err(Fault::NoPartner) if !is_needed => return Ok(None),
+            Err(Fault::NoPartner) if matches!(origin.entry, ContactEntry::Found(_)) => return Ok(None),
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut, &spec)))?,
         };
         pair.surfaces = spec.between.each_ref().map(|name| name.value.clone());
@@ -307,7 +216,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
         let ends =
             spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
-        Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } }))
+        Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, chords, ends, surface } }))
     }
 }
 

@@ -280,6 +280,8 @@ pub struct ContactTable {
     pub displacement: [Vec<f64>; 2],
     /// Estimated error of the pressure, exact minus discrete; empty unless an estimate was requested.
     pub pressure_error: Vec<f64>,
+    /// Number of the smooth face of the surface with the points; empty if all points are on one.
+    pub face: Vec<f64>,
 }
 
 impl ContactTable {
@@ -294,9 +296,8 @@ impl ContactTable {
             (&name_a, &self.displacement[0]),
             (&name_b, &self.displacement[1]),
         ];
-        if !self.pressure_error.is_empty() {
-            columns.push(("pressure_error", &self.pressure_error));
-        }
+        let optional: [(&str, &[f64]); 2] = [("pressure_error", &self.pressure_error), ("face", &self.face)];
+        columns.extend(optional.into_iter().filter(|(_, values)| !values.is_empty()));
         let mut csv = csv::Writer::from_writer(out);
         csv.write_record(["x", "y", "z"].into_iter().chain(columns.iter().map(|(name, _)| *name)))?;
         for (q, point) in self.points.iter().enumerate() {

@@ -37,9 +37,9 @@ keys! {
             /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most twice its own
             /// area there. Both tend to infinity as the angle grows to a right one.
             pub angle: f64 = 60.0,
-            /// angle in degrees beyond which facets meet at an edge that splits a surface
+            /// angle in degrees beyond which facets meet at an edge, with a normal for each side
             ///
-            /// It is > 0 and at most 180. Faces on both sides of an edge form pairs of their own.
+            /// It is > 0 and at most 180.
             ///
             /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45 degrees. The
             /// default is in between.

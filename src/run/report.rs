@@ -35,6 +35,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     report.warnings.extend(too_large);
     for i in 0..model.pairs.len() {
         report.warnings.extend(warnings::beyond_law(done, i).into_iter().chain(warnings::by_chords(done, i)));
+        report.warnings.extend(warnings::tilted(done, i));
     }
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
@@ -340,6 +341,11 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
         pressure: outcome.layer.pressure[range.clone()].to_vec(),
         displacement: sides.map(displacement),
         pressure_error: estimate.map_or(Vec::new(), |estimate| estimate.pressure_error[range].to_vec()),
+        face: if pair.face.iter().any(|&face| face > 1) {
+            pair.face.iter().map(|&face| face as f64).collect()
+        } else {
+            Vec::new()
+        },
     }
 }
 

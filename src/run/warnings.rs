@@ -7,7 +7,6 @@ use super::stages::{Built, Done};
 use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, Left, LostPieces, UncoveredPoint};
 use crate::discretize::{ContactInfo, Discrete, point};
-use crate::error::few;
 use crate::estimate::{Cause, Estimate, softness};
 use crate::linalg::{self, diagonal};
 use crate::model::Mechanism;
@@ -15,7 +14,6 @@ use crate::output::report::readable;
 use crate::output::{BalanceReport, sci};
 use crate::petsc::{Schur, Session, has_metis};
 use crate::problem::LayerSpec;
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 /// Return the warnings about a problem before it is solved.
@@ -138,8 +136,8 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
         let change = estimate.sides[i];
         if change > estimate.pressure[i].max(ONE_SIDED) {
             warnings.push(format!(
-                "the pressures between `{a}` and `{b}` would change by about {:.0} % with the normals of `{b}` instead of those of `{a}`, more \
-                 than by their estimated error: the surfaces slide or tilt too far for small displacements",
+                "the pressures between `{a}` and `{b}` depend by about {:.0} % on which of their normals count, more than by their estimated \
+                 error: the surfaces slide or tilt too far for small displacements",
                 100.0 * change
             ));
         }
@@ -154,7 +152,7 @@ fn names(contact: &ContactInfo) -> [&str; 2] {
 
 /// Return the warnings of the surfaces of all pairs.
 fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
-    let mut warnings = split_pairs(contacts);
+    let mut warnings = Vec::new();
     for (pair, contact) in pairs.iter().zip(contacts) {
         warnings.extend(left_out(pair, contact));
         warnings.extend(lost(pair, contact));
@@ -173,15 +171,11 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
 fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     let without: Vec<Left> =
         pair.cover.iter().filter(|cover| cover.carriers.is_none()).map(|cover| cover.left).collect();
-    if without.is_empty() && contact.idle == 0 {
+    if without.is_empty() {
         return None;
     }
     let [a, b] = names(contact);
-    let (all, count) = (pair.cover.len() + contact.idle, without.len() + contact.idle);
-    let mut text = format!("{a} - {b}: {count} of {all} facets have no partner");
-    if contact.idle > 0 {
-        text += &format!("; {} of them lie beyond edges (key `edge`)", contact.idle);
-    }
+    let mut text = format!("{a} - {b}: {} of {} facets have no partner", without.len(), pair.cover.len());
     let steep = format!("stand at more than {} degrees to the other side (key `angle`)", contact.spec.angle);
     let far = match contact.spec.distance {
         Some(distance) => format!("are farther away from it than {distance} (key `distance`)"),
@@ -194,22 +188,6 @@ fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
         }
     }
     Some(text)
-}
-
-/// Return a line for each contact of the scene that is several pairs, since its surfaces have edges.
-fn split_pairs(contacts: &[ContactInfo]) -> Vec<String> {
-    let mut names_of: BTreeMap<usize, (f64, Vec<String>)> = BTreeMap::new();
-    for contact in contacts.iter().filter(|contact| contact.is_split) {
-        let ([a, b], spec) = (names(contact), &contact.spec);
-        names_of.entry(spec.table).or_insert((spec.edge, Vec::new())).1.push(format!("{a} - {b}"));
-    }
-    let line = |(table, (edge, names)): (usize, (f64, Vec<String>))| {
-        let names = few(names).join(", ");
-        format!(
-            "contact.{table}: surfaces have edges of more than {edge} degrees (key `edge`), and faces are pairs of their own: {names}"
-        )
-    };
-    names_of.into_iter().map(line).collect()
 }
 
 /// Least change of the pressures by the height of curved surfaces above straight facets that is worth a warning. The height is that of parabolas
@@ -314,6 +292,29 @@ pub fn beyond_law(done: &Done, i: usize) -> Option<String> {
             sci(most, 2),
             sci(pressure, 2),
             sci(end, 2)
+        )
+    })
+}
+
+/// Change of the force along the normal, as a share, from which it is worth a warning that the normals of both sides differ. A normal that is
+/// inclined by the angle t changes the force by t^2/2: one per cent belongs to 8 degrees.
+const TILTED: f64 = 0.01;
+
+/// Return the warning for pair `i`, if the normals of its sides differ under pressure by more than small displacements allow.
+pub fn tilted(done: &Done, i: usize) -> Option<String> {
+    let (pair, pressure) = (&done.model().pairs[i], &done.outcome.layer.pressure[done.model().range(i)]);
+    let force = |q: usize| pair.weight[q] * pressure[q];
+    let all: f64 = (0..pair.len()).map(force).sum();
+    let mean = |of: &dyn Fn(f64) -> f64| (0..pair.len()).map(|q| force(q) * of(pair.tilt[q])).sum::<f64>() / all;
+    let along = mean(&|tilt| 0.5 * tilt * tilt);
+    let [a, b] = names(&done.built.discrete.contacts[i]);
+    (done.outcome.status.is_solved() && all > 0.0 && along > TILTED).then(|| {
+        format!(
+            "{a} - {b}: the normals of both sides differ under pressure by {:.0} degrees on the mean: the contact force depends by {:.0} % on which of \
+             them counts, and forces along the surfaces by {:.0} % of it, since displacements are taken to be small",
+            (2.0 * along).sqrt().to_degrees(),
+            100.0 * along,
+            100.0 * mean(&|tilt| tilt)
         )
     })
 }

@@ -8,6 +8,7 @@ mod fits;
 mod foreign;
 mod gmsh;
 mod meshes;
+mod normals;
 mod patterns;
 mod pieces;
 mod quadratic;
