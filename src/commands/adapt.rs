@@ -345,11 +345,8 @@ impl AdaptiveRun {
         }
         // coarse meshes may miss a singularity of the pressure: on the first mesh that resolves it the estimated error of pressures grows,
         // while that in energy falls
-        if self
-            .best
-            .as_ref()
-            .is_some_and(|best| !best.is_guess && best.error <= error && best.energy <= estimate.energy)
-        {
+        let is_better = |best: &Best| !best.is_guess && best.error <= error && best.energy <= estimate.energy;
+        if self.best.as_ref().is_some_and(is_better) {
             return self.follow_best();
         }
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
@@ -359,8 +356,8 @@ impl AdaptiveRun {
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
         let most = goal.cells as f64 * excess;
-        let layer = &done.outcome.layer;
-        let mut next = sizes::wanted(&**meshes, model, layer, estimate, Aim { share, more: GROWTH, most });
+        let aim = Aim { share, more: GROWTH, most };
+        let mut next = sizes::wanted(&**meshes, model, &done.outcome.layer, estimate, aim);
         // where the script bounds the sizes, no smaller ones give the missing cells: GROWTH bounds what is tried
         next.refine(excess.clamp(1.0, GROWTH).min(most / next.cells));
         if next.cells >= 0.9 * most && cells >= 0.7 * goal.cells as f64 {

@@ -50,7 +50,12 @@ fn patch_of(name: &str, shortening: f64, axis: usize, meshes: &[(usize, usize)],
             assert!((force(0) + 10.0).abs() < 1e-9 && (force(0) + force(1)).abs() < 1e-13 * 10.0);
             let other = solve_with(&swapped, &args);
             assert_eq!(other.count("iterations"), run.count("iterations"));
-            assert!(distance(&other.contact()["pressure"], &table["pressure"]) < 1e-13);
+            // of two equally fine surfaces the first one carries, whose order may be another
+            let pressure = &other.contact()["pressure"];
+            match other.text("pairs/0/carrier") == run.text("pairs/0/carrier") {
+                true => assert!(distance(pressure, &table["pressure"]) < 1e-13),
+                false => assert!(pressure.iter().all(|p| (p / 10.0 - 1.0).abs() < 1e-10), "{name}: {pressure:?}"),
+            }
             assert!((other.number(&format!("pairs/0/force/0/{axis}")) - force(1)).abs() < 1e-12);
         }
     }

@@ -651,7 +651,7 @@ fn pressures_at_a_rim_are_a_guess() {
 fn an_adaptation_ends_when_only_a_sharp_end_is_left() {
     let adapted = |stiffness: &str| {
         let layer = format!("contact.0.layer.linear.stiffness={stiffness}");
-        let title = format!("title={}", nanoseconds());
+        let title = format!("title=\"{}\"", nanoseconds());
         solve(punch(PUNCH, "x = 0, y = -1e-3"), &["--tolerance", "2e-2", "--set", &layer, "--set", &title]).converged()
     };
     let (hard, soft) = (adapted("1e9"), adapted("1e4"));
