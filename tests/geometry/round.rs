@@ -124,7 +124,7 @@ fn a_force_beside_the_centre_is_told() {
 
 /// The largest difference of the pressures of two runs, relative to the mean.
 fn apart(one: &Run, other: &Run) -> f64 {
-    let [p, q] = [one, other].map(|run| run.contact()["pressure"].clone());
+    let [p, q] = [one, other].map(|run| run.contact()["pressure"].to_vec());
     let mean = p.iter().sum::<f64>() / p.len() as f64;
     p.iter().zip(&q).map(|(p, q)| (p - q).abs()).fold(0.0, f64::max) / mean
 }
