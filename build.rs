@@ -80,6 +80,7 @@ const FUNCTIONS: &[&str] = &[
     "PCGetFailedReason",
     "PCGetOperators",
     "PCGetType",
+    "PCMGGetLevels",
     "PCMGGetSmoother",
     "PCMGSetGalerkin",
     "PCMGSetInterpolation",

@@ -17,7 +17,7 @@ use crate::model::field::residual;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
 use held::HoldingSprings;
-pub use pressure::{Cause, Guess};
+pub use pressure::{Cause, Guess, softness};
 use pressure::{LayerError, PressureErrors, SAFETY};
 use std::rc::Rc;
 
@@ -39,6 +39,8 @@ pub struct Estimate {
     pub pressure_error: Vec<f64>,
     /// Relative error of the pressures of each pair at its points: root mean square over the surface, with the factor `SAFETY`.
     pub pressure: Vec<f64>,
+    /// The part of it on the facets at sharp ends of the contact, where the pressure may be singular.
+    pub ends: Vec<f64>,
     /// Why the error of the pressures of each pair is a guess, if it is one.
     pub guesses: Vec<Option<Guess>>,
     /// Relative change of the pressures of each pair if the other side gave the normals.
@@ -48,6 +50,23 @@ pub struct Estimate {
 }
 
 impl Estimate {
+    /// Return the largest of the errors of pressures and displacements.
+    pub fn largest(&self) -> f64 {
+        self.pressure.iter().copied().fold(self.displacement, f64::max)
+    }
+
+    /// Return the largest of the errors of displacements, and of pressures beside sharp ends of contacts.
+    pub fn largest_beside_ends(&self) -> f64 {
+        let beside = |(whole, end): (&f64, &f64)| (whole * whole - end * end).max(0.0).sqrt();
+        self.pressure.iter().zip(&self.ends).map(beside).fold(self.displacement, f64::max)
+    }
+
+    /// Return the pair with the largest error at its sharp ends, and the error.
+    pub fn largest_end(&self) -> Option<(usize, f64)> {
+        let ends = self.ends.iter().copied().enumerate();
+        ends.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
     /// Return whether the errors are a guess: of pressures at the edge of the contact, or because the energy error is as large as the solution.
     pub fn is_guess(&self) -> bool {
         self.guesses.iter().any(Option::is_some) || self.energy >= 1.0 || self.energy.is_nan()
@@ -108,6 +127,7 @@ pub fn estimate(
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
         pressure: pressures.relative,
+        ends: pressures.ends,
         guesses: pressures.guesses,
         pressure_error: pressures.error,
         displacement: if error == 0.0 { 0.0 } else { SAFETY * f64::sqrt(error / whole) },

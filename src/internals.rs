@@ -22,7 +22,9 @@ pub mod expression {
 
 pub mod fem {
     //! Finite elements.
-    pub use crate::fem::{Elasticity, Facets, Frame, Space, Subdivision, assemble, cross, displacement, pad, surface};
+    pub use crate::fem::{
+        EDGES, Elasticity, Facets, Frame, Space, Subdivision, assemble, cross, displacement, pad, surface,
+    };
 }
 
 pub mod mesh {

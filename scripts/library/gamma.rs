@@ -6,7 +6,9 @@
 
 use std::f64::consts::PI;
 use std::path::Path;
-use winkler::api::{Gamma, GammaRule, Iterate, MethodName, MethodSpec, Result, Ritz, Session, Unbounded, solve};
+use winkler::api::{
+    Gamma, GammaRule, Iterate, MethodName, MethodSpec, Result, Ritz, Session, Solution, Unbounded, load, solve,
+};
 
 /// Steps after which the rule begins anew.
 const CYCLE: usize = 4;
@@ -22,16 +24,25 @@ impl GammaRule for Chebyshev {
     }
 }
 
+/// Solve the paper's groove by a rule for gamma.
+pub fn by(session: &Session, gamma: Gamma) -> Result<Solution> {
+    let overrides = ["mesh.set.n=16", "method.stop={residual=1e-9}", "solver=condensed"].map(str::to_owned);
+    let mut scene = load(Path::new("meshes/groove/scene.toml"), &overrides)?;
+    scene.method = MethodSpec { gamma, stop: scene.method.stop.clone(), ..MethodSpec::new(MethodName::Robin) };
+    solve(session, scene.rule("chebyshev", || Chebyshev))
+}
+
+/// Return the rules to compare.
+pub fn rules() -> [Gamma; 5] {
+    let own = Gamma::Own("chebyshev".to_owned());
+    [Gamma::Stationary(0.6), own, Gamma::Aitken, Gamma::Spectral, Gamma::LineSearch]
+}
+
 fn main() -> Result<()> {
     let session = Session::start(&[])?;
-    let overrides = ["mesh.set.n=16", "method.stop={residual=1e-9}", "solver=condensed"].map(str::to_owned);
-    for gamma in
-        [Gamma::Stationary(0.6), Gamma::Own("chebyshev".to_owned()), Gamma::Aitken, Gamma::Spectral, Gamma::LineSearch]
-    {
-        let mut scene = winkler::api::load(Path::new("meshes/groove/scene.toml"), &overrides)?;
-        scene.method = MethodSpec { gamma, stop: scene.method.stop.clone(), ..MethodSpec::new(MethodName::Robin) };
-        let name = format!("{:?}", scene.method.gamma);
-        let solution = solve(&session, scene.rule("chebyshev", || Chebyshev))?;
+    for gamma in rules() {
+        let name = format!("{gamma:?}");
+        let solution = by(&session, gamma)?;
         let report = solution.report();
         let peak = solution.contact(0).pressure.into_iter().fold(0.0, f64::max);
         println!("{name:20} {} in {:3} sweeps, peak pressure {peak:.6}", report.status, report.sweeps);

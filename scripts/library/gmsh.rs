@@ -4,9 +4,10 @@
 //! cargo run --release --example gmsh
 //! ```
 
-use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshSource, Result, Scene, Session, solve};
+use winkler::api::{BodySpec, ContactSpec, LayerSpec, MeshSource, Result, Scene, Session, Solution, solve};
 
-fn main() -> Result<()> {
+/// Solve the groove.
+pub fn groove(session: &Session) -> Result<Solution> {
     let half = |name: &str| {
         BodySpec::new(name, 2.1e5, 0.3)
             .fix(&format!("{name}_axis"), [Some(0.0), None])
@@ -20,8 +21,11 @@ fn main() -> Result<()> {
         .body(half("upper"))
         .contact(ContactSpec::new("lower_top", "upper_bottom", layer).gap(groove));
 
-    let session = Session::start(&[])?;
-    let solution = solve(&session, scene)?;
+    solve(session, scene)
+}
+
+fn main() -> Result<()> {
+    let solution = groove(&Session::start(&[])?)?;
     let report = solution.report();
     println!("{} in {} Newton steps, F1 = {:.10e}", report.status, report.iterations, report.f1.unwrap_or(f64::NAN));
     let contact = solution.contact(0);

@@ -5,7 +5,14 @@
 //! cargo run --release --example law
 //! ```
 
-use winkler::api::{BodySpec, ContactSpec, LayerLaw, LayerSpec, MeshArrays, Response, Result, Scene, Session, solve};
+use winkler::api::{
+    BodySpec, ContactSpec, LayerLaw, LayerSpec, MeshArrays, Response, Result, Scene, Session, Solution, solve,
+};
+
+const YOUNG: f64 = 100.0;
+/// The pressure on the upper block.
+pub const LOAD: f64 = 20.0;
+const FILM: Film = Film { stiffness: 50.0, thickness: 0.1 };
 
 #[derive(Debug)]
 struct Film {
@@ -37,22 +44,28 @@ fn block(mut mesh: MeshArrays, name: &str, y: f64, n: u32) -> MeshArrays {
     mesh.group(&format!("{name}_low"), 1, side(0)).group(&format!("{name}_high"), 1, side(n))
 }
 
-fn main() -> Result<()> {
-    let (young, load, k, h) = (100.0, 20.0, 50.0, 0.1);
+/// Solve the blocks with their film.
+pub fn pressed(session: &Session) -> Result<Solution> {
     let mesh = block(block(MeshArrays::new(Vec::new()), "lower", 0.0, 4), "upper", 1.0, 6);
     let scene = Scene::new(2, mesh)
-        .law("film", move |_| Film { stiffness: k, thickness: h })
-        .body(BodySpec::new("lower", young, 0.0).fix("lower_low", [Some(0.0), Some(0.0)]))
-        .body(BodySpec::new("upper", young, 0.0).fix("upper_high", [Some(0.0), None]).pressure("upper_high", load))
+        .law("film", |_| FILM)
+        .body(BodySpec::new("lower", YOUNG, 0.0).fix("lower_low", [Some(0.0), Some(0.0)]))
+        .body(BodySpec::new("upper", YOUNG, 0.0).fix("upper_high", [Some(0.0), None]).pressure("upper_high", LOAD))
         .contact(ContactSpec::new("lower_high", "upper_low", LayerSpec::Own("film".to_owned())));
+    solve(session, scene)
+}
 
-    let session = Session::start(&[])?;
-    let solution = solve(&session, scene)?;
+/// Return by how much the top moves, by the closed form.
+pub fn exact() -> f64 {
+    -(2.0 * LOAD / YOUNG + LOAD / (FILM.stiffness + LOAD / FILM.thickness))
+}
+
+fn main() -> Result<()> {
+    let solution = pressed(&Session::start(&[])?)?;
     let Some(upper) = solution.body(1).transpose()? else { return Ok(()) };
     let computed = upper.displacement.iter().map(|u| u[1]).fold(f64::INFINITY, f64::min);
-    let exact = -(2.0 * load / young + load / (k + load / h));
-    println!("{}: the top sinks by {computed:.12}, exact {exact:.12}", solution.report().status);
-    let off = solution.contact(0).pressure.iter().map(|p| (p - load).abs()).fold(0.0, f64::max);
+    println!("{}: the top sinks by {computed:.12}, exact {:.12}", solution.report().status, exact());
+    let off = solution.contact(0).pressure.iter().map(|p| (p - LOAD).abs()).fold(0.0, f64::max);
     println!("largest error of the pressure: {off:.1e}");
     Ok(())
 }

@@ -42,6 +42,9 @@ const GROWTH: f64 = 2.0;
 /// second has twice its cells.
 const MOST_WORSE: usize = 2;
 
+/// Number of times as many cells from which the cost of a sharp end is not worth it: two further meshes.
+const COSTLY: f64 = GROWTH * GROWTH;
+
 /// The state of a run on several meshes. A round is one mesh, with the solution on it.
 pub struct AdaptiveRun {
     pub scene: Rc<Scene>,
@@ -49,6 +52,8 @@ pub struct AdaptiveRun {
     pub rounds: Vec<RoundReport>,
     /// Why the run ends before the error is reached, as a text.
     pub limit: Option<String>,
+    /// What the error at a sharp end of a contact would cost, as a text, if it alone is left.
+    pub costly_end: Option<String>,
     /// The error to which meshes are adapted; none without adaptation.
     goal: Option<AdaptSpec>,
     /// The scene that follows a coarse one.
@@ -65,6 +70,8 @@ pub struct AdaptiveRun {
     seconds: f64,
     /// The solution of the round before with its estimated errors.
     previous: Option<EstimatedSolution>,
+    /// The error at sharp ends on the mesh before.
+    last_end: Option<EndError>,
     /// The best mesh so far.
     best: Option<Best>,
     /// Whether this round is the best mesh once more, with which the run ends.
@@ -73,6 +80,21 @@ pub struct AdaptiveRun {
     predicted_cells: Option<f64>,
     /// The load steps that follow on the last mesh, while meshes are adapted under the largest of them.
     later_steps: Option<History>,
+}
+
+/// The largest error of pressures at a sharp end of a contact, on a mesh with this number of cells.
+#[derive(Clone, Copy)]
+struct EndError {
+    cells: f64,
+    error: f64,
+}
+
+impl EndError {
+    /// Return the number of cells of a mesh whose error is `asked`, if it goes on falling with the number of cells as it did since the mesh `before`.
+    fn cells_for(&self, before: EndError, asked: f64) -> f64 {
+        let rate = (before.error / self.error).ln() / (self.cells / before.cells).ln();
+        if rate > 0.0 { self.cells * (self.error / asked).powf(1.0 / rate) } else { f64::INFINITY }
+    }
 }
 
 /// The last mesh that was better than the best one before it: with a smaller error, or with a smaller energy error.
@@ -137,6 +159,8 @@ impl AdaptiveRun {
             rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
             resumed,
             limit: None,
+            costly_end: None,
+            last_end: None,
             finer: None,
             start_from: Vec::new(),
             seconds: 0.0,
@@ -306,8 +330,8 @@ impl AdaptiveRun {
         if !is_solved {
             return false;
         }
-        let error = estimate.pressure.iter().copied().fold(estimate.displacement, f64::max);
-        if error <= goal.error.value {
+        let error = estimate.largest();
+        if error <= goal.error.value || self.has_costly_end(done, estimate, goal.error.value) {
             // the best mesh once more may have the error, because its estimate is held against another mesh than the first time
             self.limit = None;
             return self.end_meshes();
@@ -346,6 +370,32 @@ impl AdaptiveRun {
         let (energy, is_guess) = (estimate.energy, estimate.is_guess());
         self.best = Some(Best { error, energy, is_guess, round, view, next, tables, worse: 0 });
         self.go_from_best()
+    }
+
+    /// Return whether only a sharp end of a contact is left of an error, which meshes of a few times as many cells do not reach there.
+    ///
+    /// Without a layer the pressure is K r^(lambda - 1) at the distance r from the end, and facets of size h miss the order h^(lambda - 1/2) of it. A
+    /// punch with right angles has lambda = 0.774: a half of the error takes facets of a thirteenth.
+    fn has_costly_end(&mut self, done: &Done, estimate: &Estimate, asked: f64) -> bool {
+        let Some((pair, error)) = estimate.largest_end() else { return false };
+        let cells = self.rounds[self.rounds.len() - 1].cells as f64;
+        let own = EndError { cells, error };
+        let beside = estimate.largest_beside_ends();
+        let Some(before) = self.last_end.replace(own).filter(|_| beside <= asked && error > 0.0) else { return false };
+        let needed = own.cells_for(before, asked);
+        if needed <= COSTLY * cells {
+            return false;
+        }
+        let [a, b] = &done.model().pairs[pair].surfaces;
+        let meshes = match needed < 1e9 {
+            true => format!("takes a mesh of about {needed:.0e} cells"),
+            false => "takes more cells than a mesh can have".to_owned(),
+        };
+        self.costly_end = Some(format!(
+            "the pressures between `{a}` and `{b}` have an error of {error:.1e} at a sharp end of the contact, and all others of {beside:.1e} at most: \
+             {asked:.1e} there {meshes}; a rounded edge or a softer layer bounds these pressures"
+        ));
+        true
     }
 
     /// End the adaptation because the next mesh would have more cells than allowed.

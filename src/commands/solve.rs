@@ -202,6 +202,7 @@ impl Solver<'_> {
         let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
         let files = ResultFiles { is_last: true, ..self.files(&done, estimate.as_ref(), true) };
         let (report, written) = files.write(&mut self.clock.clone(), |report| {
+            report.warnings.extend(plan.costly_end.clone());
             if let Some(limit) = &plan.limit {
                 report.status = "mesh-limit".to_owned();
                 report.message = format!("the error asked for is not reached: {limit}");

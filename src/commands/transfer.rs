@@ -68,7 +68,9 @@ impl EstimatedSolution {
         }
         let norms = norms(&self.tables, tables);
         for (i, error) in estimate.pressure.iter_mut().enumerate() {
-            *error *= excess(&norms.pressure[i], *error, self.pressure[i]);
+            let excess = excess(&norms.pressure[i], *error, self.pressure[i]);
+            *error *= excess;
+            estimate.ends[i] *= excess;
         }
         estimate.displacement *= excess(&norms.displacement, estimate.displacement, self.displacement);
     }
@@ -130,7 +132,12 @@ mod tests {
     #[test]
     fn errors_explain_the_difference_of_two_meshes() {
         let corrected = |of_earlier: f64| {
-            let estimate = |displacement: f64| Estimate { displacement, pressure: vec![0.1], ..Estimate::default() };
+            let estimate = |displacement: f64| Estimate {
+                displacement,
+                pressure: vec![0.1],
+                ends: vec![0.0],
+                ..Estimate::default()
+            };
             let mut later = estimate(0.05);
             EstimatedSolution::new(&estimate(of_earlier), vec![table(5, 1.0)]).correct(&[table(5, 1.1)], &mut later);
             assert_eq!(later.pressure, [0.1]);

@@ -13,7 +13,7 @@ use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// An integration point that both surfaces of a pair share.
 #[derive(Serialize, Deserialize)]
@@ -83,7 +83,8 @@ pub struct FineSide<const D: usize> {
 }
 
 impl<const D: usize> Fine<D> {
-    /// Collect the integration points of `pair`, which was made of these sides and common pieces.
+    /// Collect the integration points of `pair`, which was made of these sides and common pieces. `jumps` has the nodes of both sides where the
+    /// material of their body jumps.
     ///
     /// `gap(x)` is the gap that the scene adds to the distance of the meshes. If the surfaces are `touching`, the difference
     /// between that distance at a contact point and its mean around it counts as zero, as does the height of surfaces above their facets.
@@ -94,6 +95,7 @@ impl<const D: usize> Fine<D> {
         pair: &ContactPair,
         gap: &dyn Fn([f64; 3]) -> f64,
         touching: bool,
+        jumps: [&HashSet<u32>; 2],
     ) -> Self {
         let shared = &common.points;
         let side = |side: &Side<D>,
@@ -108,7 +110,7 @@ impl<const D: usize> Fine<D> {
             true => 0.0,
             false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
         };
-        let at_rim = facets_at_rim(a, b, common, &pair.cover);
+        let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
         let direction = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.direction);
         let of_point = |point: &IntegrationPoint<D>| FinePoint {
@@ -315,17 +317,29 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
 /// 1/2 <= lambda. The edge is no rim where the surface goes on as its mirror image: on an axis of revolution, and on a plane of symmetry.
 /// A facet lies at a rim if such an edge of side a bounds it. It does, too, if side b ends on it or on a facet beside it, at such an edge
 /// of b: the covered part of that facet may be a sliver.
-fn facets_at_rim<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>, cover: &[Coverage]) -> Vec<bool> {
+///
+/// The pressure may be singular where an interface of two materials ends in the contact, too, on the softer one as at a corner of the stiffer one.
+fn facets_at_rim<const D: usize>(
+    a: &Side<D>,
+    b: &Side<D>,
+    common: &Intersection<D>,
+    cover: &[Coverage],
+    jumps: [&HashSet<u32>; 2],
+) -> Vec<bool> {
+    let at_jump = |side: usize, nodes: &[u32]| nodes.iter().any(|node| jumps[side].contains(node));
     let (edges_a, edges_b) = (a.facets.by_edge(), b.facets.by_edge());
-    let mut above_rim_of_b = vec![false; a.facets.count()];
+    let (mut above_rim_of_b, mut at_interface) = (vec![false; a.facets.count()], vec![false; a.facets.count()]);
     for point in &common.points {
         above_rim_of_b[point.facet_a] |= is_at_rim(b, &edges_b, point.facet_b);
+        at_interface[point.facet_a] |=
+            at_jump(0, a.facets.facet(point.facet_a)) || at_jump(1, b.facets.facet(point.facet_b));
     }
     let ends_on = |i: usize| cover[i].share < WHOLE;
     let beside = |i: usize| a.facets.edges(i).into_iter().flat_map(|edge| &edges_a[&edge]).filter(move |&&k| k != i);
     let ends_beside = |i: usize| beside(i).any(|&k| ends_on(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
     let at_rim = |i: usize| {
-        cover[i].share > 0.0 && (is_at_rim(a, &edges_a, i) || ends_on(i) && above_rim_of_b[i] || ends_beside(i))
+        cover[i].share > 0.0
+            && (at_interface[i] || is_at_rim(a, &edges_a, i) || ends_on(i) && above_rim_of_b[i] || ends_beside(i))
     };
     (0..a.facets.count()).map(at_rim).collect()
 }

@@ -1,88 +1,70 @@
-//! What a user should know of a pair: overlaps that facets make where they leave their curved surface, and points where the pair ends
-//! because its surfaces are farther apart than its largest distance.
+//! What a user should know of a pair: how far straight facets leave curved surfaces, and points where the pair ends because its surfaces are
+//! farther apart than its largest distance.
 
 use super::pair::ContactPair;
 use super::pieces::Intersection;
 use super::side::Side;
 use crate::fem::{element, minus};
-use crate::linalg::{dot, range};
+use crate::linalg::dot;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap};
 
-/// An overlap of two meshes that is mostly made by their facets.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// The height of curved surfaces above straight facets.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chords {
-    /// Largest distance between a facet where the bodies overlap and its curved surface.
+    /// Largest distance between a facet and its curved surface.
     pub sagitta: f64,
-    /// Largest overlap of the contact points.
-    pub deepest: f64,
-    /// Mean overlap, weighted by the areas of the points, if it is positive.
-    pub mean: Option<f64>,
+    /// Mean height of both surfaces above their facets around each contact point, by which the gap is too large, n.
+    pub height: Vec<f64>,
 }
-
-/// Difference of the gaps, as a share of the overlap, up to which the gap is uniform. Bodies are stiffer against a gap that changes from facet
-/// to facet than against a uniform one, by about the radius over the size of a facet. So a tenth can change pressures by all of their mean.
-///
-/// On rings in space with six and seven chords on a quarter, an overlap of 0.01 at the radius 2 differs by half of its largest value, and the
-/// mean pressure is 1.4 times that of Lame.
-const UNIFORM: f64 = 0.1;
 
 impl Chords {
-    /// Return the overlap of a pair if its facets make most of it, `None` otherwise.
+    /// Return the heights at a pair, `None` if no facet is a chord of a curved surface.
     ///
-    /// A chord adds at most its sagitta s to the overlap of the curved surfaces. If the meshes overlap by o at most, the curved surfaces
-    /// overlap by o - s or more, and most of it comes from facets if s > o - s. What facets add differs from point to point: where those of
-    /// both surfaces match, the gap is uniform however coarse they are. So it must vary, too.
-    ///
-    /// Surfaces that touch at a point or along a line overlap as well where their facets do not match, within one facet from there. They are no
-    /// fit: on more than half of a fit what facets add is the whole distance, 2 s at most, as that of two facets.
+    /// Where facets of both sides match, one surface lies above its facets by as much as the other lies below, and the heights cancel.
     pub fn of<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>, pair: &ContactPair) -> Option<Self> {
-        let [least, most] = range(pair.gap.iter().copied());
-        let deepest = -least;
-        if deepest <= 0.0 || most - least <= UNIFORM * deepest {
-            return None;
-        }
-        let overlapping = pair.on_side.iter().zip(&pair.gap).filter(|(_, gap)| **gap < 0.0).map(|(&at, _)| at);
-        let overlapping: HashSet<u32> = overlapping.collect();
-        let mut facets = [HashSet::new(), HashSet::new()];
+        let (mut sums, mut sagitta) = (HashMap::<u32, [f64; 2]>::new(), 0.0f64);
+        let rises: [Vec<Vec<f64>>; 2] = [a, b].map(|side| (0..side.facets.count()).map(|i| rises(side, i)).collect());
         for point in &common.points {
-            if a.on_facet(point.facet_a).iter().any(|at| overlapping.contains(at)) {
-                facets[0].insert(point.facet_a);
-                facets[1].insert(point.facet_b);
+            let on = [(&rises[0][point.facet_a], &point.at_a), (&rises[1][point.facet_b], &point.at_b)];
+            let height: f64 = on.iter().flat_map(|(rises, l)| rises.iter().zip(products(l))).map(|(r, l)| r * l).sum();
+            on.iter().flat_map(|(rises, _)| *rises).for_each(|rise| sagitta = sagitta.max(0.25 * rise.abs()));
+            for (at, share) in
+                a.on_facet(point.facet_a).iter().zip(point.at_a.into_iter().chain(products(&point.at_a)))
+            {
+                let sum = sums.entry(*at).or_default();
+                *sum = [sum[0] + point.weight * share * height, sum[1] + point.weight * share];
             }
         }
-        let sagitta = largest_sagitta(a, &facets[0]).max(largest_sagitta(b, &facets[1]));
-        let area: f64 = pair.weight.iter().sum();
-        let mean = -pair.weight.iter().zip(&pair.gap).map(|(w, gap)| w * gap).sum::<f64>() / area;
-        let close = pair.weight.iter().zip(&pair.gap).filter(|(_, gap)| gap.abs() <= 2.0 * sagitta);
-        let is_fit = 2.0 * close.map(|(w, _)| w).sum::<f64>() > area;
-        (is_fit && 2.0 * sagitta > deepest).then_some(Self {
-            sagitta,
-            deepest,
-            mean: Some(mean).filter(|&mean| mean > 0.0),
-        })
+        let mean = |at: &u32| sums.get(at).map_or(0.0, |[height, weight]| height / weight);
+        (sagitta > 0.0).then(|| Self { sagitta, height: pair.on_side.iter().map(mean).collect() })
     }
 }
 
-/// Return the largest distance of straight facets from their curved surface.
+/// Return the rise of a curved surface over each edge of a facet, in the order of [`products`]: the factor of l_i l_j in the height of the
+/// surface above the facet. It is zero on a facet that is curved itself.
 ///
-/// The edge from x_i to x_j is a chord. Between its ends the normal of the surface turns from n_i to n_j, so that the parabola over it
-/// rises by (n_j - n_i).(x_j - x_i)/8.
-fn largest_sagitta<const D: usize>(side: &Side<D>, facets: &HashSet<usize>) -> f64 {
-    let mut largest: f64 = 0.0;
-    for &facet in facets {
-        let x = side.facets.coordinates(facet, side.space);
-        if !element::is_straight(&x, D) {
-            continue;
-        }
-        let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
-        for i in 0..D {
-            for j in i + 1..D {
-                largest = largest.max(0.125 * dot(&minus(normals[j], normals[i]), &minus(x[j], x[i])).abs());
-            }
-        }
-    }
-    largest
+/// The edge from x_i to x_j is a chord if the normals at both ends turn away from the facet to opposite sides. Beside an edge of a part only one
+/// of them does. The smaller turn counts.
+fn rises<const D: usize>(side: &Side<D>, facet: usize) -> Vec<f64> {
+    let x = side.facets.coordinates(facet, side.space);
+    let is_straight = element::is_straight(&x, D);
+    let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
+    let rise = |(i, j): (usize, usize)| {
+        let along = minus(x[j], x[i]);
+        let (first, last) = (-dot(&normals[i], &along), dot(&normals[j], &along));
+        if is_straight && first * last > 0.0 { first.signum() * first.abs().min(last.abs()) } else { 0.0 }
+    };
+    edges::<D>().map(rise).collect()
+}
+
+/// Return l_i l_j for each edge of a facet.
+fn products<const D: usize>(l: &[f64; D]) -> impl Iterator<Item = f64> {
+    edges::<D>().map(|(i, j)| l[i] * l[j])
+}
+
+fn edges<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
+    element::EDGES[..D * (D - 1) / 2].iter().copied()
 }
 
 /// A contact point on a facet, or beside one, that has no partner or only a part of one, because what lies before it is too far away.

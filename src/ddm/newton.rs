@@ -15,7 +15,7 @@ use super::bound::{Reached, Scale, compression_roundoff, contact_energy, surface
 use super::progress::{Equilibrium, SHORTEST};
 use super::run::{FallbackIterate, LoopEnd, Measured, Run};
 use super::start;
-use super::stop::{Stagnation, Status};
+use super::stop::{Cycle, Stagnation, Status};
 use crate::error::Result;
 use crate::model::Model;
 use crate::model::field::{Field, LineEnergy, residual};
@@ -53,7 +53,8 @@ pub(super) fn iterate(
     is_near: bool,
 ) -> Result<LoopEnd> {
     let (unit, tolerance) = (meeting_slopes(run.model), run.stop.tolerance());
-    let mut newton = Newton { run, linear, unit, tolerance, u, states, is_near, correction: None, best: None };
+    let start = Some(u.clone());
+    let mut newton = Newton { run, linear, unit, tolerance, u, start, states, is_near, correction: None, best: None };
     loop {
         let step = match newton.linear_step()? {
             Ok(step) => step,
@@ -66,6 +67,9 @@ pub(super) fn iterate(
         let iterate = newton.advance(step, part);
         let measures = newton.measure(&iterate)?;
         if let Some(status) = newton.check_termination(&iterate, &measures)? {
+            if newton.leave_cycle(&status)? {
+                continue;
+            }
             return Ok(newton.end(status, Some(iterate.resolved)));
         }
         newton.update_states(&iterate);
@@ -83,6 +87,8 @@ struct Newton<'n, 'r> {
     unit: Vec<f64>,
     tolerance: f64,
     u: Field,
+    /// Displacements at the start, until F1 has fallen from there.
+    start: Option<Field>,
     /// States of the layers from which the next linear step is taken.
     states: Layer,
     /// Whether these states are those of another solution, while the displacements are still at rest.
@@ -194,6 +200,17 @@ impl Newton<'_, '_> {
         Ok(true)
     }
 
+    /// Leave a cycle once: go back to the start, and let F1 fall from there. Far from the solution roundoff may hide in which direction it falls.
+    /// Return whether the run goes on.
+    fn leave_cycle(&mut self, status: &Status) -> Result<bool> {
+        let is_cycle = matches!(status, Status::Cycle { .. });
+        let Some(start) = self.start.take_if(|_| is_cycle) else { return Ok(false) };
+        self.u = start;
+        (self.correction, self.best) = (None, None);
+        self.run.memory.cycle = Cycle::default();
+        self.descend()
+    }
+
     /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length; none if its linear system
     /// is not solved, or F1 falls without end.
     fn descent_step(&mut self) -> Result<Option<f64>> {
@@ -241,7 +258,10 @@ impl Newton<'_, '_> {
         let (rest, energy) = residual(run.model, &self.u, &run.model.forces(&iterate.pressure));
         let measured = run.measure(energy, &Layer::new(run.model, iterate.compression.clone()), self.linear);
         let strain = measured.strain;
-        let reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
+        let mut reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
+        if step.is_exact {
+            reached.verify(measured.unbalanced);
+        }
         let is_enough = run.is_enough(&reached);
         let is_complete = is_enough || run.is_at_roundoff(&reached, &self.u, resolved, strain);
         let mut measures = Measures { measured, reached, is_complete, is_roundoff: false };

@@ -37,7 +37,7 @@ pub(super) struct Run<'a> {
 }
 
 /// Numbers in the message of a step, besides requests from outside.
-const SUMS: usize = 4;
+const SUMS: usize = 6;
 
 /// How a loop ended.
 pub(super) struct LoopEnd {
@@ -69,6 +69,8 @@ pub(super) struct Measured {
     pub f1: f64,
     pub factorizations: usize,
     pub inner_iterations: usize,
+    /// Length of f - K u - B' omega p relative to that of the forces in it.
+    pub unbalanced: f64,
     /// Requests from outside, of all ranks.
     pub asked: u8,
 }
@@ -78,7 +80,8 @@ impl Run<'_> {
     /// compressions of the bodies. Collective.
     pub fn measure(&self, energy: Energy, layer: &Layer, linear: &dyn LinearStep) -> Measured {
         let mut sums = [0.0; SUMS + ASKS];
-        (sums[0], sums[1]) = (energy.strain, energy.potential);
+        sums[..2].copy_from_slice(&[energy.strain, energy.potential]);
+        sums[4..SUMS].copy_from_slice(&[energy.rest, energy.forces]);
         sums[SUMS..].copy_from_slice(&asks(self.observer.asked()));
         for body in self.model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.states().leads())
         {
@@ -93,6 +96,7 @@ impl Run<'_> {
             f1: sums[1] + layer.energy.iter().sum::<f64>(),
             factorizations: sums[2] as usize + joint.factorizations,
             inner_iterations: sums[3] as usize + joint.inner_iterations,
+            unbalanced: if sums[4] == 0.0 { 0.0 } else { (sums[4] / sums[5]).sqrt() },
             asked: exchange::asked(&sums[SUMS..]),
         }
     }
@@ -259,6 +263,7 @@ impl Run<'_> {
                 f1,
                 factorizations: sweep.factorizations,
                 inner_iterations: sweep.inner_iterations,
+                unbalanced: 0.0,
                 asked: sweep.asked,
             },
             residual,

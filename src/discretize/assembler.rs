@@ -10,12 +10,13 @@ use super::unassembled::{Supported, Unconstrained};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::{self, AtDofs};
-use crate::fem::{ElasticBody, NodalForces, NodeGraph, Prolongation, RigidMotion, Space};
+use crate::fem::{ElasticBody, NodalForces, NodeGraph, Prolongation, RigidMotion, Space, Split};
 use crate::linalg::{Csr, dot};
 use crate::mesh::Mesh;
 use crate::model::{BodySlot, Distribution, FreeMotion, Loads, Local};
 use crate::problem::order::Order;
 use crate::problem::{BodySpec, Plane};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// The assembly of all bodies on one rank.
@@ -87,7 +88,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
                 }
             };
             let (unloaded, motions) = (local.unloaded, unsupported);
-            self.shapes.push(FemBody { space, held, elasticity, unloaded, motions });
+            self.shapes.push(FemBody { space, split: OnceCell::new(), held, elasticity, unloaded, motions });
         }
         let Made { local, imposed, scale, row_stiffness } = made;
         let name = info.name.clone();
@@ -170,7 +171,6 @@ fn evaluate<const D: usize>(
 ) -> Result<(Rc<Space<D>>, Rc<Constraints<D>>)> {
     let rigid = part.rigid_forces().collect();
     let (space, held) = (Rc::new(part.space), Rc::new(part.held));
-    let is_whole = info.ranks.len() == 1 && !own.contains(&false);
     let post = OnPart {
         name: info.name.clone(),
         exact: part.spec.exact.clone(),
@@ -183,15 +183,14 @@ fn evaluate<const D: usize>(
         extent: part.facts.extent,
         nodes: info.nodes,
         held: held.clone(),
+        split: Split::new(&space, &part.elasticity),
         elasticity: part.elasticity,
         space: space.clone(),
         own,
     };
     post.check_exact()?;
-    info.points = match is_whole {
-        true => part.facts.points,
-        false => space.part(post.owned()).1.iter().map(|&node| part.facts.points[node as usize]).collect(),
-    };
+    let shown = post.split.space.part(post.owned()).1;
+    info.points = shown.into_iter().map(|node| part.facts.points[post.split.origin(node) as usize]).collect();
     info.post = Some(Box::new(post) as Box<dyn Post>);
     Ok((space, held))
 }

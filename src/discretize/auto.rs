@@ -43,7 +43,7 @@ pub struct SurfacePair<'a, const D: usize> {
 /// the facets with a common piece are kept.
 ///
 /// # Errors
-/// A rule finds nothing, a pattern matches no body, or two rules match a pair equally well.
+/// A pattern matches no body, or two rules match a pair equally well.
 pub fn find<'a, const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
@@ -71,7 +71,6 @@ pub fn find<'a, const D: usize>(
         found.swapped = carrier::is_second(parts, possible.bodies, possible.near.each_ref(), table, carriers);
         all.push(found);
     }
-    all_find_some(rules, &all)?;
     Ok(all)
 }
 
@@ -134,14 +133,14 @@ fn meeting<'a, const D: usize>(
     SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, names, swapped: false, pieces }
 }
 
-/// Check that every rule found a pair.
+/// Check that every rule found a pair among the `found` ones.
 ///
 /// # Errors
 /// A rule found no pair; the first such rule is reported.
-fn all_find_some<const D: usize>(rules: &[AutoContact], found: &[SurfacePair<D>]) -> Result<()> {
-    let is_fruitless =
-        |rule: &usize| found.iter().all(|found| !matches!(found.entry, ContactEntry::Found(other) if other == *rule));
-    let Some(rule) = (0..rules.len()).find(is_fruitless) else { return Ok(()) };
+pub fn all_find_some(rules: &[AutoContact], found: impl Iterator<Item = ContactEntry>) -> Result<()> {
+    let of_rule = |entry| if let ContactEntry::Found(rule) = entry { Some(rule) } else { None };
+    let fruitful: BTreeSet<usize> = found.filter_map(of_rule).collect();
+    let Some(rule) = (0..rules.len()).find(|rule| !fruitful.contains(rule)) else { return Ok(()) };
     let (bodies, place) = title(&rules[rule]);
     let message = format!("no facets of {bodies} face each other within {}", distance(&rules[rule]));
     let help = match rules.len() {

@@ -2,8 +2,9 @@
 
 use super::supports::Constraints;
 use crate::contact::{Fine, FinePoints};
-use crate::fem::{Elasticity, Errors, Recovery, RigidMotion, Space, element};
+use crate::fem::{Elasticity, Errors, Recovery, RigidMotion, Space, Split, element};
 use crate::linalg::{Csr, axpy, dot};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -80,6 +81,8 @@ pub trait RecoveredFields {
 pub struct FemBody<const D: usize> {
     /// Space of the body.
     pub space: Rc<Space<D>>,
+    /// The same space, cut apart where the material jumps, once it has been requested.
+    pub split: OnceCell<Split<D>>,
     /// Elasticity of the body.
     pub elasticity: Rc<Elasticity>,
     /// Supports of the body, which define its dofs.
@@ -109,7 +112,9 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a> {
         let shape = &self.shapes[body];
-        Box::new(OnBody { kept: self, shape, u, recovery: Recovery::new(&shape.space, &shape.elasticity, u) })
+        let split = shape.split.get_or_init(|| Split::new(&shape.space, &shape.elasticity));
+        let recovery = Recovery::new(&split.space, &shape.elasticity, split.values(u));
+        Box::new(OnBody { kept: self, shape, split, u, recovery })
     }
 
     fn unloaded(&self, body: usize) -> &[f64] {
@@ -163,6 +168,7 @@ impl<const D: usize> Meshes for Kept<D> {
 struct OnBody<'a, const D: usize> {
     kept: &'a Kept<D>,
     shape: &'a FemBody<D>,
+    split: &'a Split<D>,
     u: &'a [f64],
     recovery: Recovery<'a, D>,
 }
@@ -171,60 +177,74 @@ struct OnBody<'a, const D: usize> {
 const SIGN: [f64; 2] = [1.0, -1.0];
 
 impl<const D: usize> OnBody<'_, D> {
-    /// Return the displacement at barycentric coordinates of a facet, including the interpolation error.
-    fn displacement(&self, nodes: &[u32], l: &[f64; D]) -> [f64; D] {
-        let mut u = self.recovery.missed(nodes, l);
-        for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
+    /// Return the displacement at a point of a facet, including the interpolation error.
+    fn displacement(&self, at: &FacetPoint<D>) -> [f64; D] {
+        let mut u = self.missed(at);
+        for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.space.order, at.l)) {
             (0..D).for_each(|c| u[c] += phi * self.u[D * node as usize + c]);
         }
         u
     }
 
-    /// Call `visitor` for each integration point of a side, with its index, its normal, and the nodes and barycentric coordinates
-    /// in its facet.
-    fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], &[u32], &[f64; D])) {
+    /// Return the interpolation error at a point of a facet.
+    fn missed(&self, at: &FacetPoint<D>) -> [f64; D] {
+        self.recovery.missed(at.split, at.l)
+    }
+
+    /// Call `visitor` for each integration point of a side, with its index, its normal, and the point in its facet.
+    fn visit(&self, pair: usize, side: usize, mut visitor: impl FnMut(usize, [f64; D], FacetPoint<D>)) {
         let fine = &self.kept.fine[pair];
         let on = &fine.sides[side];
+        let split = self.split.facets(&on.facets);
         for g in 0..fine.points.each.len() {
-            visitor(g, fine.normal[g].map(|n| SIGN[side] * n), on.facets.facet(on.facet[g]), &on.at[g]);
+            let (nodes, split) = (on.facets.facet(on.facet[g]), split.facet(on.facet[g]));
+            visitor(g, fine.normal[g].map(|n| SIGN[side] * n), FacetPoint { nodes, split, l: &on.at[g] });
         }
     }
 }
 
+/// A point of a facet of the boundary.
+struct FacetPoint<'a, const D: usize> {
+    /// Nodes of the facet.
+    nodes: &'a [u32],
+    /// The same nodes in the space that is cut apart where the material jumps.
+    split: &'a [u32],
+    /// Barycentric coordinates.
+    l: &'a [f64; D],
+}
+
 impl<const D: usize> RecoveredFields for OnBody<'_, D> {
     fn errors(&self, work_on_missed: f64) -> Errors {
-        self.recovery.errors(work_on_missed)
+        let errors = self.recovery.errors(work_on_missed);
+        Errors { load: self.split.sums(errors.load), ..errors }
     }
 
     fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64 {
         let mut work = 0.0;
-        self.visit(pair, side, |g, normal, nodes, l| work += force[g] * dot(&normal, &self.recovery.missed(nodes, l)));
+        self.visit(pair, side, |g, normal, at| work += force[g] * dot(&normal, &self.missed(&at)));
         work
     }
 
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
-        self.visit(pair, side, |g, normal, nodes, l| {
-            let u = self.displacement(nodes, l);
-            values[g] = (0..D).map(|c| normal[c] * u[c]).sum();
-        });
+        self.visit(pair, side, |g, normal, at| values[g] = dot(&normal, &self.displacement(&at)));
         values
     }
 
     fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let tilt = &self.kept.fine[pair].tilt;
         let mut values = vec![0.0; tilt.len()];
-        self.visit(pair, side, |g, _, nodes, l| values[g] = dot(&tilt[g], &self.displacement(nodes, l)));
+        self.visit(pair, side, |g, _, at| values[g] = dot(&tilt[g], &self.displacement(&at)));
         values
     }
 
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
         let Fine { near, sides, .. } = &self.kept.fine[pair];
-        let mut mean = vec![0.0; near.at.len()];
+        let (mut mean, split) = (vec![0.0; near.at.len()], self.split.facets(&sides[1].facets));
         rows.multiply(self.u, &mut mean);
         let lacks = |(q, mean): (usize, f64)| {
-            let (nodes, l) = (sides[1].facets.facet(near.facet[q]), &near.at[q]);
-            let u = self.displacement(nodes, l);
+            let (nodes, split) = (sides[1].facets.facet(near.facet[q]), split.facet(near.facet[q]));
+            let u = self.displacement(&FacetPoint { nodes, split, l: &near.at[q] });
             let here: f64 = (0..D).map(|c| -near.normal[q][c] * u[c]).sum();
             here - mean + near.distance[q]
         };
@@ -232,8 +252,8 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
     }
 
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]) {
-        self.visit(pair, side, |g, normal, nodes, l| {
-            for (&node, phi) in nodes.iter().zip(element::values(self.shape.space.order, l)) {
+        self.visit(pair, side, |g, normal, at| {
+            for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.space.order, at.l)) {
                 (0..D).for_each(|c| r[D * node as usize + c] += force[g] * phi * normal[c]);
             }
         });

@@ -10,7 +10,7 @@ use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, SmoothFaces, UncoveredPoint};
 use crate::error::{Error, Located, Result};
-use crate::fem::{Facets, unit};
+use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
@@ -127,12 +127,48 @@ pub fn all<const D: usize>(
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&scene.auto, cut, parts, &taken, &scene.carriers)?);
-    let mut opposite = Vec::new();
-    for SurfacePair { entry, bodies, names, swapped, pieces } in found {
-        opposite
-            .extend(pieces.into_iter().map(|piece| Opposite::new(entry, scene, parts, bodies, names, piece, swapped)));
+    let mut contacts = Vec::new();
+    for surfaces in found {
+        contacts.extend(assemble(scene, cut, parts, fine, surfaces)?);
     }
-    opposite.into_iter().map(|pair| pair.assemble(&scene.laws, cut, fine)).collect()
+    auto::all_find_some(&scene.auto, contacts.iter().map(|contact: &Contact<D>| contact.facts.origin.entry))?;
+    Ok(contacts)
+}
+
+/// Return the pairs of two surfaces. A piece of them whose facets have no common piece with the normals and the carrier of its own is left out;
+/// surfaces with names must keep one.
+///
+/// # Errors
+/// Surfaces with names do not face each other. A law or a gap has no value somewhere.
+fn assemble<const D: usize>(
+    scene: &Scene,
+    cut: Cut<D>,
+    parts: &[SceneBody<D>],
+    fine: bool,
+    surfaces: SurfacePair<D>,
+) -> Result<Vec<Contact<D>>> {
+    let SurfacePair { entry, bodies, names, swapped, pieces } = surfaces;
+    let (mut contacts, mut left_out, count): (Vec<Contact<D>>, _, _) = (Vec::new(), [0; 2], pieces.len());
+    for (number, piece) in pieces.into_iter().enumerate() {
+        let all: [usize; 2] = std::array::from_fn(|side| piece.facets[side].count() + piece.idle[side]);
+        let is_needed = matches!(entry, ContactEntry::Named(_)) && contacts.is_empty() && number + 1 == count;
+        match Opposite::new(entry, scene, parts, bodies, names, piece, swapped).assemble(
+            &scene.laws,
+            parts,
+            cut,
+            fine,
+            is_needed,
+        )? {
+            Some(contact) => contacts.push(contact),
+            None => left_out = [0, 1].map(|side| left_out[side] + all[side]),
+        }
+    }
+    if let (ContactEntry::Named(_), Some(ContactFacts { idle, swapped, .. })) =
+        (entry, contacts.first_mut().map(|c| &mut c.facts))
+    {
+        *idle += left_out[usize::from(*swapped)];
+    }
+    Ok(contacts)
 }
 
 /// Return the pairs of the two surfaces that a contact names: one, or several where they have edges.
@@ -224,8 +260,16 @@ impl<'a, const D: usize> Opposite<'a, D> {
         Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, idle: idle[usize::from(swapped)], far, reach }
     }
 
-    /// Assemble the pair, and its integration points if `fine` requests them.
-    fn assemble(mut self, laws: &OwnLaws, cut: Cut<D>, fine: bool) -> Result<Contact<D>> {
+    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces have no common piece, unless the pair is
+    /// needed.
+    fn assemble(
+        mut self,
+        laws: &OwnLaws,
+        parts: &[SceneBody<D>],
+        cut: Cut<D>,
+        fine: bool,
+        is_needed: bool,
+    ) -> Result<Option<Contact<D>>> {
         let mut common = cut(&self.a, &self.b, &self.reach);
         if self.a.towards(&self.b, &common) {
             common = cut(&self.a, &self.b, &self.reach);
@@ -236,8 +280,10 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let Self { origin, spec, bodies, a, b, swapped, idle, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
-        let refuse = |fault| refuse(&spec, fault, || why(&a, &b, cut, &spec));
-        let mut pair = contact::assemble(&a, &b, bodies, &common, &gap, &law).map_err(refuse)?;
+        let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
+            Err(Fault::NoPartner) if !is_needed => return Ok(None),
+            assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut, &spec)))?,
+        };
         pair.surfaces = spec.between.each_ref().map(|name| name.value.clone());
         if swapped {
             pair.surfaces.swap(0, 1);
@@ -254,13 +300,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
             pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
         }
         let surface = ContactSurface::new(&a, &pair);
-        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching));
+        let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
+        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
         let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
         let ends =
             spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
-        Ok(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } })
+        Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, idle, chords, ends, surface } }))
     }
 }
 

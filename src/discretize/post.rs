@@ -8,14 +8,15 @@ use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::fem::displacement::{self, Internal, Strained};
-use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, PointExtent, Space, assemble, pad};
+use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, PointExtent, Space, Split, assemble, pad};
 use crate::linalg::{Csr, dot};
 use crate::output::{BodyField, CellKind};
 use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
 pub trait Post {
-    /// Return displacements and stresses of the cells that this rank writes. `bent` is the state without the rigid motion that
+    /// Return displacements and stresses of the cells that this rank writes. A node where the material jumps is several points, one for each
+    /// material. `bent` is the state without the rigid motion that
     /// supports leave. Stresses come from `bent`, since a large rigid motion leaves few digits to the deformation.
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
 
@@ -73,6 +74,8 @@ pub struct OnPart<const D: usize> {
     pub outer: Outer,
     /// Cells and nodes.
     pub space: Rc<Space<D>>,
+    /// The same, cut apart where the material jumps.
+    pub split: Split<D>,
     /// Whether this rank owns each node.
     pub own: Vec<bool>,
     /// Elasticity of the cells.
@@ -157,15 +160,18 @@ impl<const D: usize> OnPart<D> {
 
 impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
-        let (u, space) = (self.nodal(v), &self.space);
-        let (owned, shown) = space.part(self.owned());
-        let stress = displacement::nodal_stresses(space, &self.elasticity, &self.nodal(bent));
+        let (u, split) = (self.nodal(v), &self.split);
+        let (owned, shown) = split.space.part(self.owned());
+        let stress = displacement::nodal_stresses(&split.space, &self.elasticity, &split.values(&self.nodal(bent)));
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
-        let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
+        let displacement = |&node: &u32| {
+            let first = D * split.origin(node) as usize;
+            pad(std::array::from_fn::<f64, D, _>(|c| u[first + c]))
+        };
         BodyField {
             name: self.name.clone(),
             points: owned.nodes.iter().map(|&x| owned.in_scene(x)).collect(),
-            cell: CellKind::simplex(D, space.order.degree()),
+            cell: CellKind::simplex(D, self.space.order.degree()),
             connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
             von_mises: stress.iter().map(displacement::von_mises).collect(),

@@ -5,6 +5,7 @@ use crate::discretize::meshes::Meshes;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Layer, Model};
 use crate::problem::order::Order;
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -46,6 +47,8 @@ pub(super) struct PressureErrors {
     pub error: Vec<f64>,
     /// Relative error of each pair, with the factor [`SAFETY`].
     pub relative: Vec<f64>,
+    /// The part of it on the facets at rims.
+    pub ends: Vec<f64>,
     /// Why the error of each pair is a guess, if it is one.
     pub guesses: Vec<Option<Guess>>,
 }
@@ -60,7 +63,7 @@ impl PressureErrors {
         let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
         let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
         let error = resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect();
-        let mut errors = Self { error, relative: Vec::new(), guesses: Vec::new() };
+        let mut errors = Self { error, relative: Vec::new(), ends: Vec::new(), guesses: Vec::new() };
         for pair in 0..model.pairs.len() {
             errors.add_pair(meshes.points(pair), model, layer, pair);
         }
@@ -74,8 +77,15 @@ impl PressureErrors {
         let square = |values: &[f64]| -> f64 { range.clone().map(|q| model.weight[q] * values[q] * values[q]).sum() };
         let (squared, whole) = (square(&self.error), square(&layer.pressure));
         let rim = RimError::new(points, softness(model, index), pressure, tangent);
-        let errors = squared + rim.squared;
-        self.relative.push(if errors == 0.0 { 0.0 } else { SAFETY * f64::sqrt(errors / whole) });
+        let at_rims: BTreeSet<usize> = (0..points.each.len())
+            .filter(|&g| points.each[g].at_rim)
+            .flat_map(|g| points.interpolation.row(g).map(|(q, _)| q))
+            .collect();
+        let of_points: f64 =
+            at_rims.iter().map(|q| range.start + q).map(|q| model.weight[q] * self.error[q].powi(2)).sum();
+        let relative = |squared: f64| if squared == 0.0 { 0.0 } else { SAFETY * f64::sqrt(squared / whole) };
+        self.relative.push(relative(squared + rim.squared));
+        self.ends.push(relative(of_points + rim.squared));
         let peak = (0..pressure.len()).max_by(|&p, &q| pressure[p].total_cmp(&pressure[q]));
         self.guesses.push(if rim.squared > squared.max(UNFINISHED.powi(2) * whole) {
             Some(Guess { cause: Cause::Rim, place: position[rim.worst] })
@@ -91,7 +101,7 @@ impl PressureErrors {
 ///
 /// Times the size of a facet over pi it is their compliance to a pressure that changes its sign within the facet. It is that of the springs of two
 /// half-spaces in series, for a wave as long as the facet.
-pub(super) fn softness(model: &Model, pair: usize) -> f64 {
+pub fn softness(model: &Model, pair: usize) -> f64 {
     model.pairs[pair].bodies.iter().map(|&body| 1.0 / model.bodies[body].modulus).sum::<f64>()
 }
 

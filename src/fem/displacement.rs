@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 /// Return the stress (xx yy zz xy yz xz) at every node: the mean of the stresses that the cells around the node have there, weighted by
 /// their measures. In bodies of revolution zz is the stress along the circles.
 ///
-/// `u` has one entry a dof. Where the elasticity has no value at a node, as on the axis of cylindrical axes, that of an integration
+/// `u` has one entry a dof. The nodes of the space are cut apart where the material jumps ([`Split`](super::Split)), so that a mean is over cells
+/// of one material. Where the elasticity has no value at a node, as on the axis of cylindrical axes, that of an integration
 /// point of the cell is used.
 pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
     let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });

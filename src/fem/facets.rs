@@ -69,35 +69,16 @@ impl<const D: usize> Space<D> {
 
     /// Return the same facets, each as its cell and the local vertex opposite to it.
     pub fn lone_facets(&self) -> impl Iterator<Item = (usize, usize)> + use<D> {
-        let faces = self.faces();
-        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
-        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
-        places.sort_unstable();
-        places.into_iter().map(Self::place)
-    }
-
-    /// Return the facets between two cells, each as both cells and the local vertices opposite to it.
-    pub fn inner_facets(&self) -> impl Iterator<Item = [(usize, usize); 2]> + use<D> {
-        let faces = self.faces();
-        let inner = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 2);
-        let places: Vec<[u32; 2]> = inner.map(|group| [group[0].1, group[1].1]).collect();
-        places.into_iter().map(|places| places.map(Self::place))
-    }
-
-    /// Return the faces of all cells, sorted by their nodes, each with its number: that of its cell and of the opposite vertex in one.
-    fn faces(&self) -> Vec<([u32; D], u32)> {
         let mut faces: Vec<([u32; D], u32)> = Vec::with_capacity(self.cell_count() * (D + 1));
         for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
             faces
                 .extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), (index * (D + 1) + opposite) as u32)));
         }
         faces.sort_unstable();
-        faces
-    }
-
-    /// Return the cell of a face and the opposite vertex from the number of the face.
-    fn place(number: u32) -> (usize, usize) {
-        (number as usize / (D + 1), number as usize % (D + 1))
+        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
+        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
+        places.sort_unstable();
+        places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1)))
     }
 
     /// Return the facets that are given as a cell and the local vertex opposite to the facet, oriented out of the cell.

@@ -13,6 +13,7 @@ pub mod interpolation;
 mod recovery;
 pub mod rigid;
 pub mod space;
+mod split;
 pub mod surface;
 #[cfg(test)]
 mod tests;
@@ -27,3 +28,4 @@ pub use interpolation::Prolongation;
 pub use recovery::{Errors, Recovery};
 pub use rigid::{PointExtent, RigidMotion};
 pub use space::Space;
+pub use split::{Split, jumping};

@@ -1,8 +1,8 @@
 //! Displacements recovered by patches, and the error estimated from them: polynomial preserving recovery (Zhang and Naga 2005).
 //!
 //! Around each vertex a polynomial of one degree more than the elements is fitted to the nodal displacements. Its gradient is of
-//! higher order than the discrete one on any mesh, at boundaries too. Patches end at the boundary of their body, so nothing is
-//! smoothed across a contact. With P_i the polynomial of vertex i and l_i its barycentric coordinate (the hat function of the vertex)
+//! higher order than the discrete one on any mesh, at boundaries too. Patches end at the boundary of their body and where its material
+//! jumps ([`Split`](super::Split)), so nothing is smoothed across a contact or an interface. With P_i the polynomial of vertex i and l_i its barycentric coordinate (the hat function of the vertex)
 //!
 //! ```text
 //! u* = sum l_i P_i          the blend: continuous, since on a facet only the hats of its vertices are not zero
@@ -20,6 +20,7 @@ use super::space::{CellPoint, Slope, Space};
 use crate::linalg::{axpy, dot};
 use crate::problem::order::Order;
 use patch::{Monomials, Patch, Rings};
+use std::borrow::Cow;
 
 /// Largest number of additional rings of cells that a patch gets while its nodes do not determine the polynomial. Cells at a
 /// corner of a body have few nodes, and with two more rings as many as others. No larger patch determines what is then still
@@ -30,7 +31,7 @@ const MORE_RINGS: usize = 3;
 pub struct Recovery<'a, const D: usize> {
     space: &'a Space<D>,
     elasticity: &'a Elasticity,
-    displacement: &'a [f64],
+    displacement: Cow<'a, [f64]>,
     /// Polynomial of each vertex; `None` at mid-edge nodes.
     patches: Vec<Option<Patch<D>>>,
     /// Nodal values of the blend of the polynomials, one entry per dof.
@@ -50,12 +51,12 @@ pub struct Errors {
 }
 
 impl<'a, const D: usize> Recovery<'a, D> {
-    /// Recover the polynomials of the displacement `u`, one entry per dof.
-    pub fn new(space: &'a Space<D>, elasticity: &'a Elasticity, u: &'a [f64]) -> Self {
+    /// Recover the polynomials of the displacement `u`, one entry per dof. The nodes of the space are cut apart where the material jumps.
+    pub fn new(space: &'a Space<D>, elasticity: &'a Elasticity, u: impl Into<Cow<'a, [f64]>>) -> Self {
         let degree = if space.order == Order::P1 { 2 } else { 3 };
         let monomials = (0..=degree).rev().map(|degree| Monomials::new(D, degree)).collect();
         let (patches, blended) = (Vec::new(), Vec::new());
-        let mut recovery = Self { space, elasticity, displacement: u, patches, blended, monomials };
+        let mut recovery = Self { space, elasticity, displacement: u.into(), patches, blended, monomials };
         let (mut rings, outer) = (Rings::new(space), recovery.outer_vertices());
         let fit = |node| if rings.is_vertex(node) { recovery.fit(node, outer[node], &mut rings) } else { None };
         recovery.patches = (0..space.nodes.len()).map(fit).collect();
@@ -79,7 +80,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// Return the polynomial of a vertex. A vertex on the boundary uses two rings of cells, since a single ring is one-sided. The
     /// polynomial has a lower degree in a body or plate of so few cells that its nodes determine no more.
     fn fit(&self, node: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
-        let (space, u) = (self.space, self.displacement);
+        let (space, u) = (self.space, &*self.displacement);
         let fit = |nodes: &[u32], monomials| Patch::fit(space, u, space.nodes[node], nodes, monomials);
         rings.begin(node);
         if is_outer {
@@ -149,9 +150,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
             cells.iter_mut().zip(&of_interpolant).for_each(|(error, nearer)| *error = error.min(*nearer));
         }
         let softening = self.softening(&cells);
-        let work = dot(&softening, self.displacement);
+        let work = dot(&softening, &self.displacement);
         if work > 0.0 {
-            let lacking = (cells.iter().sum::<f64>() - work_on_missed - dot(&load, self.displacement)) / work;
+            let lacking = (cells.iter().sum::<f64>() - work_on_missed - dot(&load, &self.displacement)) / work;
             axpy(lacking.clamp(0.0, 1.0), &softening, &mut load);
         }
         let strips = self.add_strip(&mut load);
@@ -167,7 +168,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
         let of_cell = |index: usize| {
             let of_point = |point: CellPoint<D>| {
                 let mut difference = self.recovered_slope(point.cell, point.l, &point.at);
-                difference.add(-1.0, &point.slope(self.displacement));
+                difference.add(-1.0, &point.slope(&self.displacement));
                 let strain = difference.strain();
                 point.weight * dot(&self.stress(index, point.at, &strain), &strain)
             };
@@ -179,7 +180,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// Return the squared energy error of a linear cell. Its map and its discrete strain are constant, so that both are computed once.
     fn energy_error_of_linear(&self, index: usize, rule: &element::Rule) -> f64 {
         let Some(first) = self.space.points(index, rule).flatten().next() else { return 0.0 };
-        let errors = self.strain_errors(first.cell, &first.slope(self.displacement));
+        let errors = self.strain_errors(first.cell, &first.slope(&self.displacement));
         let x = self.space.cell_nodes(index);
         let mut sum = 0.0;
         for (l, weight) in rule.iter() {
@@ -296,7 +297,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
         for (index, error) in errors.iter().enumerate() {
             let (mut energy, mut stresses) = (0.0, Vec::with_capacity(rule.points.len()));
             for point in self.space.points(index, &rule).flatten() {
-                let strain = point.slope(self.displacement).strain();
+                let strain = point.slope(&self.displacement).strain();
                 let stress = self.stress(index, point.at, &strain);
                 energy += point.weight * dot(&stress, &strain);
                 stresses.push((point, stress));

@@ -86,13 +86,13 @@ impl<const D: usize> Space<D> {
     /// no link to points of the mesh.
     pub fn on(&self, cells: &[u32], nodes: &[u32]) -> Self {
         let number = Numbering::in_order(nodes.iter().copied());
-        Space {
-            nodes: nodes.iter().map(|&node| self.nodes[node as usize]).collect(),
-            cells: cells.iter().filter_map(|&node| number.get(node)).collect(),
-            from_mesh: Numbering::default(),
-            measure: OnceCell::new(),
-            ..*self
-        }
+        let own = nodes.iter().map(|&node| self.nodes[node as usize]).collect();
+        self.with(own, cells.iter().filter_map(|&node| number.get(node)).collect())
+    }
+
+    /// Return the space with other nodes and cells, which has no link to points of the mesh.
+    pub fn with(&self, nodes: Vec<[f64; D]>, cells: Vec<u32>) -> Self {
+        Space { nodes, cells, from_mesh: Numbering::default(), measure: OnceCell::new(), ..*self }
     }
 
     /// Turn the space into the meridian of a body of revolution.

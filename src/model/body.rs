@@ -12,6 +12,10 @@ pub struct Energy {
     pub strain: f64,
     /// u'Ku/2 - f'u.
     pub potential: f64,
+    /// Squared length |r|^2 of the equilibrium residual.
+    pub rest: f64,
+    /// Squared lengths |f|^2 + |K u|^2 of the forces in it.
+    pub forces: f64,
 }
 
 /// The outcome of a solve G z = r.

@@ -105,6 +105,8 @@ pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, 
     for energy in energies {
         sum.strain += energy.strain;
         sum.potential += energy.potential;
+        sum.rest += energy.rest;
+        sum.forces += energy.forces;
     }
     (all, sum)
 }

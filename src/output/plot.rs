@@ -509,34 +509,6 @@ impl ValueFormatter<f64> for AxisScale {
 mod tests {
     use super::*;
 
-    fn run(label: &str) -> ConvergenceSeries {
-        let rows = vec![(0, 1.0, f64::NAN), (1, 0.1, 0.5), (2, 0.0, 0.05)];
-        ConvergenceSeries { label: label.into(), rows }
-    }
-
-    #[test]
-    fn several_runs_share_one_explanation_of_the_line_styles() {
-        let labels = |plot: &Plot| -> Vec<String> {
-            plot.series.iter().map(|s| s.label.clone()).filter(|l| !l.is_empty()).collect()
-        };
-        let one = Plot::convergence("", &[run("a")]);
-        assert_eq!(labels(&one), ["residual", "increment"]);
-        let two = Plot::convergence("", &[run("a"), run("b")]);
-        assert_eq!(labels(&two), ["a", "b", "residual", "increment"]);
-        assert_eq!(two.series[2].color, two.series[3].color);
-        assert_eq!(two.series[2].points, [(0.0, 1.0), (1.0, 0.1), (2.0, 0.0)]);
-        assert_eq!(two.series[3].points[1..], [(1.0, 0.5), (2.0, 0.05)]);
-    }
-
-    #[test]
-    fn references_come_last_and_points_in_order() {
-        let curve = |label: &str, style| Series::new(label, vec![(1.0, 5.0), (0.0, 7.0)], style);
-        let plot = Plot::pressure("", "x", "p", vec![curve("exact", Style::Dashed), curve("run", Style::Line)]);
-        assert_eq!(plot.series[0].label, "run");
-        assert_eq!(plot.series[0].points, [(0.0, 7.0), (1.0, 5.0)]);
-        assert_eq!(plot.series[1].style, Style::Dashed);
-    }
-
     fn plot(points: Vec<(f64, f64)>, log: bool) -> Plot {
         Plot {
             title: String::new(),
@@ -585,36 +557,6 @@ mod tests {
         let heights = [1.0, f64::NAN, 0.1, 0.01, 0.0, -1.0, 0.1, f64::INFINITY];
         let points = heights.iter().enumerate().map(|(k, &v)| (k as f64, v)).collect();
         assert_eq!(curves(&plot(points, true)).iter().map(Vec::len).collect::<Vec<_>>(), [1, 2, 1]);
-    }
-
-    #[test]
-    fn the_legend_stands_beside_the_axes() {
-        let mut plot = plot((0..400).map(|k| (f64::from(k), f64::from(k % 2))).collect(), false);
-        plot.series[0].label = "a curve with a long name".into();
-        plot.series.push(Series::new("marks", vec![(1.0, 0.5)], Style::LineMarkers));
-        let right = curves(&plot).iter().flatten().map(|point| point.0).max().unwrap();
-        let svg = plot.svg().unwrap();
-        let before = svg.split("a curve with").next().unwrap().rsplit("<text x=\"").next().unwrap();
-        let at: i32 = before.split('"').next().unwrap().parse().unwrap();
-        assert!(at > right, "{at} {right}");
-        // one series needs no legend
-        plot.series.pop();
-        assert!(!plot.svg().unwrap().contains("a curve with"));
-    }
-
-    #[test]
-    fn the_picture_is_one_element_of_the_shown_size() {
-        let mut plot = plot(vec![(0.0, 1.0), (2.1e6, 2.0)], false);
-        plot.title = "a < b & \u{1}c".into();
-        plot.x.label = "places".into();
-        let text = plot.svg().unwrap();
-        assert!(text.starts_with("<svg ") && text.trim_end().ends_with("</svg>"));
-        assert_eq!(text.matches("<svg").count(), 1);
-        assert!(
-            text.contains("width=\"900\" height=\"560\"") && text.contains("viewBox=\"0 0 18000 11200\""),
-            "{text}"
-        );
-        assert!(text.contains("a &lt; b &amp; c") && text.contains("places (×10⁶)"), "{text}");
     }
 
     #[test]

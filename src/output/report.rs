@@ -461,16 +461,18 @@ impl Report {
 
     /// Return the line with the counters, errors and times.
     fn counts(&self) -> String {
-        let number = |value: Option<f64>| sci(value.unwrap_or(f64::NAN), 2);
+        let error = match (self.error_bound, self.error_estimate) {
+            (Some(error), _) => format!(", error at most {}", sci(error, 2)),
+            (None, Some(error)) => format!(", estimated error {}", sci(error, 2)),
+            (None, None) => String::new(),
+        };
         format!(
-            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}, {} {}, {} dofs, {} s",
+            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}{error}, {} dofs, {} s",
             self.method,
             self.iterations,
             self.sweeps,
             self.factorizations,
-            number(self.residual),
-            if self.error_bound.is_some() { "error at most" } else { "estimated error" },
-            number(self.error_bound.or(self.error_estimate)),
+            sci(self.residual.unwrap_or(f64::NAN), 2),
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
         )

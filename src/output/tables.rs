@@ -312,35 +312,6 @@ mod tests {
     use super::*;
     use crate::output::Extent;
 
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn a_full_disk_is_reported_once_and_tried_again() {
-        let full = || File::options().write(true).open("/dev/full").unwrap();
-        let failure = None;
-        let mut rows = RowFile {
-            path: "history.csv".into(),
-            file: full(),
-            length: 0,
-            waiting: Vec::new(),
-            failure,
-            is_reported: false,
-        };
-        rows.push(&["1".to_owned()]);
-        assert!(rows.complaint().unwrap().contains("history.csv lacks rows"));
-        rows.push(&["2".to_owned()]);
-        assert_eq!(rows.complaint(), None);
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("rows");
-        rows.file = File::create(&path).unwrap();
-        rows.push(&["3, 4".to_owned()]);
-        assert_eq!(std::fs::read_to_string(&path).unwrap(), "1\n2\n\"3, 4\"\n");
-        rows.file = full();
-        rows.push(&["5".to_owned()]);
-        let error = rows.finish().unwrap_err();
-        assert!(error.message().contains("history.csv"), "{error}");
-        assert!(error.advice().unwrap().contains("space"), "{error}");
-    }
-
     #[test]
     fn rows_are_in_the_file_before_the_end() {
         let base = tempfile::tempdir().unwrap();

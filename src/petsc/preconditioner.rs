@@ -75,6 +75,17 @@ impl Ksp {
         made
     }
 
+    /// Return the number of levels of a multigrid (PCMG).
+    ///
+    /// # Errors
+    /// PETSc's, also when the preconditioner is no such multigrid.
+    pub fn multigrid_levels(&self) -> Result<usize> {
+        let (pc, mut levels) = (self.pc()?, 0);
+        // SAFETY: the preconditioner of this solver.
+        unsafe { petsc!(PCMGGetLevels(pc, &mut levels)) }?;
+        Ok(usize::try_from(levels).unwrap_or(0))
+    }
+
     /// Set up the smoother again with the current values of the `matrix`, where the preconditioner is otherwise kept.
     ///
     /// Chebyshev's method estimates its bounds anew. The matrix of the coarse level stays as it is.

@@ -142,7 +142,7 @@ impl Sweeper {
     fn collect(&mut self, sweep: &mut Sweep, sums: &[f64], reasons: &[String]) {
         for (index, scalars) in sums.chunks_exact(SCALARS).enumerate() {
             sweep.decrement.push(scalars[DECREMENT]);
-            sweep.energy.push(Energy { strain: scalars[STRAIN], potential: scalars[POTENTIAL] });
+            sweep.energy.push(Energy { strain: scalars[STRAIN], potential: scalars[POTENTIAL], ..Energy::default() });
             if scalars[FAILED] != 0.0 && sweep.failed.is_none() {
                 sweep.failed = Some(Failure { body: Some(index), reason: reasons[index].clone() });
             }

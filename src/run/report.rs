@@ -4,7 +4,7 @@ use super::stages::{All, Built, Clock, Done, Look};
 use super::verdict::{self, forecast, message, status_name};
 use super::{results, warnings};
 use crate::contact::{ContactPair, Left};
-use crate::ddm::{Outcome, Reached, Status, Whose};
+use crate::ddm::{Outcome, Reached, Row, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::few;
 use crate::estimate::Estimate;
@@ -32,9 +32,10 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
-    report
-        .warnings
-        .extend(too_large.into_iter().chain((0..model.pairs.len()).filter_map(|i| warnings::beyond_law(done, i))));
+    report.warnings.extend(too_large);
+    for i in 0..model.pairs.len() {
+        report.warnings.extend(warnings::beyond_law(done, i).into_iter().chain(warnings::by_chords(done, i)));
+    }
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);
@@ -67,8 +68,16 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
         lower: interval.lower,
         upper: interval.upper,
     });
-    report.error_bound = last.filter(|row| row.is_bound).and_then(|row| finite(row.error));
-    report.error_estimate = last.filter(|row| !row.is_bound).and_then(|row| finite(row.error));
+    // the iterates of other runs are no approximations of a solution
+    let is_measured = matches!(outcome.status, Status::IterationLimit | Status::Paused { .. } | Status::Inaccurate(_))
+        || outcome.status.is_solved();
+    let measured = last.filter(|_| is_measured);
+    // a relative error of one or more leaves no digit, of the bound neither
+    let is_bound = |row: &&Row| row.is_bound && row.residual < 1.0;
+    report.error_bound = measured.filter(is_bound).and_then(|row| finite(row.error));
+    report.error_estimate = measured
+        .filter(|row| !is_bound(row))
+        .and_then(|row| finite(if row.is_bound { row.residual } else { row.error }));
     report.rounding = finite(outcome.rounding);
     report.residual = last.and_then(|row| finite(row.residual));
     report.increment = last.and_then(|row| finite(row.increment));

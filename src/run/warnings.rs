@@ -8,14 +8,15 @@ use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, Left, LostPieces, UncoveredPoint};
 use crate::discretize::{ContactInfo, Discrete, point};
 use crate::error::few;
-use crate::estimate::{Cause, Estimate};
-use crate::linalg::diagonal;
+use crate::estimate::{Cause, Estimate, softness};
+use crate::linalg::{self, diagonal};
 use crate::model::Mechanism;
 use crate::output::report::readable;
 use crate::output::{BalanceReport, sci};
 use crate::petsc::{Schur, Session, has_metis};
 use crate::problem::LayerSpec;
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 /// Return the warnings about a problem before it is solved.
 pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<String> {
@@ -165,7 +166,6 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
                 pair.surfaces[0], pair.surfaces[1], -overlap
             ));
         }
-        warnings.extend(contact.chords.map(|chords| overlap_of_facets(pair, chords)));
     }
     warnings
 }
@@ -213,18 +213,49 @@ fn split_pairs(contacts: &[ContactInfo]) -> Vec<String> {
     names_of.into_iter().map(line).collect()
 }
 
-/// Return the warning of an overlap that facets make.
-fn overlap_of_facets(pair: &ContactPair, Chords { sagitta, deepest, mean }: Chords) -> String {
-    let mean = mean.map_or(String::new(), |mean| format!(" and {} on the mean", sci(mean, 2)));
-    format!(
-        "{} - {}: straight facets leave their curved surfaces by up to {}, and the overlap is {} at most{mean}: pressures are those of \
-         facets; take order = 2 or a finer mesh; if the true surfaces have no clearance, write touching = true, with their own overlap as a \
-         negative `gap`",
+/// Least change of the pressures by the height of curved surfaces above straight facets that is worth a warning. The height is that of parabolas
+/// and the bodies yield to it about as much as to the pressures, so that the change itself is known to a half of it.
+const BY_CHORDS: f64 = 0.1;
+
+/// Return the warning for pair `i`, if its pressures would be others on the curved surfaces whose chords its facets are.
+///
+/// The heights h of the surfaces above their facets close the gap, be it drawn as a clearance, as an overlap or as nothing. A point with the
+/// compression c and the pressure p then has the pressure where the law meets the line c + h + s p, with the compliance s of the bodies to a wave as
+/// long as the contact. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
+pub fn by_chords(done: &Done, i: usize) -> Option<String> {
+    let (pair, layer, range) = (&done.model().pairs[i], &done.outcome.layer, done.model().range(i));
+    let Chords { sagitta, height } =
+        done.built.discrete.contacts[i].chords.as_ref().filter(|_| done.outcome.status.is_solved())?;
+    let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range]);
+    let closed: f64 = (0..pair.len()).filter(|&q| pressure[q] > 0.0).map(|q| pair.weight[q]).sum();
+    let extent = if pair.measure == "length" { closed } else { closed.sqrt() };
+    let give = softness(done.model(), i) * extent / PI;
+    let (mut changed, mut whole) = (0.0, 0.0);
+    for q in 0..pair.len() {
+        let state = compression[q] + height[q] + give * pressure[q];
+        let curved = if give > 0.0 { pair.law.resolvent(q, state, 1.0 / give) } else { state };
+        changed += pair.weight[q] * (pair.law.response(q, curved).pressure - pressure[q]).powi(2);
+        whole += pair.weight[q] * pressure[q].powi(2);
+    }
+    if changed <= BY_CHORDS.powi(2) * whole {
+        return None;
+    }
+    let [least, most] = linalg::range(pair.gap.iter().copied());
+    let drawn = match least < 0.0 {
+        true => format!("the overlap is {} at most", sci(-least, 2)),
+        false => format!("the gap is {} to {}", sci(least, 2), sci(most, 2)),
+    };
+    let change = match whole > 0.0 {
+        true => format!("would change by about {:.0} % on these", 100.0 * f64::sqrt(changed / whole)),
+        false => "would not vanish on these".to_owned(),
+    };
+    Some(format!(
+        "{} - {}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
+         or a finer mesh; if the true surfaces have one distance everywhere, write touching = true, with that distance as `gap` (negative for an overlap)",
         pair.surfaces[0],
         pair.surfaces[1],
-        sci(sagitta, 2),
-        sci(deepest, 2)
-    )
+        sci(*sagitta, 2),
+    ))
 }
 
 /// Return the warning of pieces of a pair that the search for common points has lost, if any.

@@ -2,7 +2,7 @@
 
 use super::options::Chosen;
 use super::{Change, InnerSolver};
-use crate::error::Result;
+use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::linalg::Csr;
 use crate::linalg::portable::log10;
@@ -69,6 +69,7 @@ impl Krylov {
         interpolation: Option<Prolongation>,
     ) -> Result<Self> {
         let mut matrix = Matrix::new(session, dimension, stiffness)?;
+        let levels = if interpolation.is_some() { 2 } else { 1 };
         matrix.set_spd()?;
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
         ksp.set_operator(&matrix)?;
@@ -84,7 +85,12 @@ impl Krylov {
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
-        let multigrid = matches!(ksp.pc_type().as_str(), "hypre" | "gamg" | "ml" | "mg") && ksp.ksp_type() != "preonly";
+        let multigrid = match ksp.pc_type().as_str() {
+            "hypre" | "gamg" | "ml" => true,
+            // with other numbers of levels it is what the user makes of it
+            "mg" => check_levels(&ksp, chosen.prefix(), levels)? == 2,
+            _ => false,
+        } && ksp.ksp_type() != "preonly";
         let keeps = multigrid && chosen.get("ksp_reuse_preconditioner").is_none();
         let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
         let session = session.clone();
@@ -280,6 +286,28 @@ impl InnerSolver for Krylov {
         let around = if self.has_rigid_space { " with rigid motions of all bodies" } else { "" };
         format!("{} + {}{inside}{around}", self.ksp.ksp_type(), self.ksp.pc_type())
     }
+}
+
+/// Return the number of levels of PETSc's `mg`, of which it can have up to `most`. PETSc calls interpolations that nobody made.
+///
+/// # Errors
+/// There are more levels.
+fn check_levels(ksp: &Ksp, prefix: &str, most: usize) -> Result<usize> {
+    let levels = ksp.multigrid_levels()?;
+    if levels <= most {
+        return Ok(levels);
+    }
+    let only = if most == 1 {
+        "elements of one order have one level"
+    } else {
+        "quadratic elements have two levels, for the vertices and all nodes"
+    };
+    Err(Error::new(
+        Kind::Solver,
+        format!("`{prefix}`: multigrid `mg` has {levels} levels here, and the mesh has only {most}"),
+    )
+    .because(only)
+    .help("give no more by -pc_mg_levels, or take a multigrid that makes its own levels: -pc_type gamg or hypre"))
 }
 
 /// Ratio of the stiffnesses under a contact row beyond which a preconditioner is poor there, in either direction. With 1.2, 1.5, 2 and 3

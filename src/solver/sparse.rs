@@ -140,6 +140,8 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         Energy {
             strain: quadratic + 2.0 * dot(&self.body.lifting, v) + self.body.strain_constant,
             potential: 0.5 * quadratic - work + self.body.energy_constant,
+            rest: dot(&r[..n], &r[..n]),
+            forces: dot(&self.body.load, &self.body.load) + dot(&product[..n], &product[..n]),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Bodies of revolution: plane = "axisymmetric", x the radius, y along the axis.
 
-use crate::common::{Run, Scene, nanoseconds, root, solve, winkler};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, nanoseconds, root, solve, winkler};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use winkler::api::Order;
@@ -21,9 +22,8 @@ fn case(name: &str) -> std::path::PathBuf {
 }
 
 /// Solves with some values of the scene replaced; it must converge.
-fn solved(scene: impl AsRef<std::path::Path>, sets: &[&str]) -> Run {
-    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-    solve(scene, &args).converged()
+fn solved(scene: impl AsRef<std::path::Path>, sets: &[&str]) -> Report {
+    solve_here(scene, sets).converged()
 }
 
 /// Asserts two positive numbers to agree within a relative tolerance.
@@ -357,7 +357,8 @@ fn hertz() {
 /// Meshes adapted to an error follow the estimate to the edge of the contact, and it is 0.7 to 2 times the true error there.
 #[test]
 fn hertz_on_an_adapted_mesh() {
-    let run = solved(case("hertz-sphere"), &["adapt.error=0.02", &format!("title=\"{}\"", nanoseconds())]);
+    let title = format!("title=\"{}\"", nanoseconds());
+    let run = solve(case("hertz-sphere"), &["--tolerance", "0.02", "--set", &title]).converged();
     let estimated = run.number("discretization_error/pressure/0");
     assert!(estimated < 0.02, "{estimated}");
     let table = run.contact();
@@ -391,10 +392,10 @@ fn normals_on_the_axis() {
         let space = space.revolved();
         let facets = space.facets(mesh.group("inner_contact").expect("a surface"));
         let (free, frame) = (HashMap::new(), Frame::default());
-        let side = Side::new("inner_contact", &space, facets, &free, &frame);
-        let on_axis: Vec<_> = side.normals.iter().filter(|(node, _)| space.on_axis(**node)).collect();
+        let side = Side::new("inner_contact", &space, facets, &free, &frame, 180.0);
+        let on_axis: Vec<_> = side.nodes.iter().filter(|at| space.on_axis(at.node)).collect();
         assert_eq!(on_axis.len(), 1);
-        assert_eq!(*on_axis[0].1, [0.0, 1.0]);
+        assert_eq!(on_axis[0].normal, [0.0, 1.0]);
     }
 }
 

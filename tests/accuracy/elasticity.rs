@@ -1,11 +1,11 @@
 //! Elasticity of the bodies: any constants, in any axes, by region and by place, through the whole program.
 
-use crate::common::{Run, Scene, case, solve, solve_on, text_of};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, case, solve, solve_on, text_of};
 
 /// Solves a scene with `--set` for each of these.
-fn solve_set(scene: impl AsRef<std::path::Path>, sets: &[String]) -> Run {
-    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set.as_str()]).collect();
-    solve(scene, &args)
+fn solve_set(scene: impl AsRef<std::path::Path>, sets: &[String]) -> Report {
+    solve_here(scene, &sets.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 fn near(found: f64, exact: f64, tolerance: f64) -> bool {
@@ -72,7 +72,7 @@ fn oblique_fibres_in_space() {
     };
     let lower = 10.0 * compliance([2.0, 1.0, 2.0], [0.0, 1.0, 0.0]);
     let upper = 10.0 * compliance([1.0, -2.0, 3.0], [1.0, 0.0, 0.0]);
-    let run = solve(case("anisotropic-3d"), &[]).converged();
+    let run = solve_here(case("anisotropic-3d"), &[]).converged();
     let table = run.contact();
     for q in 0..table.rows() {
         assert!(near(table["pressure"][q], 10.0, 1e-9), "{}", table["pressure"][q]);
@@ -91,7 +91,7 @@ fn known_displacements_and_stresses() {
     for norm in ["error_l2", "error_h1", "error_energy"] {
         let error = run.number(&format!("bodies/0/{norm}"));
         assert!(near(error, 0.01 / 1.01, 1e-8), "{norm} {error}");
-        assert!(run.report["bodies"][1][norm].is_null());
+        assert!(run["bodies"][1][norm].is_null());
     }
     for body in 0..2 {
         let stress = |key: &str| run.number(&format!("bodies/{body}/{key}"));
@@ -105,7 +105,7 @@ fn known_displacements_and_stresses() {
 /// The same blocks by their 21 constants, and in axes given in another way: the same run.
 #[test]
 fn one_material_in_several_words() {
-    let reference = solve(case("anisotropic"), &[]).converged();
+    let reference = solve_here(case("anisotropic"), &[]).converged();
     let orthotropic = "orthotropic={E1=1.4e5,E2=1e4,E3=1e4,nu12=0.3,nu13=0.3,nu23=0.45,G12=5e3,G13=5e3,G23=3.4e3}";
     // C of this composite, by inverting its compliance
     let (s11, s12, s22, s23) = (1.0 / 1.4e5, -0.3 / 1.4e5, 1e-4, -0.45e-4);
@@ -125,7 +125,7 @@ fn one_material_in_several_words() {
             "{ first = [\"cos(35*pi/180)\", \"sin(35*pi/180)\", 0], second = [0, \"1 + 0*x\", 0] }",
         ));
     for scene in [by_stiffness, vectors] {
-        let run = solve(&scene, &[]).converged();
+        let run = solve_here(&scene, &[]).converged();
         assert_eq!(run.count("iterations"), reference.count("iterations"));
         assert!(near(run.number("F1"), reference.number("F1"), 1e-11), "{}", run.number("F1"));
     }
@@ -183,14 +183,14 @@ fn layered(regions: &str) -> (Scene, tempfile::TempDir) {
 #[test]
 fn regions() {
     let (scene, _script) = layered("[[body.region]]\non = \"core\"\nyoung = 7e4\npoisson = 0\n");
-    let run = solve(&scene, &[]).converged();
+    let run = solve_here(&scene, &[]).converged();
     // cells that another rank has read have the constants of their region, too
     let distributed = solve_on(3, &scene, &["--method", "newton", "--set", "solver=mumps"]).converged();
     let shortening = 10.0 * (0.5 / 2.1e5 + 0.5 / 7e4);
     for table in [run.contact(), distributed.contact()] {
         assert!(table["u_n_lower"].iter().all(|u| near(*u, -shortening, 1e-9)), "{:?}", &table["u_n_lower"]);
     }
-    assert_eq!(run.report.pointer("/settings/body/0/region/0/on").and_then(|on| on.as_str()), Some("core"));
+    assert_eq!(run.pointer("/settings/body/0/region/0/on").and_then(|on| on.as_str()), Some("core"));
 }
 
 fn refused(scene: &Scene, words: &[&str]) {
@@ -238,7 +238,7 @@ fn materials_that_cannot_be() {
 #[test]
 fn axes_without_direction_at_a_node() {
     let text = text_of("anisotropic").replace("{ angle = \"35*pi/180\" }", "{ first = [\"x\", \"y\"] }");
-    let run = solve(Scene::new(text), &[]).converged();
+    let run = solve_here(Scene::new(text), &[]).converged();
     assert!(near(run.number("pairs/0/force/0/1"), -10.0, 1e-9));
 }
 
@@ -276,7 +276,7 @@ fn strains_that_are_not_small() {
     let run = |young: f64| {
         let young = format!("body.lower.young={young}");
         let sets = ["method={stop={residual=1e-10}}", &young, "body.upper.young=1e4"];
-        solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        solve_here(case("patch"), &sets).converged()
     };
     let soft = run(100.0);
     let warnings = soft.warnings();

@@ -1,12 +1,12 @@
 //! Every law of a layer, through the whole program, against closed forms.
 
-use crate::common::{Run, Scene, case, solve, winkler};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, case, winkler};
 
 /// Solves the patch under q = 10 with a layer and further settings.
-fn patch(layer: &str, more: &[&str]) -> Run {
+fn patch(layer: &str, more: &[&str]) -> Report {
     let layer = format!("contact.0.layer={layer}");
-    let sets = [&["method={stop={residual=1e-11}}", &layer], more].concat();
-    solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+    solve_here(case("patch"), &[&["method={stop={residual=1e-11}}", &layer], more].concat()).converged()
 }
 
 /// V1 with every law: the pressure is q, the layer's closing is where p(c) = q.
@@ -47,7 +47,7 @@ fn a_varying_layer() {
     }
     // a constant written as an expression is a constant
     let groove = Scene::edited("groove", "B = 2.5e-5", "B = \"2.5e-5 + 0*x\"");
-    let [ours, theirs] = [groove.path.clone(), case("groove")].map(|scene| solve(scene, &[]).converged());
+    let [ours, theirs] = [groove.path.clone(), case("groove")].map(|scene| solve_here(scene, &[]).converged());
     assert_eq!(ours.count("iterations"), theirs.count("iterations"));
     assert_eq!(ours.contact()["pressure"], theirs.contact()["pressure"]);
 }
@@ -74,7 +74,7 @@ fn starts_beyond_the_range_of_numbers() {
 /// `meshes/coating`: a punch pressed by 50 into a coating that thins out, on a foundation.
 #[test]
 fn coating() {
-    let run = solve(case("coating"), &[]).converged();
+    let run = solve_here(case("coating"), &[]).converged();
     // statics: the layer and the foundation carry the force on the punch
     assert!((run.number("pairs/0/force/1/1") - 50.0).abs() < 1e-6, "{}", run.said());
     assert!((run.number("bodies/0/balance/springs/0/force/1") - 50.0).abs() < 1e-6);

@@ -13,9 +13,8 @@ use winkler::internals::fem::{Frame, Space, Subdivision, assemble as fem};
 use winkler::internals::mesh::{Mesh, load};
 
 /// Runs a case with overrides of its scene; the run must converge.
-fn run(name: &str, set: &[&str]) -> crate::common::Run {
-    let args: Vec<&str> = set.iter().flat_map(|set| ["--set", set]).collect();
-    solve(case(name), &args).converged()
+fn run(name: &str, set: &[&str]) -> crate::common::Report {
+    crate::common::here::solve_here(case(name), set).converged()
 }
 
 /// The mesh of a case, with overrides.
@@ -51,7 +50,7 @@ fn groove_in_a_slice() {
             .collect();
         let apart = distance(&mean, &exact["pressure"]);
         assert!(apart < tolerance, "thickness {thickness}: {apart}");
-        let force = |run: &crate::common::Run| run.number("pairs/0/force/0/1");
+        let force = |run: &crate::common::Report| run.number("pairs/0/force/0/1");
         assert!((force(&slice) / (thickness * force(&plane)) - 1.0).abs() < tolerance);
     }
 }
@@ -99,7 +98,7 @@ fn pair_on<const D: usize>(
         (0..2).map(|k| Space::new(mesh, mesh.group(bodies[k]).expect("a body"), order[k])).collect();
     let side = |k: usize| {
         let facets = spaces[k].facets(mesh.group(groups[k]).expect("a surface"));
-        Side::new(groups[k], &spaces[k], facets, &free, &frame)
+        Side::new(groups[k], &spaces[k], facets, &free, &frame, 40.0)
     };
     let (a, b) = (side(0), side(1));
     let shared = cut(&a, &b, &Reach::between(&a, &b, 60.0, None));
@@ -343,7 +342,7 @@ fn surface_of<const N: usize>(run: &crate::common::Run, stem: &str, names: [&str
 #[test]
 fn surfaces_are_written() {
     for (name, set) in [("patch-2d", "body.1.order=2"), ("shells", "body.0.order=1"), ("shells", "body.0.order=2")] {
-        let run = run(name, &[set, "output.vtu=true"]);
+        let run = solve(case(name), &["--vtu", "--set", set]).converged();
         let side = |k: usize| run.text(&format!("pairs/0/bodies/{k}"));
         let stem = format!("contact-{}-{}", side(0), side(1));
         let collection = std::fs::read_to_string(run.folder.join("bodies.pvd")).expect("a collection");
@@ -373,7 +372,7 @@ fn surfaces_are_written() {
 #[test]
 fn vertices_between_points_at_mid_edges() {
     let sets = ["body.0.order=2", "body.1.order=2", "contact.0.gap=1e-6*(x+y)", "output.vtu=true"];
-    let run = run("patch-3d", &sets);
+    let run = solve(case("patch-3d"), &sets.map(|set| ["--set", set]).concat()).converged();
     let [x, gap] = surface_of(&run, "contact-lower-upper", ["points", "gap"]);
     let gap: Vec<f64> = gap.iter().map(|gap| 1e6 * gap).collect();
     for (x, gap) in x.chunks(3).zip(&gap) {

@@ -1,23 +1,24 @@
 //! Supports, springs and forces of every kind, and what the report says of them.
 
-use crate::common::{Run, Scene, case, distance, root, solve, text_of};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, case, distance, root, solve, text_of};
 use std::f64::consts::PI;
 
 /// Solves the patch to rounding with further settings.
-fn patch(sets: &[&str]) -> Run {
+fn patch(sets: &[&str]) -> Report {
     let all = [&["method={stop={residual=1e-12}}", "mesh.set={nl=2,nu=3}"], sets].concat();
-    solve(case("patch"), &all.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+    solve_here(case("patch"), &all).converged()
 }
 
 /// Every value of a column is this one.
-fn uniform(run: &Run, column: &str, value: f64) {
+fn uniform(run: &Report, column: &str, value: f64) {
     for found in &run.contact()[column] {
         assert!((found / value - 1.0).abs() < 1e-9, "{column}: {found}, not {value}");
     }
 }
 
 /// The force that a support, spring or rigid surface of a body gives, by list and number.
-fn force(run: &Run, body: usize, list: &str, index: usize) -> [f64; 2] {
+fn force(run: &Report, body: usize, list: &str, index: usize) -> [f64; 2] {
     [0, 1].map(|c| run.number(&format!("bodies/{body}/balance/{list}/{index}/force/{c}")))
 }
 
@@ -27,8 +28,8 @@ fn near(found: [f64; 2], expected: [f64; 2]) {
 }
 
 /// Forces and moments on every body cancel, and each pair's are opposite.
-fn balanced(run: &Run, tolerance: f64) {
-    for body in 0..run.report["bodies"].as_array().expect("bodies").len() {
+fn balanced(run: &Report, tolerance: f64) {
+    for body in 0..run["bodies"].as_array().expect("bodies").len() {
         for kind in ["force", "moment"] {
             let imbalance = run.number(&format!("bodies/{body}/balance/{kind}_imbalance"));
             assert!(imbalance < tolerance, "body {body}, {kind}: {imbalance:e}\n{}", run.said());
@@ -66,7 +67,7 @@ fn a_soft_spring_holds_what_contact_lets_go() {
         "body.1.spring=[{on=\"upper_face\",normal=0.01}]",
         "contact.0.gap=-1e-3",
     ];
-    let run = solve(case("patch"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+    let run = solve_here(case("patch"), &sets).converged();
     assert!(run.contact()["pressure"].iter().all(|&pressure| pressure == 0.0));
     let pull = force(&run, 1, "springs", 0)[1];
     assert!((pull / -1e-3 - 1.0).abs() < 1e-7, "{pull}");
@@ -128,7 +129,7 @@ fn displacements_of_the_contact_itself() {
         block("b2", "top", -0.01, &format!("-0.01 + {pressure}/100*(2 - y)"))
     ));
     for solver in ["condensed", "mumps"] {
-        let run = solve(&scene, &["--set", "method={stop={residual=1e-10}}", "--set", &format!("solver={solver}")]);
+        let run = solve_here(&scene, &["method={stop={residual=1e-10}}", &format!("solver={solver}")]);
         let run = run.converged();
         uniform(&run, "pressure", pressure);
         uniform(&run, "u_n_b1", -pressure / 100.0);
@@ -188,7 +189,7 @@ fn imbalance_of_an_early_end() {
     let held = "body.1.fix=[{on=\"upper_pin\",x=0},{on=\"upper_face\",y=-1e-4}]";
     let loaded = "body.1.load=[{on=\"upper_bottom\",pressure=2}]";
     let args = [&sets[..], &[held, loaded]].concat();
-    let run = solve(case("patch"), &args.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
+    let run = solve_here(case("patch"), &args);
     assert_eq!(run.text("status"), "iteration-limit", "{}", run.said());
     let y = |part: &str| run.number(&format!("bodies/1/balance/{part}/force/1"));
     let parts = [y("loads"), y("contacts"), y("supports/1")];
@@ -203,8 +204,7 @@ fn reactions() {
     for order in [1, 2] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
         let sets = ["mesh.set.n=8", "method={stop={residual=1e-11}}", &orders[0], &orders[1]];
-        let run =
-            solve(case("groove-held"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged();
+        let run = solve_here(case("groove-held"), &sets).converged();
         balanced(&run, 1e-9);
         let roller = force(&run, 0, "supports", 1);
         assert!((roller[1] - 40.0).abs() < 1e-6 && roller[0] == 0.0, "{roller:?}");
@@ -347,7 +347,7 @@ fn planes_of_symmetry_in_space() {
         let scene = folder.path().join("scene.toml");
         std::fs::write(&scene, text).expect("a scene");
         // a rigid top does not widen: only the force is exact then
-        let run = solve(&scene, if rigid { &["--set", "body.1.poisson=0"] } else { &[] }).converged();
+        let run = solve_here(&scene, if rigid { &["body.1.poisson=0"] } else { &[] }).converged();
         uniform(&run, "pressure", 10.0);
         uniform(&run, "u_n_lower", -10.0 / 2.1e5);
         balanced(&run, 1e-10);
@@ -391,7 +391,7 @@ fn moments_bend_a_bar() {
         let along = 5.0 * (kappa[0].abs() + kappa[1].abs());
         let most = f64::hypot(50.0 * f64::hypot(kappa[0], kappa[1]), along);
         for rigid in [false, true] {
-            let run = solve(&scene, &["--set", &format!("body.0.load.0.rigid={rigid}")]).converged();
+            let run = solve_here(&scene, &[&format!("body.0.load.0.rigid={rigid}")]).converged();
             let relative = |path: &str, exact: f64| (run.number(path) / exact - 1.0).abs();
             assert!(relative("bodies/0/max_displacement", most) < 1e-9, "{most} {}", run.said());
             let most = 6.0 * (total[0].abs() + total[1].abs());

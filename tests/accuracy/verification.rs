@@ -1,6 +1,7 @@
 //! Cases with known answers, through the whole program; docs/cases.md names their sources.
 
-use crate::common::{Run, Scene, case, distance, solve, text_of};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, case, distance};
 
 /// Linear interpolation of a column over another, rising one.
 fn at(x: &[f64], y: &[f64], place: f64) -> f64 {
@@ -22,8 +23,9 @@ fn both_orders(order: usize) -> Vec<String> {
     (0..2).flat_map(|body| ["--set".to_owned(), format!("body.{body}.order={order}")]).collect()
 }
 
-fn solve_with(scene: impl AsRef<std::path::Path>, args: &[String]) -> Run {
-    solve(scene, &args.iter().map(String::as_str).collect::<Vec<_>>()).converged()
+fn solve_with(scene: impl AsRef<std::path::Path>, args: &[String]) -> Report {
+    let sets = args.iter().map(String::as_str).filter(|&word| word != "--set").collect::<Vec<_>>();
+    solve_here(scene, &sets).converged()
 }
 
 /// V1: a constant pressure is exact on matching and non-matching surfaces, and the order of the sides does not matter.
@@ -174,73 +176,5 @@ fn figure_2a() {
             |other: usize, share: f64, least: f64| ours.abs_diff(other) as f64 <= (share * other as f64).max(least);
         assert!(near(paper[k], 0.15, 3.0), "gamma {gamma}: {ours}, the paper {}", paper[k]);
         assert!(near(independent[k], 0.03, 1.0), "gamma {gamma}: {ours}, elsewhere {}", independent[k]);
-    }
-}
-
-/// V8: units do not change iterations or the shape of the answer: mm and N (stresses in MPa) or m and Pa instead of cm.
-#[test]
-fn units() {
-    let reference = solve_with(case("groove"), &["--set".into(), "mesh.set.n=8".into()]);
-    for (length, stress) in [(10.0, 1.0), (0.01, 1e6)] {
-        let folder = tempfile::TempDir::new().expect("a temporary folder");
-        let script =
-            std::fs::read_to_string(crate::common::root().join("meshes/groove/groove.geo")).expect("the script");
-        let script = script.replace("length = 4;", &format!("length = {};", 4.0 * length));
-        let script = script.replace("height = 1;", &format!("height = {length};"));
-        std::fs::write(folder.path().join("groove.geo"), script).expect("a script");
-        let text = text_of("groove")
-            .replace(&format!("{}/", crate::common::root().join("meshes/groove").display()), "")
-            .replace("2.1e5", &format!("{:e}", 2.1e5 * stress))
-            .replace("pressure = 10 ", &format!("pressure = {:e} ", 10.0 * stress))
-            .replace("5e-4 * max(0, 1 - (x - 4)^2)", &format!("{:e} * max(0, 1 - (x/{length:e} - 4)^2)", 5e-4 * length))
-            .replace("B = 2.5e-5", &format!("B = {:e}", 2.5e-5 * length / f64::sqrt(stress)))
-            .replace("normal = 1e-4", &format!("normal = {:e}", 1e-4 * length));
-        let scene = folder.path().join("scene.toml");
-        std::fs::write(&scene, text).expect("a scene");
-        let run = solve_with(&scene, &["--set".into(), "mesh.set.n=8".into()]);
-        assert_eq!(run.count("iterations"), reference.count("iterations"));
-        let pressure: Vec<f64> = run.contact()["pressure"].iter().map(|p| p / stress).collect();
-        assert!(distance(&pressure, &reference.contact()["pressure"]) < 1e-9);
-    }
-}
-
-/// V8: a scene turned by a right angle, with its supports, gives the same iterations and pressures.
-#[test]
-fn turned() {
-    let reference = solve_with(case("groove-held"), &["--set".into(), "mesh.set.n=8".into()]);
-    let folder = tempfile::TempDir::new().expect("a temporary folder");
-    let script = std::fs::read_to_string(crate::common::root().join("meshes/groove/groove.geo")).expect("the script");
-    // without this Gmsh joins the two surfaces when it moves them
-    let turn = "Geometry.AutoCoherence = 0;\nRotate {{0, 0, 1}, {0, 0, 0}, Pi/2} { Surface{1, 2}; }\n";
-    std::fs::write(folder.path().join("groove.geo"), script + "\n" + turn).expect("a script");
-    // (x, y) -> (-y, x)
-    let text = std::fs::read_to_string(case("groove-held")).expect("the scene");
-    let text = text.replace("../groove/groove.geo", "groove.geo").replace("(x - 4)", "(y - 4)");
-    let text = text.replace("y = 0 }", "z = 0 }").replace("x = 0 }", "y = 0 }").replace("z = 0 }", "x = 0 }");
-    let scene = folder.path().join("scene.toml");
-    std::fs::write(&scene, text).expect("a scene");
-    let run = solve_with(&scene, &["--set".into(), "mesh.set.n=8".into()]);
-    assert_eq!(run.count("iterations"), reference.count("iterations"));
-    let (ours, theirs) = (run.contact(), reference.contact());
-    assert!(distance(&ours["y"], &theirs["x"]) < 1e-9, "points in the same order");
-    assert!(distance(&ours["pressure"], &theirs["pressure"]) < 1e-8);
-    assert!((run.number("pairs/0/force/0/0") + reference.number("pairs/0/force/0/1")).abs() < 1e-6);
-}
-
-/// V10: every inner solver gives one answer.
-#[test]
-fn solvers_agree() {
-    let tight = ["--set", "method.stop={residual=1e-9}", "--set", "mesh.set.n=16"];
-    let reference = solve(case("groove"), &tight).converged().contact();
-    for options in [
-        vec!["-ksp_type", "cg", "-pc_type", "hypre"],
-        vec!["-pc_type", "gamg"],
-        vec!["-pc_type", "icc", "-lower_pc_type", "cholesky"],
-        vec!["-ksp_type", "minres", "-pc_type", "jacobi", "-ksp_rtol", "1e-8"],
-        vec!["--set", "solver=hypre"],
-    ] {
-        let run = solve(case("groove"), &[&tight[..], &options].concat()).converged();
-        let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
-        assert!(apart < 1e-7, "{options:?}: {apart:e}");
     }
 }

@@ -23,10 +23,14 @@ pub fn alone(
     }
     let program = std::env::current_exe().expect("the path of this program");
     let mut command = match ranks {
-        0 => Command::new(program),
+        0 => {
+            let mut command = Command::new(program);
+            super::without_session(&mut command);
+            command
+        }
         ranks => {
             let mut command = launcher();
-            command.args(["-n", &ranks.to_string()]).arg(program);
+            super::without_session(&mut command).args(["-n", &ranks.to_string()]).arg(program);
             // A hang ends the test instead of stopping it for ever.
             command
                 .env("MPIEXEC_TIMEOUT", TIMEOUT.as_secs().to_string())

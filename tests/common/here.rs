@@ -1,7 +1,6 @@
 //! Scenes solved in this process, by the library. PETSc runs once in a process and in one thread, so they are solved one after the other.
 
-use super::Table;
-use serde_json::Value;
+use super::{Report, Table, Tables};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
@@ -35,37 +34,8 @@ fn start() -> Sender<Job> {
     sender
 }
 
-/// What came of a scene.
-pub struct Solved {
-    /// What `report.json` has.
-    pub report: Value,
-    /// The contact table of each pair.
-    pub contacts: Vec<Table>,
-}
-
-impl Solved {
-    /// Return a number of the report, by name or path (`"times/total"`).
-    pub fn number(&self, path: &str) -> f64 {
-        let value = self.report.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
-        value.as_f64().unwrap_or_else(|| panic!("`{path}` of the report is {value}\n{:#}", self.report))
-    }
-
-    /// Return a whole number of the report.
-    pub fn count(&self, path: &str) -> usize {
-        let number = self.number(path);
-        assert_eq!(number, number.trunc(), "{path}");
-        number as usize
-    }
-
-    /// Return the result, whose status must be `converged`.
-    pub fn converged(self) -> Self {
-        assert_eq!(self.report["status"].as_str(), Some("converged"), "{:#}", self.report);
-        self
-    }
-}
-
 /// Solve a scene with values to replace (`"mesh.set.n=4"`), as `--set` does. Return the refusal if the program refuses it.
-pub fn try_here(scene: impl AsRef<Path>, set: &[&str]) -> Result<Solved, Error> {
+pub fn try_here(scene: impl AsRef<Path>, set: &[&str]) -> Result<Report, Error> {
     let (path, set) = (scene.as_ref().to_owned(), set.iter().map(|&set| set.to_owned()).collect::<Vec<_>>());
     with_session(move |session| {
         let solution = solve(session, load(&path, &set)?)?;
@@ -74,12 +44,13 @@ pub fn try_here(scene: impl AsRef<Path>, set: &[&str]) -> Result<Solved, Error> 
             solution.contact(pair).write(&mut bytes).expect("memory can be written");
             Table::of(&bytes[..], "the contact table")
         };
-        let contacts = (0..solution.pairs()).map(table).collect();
-        Ok(Solved { report: serde_json::to_value(solution.report()).expect("a report is JSON"), contacts })
+        let tables = Tables::Memory((0..solution.pairs()).map(table).collect());
+        let value = super::without_machine(serde_json::to_value(solution.report()).expect("a report is JSON"));
+        Ok(Report { value, said: String::new(), tables })
     })
 }
 
 /// Solve a scene with values to replace, which the program must not refuse.
-pub fn solve_here(scene: impl AsRef<Path>, set: &[&str]) -> Solved {
+pub fn solve_here(scene: impl AsRef<Path>, set: &[&str]) -> Report {
     try_here(scene, set).unwrap_or_else(|error| panic!("{}", error.render(false)))
 }

@@ -8,7 +8,7 @@ pub mod shapes;
 
 use serde_json::Value;
 use std::fs::{self, File};
-use std::ops::Index;
+use std::ops::{Deref, Index};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
@@ -18,57 +18,38 @@ use winkler::petsc::{CROWDED, UNBOUND, launcher};
 /// The program under test.
 pub const WINKLER: &str = env!("CARGO_BIN_EXE_winkler");
 
-/// After this a run counts as hanging and is ended: a minute, or the seconds in `WINKLER_TEST_PATIENCE` on a busy machine.
+/// After this a run counts as hanging and is ended: two minutes, or the seconds in `WINKLER_TEST_PATIENCE` on a busy machine.
 fn patience() -> Duration {
     let seconds = std::env::var("WINKLER_TEST_PATIENCE").ok().and_then(|seconds| seconds.parse().ok());
-    Duration::from_secs(seconds.unwrap_or(60))
+    Duration::from_secs(seconds.unwrap_or(120))
 }
 
-/// Builds and runs an example in the folder of the project; gives what it printed.
-pub fn example(name: &str, args: &[&str]) -> String {
-    let cargo = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO"));
-        command.args(words).args(["--locked", "--quiet", "--example", name]).current_dir(root());
-        // `scripts/timed` sets it for the test program; cargo would build all crates anew for it
-        command.env_remove("RUSTC_BOOTSTRAP");
-        if !cfg!(debug_assertions) {
-            command.arg("--release");
-        }
-        command
-    };
-    let built = output(cargo(&["build"]), Duration::from_secs(600));
-    assert!(built.0.success(), "{name} is not built\n{}", built.2);
-    let file = Path::new(WINKLER).parent().expect("a folder").join("examples").join(name);
-    let mut command = Command::new(file);
-    command.args(args).current_dir(root());
-    // launchers that start at the same moment get into each other's way in a common folder
-    let scratch = tempfile::tempdir().expect("a folder");
-    command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
-    environment(&mut command);
-    let (status, said, complaint) = output(command, Duration::from_secs(60));
-    assert!(status.success(), "{name} ended with {status}\n{said}{complaint}");
-    said
+/// What came of a scene: `report.json`, which is null if there is none, and the contact tables.
+pub struct Report {
+    value: Value,
+    /// All that was said, for messages of tests.
+    said: String,
+    tables: Tables,
 }
 
-/// What came of one run.
-pub struct Run {
-    /// Exit code.
-    pub code: i32,
-    /// What it printed.
-    pub stdout: String,
-    /// What it complained about.
-    pub stderr: String,
-    /// `report.json`; null if there is none.
-    pub report: Value,
-    /// Folder of results; it may not exist.
-    pub folder: PathBuf,
-    _scratch: TempDir,
+/// Where contact tables are.
+enum Tables {
+    Folder(PathBuf),
+    Memory(Vec<Table>),
 }
 
-impl Run {
+impl Deref for Report {
+    type Target = Value;
+
+    fn deref(&self) -> &Value {
+        &self.value
+    }
+}
+
+impl Report {
     /// A number of the report, by name or path (`"times/total"`).
     pub fn number(&self, path: &str) -> f64 {
-        let value = self.report.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
+        let value = self.value.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
         value.as_f64().unwrap_or_else(|| panic!("`{path}` of the report is {value}\n{}", self.said()))
     }
 
@@ -81,26 +62,20 @@ impl Run {
 
     /// A text of the report.
     pub fn text(&self, path: &str) -> &str {
-        let value = self.report.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
+        let value = self.value.pointer(&format!("/{path}")).unwrap_or(&Value::Null);
         value.as_str().unwrap_or_else(|| panic!("`{path}` of the report is {value}\n{}", self.said()))
     }
 
     /// Inner solver of each body, as the report has it.
     pub fn solvers(&self) -> Vec<&str> {
-        let bodies = self.report["bodies"].as_array().unwrap_or_else(|| panic!("no bodies\n{}", self.said()));
+        let bodies = self.value["bodies"].as_array().unwrap_or_else(|| panic!("no bodies\n{}", self.said()));
         bodies.iter().map(|body| body["solver"].as_str().unwrap_or_default()).collect()
     }
 
-    /// All warnings of the report, a line each, without that on the BLAS of this machine.
+    /// All warnings of the report, a line each.
     pub fn warnings(&self) -> String {
-        let warnings = self.report["warnings"].as_array().unwrap_or_else(|| panic!("no report\n{}", self.said()));
-        let is_of_run = |text: &&str| !text.contains("OPENBLAS_CORETYPE");
-        warnings.iter().filter_map(Value::as_str).filter(is_of_run).collect::<Vec<_>>().join("\n")
-    }
-
-    /// A table among the results.
-    pub fn table(&self, name: &str) -> Table {
-        Table::read(&self.folder.join(name))
+        let warnings = self.value["warnings"].as_array().unwrap_or_else(|| panic!("no report\n{}", self.said()));
+        warnings.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("\n")
     }
 
     /// The contact table of the first pair.
@@ -110,8 +85,13 @@ impl Run {
 
     /// The contact table of a pair, which must be the only one of its two bodies.
     pub fn contact_of(&self, pair: usize) -> Table {
-        let name = |side: usize| self.text(&format!("pairs/{pair}/bodies/{side}"));
-        self.table(&format!("contact-{}-{}.csv", name(0), name(1)))
+        match &self.tables {
+            Tables::Memory(tables) => tables[pair].clone(),
+            Tables::Folder(folder) => {
+                let name = |side: usize| self.text(&format!("pairs/{pair}/bodies/{side}"));
+                Table::read(&folder.join(format!("contact-{}-{}.csv", name(0), name(1))))
+            }
+        }
     }
 
     /// Force vectors of a pair on its two bodies, in the order of the scene.
@@ -120,25 +100,56 @@ impl Run {
         std::array::from_fn(|side| std::array::from_fn(|c| component(side, c)))
     }
 
+    /// The report, whose status must be `converged`.
+    pub fn converged(self) -> Self {
+        assert_eq!(self.value["status"].as_str(), Some("converged"), "{}", self.said());
+        self
+    }
+
+    /// All that was said, for messages of tests.
+    pub fn said(&self) -> String {
+        if self.said.is_empty() { format!("{:#}", self.value) } else { self.said.clone() }
+    }
+}
+
+/// What came of one run of the program.
+pub struct Run {
+    /// Exit code.
+    pub code: i32,
+    /// What it printed.
+    pub stdout: String,
+    /// What it complained about.
+    pub stderr: String,
+    /// What it reported.
+    pub report: Report,
+    /// Folder of results; it may not exist.
+    pub folder: PathBuf,
+    _scratch: TempDir,
+}
+
+impl Deref for Run {
+    type Target = Report;
+
+    fn deref(&self) -> &Report {
+        &self.report
+    }
+}
+
+impl Run {
+    /// A table among the results.
+    pub fn table(&self, name: &str) -> Table {
+        Table::read(&self.folder.join(name))
+    }
+
     /// `history.csv`.
     pub fn history(&self) -> Table {
         self.table("history.csv")
-    }
-
-    /// Runs a command that writes its results to `folder`.
-    pub fn of(command: Command, folder: &Path) -> Self {
-        end_of(command, TempDir::new().expect("a temporary folder"), folder.to_owned())
     }
 
     /// The run itself, which must have ended with status `converged`.
     pub fn converged(self) -> Self {
         assert_eq!((self.code, self.report["status"].as_str()), (0, Some("converged")), "{}", self.said());
         self
-    }
-
-    /// All that was said, for messages of tests.
-    pub fn said(&self) -> String {
-        format!("exit code {}\n--- stdout\n{}--- stderr\n{}", self.code, self.stdout, self.stderr)
     }
 }
 
@@ -207,10 +218,19 @@ fn program(ranks: usize) -> Command {
     command
 }
 
+/// Removes what MPI sets where this process has a session, and a launcher would take for its own.
+pub fn without_session(command: &mut Command) -> &mut Command {
+    let is_of_mpi = |name: &str| ["OMPI_", "ORTE_", "PMIX_", "PRTE_"].iter().any(|start| name.starts_with(start));
+    for (name, _) in std::env::vars().filter(|(name, _)| is_of_mpi(name)) {
+        command.env_remove(name);
+    }
+    command
+}
+
 /// Sets what tests need: Open MPI as root, ranks that share cores, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
 /// options from outside.
 pub fn environment(command: &mut Command) {
-    command
+    without_session(command)
         .envs(CROWDED)
         // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
         .envs(UNBOUND)
@@ -225,20 +245,33 @@ pub fn environment(command: &mut Command) {
 
 fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     command.current_dir(scratch.path());
-    end_of(command, scratch, folder)
-}
-
-fn end_of(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
     // launchers that start at the same moment get into each other's way in a common folder
     command.env("OMPI_MCA_orte_tmpdir_base", scratch.path());
     let (status, stdout, stderr) = output(command, patience());
-    let report = match fs::read(folder.join("report.json")) {
-        Ok(bytes) => serde_json::from_slice(&bytes).expect("report.json is JSON"),
+    let stdout = stdout.split_inclusive('\n').filter(|line| !is_of_machine(line)).collect::<String>();
+    let value = match fs::read(folder.join("report.json")) {
+        Ok(bytes) => without_machine(serde_json::from_slice(&bytes).expect("report.json is JSON")),
         Err(_) => Value::Null,
     };
-    let run = Run { code: status.code().unwrap_or(-1), stdout, stderr, report, folder, _scratch: scratch };
+    let code = status.code().unwrap_or(-1);
+    let said = format!("exit code {code}\n--- stdout\n{stdout}--- stderr\n{stderr}");
+    let report = Report { value, said, tables: Tables::Folder(folder.clone()) };
+    let run = Run { code, stdout, stderr, report, folder, _scratch: scratch };
     assert!(!run.stderr.contains("panicked"), "the program panicked\n{}", run.said());
     run
+}
+
+/// Whether a line is the warning that OpenBLAS does not know this processor.
+fn is_of_machine(line: &str) -> bool {
+    line.contains("OPENBLAS_CORETYPE")
+}
+
+/// A report without that warning.
+fn without_machine(mut report: Value) -> Value {
+    if let Some(warnings) = report.get_mut("warnings").and_then(Value::as_array_mut) {
+        warnings.retain(|warning| !warning.as_str().is_some_and(is_of_machine));
+    }
+    report
 }
 
 /// Runs a command to its end, which must come before `patience` is over; gives its exit status, output and complaints.
@@ -341,6 +374,7 @@ pub fn text_of(name: &str) -> String {
 }
 
 /// A CSV file as columns; an empty field is NaN.
+#[derive(Clone)]
 pub struct Table {
     /// Names of the columns, in order.
     pub names: Vec<String>,

@@ -1,6 +1,7 @@
 //! Bodies on coarse meshes in any units of length and stress.
 
-use super::{Scene, root, solve};
+use super::here::solve_here;
+use super::{Scene, root};
 use std::fs;
 use std::process::Command;
 
@@ -87,9 +88,9 @@ contact = [{{ between = ["lower_top", "upper_bottom"], gap = "{gap}", layer = {{
     }
 
     /// Pressures in units of `stress` with the layer (c/B)^2, which a stress of 10 closes by 8e-5 in the first units.
-    pub fn pressures(&self, stress: f64, length: f64, arguments: &[&str]) -> Vec<f64> {
+    pub fn pressures(&self, stress: f64, length: f64, set: &str) -> Vec<f64> {
         let layer = format!("power = {{ B = {:e}, a = 0.5 }}", 2.5e-5 * length / stress.sqrt());
-        let run = solve(self.scene(stress, length, &layer), arguments).converged();
+        let run = solve_here(self.scene(stress, length, &layer), &[set]).converged();
         run.contact()["pressure"].iter().map(|pressure| pressure / stress).collect()
     }
 }

@@ -5,3 +5,4 @@ mod carrier;
 mod effectivity;
 mod estimate;
 mod parts;
+mod regions;

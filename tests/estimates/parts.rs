@@ -1,6 +1,7 @@
 //! Estimated errors of machine parts: singular corners away from the contact, and curved surfaces of straight facets.
 
-use crate::common::{Run, Scene, Table, case, solve};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, Table, case};
 
 /// A bolt's head on a plate with a hole, of revolution. The corner between head and shank is singular, and the bolt is too stiff by it.
 const BOLT: &str = "SetFactory(\"OpenCASCADE\"); DefineConstant[ h = {1, Name \"h\"} ]; e = 1e-4;\n\
@@ -50,9 +51,9 @@ fn difference(coarse: &Table, fine: &Table, columns: &[&str]) -> f64 {
 #[test]
 fn displacements_of_a_bolt() {
     let scene = bolt();
-    let fine = solve(&scene, &["--set", "mesh.set.h=0.125"]).converged().contact();
+    let fine = solve_here(&scene, &["mesh.set.h=0.125"]).converged().contact();
     for h in ["1", "0.5"] {
-        let run = solve(&scene, &["--set", &format!("mesh.set.h={h}")]).converged();
+        let run = solve_here(&scene, &[&format!("mesh.set.h={h}")]).converged();
         let exact = difference(&run.contact(), &fine, &["u_n_plate", "u_n_bolt"]);
         let estimated = run.number("discretization_error/displacement");
         assert!((0.7..2.0).contains(&(estimated / exact)), "h = {h}: {estimated} {exact}");
@@ -87,8 +88,8 @@ fn dovetail() -> Scene {
 #[test]
 fn displacements_of_a_dovetail() {
     let scene = dovetail();
-    let fine = solve(&scene, &["--set", "mesh.set.h=0.125"]).converged().contact();
-    let run = solve(&scene, &[]).converged();
+    let fine = solve_here(&scene, &["mesh.set.h=0.125"]).converged().contact();
+    let run = solve_here(&scene, &[]).converged();
     let exact = difference(&run.contact(), &fine, &["u_n_groove", "u_n_tongue"]);
     let estimated = run.number("discretization_error/displacement");
     assert!((0.7..2.0).contains(&(estimated / exact)), "{estimated} {exact}");
@@ -100,8 +101,8 @@ fn displacements_of_a_dovetail() {
 #[test]
 fn energy_of_a_dovetail() {
     let scene = dovetail();
-    let [coarse, fine] = ["1", "0.5"].map(|h| solve(&scene, &["--set", &format!("mesh.set.h={h}")]).converged());
-    let squared = |run: &Run| run.number("discretization_error/energy").powi(2);
+    let [coarse, fine] = ["1", "0.5"].map(|h| solve_here(&scene, &[&format!("mesh.set.h={h}")]).converged());
+    let squared = |run: &Report| run.number("discretization_error/energy").powi(2);
     let fallen = (coarse.number("F1") - fine.number("F1")) / fine.number("F1").abs();
     let ratio = (squared(&coarse) - squared(&fine)) / fallen;
     assert!((0.8..1.6).contains(&ratio), "{ratio}");
@@ -111,11 +112,10 @@ fn energy_of_a_dovetail() {
 #[test]
 fn pressures_of_cylinders_of_straight_facets() {
     let with = |order: usize, n: usize| {
-        let mut sets = vec![format!("mesh.set.n={n}"), "contact.0.layer={linear={stiffness=1e5}}".to_owned()];
-        sets.extend((0..2).map(|body| format!("body.{body}.order={order}")));
-        let mut args = vec!["--estimate"];
-        args.extend(sets.iter().flat_map(|set| ["--set", set]));
-        solve(case("hertz-line"), &args).converged()
+        let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+        let layer = "contact.0.layer={linear={stiffness=1e5}}";
+        let sets = ["estimate=true", &format!("mesh.set.n={n}"), layer, &orders[0], &orders[1]];
+        solve_here(case("hertz-line"), &sets).converged()
     };
     let fine = with(2, 24).contact();
     for n in [3, 6] {
@@ -132,8 +132,8 @@ fn pressures_of_a_few_facets_are_a_guess() {
     // half of the contact is 0.25 wide
     let pressed = "body.1.load=[{on=\"upper_face\",pressure=1.5}]";
     let warnings = |n: &str| {
-        let args = ["--estimate", "--set", pressed, "--set", &format!("mesh.set.n={n}")];
-        solve(case("hertz-line"), &args).converged().warnings()
+        let sets = ["estimate=true", pressed, &format!("mesh.set.n={n}")];
+        solve_here(case("hertz-line"), &sets).converged().warnings()
     };
     let (coarse, fine) = (warnings("2"), warnings("16"));
     assert!(coarse.contains("is a guess: contact ends within the facets"), "{coarse}");

@@ -1,6 +1,7 @@
 //! Contact of curved surfaces that become steep: a punch with rounded edges, a cone, a ball in a socket, flanks of gears.
 
-use crate::common::{Run, Scene, root, solve};
+use crate::common::here::solve_here;
+use crate::common::{Report, Scene, root, solve};
 use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 
 const PUNCH: usize = 1;
@@ -29,8 +30,8 @@ fn scene(shape: usize, order: usize, pressure: f64, stiffness: f64) -> Scene {
 }
 
 /// Solves it with `n` elements a radius on the upper surface and `m` on the lower one.
-fn run(scene: &Scene, n: usize, m: usize) -> Run {
-    solve(scene, &["--set", &format!("mesh.set.n={n}"), "--set", &format!("mesh.set.m={m}")]).converged()
+fn run(scene: &Scene, n: usize, m: usize) -> Report {
+    solve_here(scene, &[&format!("mesh.set.n={n}"), &format!("mesh.set.m={m}")]).converged()
 }
 
 fn range(values: &[f64]) -> [f64; 2] {
@@ -64,7 +65,7 @@ fn linear_and_quadratic_elements_agree() {
         (BALL, 60.0, None),
         (FLANKS, 20.0, None),
     ] {
-        let end = |run: &Run| run.number("pairs/0/contact_ends/0/0");
+        let end = |run: &Report| run.number("pairs/0/contact_ends/0/0");
         let scenes = [1, 2].map(|order| scene(shape, order, pressure, 1e6));
         let fine = run(&scenes[1], 32, 32);
         let (width, peak) = (exact.unwrap_or(end(&fine)), fine.number("pairs/0/peak_pressure"));

@@ -1,6 +1,6 @@
 //! Pairs that end: at their largest distance, at a step of a surface, and behind a facet that is no partner.
 
-use crate::common::{Run, Scene, root, solve, solve_on};
+use crate::common::{Report, Scene, root, solve, solve_on};
 use std::fmt::Write;
 
 /// The stiff spheres of `sphere-layer` as bodies of revolution. Their contact ends at the radius 1, where they are 0.02 apart.
@@ -72,7 +72,7 @@ Physical Surface(\"under\")={{e(10):e({})}};Physical Surface(\"back\")={{e(8)}};
 }
 
 /// Move the upper body by 0.002 towards the block of [`below`].
-fn pressed(underside: &[[f64; 2]], space: bool, order: usize, contact: &str) -> Run {
+fn pressed(underside: &[[f64; 2]], space: bool, order: usize, contact: &str) -> Report {
     let (dimension, z) = if space { (3, ", z = 0") } else { (2, "") };
     let body = |name: &str, on: &str, y: f64| {
         format!(
@@ -85,7 +85,7 @@ fn pressed(underside: &[[f64; 2]], space: bool, order: usize, contact: &str) -> 
         body("upper", "back", -0.002)
     ));
     std::fs::write(scene.path.with_file_name("under.geo"), below(underside, space)).expect("a script");
-    solve(&scene, &[]).converged()
+    crate::common::here::solve_here(&scene, &[]).converged()
 }
 
 /// The facet of the block under the step lies before both parts of the underside. Its gap is between theirs, where a dual mean would make an

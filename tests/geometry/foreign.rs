@@ -129,6 +129,9 @@ fn files_of_abaqus_and_calculix() {
     assert!((run.number("pairs/0/force/0/2") + 10.0).abs() < 1e-9);
     assert_eq!([run.count("bodies/0/cells"), run.count("bodies/1/cells")], [6, 6]);
     assert!(run.warnings().contains("split"), "{}", run.warnings());
+    // a line that has not all nodes goes on without a comma, too
+    let bare = solved("a.inp", INP.replace("2, 3, 4,\n", "2, 3, 4\n").as_bytes(), "\"a.inp\"", &names).converged();
+    assert_eq!(bare.number("pairs/0/force/0/2"), run.number("pairs/0/force/0/2"));
     let scene = scene("\"a.inp\"", &names);
     fs::write(scene.path.with_file_name("a.inp"), INP).expect("a file");
     let list = winkler(&["mesh", scene.path.to_str().expect("a path")]);

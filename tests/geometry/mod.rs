@@ -1,5 +1,6 @@
 //! Meshes, shapes and surfaces: what is read, what is refused, and what lies opposite what.
 
+mod chords;
 mod curved;
 mod digits;
 mod ends;
@@ -11,4 +12,5 @@ mod patterns;
 mod pieces;
 mod quadratic;
 mod round;
+mod segments;
 mod surfaces;

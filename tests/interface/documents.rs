@@ -126,63 +126,6 @@ fn every_command_in_the_documents_works() {
     assert!(failed.is_empty(), "{} of {} commands fail:\n{}", failed.len(), seen.len(), failed.join("\n"));
 }
 
-#[test]
-fn commands_are_found_in_their_blocks() {
-    let text = "winkler no\n```sh\n# winkler no\nwinkler a \\\n    b  # c\ncd x\nscripts/run d\nmpiexec -n 2 winkler e\n\
-                mpiexec -n 2 other\n```\nscripts/run no\n```text\nwinkler no\n```\n";
-    let found: Vec<(usize, String)> = commands(text).into_iter().map(|typed| (typed.line, typed.text)).collect();
-    let expected = [(4, "winkler a b  # c"), (7, "scripts/run d"), (8, "mpiexec -n 2 winkler e")];
-    assert_eq!(found, expected.map(|(line, text)| (line, text.to_owned())));
-}
-
-/// Pieces of sources in the documents: blocks whose first line names their file, and that stand there line for line.
-#[test]
-fn the_pieces_of_sources_in_the_documents_are_those_of_the_sources() {
-    let text = fs::read_to_string(root().join("docs/extending.md")).expect("a document");
-    let blocks = text.split("```rust\n").skip(1).chain(text.split("```toml\n").skip(1));
-    let mut seen = 0;
-    for block in blocks.filter_map(|rest| rest.split("\n```").next()) {
-        let (first, piece) = block.split_once('\n').expect("a file and its lines");
-        let file = first.trim_start_matches(['/', '#', ' ']);
-        let source = fs::read_to_string(root().join(file)).unwrap_or_else(|cause| panic!("{file}: {cause}"));
-        assert!(source.contains(piece), "{file} has no longer\n{piece}");
-        seen += 1;
-    }
-    assert!(seen > 10, "{seen}");
-}
-
-/// The job scripts of the documents run, with `mpiexec` in the place of `srun`, and save their state before their time is over.
-#[test]
-fn the_job_scripts_work() {
-    let text = fs::read_to_string(root().join("docs/cluster.md")).expect("a document");
-    let scripts: Vec<&str> = text.split("```text\n").filter_map(|block| block.split("```").next()).collect();
-    let scripts: Vec<&str> = scripts.into_iter().filter(|script| script.starts_with("#!/bin/bash\n#SBATCH")).collect();
-    assert_eq!(scripts.len(), 2);
-    for script in scripts {
-        let option = |name: &str| script.split_once(name).and_then(|(_, rest)| rest.split_whitespace().next());
-        let time: Vec<u32> = option("--time=").expect("a time").split(':').map(|n| n.parse().expect("time")).collect();
-        if let Some(minutes) = option("--checkpoint ") {
-            let minutes: u32 = minutes.parse().expect("minutes");
-            assert!(2 * minutes <= 60 * time[0] + time[1], "checkpoints every {minutes} minutes in {time:?}");
-        }
-        let folder = scratch();
-        let base = folder.path();
-        let srun = base.join("bin/srun");
-        fs::write(&srun, "#!/bin/sh\nshift\nexec mpiexec -n 2 \"$@\"\n").expect("a script");
-        fs::set_permissions(&srun, fs::Permissions::from_mode(0o755)).expect("a script that runs");
-        let mut job = Command::new("bash");
-        crate::common::environment(&mut job);
-        job.env("PATH", format!("{}:{}", base.join("bin").display(), std::env::var("PATH").unwrap_or_default()));
-        job.envs([("SLURM_JOB_ID", "7"), ("SLURM_ARRAY_JOB_ID", "7"), ("SLURM_ARRAY_TASK_ID", "1")]);
-        job.env("SLURM_SUBMIT_DIR", base).env("OMPI_MCA_orte_tmpdir_base", base).current_dir(base).args(["-c", script]);
-        let (status, _, complaint) = output(job, Duration::from_secs(120));
-        assert!(status.success(), "{script}\nended with {status}\n{complaint}");
-        let reports = fs::read_dir(base.join("results")).into_iter().flatten().flatten();
-        assert_eq!(reports.filter(|folder| folder.path().join("report.json").is_file()).count(), 1, "{script}");
-        assert!(base.join("cache").is_dir(), "{script}");
-    }
-}
-
 /// A command that fails is reported with its place.
 #[test]
 fn a_wrong_command_fails() {
@@ -191,44 +134,4 @@ fn a_wrong_command_fails() {
     let failed = failures(Path::new("README.md"), &wrong);
     assert_eq!(failed.len(), 1, "{failed:?}");
     assert!(failed[0].starts_with("README.md:3: `scripts/run") && failed[0].contains("pach"), "{failed:?}");
-}
-
-/// Where there is no apt, `scripts/setup` names what is missing, and a PETSc of the user's own counts with its MPI and MUMPS. Gmsh is not
-/// required.
-#[test]
-fn setup_without_apt_takes_the_users_own_petsc() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = |name: &str| folder.path().join(name);
-    for name in ["bin", "petsc/lib/pkgconfig", "petsc/include"] {
-        fs::create_dir_all(path(name)).expect("a folder");
-    }
-    fs::write(path("petsc/include/dmumps_c.h"), "").expect("a header");
-    let usual = std::env::var("PATH").expect("a path");
-    for name in ["bash", "cat", "dirname", "env", "grep", "readlink", "sed", "sort", "tail"] {
-        let tool = std::env::split_paths(&usual).map(|folder| folder.join(name)).find(|file| file.is_file());
-        std::os::unix::fs::symlink(tool.expect(name), path("bin").join(name)).expect("a link");
-    }
-    for name in ["cargo", "cc", "mpicc", "pkg-config", "rustc"] {
-        let program = path("bin").join(name);
-        fs::write(&program, "#!/bin/sh\necho rustc 9.9.9\n").expect("a program");
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).expect("a program that runs");
-    }
-    let setup = |variables: &[(&str, &str)]| {
-        let mut command = Command::new("bash");
-        command.arg(root().join("scripts/setup")).env("PATH", path("bin")).env("CARGO_HOME", path("none"));
-        command.env("PETSC_DIR", path("petsc")).env_remove("PETSC_ARCH").env_remove("MPICC").env_remove("MUMPS_DIR");
-        command.envs(variables.iter().copied());
-        let (status, said, complaint) = output(command, Duration::from_secs(20));
-        assert!(!complaint.contains("apt"), "{complaint}");
-        (status.success(), said + &complaint)
-    };
-    let (is_ready, said) = setup(&[]);
-    assert!(is_ready && said.contains("no gmsh in PATH"), "{said}");
-    for (name, value, words) in [
-        ("MPICC", "/nowhere/mpicc", "/nowhere/mpicc: the mpicc of the MPI"),
-        ("PETSC_DIR", "/nowhere", "/nowhere/ has no lib/pkgconfig"),
-    ] {
-        let (is_ready, said) = setup(&[(name, value)]);
-        assert!(!is_ready && said.contains(words), "{name}: {said}");
-    }
 }

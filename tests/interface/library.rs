@@ -1,58 +1,60 @@
 //! The library as a program of one's own uses it: the examples, scenes built in Rust and what is wrong with some, the features.
 
-use crate::common::here::with_session;
-use crate::common::{case, example, output, root};
+use crate::common::here::{solve_here, with_session};
+use crate::common::{case, output, root};
 use std::process::Command;
 use std::time::Duration;
 use winkler::api::*;
 
-/// The numbers in a line, signs and exponents included.
-fn numbers(line: &str) -> Vec<f64> {
-    line.split(|c: char| c.is_whitespace() || c == ',').filter_map(|word| word.parse().ok()).collect()
-}
+#[path = "../../scripts/library/gamma.rs"]
+#[allow(dead_code)]
+mod gamma;
+#[path = "../../scripts/library/gmsh.rs"]
+#[allow(dead_code)]
+mod gmsh;
+#[path = "../../scripts/library/law.rs"]
+#[allow(dead_code)]
+mod law;
 
 /// The scene in Rust is that of the file, solved to the same digits.
 #[test]
 fn the_groove_built_in_rust_is_that_of_the_file() {
-    let said = example("gmsh", &[]);
-    let run = crate::common::solve(case("groove"), &["--set", "mesh.set.n=16", "--set", "method={}"]).converged();
-    let mut lines = said.lines();
-    let head = numbers(lines.next().expect("a line"));
-    assert_eq!(head[0] as usize, run.count("iterations"), "{said}");
-    assert!((head[1] / run.number("F1") - 1.0).abs() < 1e-9, "{said}");
-    let contact = run.contact();
-    let (x, p) = (&contact["x"], &contact["pressure"]);
-    let mut seen = 0;
-    for (line, q) in lines.zip((0..x.len()).step_by(8)) {
-        let [at, pressure] = numbers(line)[..] else { panic!("{line}") };
-        assert!((at - x[q]).abs() < 1e-3 && (pressure - p[q]).abs() < 1e-6, "{line}: {} {}", x[q], p[q]);
-        seen += 1;
-    }
-    assert!(seen > 8, "{said}");
+    let file = solve_here(case("groove"), &["mesh.set.n=16", "method={}"]).converged();
+    with_session(move |session| {
+        let built = gmsh::groove(session).expect("a solution");
+        let report = built.report();
+        assert_eq!(report.iterations, file.count("iterations"));
+        assert!((report.f1.expect("an energy") / file.number("F1") - 1.0).abs() < 1e-12);
+        assert_eq!(built.contact(0).pressure, file.contact()["pressure"]);
+    });
 }
 
 #[test]
 fn an_own_law_gives_the_closed_form() {
-    let said = example("law", &[]);
-    let found = said.lines().flat_map(numbers).collect::<Vec<f64>>();
-    let [computed, exact, off] = found[..] else { panic!("{said}") };
-    assert!(said.starts_with("converged") && (computed - exact).abs() < 1e-9 && off < 1e-9, "{said}");
-    assert!((exact + 0.48).abs() < 1e-12, "{said}");
+    with_session(|session| {
+        let solution = law::pressed(session).expect("a solution");
+        assert!(solution.is_converged());
+        let upper = solution.body(1).expect("a body").expect("displacements");
+        let top = upper.displacement.iter().map(|u| u[1]).fold(f64::INFINITY, f64::min);
+        assert!((top - law::exact()).abs() < 1e-9 && (top + 0.48).abs() < 1e-9, "{top}");
+        assert!(solution.contact(0).pressure.iter().all(|p| (p - law::LOAD).abs() < 1e-9));
+    });
 }
 
 /// All rules reach one solution, and Chebyshev's steps in fewer sweeps than the paper's gamma.
 #[test]
 fn an_own_rule_for_gamma_is_one_of_them() {
-    let said = example("gamma", &[]);
-    let row = |line: &str| {
-        assert!(line.contains(" converged in "), "{said}");
-        let [sweeps, peak] = numbers(&line.replace("gamma", ""))[..] else { panic!("{line}") };
-        (sweeps as usize, peak)
-    };
-    let rows: Vec<(usize, f64)> = said.lines().map(row).collect();
-    assert_eq!(rows.len(), 5, "{said}");
-    assert!(rows.iter().all(|(_, peak)| (peak / rows[0].1 - 1.0).abs() < 1e-6), "{said}");
-    assert!(rows[1].0 < rows[0].0 && rows[1].0 > 5, "{said}");
+    with_session(|session| {
+        let solved = gamma::rules().map(|rule| gamma::by(session, rule).expect("a solution"));
+        let peak = |solution: &Solution| solution.contact(0).pressure.into_iter().fold(0.0, f64::max);
+        assert!(
+            solved
+                .iter()
+                .all(|solution| solution.is_converged() && (peak(solution) / peak(&solved[0]) - 1.0).abs() < 1e-6)
+        );
+        let [paper, own] = [0, 1].map(|k| solved[k].report().sweeps);
+        assert!(own < paper && own > 5, "{own} {paper}");
+    });
 }
 
 /// Two unit squares, one on the other, each point of the upper one numbered backwards, and a point of nobody.
@@ -215,26 +217,6 @@ fn scenes_that_contradict_themselves_are_refused() {
     let scene = pressed(squares()).body(BodySpec::new("Upper", 1.0, 0.0));
     let place = format!("{}:{}:", file!(), line!() - 1);
     assert!(scene.check().expect_err("a capital").to_string().contains(&place), "{place}");
-}
-
-/// What is not for a library is not in it.
-#[test]
-fn without_the_command_line_its_crates_are_gone() {
-    let names = |more: &[&str]| {
-        let mut tree = Command::new(env!("CARGO"));
-        tree.args(["tree", "--locked", "--offline", "--edges", "normal", "--prefix", "none"])
-            .args(more)
-            .current_dir(root());
-        let (status, said, complaint) = output(tree, Duration::from_secs(60));
-        assert!(status.success(), "{complaint}");
-        said.lines().filter_map(|line| line.split(' ').next().map(str::to_owned)).collect::<Vec<String>>()
-    };
-    let (with, without) = (names(&[]), names(&["--no-default-features"]));
-    for name in ["clap", "plotters", "indicatif", "comfy-table", "minijinja", "wait4", "anstream"] {
-        let is_in = |names: &[String]| names.iter().any(|other| other == name);
-        assert!(is_in(&with) && !is_in(&without), "{name}");
-    }
-    assert!(without.len() > 20);
 }
 
 /// The script of docs/library.md reads the files of a run to the same numbers, where Python has numpy.

@@ -1,6 +1,6 @@
 //! What the program does besides solving: scenes to begin from, completions, man pages, colours.
 
-use crate::common::{case, environment, output, solve, winkler, winkler_on};
+use crate::common::{case, environment, solve, winkler, winkler_on};
 use std::fs;
 use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::Path;
@@ -94,21 +94,6 @@ fn shells_and_man_know_the_commands() {
     assert_eq!(winkler(&["man", "/dev/null/man"]).code, 6);
 }
 
-#[test]
-fn colours_are_asked_for() {
-    let coloured = |words: &[&str], variable: Option<(&str, &str)>| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_winkler"));
-        environment(&mut command);
-        command.args(words).arg("mesh").arg("none.toml").envs(variable);
-        let (_, _, complaint) = output(command, Duration::from_secs(60));
-        assert!(complaint.contains("none.toml"), "{complaint}");
-        complaint.contains('\u{1b}')
-    };
-    assert!(!coloured(&[], None) && coloured(&["--color", "always"], None));
-    assert!(coloured(&[], Some(("CLICOLOR_FORCE", "1"))));
-    assert!(!coloured(&["--color", "never"], Some(("CLICOLOR_FORCE", "1"))));
-}
-
 /// With `-q` a run that is solved says where its results are; one that is not says so, too. Warnings stay.
 #[test]
 fn quiet_runs_say_what_matters() {
@@ -150,40 +135,6 @@ fn check_names_the_solvers_of_a_run() {
         let solvers = facts["bodies"].as_array().expect("bodies").iter().map(|body| body["solver"].clone());
         assert_eq!(solvers.collect::<Vec<_>>(), solve(scene, &words).solvers(), "{solver}");
     }
-}
-
-/// With `-v` standard error has the decisions and the PETSc options of each body, typed ones and the program's own.
-#[test]
-fn verbose_runs_say_what_was_decided() {
-    let words = ["--set", "mesh.set.n=4", "--method", "robin", "--set", "solver=mumps", "-upper_ksp_type", "cg"];
-    let usual = solve(case("groove"), &words);
-    let run = solve(case("groove"), &[&words[..], &["-v"]].concat());
-    let without = |text: &str| text.lines().filter(|line| !line.contains(" s")).map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(without(&run.stdout).len(), without(&usual.stdout).len(), "what comes out is the same");
-    assert!(usual.stderr.is_empty(), "{}", usual.stderr);
-    for part in ["decided", "method: robin", "until increment <=", "inner solver: ", "points on `", "body lower: "] {
-        assert!(run.stderr.contains(part), "no `{part}` in\n{}", run.stderr);
-    }
-    let options = |body: &str| {
-        let begin = format!("  PETSc options of {body}: ");
-        run.stderr.lines().find_map(|line| line.strip_prefix(&begin)).unwrap_or_default().to_owned()
-    };
-    assert!(options("upper").contains("-upper_ksp_type cg"), "{}", run.stderr);
-    assert!(options("lower").contains("-lower_pc_type cholesky"), "{}", run.stderr);
-    assert!(!options("lower").contains("upper"), "{}", run.stderr);
-}
-
-#[test]
-fn help_has_examples_and_petsc_options() {
-    for command in ["solve", "check", "sweep", "bench"] {
-        let help = winkler(&[command, "--help"]);
-        assert!(help.code == 0 && help.stdout.contains("Examples:\n  winkler "), "{}", help.said());
-    }
-    let help = winkler(&["solve", "--help"]).stdout;
-    assert!(help.contains("-upper_ksp_type cg") && help.contains("-newton_pc_type"), "{help}");
-    // options of the program with one dash look like PETSc's
-    let slip = winkler(&["solve", "scene.toml", "-verbose"]);
-    assert!(slip.code == 2 && slip.stderr.contains("did you mean --verbose?"), "{}", slip.said());
 }
 
 /// A run that would take hours, ended when its test ends.
@@ -298,54 +249,6 @@ fn nothing_old_stands_beside_what_is_new() {
     assert!(users.iter().all(|name| fs::read_to_string(folder.join(name)).is_ok_and(|text| text == "mine")));
 }
 
-/// Tables that grow replace what has their name, as all other files do: a link is not followed, a pipe is no table.
-#[test]
-fn tables_stay_in_their_folder() {
-    let scratch = tempfile::tempdir().expect("a folder");
-    let (folder, target) = (scratch.path().join("out"), scratch.path().join("target.csv"));
-    let out = folder.to_str().expect("UTF-8");
-    fs::create_dir(&folder).expect("a folder");
-    fs::write(&target, "a file of somebody else").expect("a file");
-    let tables = ["history.csv", "steps.csv", "sweep.csv", "bench.csv", "report.json"];
-    tables.iter().for_each(|name| symlink(&target, folder.join(name)).expect("a link"));
-    let scene = case("groove-held").display().to_string();
-    let small = ["--set", "mesh.set.n=4", "--method", "newton", "-o", out];
-    for words in [
-        &["solve", &scene, "--set", "method.steps=2"][..],
-        &["sweep", &scene, "--over", "contact.0.layer.power.a=0.5,1"],
-        &["bench", &scene, "--solver", "condensed"],
-    ] {
-        let run = winkler(&[words, &small].concat());
-        assert_eq!(run.code, 0, "{}", run.said());
-    }
-    assert_eq!(fs::read_to_string(&target).expect("a file"), "a file of somebody else");
-    assert!(
-        ["sweep.csv", "bench.csv"].iter().all(|name| folder.join(name).symlink_metadata().is_ok_and(|d| d.is_file()))
-    );
-    for (name, words) in [
-        ("history.csv", &["solve", &scene][..]),
-        ("report.json", &["solve", &scene]),
-        ("sweep.csv", &["sweep", &scene, "--over", "contact.0.layer.power.a=0.5,1"]),
-        ("bench.csv", &["bench", &scene, "--solver", "condensed", "--resume"]),
-        ("page.html", &["report", out]),
-    ] {
-        let path = folder.join(name);
-        // a table of before may be there or not
-        let _ = fs::remove_file(&path);
-        assert!(Command::new("mkfifo").arg(&path).status().expect("mkfifo").success());
-        let page = path.display().to_string();
-        let run = match words[0] {
-            "report" => {
-                assert_eq!(winkler(&[&["solve", &scene], &small[..]].concat()).code, 0);
-                winkler(&[words, &["-o", &page]].concat())
-            }
-            _ => winkler(&[words, &small].concat()),
-        };
-        assert!(run.code == 6 && run.stderr.contains(&format!("{page} is a pipe")), "{name}: {}", run.said());
-        fs::remove_file(&path).expect("the pipe is there");
-    }
-}
-
 /// What is in the way of a folder of results is named.
 #[test]
 fn folders_that_cannot_be_used_are_refused() {
@@ -380,31 +283,4 @@ fn folders_that_cannot_be_used_are_refused() {
         let run = winkler(&["solve", &scene, "--set", "mesh.set.n=4", "-o", &path("theirs")]);
         assert_eq!(run.code, 0, "{}", run.said());
     }
-}
-
-/// On a disk that fills up a sweep goes on: it says so at once and at the end, and prints all that it computed.
-#[test]
-fn a_table_on_a_full_disk_is_a_warning_and_nothing_is_lost() {
-    let scratch = tempfile::tempdir().expect("a folder");
-    let out = scratch.path().join("out");
-    let values: Vec<String> = (0..60).map(|k| format!("{}", 0.5 + 0.005 * f64::from(k))).collect();
-    let mut command = Command::new("bash");
-    // files of 8 kB; a row has some 200 bytes. What is printed goes through a pipe, which has no limit
-    let script = "set -o pipefail; (ulimit -f 8; exec \"$@\") | cat";
-    command.args(["-c", script, "bash", env!("CARGO_BIN_EXE_winkler"), "sweep"]);
-    command.arg(case("groove-held")).arg("-o").arg(&out).args(["--set", "mesh.set.n=2", "--set", "method={}"]);
-    command.args(["--set", "output.plots=false", "--json", "--over"]);
-    command.arg(format!("contact.0.layer.power.a={}", values.join(","))).current_dir(scratch.path());
-    environment(&mut command);
-    assert_eq!(winkler(&["mesh", case("groove-held").to_str().expect("UTF-8"), "--set", "mesh.set.n=2"]).code, 0);
-    let (status, stdout, stderr) = output(command, Duration::from_secs(120));
-    assert_eq!(status.code(), Some(6), "{stderr}");
-    let warns = |line: &&str| line.contains("warning: ") && !line.contains("OPENBLAS_CORETYPE");
-    assert_eq!(stderr.lines().filter(warns).count(), 1, "{stderr}");
-    assert!(stderr.contains("sweep.csv lacks rows") && stderr.contains("cannot write"), "{stderr}");
-    let reports: serde_json::Value = serde_json::from_str(&stdout).expect("JSON");
-    assert_eq!(reports.as_array().map(Vec::len), Some(60), "all runs are reported");
-    let table = fs::read_to_string(out.join("sweep.csv")).expect("a table");
-    let widths: Vec<usize> = table.lines().map(|line| line.split(',').count()).collect();
-    assert!(table.ends_with('\n') && widths.len() > 5 && widths.iter().all(|width| *width == widths[0]), "{table}");
 }

@@ -173,13 +173,6 @@ fn expressions_without_a_value() {
     assert_eq!(run.history().rows(), 4);
 }
 
-/// Ranks find the same and one of them says it.
-#[test]
-fn one_message_from_several_ranks() {
-    let run = solve_on(2, case("groove"), &["--set", "mesh.set.n=8", "--set", "method.psi=sqrt(x-2)"]);
-    assert!(run.code == SCENE && run.stderr.matches("psi is not a finite number").count() == 1, "{}", run.said());
-}
-
 #[test]
 fn words_of_the_command_line() {
     let scene = case("groove");
@@ -310,43 +303,6 @@ fn scripts_that_take_too_much() {
     refused(&limited(&huge, "timeout=60, memory=2"), MESH, &["own.geo", "more memory", "2.0 GB", "`memory`"]);
 }
 
-/// A killed run leaves no Gmsh behind, and the next one removes its folder.
-#[test]
-fn gmsh_ends_with_a_killed_run() {
-    let (folder, scene) = patch_with_script("For i In {0:1e15}\nx = i;\nEndFor\n");
-    let cache = folder.path().join("cache");
-    let mut command = Command::new(crate::common::WINKLER);
-    crate::common::environment(&mut command);
-    command.arg("mesh").arg(&scene.path).env("WINKLER_CACHE", &cache);
-    let mut run = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a run");
-    let wait = |what: &dyn Fn() -> bool| {
-        let began = std::time::Instant::now();
-        while !what() {
-            assert!(began.elapsed() < Duration::from_secs(30), "it never comes");
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    };
-    let child = || std::fs::read_to_string(format!("/proc/{0}/task/{0}/children", run.id())).unwrap_or_default();
-    let name = |pid: &str| std::fs::read_to_string(format!("/proc/{}/comm", pid.trim())).unwrap_or_default();
-    wait(&|| name(&child()).starts_with("gmsh"));
-    let gmsh = child();
-    run.kill().expect("a signal");
-    run.wait().expect("an end");
-    wait(&|| !name(&gmsh).starts_with("gmsh"));
-    let left = || {
-        std::fs::read_dir(&cache)
-            .expect("a cache")
-            .filter(|entry| entry.as_ref().is_ok_and(|e| e.path().is_dir()))
-            .count()
-    };
-    assert_eq!(left(), 1);
-    let mut command = Command::new(crate::common::WINKLER);
-    crate::common::environment(&mut command);
-    command.arg("mesh").arg(case("patch")).env("WINKLER_CACHE", &cache);
-    assert!(output(command, Duration::from_secs(60)).0.success());
-    assert_eq!(left(), 0);
-}
-
 #[test]
 fn petsc_options() {
     let typed = |options: &[&str], words: &[&str]| refused(&solve(case("groove"), options), SOLVER, words);
@@ -474,8 +430,6 @@ fn an_inner_solver_that_gives_up() {
     failed(&run, &["inner-solver"], &["`upper`", "iteration 0"]);
 }
 
-// Two ranks: one message, the right code, and no waiting for each other.
-
 /// Bodies of revolution have an axis, and nothing around it that is not the same all around.
 #[test]
 fn axisymmetric_scenes() {
@@ -512,58 +466,22 @@ fn axisymmetric_scenes() {
     refused(&solve(&space, &[]), SCENE, &["`plane` in a problem in space"]);
 }
 
+/// What all ranks find, or the owner of one body alone, is said once, and no rank waits for another.
 #[test]
-fn a_scene_refused_on_two_ranks() {
-    let scene = Scene::edited("groove", "gamma = 0.6", "gama = 0.6");
-    refused(&solve_on(2, &scene, &[]), SCENE, &["`gama`", "did you mean `gamma`?", "scene.toml"]);
-    let scene = Scene::edited("groove", "on = \"lower_axis\"", "on = \"upper_axis\"");
-    refused(&solve_on(2, &scene, &[]), SCENE, &["`upper_axis` does not touch body `lower`"]);
-    let wrong = ["--set", "contact.0.gap=sqrt(x-1)"];
-    refused(&solve_on(2, case("groove"), &wrong), SCENE, &["the gap is not a finite number"]);
-}
-
-/// Only the owner of a body looks at its loads.
-#[test]
-fn a_load_refused_on_one_of_two_ranks() {
-    for body in ["lower", "upper"] {
-        let load = format!("on = \"{body}_face\", pressure = ");
-        let scene = Scene::edited("groove", &format!("{load}10"), &format!("{load}\"sqrt(x - 2)\""));
-        let line = format!(":{}:", scene.line_of("sqrt"));
-        refused(&solve_on(2, &scene, &[]), SCENE, &[&line, "this load is not a finite number"]);
+fn two_ranks_refuse_as_one() {
+    let words: [(i32, &[&str], &[&str]); 7] = [
+        (SCENE, &["--set", "method.gama=1"], &["did you mean `gamma`?"]),
+        (SCENE, &["--set", "contact.0.gap=sqrt(x-1)"], &["the gap is not a finite number"]),
+        (SCENE, &["--set", "body.lower.load.0.pressure=sqrt(x-2)"], &["this load is not a finite number"]),
+        (SCENE, &["--set", "body.upper.load.0.pressure=sqrt(x-2)"], &["this load is not a finite number"]),
+        (SOLVER, &["-upper_ksp_tpye", "cg"], &["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]),
+        (SOLVER, &["-lower_pc_type", "nonsense"], &["nonsense", "PC"]),
+        (SOLVER, &["-upper_pc_type", "nonsense"], &["nonsense", "PC"]),
+    ];
+    for (code, options, words) in words {
+        refused(&solve_on(2, case("groove"), options), code, words);
     }
-}
-
-#[test]
-fn an_option_refused_on_two_ranks() {
-    for (options, words) in [
-        (["-ksp_tpye", "cg"], ["-ksp_tpye", "did you mean -ksp_type?"]),
-        (["-upper_ksp_tpye", "cg"], ["-upper_ksp_tpye", "did you mean -upper_ksp_type?"]),
-        (["-pc_type", "nonsense"], ["nonsense", "PC"]),
-    ] {
-        refused(&solve_on(2, case("groove"), &options), SOLVER, &words);
-    }
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let missing = folder.path().join("missing.opts").display().to_string();
-    refused(&solve_on(2, case("groove"), &["-options_file", &missing]), SOLVER, &["missing.opts"]);
-}
-
-/// Only the owner of a body makes its solver.
-#[test]
-fn an_option_refused_on_one_of_two_ranks() {
-    for option in ["-lower_pc_type", "-upper_pc_type"] {
-        refused(&solve_on(2, case("groove"), &[option, "nonsense"]), SOLVER, &["nonsense", "PC"]);
-    }
-}
-
-#[test]
-fn not_converging_on_two_ranks() {
-    let run = solve_on(2, case("groove"), &[&COARSE[..], &["--set", "method.stop.iterations=3"]].concat());
-    failed(&run, &["iteration-limit"], &["3 iterations"]);
     failed(&solve_on(2, pushed_aside(), &[]), &["underconstrained"], &["`upper`", "translation along x"]);
-}
-
-#[test]
-fn an_inner_solver_that_gives_up_on_one_of_two_ranks() {
     for body in ["lower", "upper"] {
         let limit = format!("-{body}_ksp_max_it");
         let options = ["-ksp_type", "cg", "-pc_type", "none", &limit, "2"];

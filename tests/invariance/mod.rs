@@ -15,11 +15,13 @@ use winkler::internals::fem::cross;
 
 /// What a test takes: a scene, which of its cases, and a change by its name. Every change is there, and order 1 and 2, the plane, bodies
 /// of revolution and space, curved surfaces, layers typed in, `auto`, springs, rigid surfaces, data, own axes.
-const TESTED: [(&str, &[&str]); 13] = [
+const TESTED: [(&str, &[&str]); 15] = [
     ("anisotropic/scene.toml", &["turned", "mirrored"]),
     ("bearing/scene.toml", &["moved by 1e3"]),
     ("blocks/scene.toml", &["all, far"]),
     ("coating/scene.toml", &["moved by 1e3"]),
+    ("groove/scene.toml", &["length 1e9", "stress 1e9"]),
+    ("groove-held/scene.toml", &["turned"]),
     ("groove-held/graded.toml", &["moved by 1e6"]),
     ("hertz-sphere/axisymmetric.toml", &["moved by 1e3", "length 1e-9"]),
     ("manufactured/scene.toml", &["moved by 1", "moved by 1e3"]),

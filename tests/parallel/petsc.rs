@@ -6,7 +6,7 @@ use crate::common::alone::{TIMEOUT, alone, expect_success};
 use std::time::Instant;
 use winkler::error::Result;
 use winkler::internals::solver::options::{UserOptions, unread};
-use winkler::petsc::{Int, Ksp, Matrix, Rows, Schur, Scope, Session};
+use winkler::petsc::{Int, Ksp, Matrix, Rows, Scope, Session};
 
 fn words(line: &str) -> Vec<String> {
     line.split_whitespace().map(String::from).collect()
@@ -39,26 +39,6 @@ fn residual(matrix: &Matrix, b: &[f64], x: &[f64]) -> Result<f64> {
     let mut ax = vec![0.0; b.len()];
     matrix.multiply(x, &mut ax)?;
     Ok(ax.iter().zip(b).map(|(ax, b)| (b - ax).abs()).fold(0.0, f64::max))
-}
-
-/// SuperLU_DIST, which comes with PETSc, has the C library take all arrays from the heap, which keeps what is freed below what is not. Large
-/// ones lie apart all the same.
-#[cfg(target_env = "gnu")]
-#[test]
-fn large_arrays_lie_apart_from_the_heap() {
-    let output = alone("parallel::petsc::large_arrays_lie_apart_from_the_heap", 0, &[], || {
-        let session = Session::start(&[])?;
-        chain(&session, 2)?;
-        // SAFETY: the C library counts its arrays; it is the one of this target.
-        let apart = || unsafe { libc::mallinfo2() }.hblks;
-        let before = apart();
-        let array = std::hint::black_box(vec![1_u8; 8 << 20]);
-        assert_eq!(apart(), before + 1);
-        drop(array);
-        assert_eq!(apart(), before);
-        Ok(())
-    });
-    expect_success(output);
 }
 
 #[test]
@@ -201,17 +181,6 @@ fn a_missing_options_file_is_reported_in_petscs_words() {
 }
 
 #[test]
-fn settings_of_open_mpi_by_the_user_are_kept() {
-    let environment = [("OMPI_MCA_btl", "self,tcp")];
-    expect_success(alone("parallel::petsc::settings_of_open_mpi_by_the_user_are_kept", 0, &environment, || {
-        let _session = Session::start(&[])?;
-        assert_eq!(std::env::var("OMPI_MCA_btl").as_deref(), Ok("self,tcp"));
-        assert!(std::env::var_os("OMPI_MCA_pml").is_none());
-        Ok(())
-    }));
-}
-
-#[test]
 fn an_option_read_on_one_rank_is_read() {
     expect_success(alone("parallel::petsc::an_option_read_on_one_rank_is_read", 2, &[], || {
         let line = "-ksp_type cg -lower_ksp_rtol 1e-3 -upper_ksp_rtol 1e-9 -upper_ksp_rtoll 1e-9 -pc_sor_its 2 -newton_ksp_rtol 1";
@@ -258,54 +227,6 @@ fn a_panic_on_one_rank_ends_the_others() {
     }
 }
 
-/// PETSc waits for the first option or object. Its options are those of its objects, and what was read stays read.
-#[test]
-fn petsc_waits_till_it_is_needed() {
-    let inside = || {
-        let session = Session::start(&[])?;
-        let options = session.options();
-        options.clear("-gone")?;
-        options.mark_used("-flag")?;
-        assert!(options.set("-1", None).is_err() && options.mark_used("-1").is_err());
-        assert!(options.all()?.is_empty() && options.left()?.is_empty() && !options.used("-flag"));
-        assert_eq!(session.petsc_version(), None);
-        options.set("-a_ksp_rtol", Some("1e-3"))?;
-        assert!(session.petsc_version().is_some_and(|version| version.starts_with("3.")));
-        options.set("-a_KSP_max_it", Some("7"))?;
-        options.set("a_ksp_max_it", Some("9"))?;
-        options.set("-flag", None)?;
-        options.set("-slip", Some("1"))?;
-        options.set("-gone", None)?;
-        options.clear("-GONE")?;
-        options.mark_used("-flag")?;
-        let left: Vec<String> = options.left()?.into_iter().map(|(name, _)| name.to_lowercase()).collect();
-        assert_eq!(left, ["-a_ksp_max_it", "-a_ksp_rtol", "-slip"]);
-        let values = ["-a_ksp_rtol", "-A_ksp_max_it", "-flag", "-gone"].map(|name| options.get(name));
-        assert_eq!(values, [Some("1e-3"), Some("9"), Some(""), None].map(|value| value.map(str::to_owned)));
-        assert_eq!(["-flag", "-slip", "-none"].map(|name| options.used(name)), [true, false, false]);
-        let mut ksp = Ksp::new(&session, "a_")?;
-        ksp.set_operator(&chain(&session, 30)?)?;
-        ksp.set_from_options()?;
-        assert_eq!(ksp.tolerance(), 1e-3);
-        assert_eq!(options.left()?.len(), 1);
-        options.clear("-slip")
-    };
-    expect_success(alone("parallel::petsc::petsc_waits_till_it_is_needed", 0, &[], inside));
-}
-
-/// Options in the environment are PETSc's to read: then it does not wait.
-#[test]
-fn petsc_starts_at_once_where_it_has_options() {
-    let inside = || {
-        let session = Session::start(&[])?;
-        assert!(session.petsc_version().is_some());
-        assert_eq!(session.options().get("-up_ksp_type").as_deref(), Some("cg"));
-        session.options().mark_used("-up_ksp_type")
-    };
-    let environment = [("PETSC_OPTIONS", "-up_ksp_type cg")];
-    expect_success(alone("parallel::petsc::petsc_starts_at_once_where_it_has_options", 0, &environment, inside));
-}
-
 /// One rank that needs PETSc before the others would wait for them for ever.
 #[test]
 fn several_ranks_start_petsc_together() {
@@ -315,52 +236,6 @@ fn several_ranks_start_petsc_together() {
         Ok(())
     };
     expect_success(alone("parallel::petsc::several_ranks_start_petsc_together", 2, &[], inside));
-}
-
-/// Lower triangle of two uncoupled square grids of unit springs, one for each dof of a node: held by springs on one side, `side`
-/// rows of `side` nodes each.
-fn grids(side: usize) -> Vec<(usize, usize, f64)> {
-    let mut lower = Vec::new();
-    for node in 0..side * side {
-        let (row, column) = (node / side, node % side);
-        let before = [(row > 0).then(|| node - side), (column > 0).then(|| node - 1)];
-        let beyond = [row + 1 < side, column + 1 < side, row == 0];
-        let springs = before.iter().flatten().count() + beyond.into_iter().filter(|spring| *spring).count();
-        for dof in 0..2 {
-            lower.extend(before.iter().flatten().map(|other| (2 * node + dof, 2 * other + dof, -1.0)));
-            lower.push((2 * node + dof, 2 * node + dof, springs as f64));
-        }
-    }
-    lower
-}
-
-/// Small bodies of the plane are eliminated in MUMPS' own order, larger ones in that of METIS, unless an option says otherwise. The
-/// side of a grid opposite to the held one, moved as a whole, feels `side` springs in a row for each of its nodes.
-#[test]
-fn the_order_of_elimination_goes_with_the_size_and_not_into_the_complement() {
-    let output = alone(
-        "parallel::petsc::the_order_of_elimination_goes_with_the_size_and_not_into_the_complement",
-        0,
-        &[],
-        || {
-            let options = ["-asked_mat_mumps_icntl_7", "1", "-own_mat_mumps_icntl_7", "0"];
-            let session = Session::start(&options.map(String::from))?;
-            // METIS is 1, and 0 serves without METIS; 20 000 dofs are the last that never take METIS
-            for (body, side, order) in [("small", 100, 0), ("asked", 100, 1), ("large", 101, 1), ("own", 101, 0)] {
-                let dofs = 2 * side * side;
-                let interface: Vec<usize> = (dofs - 2 * side..dofs).collect();
-                let mut schur = Schur::analyse(&session, body, 2, dofs, &grids(side), &interface)?;
-                assert_eq!(schur.ordering(), order, "{body}");
-                schur.factor()?;
-                for row in schur.take_complement().chunks_exact(interface.len()) {
-                    let force: f64 = row.iter().sum();
-                    assert!((force * side as f64 - 1.0).abs() < 1e-10, "{body}: {force}");
-                }
-            }
-            Ok(())
-        },
-    );
-    expect_success(output);
 }
 
 /// A chain of springs on three ranks, of which the second has none: each solver finds the solution of the first matrix, and of the next one

@@ -1,6 +1,7 @@
 //! Newton's method is the same on any number of ranks: dofs are distributed, or every rank solves for the contacts of condensed bodies.
 
-use crate::common::{Run, Scene, apart, case, solve, solve_on, text_of, winkler_on};
+use crate::common::here::solve_here;
+use crate::common::{Report, Run, case, solve, solve_on, winkler_on};
 use std::fs;
 use tempfile::TempDir;
 
@@ -19,54 +20,13 @@ const SCENES: [(&str, &[&str]); 10] = [
     ("blocks", &["mesh.set.k=2", "output.pairs=100"]),
 ];
 
-/// The program chooses solvers by the couplings of all nodes, which ranks count where the cells are: the bytes of multigrid say how many there are. All else is of
-/// the machine.
-#[test]
-fn the_choice_of_solvers_counts_all_couplings() {
-    for scene in ["flange", "hertz-sphere"] {
-        let bytes = |run: Run| {
-            let run = run.converged();
-            let line = run.stdout.lines().find(|line| line.contains("estimates: ")).map(str::to_owned);
-            let line = line.unwrap_or_else(|| panic!("no estimates in\n{}", run.stdout));
-            let words: Vec<&str> = line.split([' ', ',', ')']).collect();
-            let bytes = words.windows(2).rfind(|pair| pair[1] == "MB").map(|pair| pair[0].to_owned());
-            bytes.unwrap_or_else(|| panic!("no bytes in {line}"))
-        };
-        let words = ["--set", "method={}", "--set", "output.plots=false"];
-        let one = bytes(solve(case(scene), &words));
-        assert_eq!(bytes(solve_on(3, case(scene), &words)), one, "{scene}");
-    }
-}
-
-/// Ranks other than the first have no use for the mesh: here each has the scene in a folder of its own. A support that holds all cells of a body is
-/// known there, too.
-#[test]
-fn one_rank_reads_the_mesh() {
-    let words = ["--method", "newton", "--set", "mesh.set={nl=10,nu=8}", "--set", "solver=hypre", "--set", STOP];
-    let rigid = ["--set", "body.0.fix=[{on=\"lower\",x=0,y=0,z=0}]", "--set", "contact.0.gap=\"1e-5*x\""];
-    let scenes = [(); 2].map(|()| Scene::new(text_of("patch-3d")));
-    let folders = scenes.each_ref().map(|scene| scene.path.parent().expect("a folder"));
-    for more in [&rigid[..], &[]] {
-        let words = [&words[..], more].concat();
-        let serial = solve(case("patch-3d"), &words).converged();
-        let parallel = apart(folders, &[], &[&["solve", "scene.toml"], &words[..]].concat()).converged();
-        assert_eq!(parallel.count("ranks"), 2);
-        assert_eq!(parallel.report["bodies"][0]["dofs"], serial.report["bodies"][0]["dofs"]);
-        let apart = pressures(&serial).into_iter().zip(pressures(&parallel)).map(|(a, b)| (a - b).abs());
-        assert!(apart.fold(0.0, f64::max) <= 1e-8 * serial.number("pairs/0/peak_pressure"));
-    }
-}
-
 /// Far below what is compared.
 const STOP: &str = "method.stop={residual=1e-10}";
 
 /// Pressures of all pairs.
-fn pressures(run: &Run) -> Vec<f64> {
-    let mut names: Vec<_> =
-        fs::read_dir(&run.folder).expect("results").flatten().map(|file| file.file_name()).collect();
-    names.sort();
-    let tables = names.iter().filter_map(|name| name.to_str()).filter(|name| name.starts_with("contact-"));
-    tables.filter(|name| name.ends_with(".csv")).flat_map(|name| run.table(name)["pressure"].to_vec()).collect()
+fn pressures(report: &Report) -> Vec<f64> {
+    let pairs = report["pairs"].as_array().map_or(0, Vec::len);
+    (0..pairs).flat_map(|pair| report.contact_of(pair)["pressure"].to_vec()).collect()
 }
 
 /// Runs a scene with a solver on some ranks.
@@ -82,41 +42,41 @@ fn run(ranks: usize, (scene, sets): (&str, &[&str]), solver: &str) -> Run {
 }
 
 /// The pressures of one rank on several, to 1e-8 of the peak, the approach of the first pair, and Newton's steps to one.
-fn same_on(ranks: &[usize], solver: &str) {
-    for scene in SCENES {
-        let serial = run(1, scene, solver);
+fn same_on(ranks: usize, scenes: &[(&str, &[&str])], solver: &str) {
+    for &scene in scenes {
+        let solver_here = format!("solver={solver}");
+        let sets = [&["method.name=newton", STOP, &solver_here], scene.1].concat();
+        let serial = solve_here(case(scene.0), &sets).converged();
         let (expected, peak) = (pressures(&serial), pressures(&serial).into_iter().fold(0.0, f64::max));
         assert!(peak > 0.0, "{}", scene.0);
-        for &ranks in ranks {
-            let parallel = run(ranks, scene, solver);
-            let found = pressures(&parallel);
-            assert_eq!(found.len(), expected.len(), "{} on {ranks}", scene.0);
-            let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(apart <= 1e-8 * peak, "{} on {ranks}: {:e} apart", scene.0, apart / peak);
-            let [far, near] = [&serial, &parallel].map(|run| run.number("pairs/0/approach"));
-            assert!((far - near).abs() <= 1e-8 * far.abs(), "{} on {ranks}: {far} {near}", scene.0);
-            let steps = [&parallel, &serial].map(|run| run.count("iterations"));
-            assert!(steps[0].abs_diff(steps[1]) <= 1, "{} on {ranks}: {steps:?}", scene.0);
-            assert_eq!([&parallel, &serial].map(|run| run.text("method")), ["newton"; 2]);
-            assert_eq!(parallel.solvers(), serial.solvers());
-            assert_eq!(parallel.count("assemblies"), serial.count("assemblies"));
-        }
+        let parallel = run(ranks, scene, solver);
+        let found = pressures(&parallel);
+        assert_eq!(found.len(), expected.len(), "{} on {ranks}", scene.0);
+        let apart = found.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart <= 1e-8 * peak, "{} on {ranks}: {:e} apart", scene.0, apart / peak);
+        let [far, near] = [&serial, &*parallel].map(|run| run.number("pairs/0/approach"));
+        assert!((far - near).abs() <= 1e-8 * far.abs(), "{} on {ranks}: {far} {near}", scene.0);
+        let steps = [&*parallel, &serial].map(|run| run.count("iterations"));
+        assert!(steps[0].abs_diff(steps[1]) <= 1, "{} on {ranks}: {steps:?}", scene.0);
+        assert_eq!([&*parallel, &serial].map(|run| run.text("method")), ["newton"; 2]);
+        assert_eq!(parallel.solvers(), serial.solvers());
+        assert_eq!(parallel.count("assemblies"), serial.count("assemblies"));
     }
 }
 
 #[test]
 fn condensed_bodies() {
-    same_on(&[2, 5], "condensed");
+    same_on(5, &SCENES[..4], "condensed");
 }
 
 #[test]
 fn one_factorisation() {
-    same_on(&[3], "mumps");
+    same_on(2, &SCENES[4..], "mumps");
 }
 
 #[test]
 fn multigrid() {
-    same_on(&[2, 3], "hypre");
+    same_on(3, &SCENES, "hypre");
 }
 
 /// The matrix of all bodies has its rows on all ranks, and is not solved by each for itself.
@@ -146,28 +106,6 @@ fn warnings_are_those_of_one_rank() {
         "{one}"
     );
     assert_eq!(warnings(solve_on(5, case("manufactured"), &sets)), one);
-}
-
-/// A product with the matrix takes each rank as many operations, although rows of quadratic elements are longer, and those at the contact: PETSc
-/// prints the ratio of the most to the least with one decimal.
-#[test]
-fn operations_are_distributed() {
-    let sets = ["solver=hypre", "body.0.order=1"];
-    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-    for ranks in [2, 3] {
-        let args = [&["--method", "newton", "-log_view"][..], &sets].concat();
-        let run = solve_on(ranks, case("hertz-sphere"), &args).converged();
-        let products = run.stdout.lines().filter(|line| line.starts_with("MatMult "));
-        let ratios: Vec<&str> = products.filter_map(|line| line.split_whitespace().nth(6)).collect();
-        assert!(!ratios.is_empty() && ratios.iter().all(|&ratio| ratio == "1.0"), "{ratios:?}");
-    }
-}
-
-/// What MUMPS takes on several ranks depends on when they answer: here its analysis foresees too little.
-#[test]
-fn mumps_gets_the_room_that_it_lacks() {
-    let run = solve_on(3, case("hertz-sphere"), &["--method", "newton", "--set", "solver=mumps"]).converged();
-    assert_eq!(run.solvers(), ["preonly + cholesky by mumps"; 2]);
 }
 
 /// More ranks than nodes, most of which have nothing.
@@ -274,37 +212,6 @@ fn bodies_are_recovered_in_parts() {
     }
 }
 
-/// Messages of a step of bodies that supports hold do not depend on the number of ranks: the traces of the step with its energy, those of
-/// the iterate, and the sums of its measures; of each iteration of multigrid the compressions it came to. What K needs of neighbours is PETSc's.
-#[test]
-fn messages_are_few() {
-    let sets = ["--method", "newton", "--set", "mesh.set.n=4", "--set", "solver=hypre"];
-    let mut counts = Vec::new();
-    for (ranks, limit) in [(2, 1), (2, 3), (3, 3)] {
-        let stop = format!("method.stop={{residual=1e-14,iterations={limit}}}");
-        let run = solve_on(ranks, case("groove"), &[&sets[..], &["--set", &stop]].concat());
-        assert_eq!(run.count("iterations"), limit, "{}", run.said());
-        counts.push(run.count("messages") - run.count("inner_iterations"));
-    }
-    assert_eq!(counts[1] - counts[0], 2 * 3, "{counts:?}");
-    assert_eq!(counts[1], counts[2]);
-}
-
-/// Where bodies in contact move, an iteration of multigrid has a second message: forces on their rigid motions.
-#[test]
-fn rigid_motions_cost_a_message() {
-    let law = "contact.0.layer={linear={stiffness=1e4}}";
-    let sets = ["--method", "newton", "--set", "mesh.set.k=2", "--set", "solver=hypre", "--set", law];
-    let counts = ["1e-4", "1e-11"].map(|residual| {
-        let stop = format!("method.stop={{residual={residual}}}");
-        let run = solve_on(2, case("blocks"), &[&sets[..], &["--set", &stop]].concat()).converged();
-        ["iterations", "inner_iterations", "messages"].map(|count| run.count(count))
-    });
-    let [few, many] = counts;
-    assert!(few[0] == many[0] && many[1] > few[1] + 5, "{counts:?}");
-    assert_eq!(many[2] - few[2], 2 * (many[1] - few[1]), "{counts:?}");
-}
-
 /// A run that pauses on three ranks goes on on one and on two.
 #[test]
 fn states_go_from_some_ranks_to_others() {
@@ -356,8 +263,10 @@ fn same_sweeps(ranks: &[usize], scene: &str, words: &[&str], to: f64) {
 fn bodies_of_sweeps_are_distributed() {
     let cubes = |words: &[&'static str]| [&["--set", "mesh.set={nl=10,nu=5}"], &CUBES[2..], words].concat();
     let newton = ["--method", "newton-robin", "--set", "solver=hypre"];
-    same_sweeps(&[2, 5], "patch-3d", &cubes(&newton), 1e-8);
-    same_sweeps(&[2], "patch-3d", &cubes(&["--method", "robin", "--set", "solver=hypre"]), 1e-7);
+    same_sweeps(&[5], "patch-3d", &cubes(&newton), 1e-8);
+    // many sweeps to the end; as many on both sides to any residual
+    let robin = ["--method", "robin", "--set", "solver=hypre", "--set", "method.stop={residual=1e-4}"];
+    same_sweeps(&[2], "patch-3d", &cubes(&robin), 1e-7);
     same_sweeps(&[3], "patch-3d", &cubes(&["--method", "ncg", "--set", "solver=mumps"]), 1e-7);
     same_sweeps(
         &[3],
@@ -371,38 +280,6 @@ fn bodies_of_sweeps_are_distributed() {
         &[&newton[..], &["--set", "mesh.set.n=3", "--set", "body.1.order=1"]].concat(),
         1e-7,
     );
-}
-
-/// The matrix of a large body has its rows on all ranks; the small one stays whole, and so does a large one whose solver is one of a rank.
-#[test]
-fn large_bodies_are_distributed_and_small_ones_are_whole() {
-    let args = ["--method", "ncg", "--set", "solver=hypre", "-ksp_view"];
-    let run = swept(2, "patch-3d", &[&CUBES[..], &args].concat());
-    let view = ["KSP Object: (lower_) 2 MPI processes", "type: mpiaij", "rows=6591, cols=6591"];
-    assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
-    assert!(!run.stdout.contains("KSP Object: (upper_) 2"), "{}", run.stdout);
-    let args = ["--method", "newton-robin", "-lower_ksp_type", "cg", "-lower_pc_type", "icc", "-lower_ksp_view"];
-    let run = swept(2, "patch-3d", &[&CUBES[..], &args].concat());
-    let view = ["KSP Object: (lower_) 1 MPI process", "type: seqaij", "rows=6591, cols=6591"];
-    assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
-    assert_eq!([run.count("bodies/0/rank"), run.count("bodies/1/rank")], [0, 1]);
-}
-
-/// A sweep has one message. A distributed body adds two if contact alone holds it, for the balance of its residual and of its correction
-/// on rigid motions, and none if supports do.
-#[test]
-fn messages_of_distributed_bodies() {
-    let upper = ["--set", "mesh.set={nl=6,nu=12}", CUBES[2], CUBES[3]];
-    for (ranks, sets, each) in [(2, &CUBES, 1), (8, &CUBES, 1), (2, &upper, 3)] {
-        let of = |limit: usize| {
-            let stop = format!("method.stop={{residual=1e-14,iterations={limit}}}");
-            let args = ["--method", "robin", "--set", "solver=hypre", "--set", &stop];
-            let run = solve_on(ranks, case("patch-3d"), &[&sets[..], &args].concat());
-            assert_eq!(run.count("iterations"), limit, "{}", run.said());
-            run.count("messages")
-        };
-        assert_eq!(of(5) - of(2), 3 * each, "{sets:?} on {ranks}");
-    }
 }
 
 /// Bodies that never touch need one solve each, distributed or not, which ranks agree on by a message.
@@ -427,12 +304,10 @@ fn quadratic_elements_keep_their_preconditioner() {
     let args = ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=2", "--set", "output.plots=false"];
     let serial = solve(case("hertz-sphere"), &args).converged();
     let most = 1.3 * serial.number("inner_iterations");
-    for ranks in [2, 3] {
-        let parallel = solve_on(ranks, case("hertz-sphere"), &args).converged();
-        for key in ["factorizations", "patches", "iterations"] {
-            assert_eq!(parallel.count(key), serial.count(key), "{key} on {ranks}");
-        }
-        assert!(parallel.count("factorizations") == 1 && parallel.count("patches") > 1);
-        assert!(parallel.number("inner_iterations") <= most, "{}", parallel.said());
+    let parallel = solve_on(3, case("hertz-sphere"), &args).converged();
+    for key in ["factorizations", "patches", "iterations"] {
+        assert_eq!(parallel.count(key), serial.count(key), "{key}");
     }
+    assert!(parallel.count("factorizations") == 1 && parallel.count("patches") > 1);
+    assert!(parallel.number("inner_iterations") <= most, "{}", parallel.said());
 }

@@ -1,7 +1,7 @@
 //! Histories of loads by a table of factors, and what is written of each step.
 
 use crate::common::blocks::Blocks;
-use crate::common::{Run, Scene, Table, case, distance, root, solve, solve_on, text_of, winkler};
+use crate::common::{Run, Scene, Table, case, distance, root, solve, text_of, winkler};
 use std::fs;
 use std::path::Path;
 use vtkio::Vtk;
@@ -43,7 +43,7 @@ fn near(ours: f64, theirs: f64, size: f64, label: &str) {
 /// Every step of a path is the run with its loads, whatever came before: elastic layers have no memory.
 #[test]
 fn a_step_of_a_path_is_a_run_with_its_loads() {
-    for method in ["auto", "ncg"] {
+    for method in ["auto", "ncg", "anderson"] {
         let run = solve(with_table(PATH), &["--method", method]).converged();
         let table = steps(&run.folder);
         assert_eq!(table["time"], [0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 5.0]);
@@ -221,33 +221,6 @@ fn fields_of_all_steps_are_a_series_in_time() {
     }
     // nobody asked
     assert!(!solve(with_table(PATH), &[]).folder.join("steps").exists());
-}
-
-#[test]
-fn a_path_on_two_ranks() {
-    let (one, two) = (solve(with_table(PATH), &[]).converged(), solve_on(2, with_table(PATH), &[]).converged());
-    let (ours, theirs) = (steps(&one.folder), steps(&two.folder));
-    assert_eq!((&ours.names, ours.rows()), (&theirs.names, 7));
-    for name in &ours.names {
-        // iterations may differ by one
-        let size = if name == "iterations" { 1.0 } else { 1e-10 };
-        ours[name].iter().zip(&theirs[name]).for_each(|(x, y)| near(*x, *y, size, name));
-    }
-    assert!(distance(&one.contact()["pressure"], &two.contact()["pressure"]) < 1e-10);
-}
-
-/// What a step lacks is in its row, and the next one goes on.
-#[test]
-fn a_step_that_is_not_solved_has_its_row() {
-    let method = ["--set", "method.name=robin", "--set", "method.stop={residual=1e-8,iterations=40}"];
-    let run = solve(with_table("press,lift\n1,0\n1,1\n0.9,0.9\n"), &method);
-    assert_eq!(run.code, 1, "{}", run.said());
-    assert_eq!(steps(&run.folder)["status"], [0.0; 3]);
-    assert!(
-        run.warnings().contains("load step 2 (lift 1, press 1): not converged in 40 iterations"),
-        "{}",
-        run.warnings()
-    );
 }
 
 #[test]

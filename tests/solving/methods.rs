@@ -1,70 +1,7 @@
 //! Every method minimises the same functional: one answer, and the sweeps that each may take.
 
-use crate::common::{Run, Scene, case, distance, root, solve, solve_on, text_of};
-
-/// The relaxed iteration with each rule, and the other methods.
-const METHODS: [&str; 10] = [
-    "{name=\"robin\", gamma=0.6}",
-    "{name=\"robin\", gamma=[0.9, 0.5, 0.6]}",
-    "{name=\"robin\", gamma=\"line-search\"}",
-    "{name=\"robin\", gamma=\"aitken\"}",
-    "{name=\"robin\", gamma=\"barzilai-borwein\"}",
-    "{name=\"robin\", gamma=\"spectral\"}",
-    "{name=\"ncg\"}",
-    "{name=\"anderson\", depth=4}",
-    "{name=\"newton-robin\"}",
-    "{name=\"newton\"}",
-];
-
-fn with(scene: &str, method: &str, more: &[&str]) -> Run {
-    let method = format!("method={method}");
-    solve(case(scene), &[&["--set", "mesh.set.n=16", "--set", &method][..], more].concat()).converged()
-}
-
-#[test]
-fn all_methods_give_one_pressure() {
-    for scene in ["groove", "groove-held"] {
-        let stop = ["--set", "method.stop={residual=1e-9}"];
-        let reference = with(scene, "{name=\"newton\"}", &["--set", "method.stop={residual=1e-12}"]).contact();
-        for method in METHODS {
-            let run = with(scene, method, &stop);
-            let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
-            assert!(apart < 1e-7, "{scene} by {method}: {apart:e}");
-            // the bodies transmit the load whatever the method
-            if scene == "groove-held" {
-                assert!((run.number("pairs/0/force/0/1") + 40.0).abs() < 1e-5, "{method}");
-            }
-        }
-    }
-}
-
-/// Robin coefficients change the way, not the goal; a frozen one is factored once a body besides the start.
-#[test]
-fn robin_coefficients_give_one_pressure() {
-    let stop = ["--set", "method.stop={residual=1e-9}"];
-    let reference = with("groove-held", "{name=\"newton\"}", &stop).contact();
-    for robin in ["\"tangent\"", "\"frozen\"", "\"auto\"", "{floor=1e4}"] {
-        let run = with("groove-held", &format!("{{name=\"ncg\", robin={robin}, start={{normal=1e-4}}}}"), &stop);
-        let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
-        assert!(apart < 1e-6, "{robin}: {apart:e}");
-        if robin == "\"frozen\"" {
-            assert_eq!(run.count("dense_factorizations"), 4);
-        }
-    }
-}
-
-/// psi changes the way as well: full Robin acts on open points too, so it is not the active zone.
-#[test]
-fn zones_give_one_pressure() {
-    let stop = ["--set", "method.stop={residual=1e-9}"];
-    let run = |psi: &str| with("groove", &format!("{{psi=\"{psi}\", gamma=\"line-search\"}}"), &stop);
-    let [active, full, none, half] = ["active", "full", "none", "x > 2"].map(run);
-    for other in [&full, &none, &half] {
-        assert!(distance(&other.contact()["pressure"], &active.contact()["pressure"]) < 1e-6);
-    }
-    assert_ne!(full.count("iterations"), active.count("iterations"));
-    assert!(none.count("dense_factorizations") == 4, "S is factored once a body, and the start");
-}
+use crate::common::here::solve_here;
+use crate::common::{Scene, case, distance, root, solve, solve_on, text_of};
 
 /// A case without its method: default settings.
 fn plain(scene: &str) -> Scene {
@@ -104,7 +41,7 @@ fn any_power_law_takes_few_steps() {
             for b in ["1e-12", "1e-7", "1e-5", "2e-4", "1e-2"] {
                 for a in ["0.02", "0.1", "0.3", "1"] {
                     let sets = [&format!("contact.0.layer.power={{B={b}, a={a}}}"), &format!("method.start={start}")];
-                    let run = solve(plain(scene), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>());
+                    let run = solve_here(plain(scene), &sets.each_ref().map(|set| set.as_str()));
                     // p'(c) times the rounding of c is 1e-8 of p and more
                     let rounded = b == "1e-12" && a != "1";
                     let steps = run.count("iterations");
@@ -118,30 +55,6 @@ fn any_power_law_takes_few_steps() {
                     }
                 }
             }
-        }
-    }
-}
-
-/// Newton's method with condensed bodies joins their Schur complements: the sparse matrix of whole bodies has the same steps.
-#[test]
-fn newton_on_condensed_bodies() {
-    for (scene, sets, steps) in
-        [("groove-held", "mesh.set.n=16", 5), ("stack", "mesh.set.n1=6", 3), ("patch-3d", "mesh.set.nl=4", 1)]
-    {
-        let run = |solver: &str| {
-            let solver = format!("solver={solver}");
-            solve(plain(scene), &["--method", "newton", "--set", &solver, "--set", sets]).converged()
-        };
-        let (small, whole) = (run("condensed"), run("mumps"));
-        assert_eq!((small.text("method"), whole.text("method")), ("newton", "newton"));
-        assert_eq!([small.count("iterations"), whole.count("iterations")], [steps; 2], "{scene}");
-        let bodies = small.solvers().len();
-        assert_eq!(small.count("factorizations"), bodies, "{scene}: one elimination a body, no other sparse factor");
-        assert_eq!([small.count("dense_factorizations"), whole.count("dense_factorizations")], [steps, 0]);
-        assert_eq!(whole.count("factorizations"), steps, "{scene}: one factor a step, none of a body");
-        for pair in 0..bodies - 1 {
-            let (ours, theirs) = (small.contact_of(pair), whole.contact_of(pair));
-            assert!(distance(&ours["pressure"], &theirs["pressure"]) < 1e-9, "{scene}");
         }
     }
 }
@@ -178,7 +91,7 @@ fn inexact_steps_are_as_many_as_exact_ones() {
             let (solver, layer) =
                 (format!("solver={solver}"), format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}"));
             let sets = ["body.0.order=1", "body.1.order=1", "method={}", &solver, &layer];
-            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+            solve_here(case("hertz-sphere"), &sets).converged()
         };
         let (inexact, exact) = (run("hypre"), run("condensed"));
         assert_eq!(inexact.count("iterations"), exact.count("iterations"), "{stiffness}");
@@ -196,7 +109,7 @@ fn rigid_layers_cost_multigrid_no_more_than_soft_ones() {
             let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
             let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
             let sets = [&orders[0], &orders[1], "method={}", "solver=hypre", &layer];
-            solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+            solve_here(case("hertz-sphere"), &sets).converged()
         };
         let (soft, rigid) = (run("1e4"), run("1e9"));
         assert_eq!((soft.count("patches"), soft.count("factorizations")), (0, 1));
@@ -229,7 +142,7 @@ fn many_bodies_under_stiff_layers_have_a_definite_preconditioner() {
         let layer = format!("contact.0.layer={{linear={{stiffness={stiffness}}}}}");
         let run = |solver: &str| {
             let sets = [solver, &layer, "output.plots=false", "output.pairs=all"];
-            solve(case("blocks"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+            solve_here(case("blocks"), &sets).converged()
         };
         let [multigrid, direct] = ["solver=hypre", "solver=mumps"].map(run);
         assert!(multigrid.count("inner_iterations") <= 50, "{}", multigrid.said());
@@ -253,7 +166,8 @@ fn rigid_bodies_foretell_the_contact() {
 /// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
 #[test]
 fn the_spectrum_is_symmetric_about_one() {
-    let run = with("groove-held", "{name=\"robin\", gamma=\"spectral\"}", &["--set", "method.stop={residual=1e-8}"]);
+    let sets = ["mesh.set.n=16", "method={gamma=\"spectral\", stop={residual=1e-8}}"];
+    let run = solve_here(case("groove-held"), &sets).converged();
     let (low, high) = (run.number("spectrum/0"), run.number("spectrum/1"));
     // Ritz values come from inside
     assert!(high < 2.0 - low + 1e-6 && high > 1.7 && low > 0.26 && low < 0.27, "{low} {high}");
@@ -269,19 +183,6 @@ fn a_body_that_is_pulled_off() {
         let run = solve(case("groove-held"), &off);
         assert_eq!((run.code, run.text("status"), run.count("sweeps")), (1, "unbounded", 0), "{method}");
     }
-}
-
-/// Two ranks, one body each, give the serial history also by Newton's method.
-#[test]
-fn newton_on_two_ranks() {
-    let args = ["--method", "newton-robin", "--set", "mesh.set.n=8", "--set", "method.start=\"auto\""];
-    let serial = solve(case("groove-held"), &args).converged();
-    let parallel = solve_on(2, case("groove-held"), &args).converged();
-    let (ours, theirs) = (serial.history(), parallel.history());
-    for column in ["residual", "energy", "sweeps", "factorizations", "closed"] {
-        assert_eq!(ours[column], theirs[column], "{column}");
-    }
-    assert_eq!(serial.contact()["pressure"], parallel.contact()["pressure"]);
 }
 
 /// A tower of blocks that only contact holds, under a load that leans: each joint carries the whole of it. Rigid motions are deflated, so

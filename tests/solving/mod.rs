@@ -1,5 +1,6 @@
 //! Methods and solvers: one answer by each of them, and the work that each may take.
 
+mod agree;
 mod condensed;
 mod counters;
 mod forecast;

@@ -28,36 +28,6 @@ fn assert_same(ours: (f64, f64, usize), theirs: (f64, f64, usize), label: &str) 
     assert_eq!(ours.2, theirs.2, "{label}");
 }
 
-/// A gap that closes under loads, a body that contact alone holds: every step is the run with that share of the load.
-#[test]
-fn a_step_is_a_run_with_its_share_of_the_loads() {
-    let factors = [0.25, 2.0, 0.5, 1.0];
-    for method in ["auto", "ncg", "anderson", "robin"] {
-        let settings = |steps: &str| format!("{{name=\"{method}\", {steps} stop={{residual=1e-9}}}}");
-        let history = groove(&settings("steps=[0.25, 2, 0.5, 1],"), &[]).converged();
-        assert_eq!(history.report["steps"].as_array().map(Vec::len), Some(4));
-        let rows = history.history();
-        for (number, factor) in factors.iter().enumerate() {
-            let load = format!("body.1.load.0.pressure={}", 10.0 * factor);
-            let alone = groove(&settings(""), &["--set", &load]).converged();
-            assert_same(step(&history, number), result(&alone), &format!("{method}, factor {factor}"));
-            // F1 in the units of the scene, at the last row of the step
-            let last = rows["step"].iter().rposition(|&step| step == number as f64 + 1.0).expect("rows of the step");
-            assert!((rows["energy"][last] / alone.number("F1") - 1.0).abs() < 1e-8, "{method}, factor {factor}");
-            if *factor == 1.0 {
-                assert!(distance(&history.contact()["pressure"], &alone.contact()["pressure"]) < 1e-7);
-                assert!((history.number("F1") / alone.number("F1") - 1.0).abs() < 1e-9);
-            }
-        }
-        // iterations are numbered through, and counted all together
-        let iterations = rows["iteration"].to_vec();
-        assert!(iterations.windows(2).all(|pair| pair[1] == pair[0] || pair[1] == pair[0] + 1.0));
-        let sum: usize = (0..4).map(|number| history.count(&format!("steps/{number}/iterations"))).sum();
-        assert_eq!((history.count("iterations"), iterations.last()), (sum, Some(&(sum as f64))));
-    }
-    assert!(!groove("{name=\"auto\"}", &[]).history().names.contains(&"step".to_owned()));
-}
-
 /// Prescribed displacements are loads, gaps and starts are not: two blocks of E = 100 and a layer of 300, pressed by -0.01 from a
 /// gap of 0.002, p = (u - d)/(1/100 + 1/100 + 1/300). The lower one is stretched
 /// sideways as well, which is no rigid motion and leaves p alone.
@@ -165,8 +135,7 @@ fn steps_run_on_the_mesh_of_the_largest_one() {
     assert!(missing.code == 3 && missing.stderr.contains("was adapted to an error of 0.002"), "{}", missing.said());
     let steps = method("steps=[0.5, 2, 1],");
     let written = write(&[&adapted[..], &["--set", &steps]].concat());
-    // the BLAS of this machine may be slow
-    let warns = written.stdout.lines().any(|line| line.contains("warning") && !line.contains("OPENBLAS_CORETYPE"));
+    let warns = written.stdout.lines().any(|line| line.contains("warning"));
     assert!(written.code == 0 && !warns, "{}", written.said());
     let mesh = format!("mesh={}", file.display());
     for (number, factor) in [0.5, 2.0, 1.0].into_iter().enumerate() {

@@ -1,9 +1,9 @@
 //! What a run keeps when a signal, a kill or a full disk ends it.
 
-use crate::common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of, winkler};
+use crate::common::{Run, Scene, case, distance, environment, output, root, solve, solve_on, text_of};
 use serde_json::Value;
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
@@ -56,10 +56,6 @@ impl Working {
         command.stdin(Stdio::null()).stdout(file("out")).stderr(file("err"));
         let child = Guard(command.spawn().expect("the program"));
         Self { child, scratch }
-    }
-
-    fn results(&self) -> PathBuf {
-        self.scratch.path().join("results")
     }
 
     /// Waits until something is there.
@@ -168,54 +164,6 @@ fn a_signal_ends_a_run_with_its_results() {
     }
 }
 
-#[test]
-fn a_snapshot_is_written_and_the_run_goes_on() {
-    let mut run = Working::start(&words(&case("groove"), &ENDLESS), 1);
-    run.until_rows(3);
-    let mut reached = 0;
-    for _ in 0..2 {
-        let path = run.results().join("report.json");
-        let _ = fs::remove_file(&path);
-        run.signal("USR1");
-        // the report is written before what is larger, and again behind it
-        let files = || serde_json::from_slice::<Value>(&fs::read(&path).unwrap_or_default()).unwrap_or_default();
-        run.until("the snapshot", |_| files()["files"].as_array().is_some_and(|files| files.len() >= 6));
-        run.until_rows(reached + 3);
-        let report = report(&run.results());
-        assert_eq!(report["status"], "running");
-        let now = report["iterations"].as_u64().expect("a number") as usize;
-        assert!(now > reached);
-        reached = now;
-        // a second one has no names of its own
-        assert_eq!(report["files"].as_array().map(Vec::len), Some(6), "{}", report["files"]);
-    }
-    run.signal("TERM");
-    let (status, scratch, said) = run.end();
-    assert_eq!(status.code(), Some(143), "{said}");
-    let report = report(&scratch.path().join("results"));
-    assert!(report["iterations"].as_u64().is_some_and(|now| now as usize > reached));
-}
-
-/// A run that pauses at each iterate takes the same steps, to the last digit, also where the laws have a barrier meanwhile.
-#[test]
-fn pauses_change_nothing() {
-    let sets = [
-        "mesh.set.n=7",
-        "body.0.order=2",
-        "body.1.order=2",
-        "method={name=\"newton\", start={normal=3e-4}}",
-        "contact.0.layer={linear={stiffness=1e9}}",
-    ];
-    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-    let whole = solve(case("groove"), &args);
-    let paused = solve(case("groove"), &[&args[..], &["--checkpoint", "1e-9"]].concat());
-    let table = |run: &Run| fs::read_to_string(run.folder.join("contact-lower-upper.csv")).expect("a table");
-    assert_eq!(table(&paused), table(&whole));
-    for name in ["status", "iterations", "residual", "F1"] {
-        assert_eq!(paused.report[name], whole.report[name], "{name}");
-    }
-}
-
 /// A solve that never ends hears one signal, and ends by the second.
 #[test]
 fn a_second_signal_ends_at_once() {
@@ -292,101 +240,6 @@ fn a_killed_rank_ends_all() {
     assert!(killed > 0);
 }
 
-/// Less and less memory: a run that does not get what it wants says so, with its code, and never hangs.
-#[test]
-fn memory_ends_with_a_message() {
-    let scene = case("patch-3d");
-    // makes the mesh, which Gmsh cannot with so little
-    let mut command = Command::new(crate::common::WINKLER);
-    environment(&mut command);
-    command.arg("check").arg(&scene).args(["--set", "mesh.set={nl=24,nu=24}"]);
-    assert!(output(command, Duration::from_secs(60)).0.success());
-    let mut reports = 0;
-    for megabytes in (60..400).step_by(20) {
-        let mut command = Command::new("sh");
-        environment(&mut command);
-        let line = format!("ulimit -v {megabytes}000; exec \"$@\"");
-        command.args(["-c", &line, "sh", crate::common::WINKLER, "check"]).arg(&scene);
-        command.args(["--set", "mesh.set={nl=24,nu=24}"]).env("OPENBLAS_NUM_THREADS", "1");
-        let (status, _, said) = output(command, Duration::from_secs(60));
-        if said.contains("out of memory") {
-            assert!(status.code() == Some(5) && said.matches("error:").count() == 1, "{megabytes}: {said}");
-            reports += 1;
-        } else if reports > 0 {
-            assert!(status.success(), "{megabytes}: {said}");
-            break;
-        }
-    }
-    assert!(reports > 0);
-}
-
-/// A stack of two blocks under a share of its loads.
-fn stack_under(share: f64) -> Scene {
-    let geo = root().join("meshes/stack/stack.geo").display().to_string();
-    let block = |name: &str, fix: &str| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nyoung = 100\npoisson = 0.3\nfix = [{fix}, {{ on = \"{name}_left\", x = 0 }}]\n"
-        )
-    };
-    Scene::new(format!(
-        "dimension = 2\nmesh = {{ geo = \"{geo}\", set = {{ rows = 2, n1 = 2, n2 = 3 }} }}\n{}\
-         load = [{{ on = \"b1_right\", pressure = {} }}]\n{}[[contact]]\nbetween = [\"b1_top\", \"b2_bottom\"]\n\
-         gap = 0.002\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
-        block("b1", "{ on = \"b1_bottom\", y = 0 }"),
-        0.3 * share,
-        block("b2", &format!("{{ on = \"b2_top\", y = {} }}", -0.02 * share))
-    ))
-}
-
-/// What a run that is interrupted in a load step shows is the run with that share of the loads and of what supports prescribe. The upper
-/// block is carried by its supports as one.
-#[test]
-fn an_interrupted_load_step_has_its_share_of_the_loads() {
-    let method =
-        |steps: &str, most: usize| format!("method={{gamma=1e-6, {steps} stop={{residual=1e-15, iterations={most}}}}}");
-    for solver in ["solver=condensed", "solver=mumps"] {
-        let (whole, endless) = (stack_under(1.0), method("steps=[0.5, 1],", 100_000_000));
-        let mut run = Working::start(&words(&whole.path, &["--set", &endless, "--set", solver]), 1);
-        run.until_rows(5);
-        run.signal("TERM");
-        let (status, scratch, said) = run.end();
-        assert_eq!(status.code(), Some(143), "{said}");
-        let folder = scratch.path().join("results");
-        let report = report(&folder);
-        let most = report["iterations"].as_u64().expect("a number") as usize;
-        let half = solve(stack_under(0.5), &["--set", &method("", most), "--set", solver]);
-        let table = |folder: &Path| -> Vec<f64> {
-            let text = fs::read_to_string(folder.join("contact-b1-b2.csv")).expect("a table");
-            text.lines().skip(1).flat_map(|line| line.split(',')).map(|word| word.parse().expect("a number")).collect()
-        };
-        let (ours, theirs) = (table(&folder), table(&half.folder));
-        assert!(
-            ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-9 * y.abs().max(1e-3)),
-            "{ours:?}\n{theirs:?}"
-        );
-        let balance = |report: &Value, body: usize| report["bodies"][body]["balance"].to_string();
-        for body in 0..2 {
-            let stress = |report: &Value| report["bodies"][body]["max_von_mises"].as_f64().expect("a number");
-            assert!((stress(&report) / stress(&half.report) - 1.0).abs() < 1e-9, "{report}");
-            for (part, at) in [("loads", ""), ("contacts", ""), ("supports", "/0"), ("supports", "/1")] {
-                for c in 0..2 {
-                    let of = |report: &Value| {
-                        let path = format!("/bodies/{body}/balance/{part}{at}/force/{c}");
-                        report.pointer(&path).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {path}"))
-                    };
-                    let (x, y) = (of(&report), of(&half.report));
-                    assert!(
-                        (x - y).abs() < 1e-9,
-                        "{x} {y}\n{}\n{}",
-                        balance(&report, body),
-                        balance(&half.report, body)
-                    );
-                }
-            }
-        }
-    }
-}
-
 /// An interrupted run has a checkpoint, which any number of ranks can take; one that is solved has none left.
 #[test]
 fn an_interrupted_run_goes_on_with_other_ranks() {
@@ -420,46 +273,6 @@ fn an_interrupted_run_goes_on_with_other_ranks() {
         assert_eq!(again.count("iterations"), done + 20);
         assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-9);
     }
-}
-
-/// A run that ends in a later direction of its loads goes on there, with the rows of all steps before.
-#[test]
-fn a_history_goes_on_in_its_step() {
-    let text = text_of("groove")
-        .replace("on = \"lower_face\", pressure = 10", "on = \"lower_face\", pressure = 10, path = \"low\"");
-    assert!(text.contains("path"));
-    let scene = Scene::new(text.split_once("[method]").expect("a method").0);
-    fs::write(scene.path.with_file_name("path.csv"), "low,factor\n0,0\n1,1\n0.5,1\n1,0.5\n").expect("a table");
-    let method = |most: usize| {
-        let stop = format!("stop={{residual=1e-12,iterations={most}}}");
-        format!("method={{name=\"robin\",gamma=1e-4,steps={{table=\"path.csv\"}},{stop}}}")
-    };
-    let endless = ["--set", &method(100_000_000), "--set", "mesh.set.n=8"];
-    let mut run = Working::start(&words(&scene.path, &endless), 1);
-    run.until_rows(8);
-    run.signal("TERM");
-    let (status, scratch, said) = run.end();
-    assert_eq!(status.code(), Some(143), "{said}");
-    let stopped = report(&scratch.path().join("results"));
-    let rows = |folder: &Path| -> Vec<String> {
-        let text = fs::read_to_string(folder.join("steps.csv")).expect("a table of steps");
-        text.lines().map(str::to_owned).collect()
-    };
-    let before = rows(&scratch.path().join("results"));
-    assert_eq!([stopped["steps"].as_array().map(Vec::len), Some(before.len())], [Some(2), Some(3)], "{stopped}");
-    assert!(before[2].contains("interrupted"), "{before:?}");
-    let done = stopped["iterations"].as_u64().expect("a number") as usize;
-    let limited = ["--set", &method(done + 3), "--set", "mesh.set.n=8"];
-    let (again, whole) = (restart(&scratch, 2, &scene.path, &limited), solve(&scene, &limited));
-    let (ours, theirs) = (rows(&again.folder), rows(&whole.folder));
-    assert_eq!((ours.len(), &ours[1]), (5, &before[1]));
-    assert!(ours[2..].iter().all(|row| row.contains("iteration-limit")), "{ours:?}");
-    for (ours, theirs) in ours[1..].iter().zip(&theirs[1..]) {
-        let numbers = |row: &str| row.split(',').filter_map(|word| word.parse::<f64>().ok()).collect::<Vec<_>>();
-        let (ours, theirs) = (numbers(ours), numbers(theirs));
-        assert!(ours.iter().zip(&theirs).all(|(x, y)| (x - y).abs() < 1e-8), "{ours:?}\n{theirs:?}");
-    }
-    assert!(distance(&again.contact()["pressure"], &whole.contact()["pressure"]) < 1e-8);
 }
 
 #[test]
@@ -498,67 +311,6 @@ fn a_checkpoint_of_something_else_is_refused() {
     refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "is damaged");
     fs::remove_file(&file).expect("a file");
     refused(restart(&scratch, 1, &scene, &args("method.gamma=1e-6", "mesh.set.n=8")), 6, "cannot read");
-}
-
-/// Meshes with as many nodes, cells and contact points, and data of the same name, are others: whatever differs between them is refused, on any
-/// number of ranks, and what is the same goes on, wherever it lies.
-#[test]
-fn a_checkpoint_of_a_mesh_or_data_of_equal_counts_is_refused() {
-    let made = winkler(&["mesh", case("groove").to_str().expect("a path"), "--set", "mesh.set.n=8", "-o", "a.msh"]);
-    assert_eq!(made.code, 0, "{}", made.said());
-    let folder = TempDir::new().expect("a folder");
-    let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes).expect("a file");
-    let mesh = fs::read(made.folder.join("a.msh")).expect("a mesh");
-    let data = |most: &str| format!("0,0\n8,{most}\n");
-    let text = text_of("groove");
-    let line = |key: &str| text.lines().find(|line| line.starts_with(key)).expect(key).to_owned();
-    let text = text.replace(&line("mesh ="), "mesh = \"a.msh\"").replace(&line("gap ="), "gap = \"rough(x)\"");
-    let scene = folder.path().join("scene.toml");
-    write("a.msh", &mesh);
-    write("rough.csv", data("1e-4").as_bytes());
-    write("scene.toml", (text + "\n[data.rough]\nfile = \"rough.csv\"\npoints = true\n").as_bytes());
-    let mut run = Working::start(&words(&scene, &ENDLESS), 1);
-    run.until_rows(2);
-    run.signal("INT");
-    let (_, scratch, said) = run.end();
-    let done = report(&scratch.path().join("results"))["iterations"].as_u64().expect(&said);
-    let limit = format!("method.stop={{residual=1e-12,iterations={}}}", done + 2);
-    let again = |ranks: usize| restart(&scratch, ranks, &scene, &["--set", "method.gamma=1e-6", "--set", &limit]);
-    let refused = |what: &str| {
-        for ranks in [1, 2] {
-            let run = again(ranks);
-            assert!(run.code == 3 && run.stderr.contains(&format!("is of another {what}")), "{}", run.said());
-        }
-    };
-    write("rough.csv", data("2e-4").as_bytes());
-    refused("scene");
-    write("rough.csv", data("1e-4").as_bytes());
-    // one coordinate of a node inside a body
-    let moved = moved_inside(&folder.path().join("a.msh"), &mesh);
-    write("a.msh", &moved);
-    refused("mesh");
-    write("a.msh", &mesh);
-    for ranks in [1, 2] {
-        assert_eq!(again(ranks).count("iterations"), done as usize + 2);
-    }
-}
-
-/// The mesh, in which numbers have eight bytes, with a node inside a body a little aside.
-fn moved_inside(path: &Path, bytes: &[u8]) -> Vec<u8> {
-    let mesh = winkler::internals::mesh::parse::<2>(path, bytes, winkler::internals::mesh::MeshProducer::User)
-        .expect("a mesh");
-    let on_surfaces: Vec<u32> =
-        mesh.groups.iter().filter(|group| group.dimension < 2).flat_map(|group| group.connectivity.clone()).collect();
-    let inside = |point: &usize| {
-        let [x, y] = mesh.points[*point];
-        !on_surfaces.contains(&(*point as u32)) && (1.0..3.0).contains(&x) && (0.3..0.7).contains(&y)
-    };
-    let [x, y] = mesh.points[(0..mesh.points.len()).find(inside).expect("a node inside")];
-    let place = [x.to_le_bytes(), y.to_le_bytes()].concat();
-    let at = bytes.windows(16).position(|window| window == place).expect("its coordinates");
-    let mut moved = bytes.to_vec();
-    moved[at..at + 8].copy_from_slice(&(x + 1e-3).to_le_bytes());
-    moved
 }
 
 /// A script that sleeps: while Gmsh works a signal ends it, and nothing is left in the cache.
@@ -613,36 +365,6 @@ fn a_sweep_that_is_ended_has_its_rows() {
     assert_eq!(lines.len(), 2, "{text}");
     assert!(lines[0].starts_with("0.6,converged") && lines[1].starts_with("1e-7,interrupted"), "{text}");
     assert!(scratch.path().join("results/pressure.svg").exists());
-}
-
-/// Files may have 40 kB: what is small is written, and the code tells of what is not.
-#[test]
-fn a_full_disk_takes_fields_and_not_results() {
-    let limited = |blocks: usize, scene: &Path, args: &[&str], cache: Option<&Path>| {
-        let folder = TempDir::new().expect("a temporary folder");
-        let mut command = Command::new("sh");
-        let script = format!("ulimit -f {blocks}; exec \"$@\"");
-        command.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_winkler"), "solve"]).arg(scene);
-        command.arg("-o").arg(folder.path()).args(args).current_dir(folder.path());
-        environment(&mut command);
-        command.envs(cache.map(|cache| ("WINKLER_CACHE", cache)));
-        let (status, stdout, stderr) = output(command, Duration::from_secs(60));
-        (status.code(), folder, stdout, stderr)
-    };
-    // its mesh is in the cache then; a block of `ulimit` has 512 or 1024 bytes
-    solve(case("groove"), &[]).converged();
-    let (code, folder, stdout, stderr) = limited(60, &case("groove"), &["--vtu", "--json"], None);
-    assert_eq!(code, Some(6), "{stderr}");
-    assert!(stderr.contains("lower.vtu"), "{stderr}");
-    let report = report(folder.path());
-    assert_eq!(report["status"], "converged");
-    assert_eq!(serde_json::from_str::<Value>(&stdout).expect("JSON")["status"], "converged");
-    assert!(folder.path().join("contact-lower-upper.csv").exists() && folder.path().join("pressure.svg").exists());
-    let cache = TempDir::new().expect("a temporary folder");
-    let (code, _, _, stderr) = limited(20, &case("groove"), &[], Some(cache.path()));
-    assert_eq!(code, Some(6), "{stderr}");
-    assert!(stderr.contains(&cache.path().display().to_string()) && stderr.contains("ulimit"), "{stderr}");
-    assert_eq!(fs::read_dir(cache.path()).expect("a folder").count(), 0);
 }
 
 #[test]

@@ -4,12 +4,13 @@ mod builder;
 mod laws;
 mod random;
 mod runs;
+mod saturating;
 mod scenes;
 mod slender;
 mod wide;
 
 use self::runs::{Answer, Recipe, Verdict};
-use self::scenes::{Case, Expect};
+use self::scenes::Case;
 use crate::common::here::with_session;
 use std::path::Path;
 use winkler::petsc::Session;
@@ -144,104 +145,19 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     assert!(answer.residual <= 1e-8 && answer.message.contains("lacks balance"), "{}", answer.message);
 }
 
-/// All numbers that follow a word in a scene.
-fn numbers(text: &str, word: &str) -> Vec<f64> {
-    let after = text.match_indices(word).map(|(at, _)| &text[at + word.len()..]);
-    let number = |rest: &str| rest.split([' ', ',', '\n', '"', '}']).next().and_then(|word| word.parse().ok());
-    after.filter_map(number).collect()
-}
-
-/// The box is that of V9: its ends are nearly reached, nothing lies outside, and every kind of scene comes up.
+/// Layers that saturate: wherever Newton's method begins, it ends with the pressures that balance the load.
 #[test]
-fn scenes_fill_the_box() {
-    let cases: Vec<_> = (0..3000).map(|index| scenes::scene(2, index, Path::new(""))).collect();
-    let spread = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
-    };
-    let of = |word: &str| spread(&mut cases.iter().flat_map(|case| numbers(&case.text, word)));
-    // kappa h/E of the softer block, from 1e-6 times the contrast to 1e6
-    let kappa = spread(&mut cases.iter().flat_map(|case| numbers(&case.line, "kappa ")));
-    assert!((1e-6..1e-4).contains(&kappa.0) && (1e5..=1.01e6).contains(&kappa.1), "{kappa:?}");
-    assert_eq!(of("a = "), (0.1, 1.0));
-    let gamma = spread(&mut cases.iter().map(|case| case.gamma));
-    assert!((0.01..0.011).contains(&gamma.0) && (1.1..1.21).contains(&gamma.1), "{gamma:?}");
-    let contrast = spread(&mut cases.iter().map(|case| {
-        let young = numbers(&case.text, "young = ");
-        young.iter().copied().fold(0.0, f64::max) / young.iter().copied().fold(f64::INFINITY, f64::min)
-    }));
-    assert!(contrast.0 == 1.0 && (1e5..=1e6).contains(&contrast.1), "{contrast:?}");
-    assert_eq!(of("poisson = "), (0.0, 0.4999));
-    let some = |what: &str, is: &dyn Fn(&scenes::Case) -> bool| {
-        let count = cases.iter().filter(|case| is(case)).count();
-        assert!(count >= 20, "{what}: {count} of {}", cases.len());
-    };
-    let has = |case: &scenes::Case, word: &str, value: f64| numbers(&case.text, word).contains(&value);
-    some("slender and flat", &|case| has(case, "width = ", 20.0));
-    some("slender and tall", &|case| has(case, "height = ", 20.0));
-    some("held by contact alone", &|case| case.hanging && case.expect == Expect::Solution);
-    some("three in a stack", &|case| has(case, "rows = ", 3.0));
-    some("four in a ring", &|case| has(case, "columns = ", 2.0));
-    some("an overlap", &|case| case.text.contains("gap = \"-"));
-    some("a pair that never touches", &|case| numbers(&case.text, "gap = \"").iter().any(|&gap| gap >= 10.0));
-    some("no load", &|case| case.line.contains(" q 0.0e0"));
-    some("one element a body", &|case| case.line.contains(" n [1, 1]"));
-    // the paper's layer on its blocks: kappa h/E at 10 MPa for B from 1e-6 to 2e-4, a from 0.1 to 1
-    let paper = |b: f64, a: f64| 10f64.powf(1.0 - a) / (a * b) / 2.1e5;
-    for (b, a) in [(1e-6, 0.1), (1e-6, 1.0), (2e-4, 0.1), (2e-4, 1.0)] {
-        assert!((kappa.0..kappa.1).contains(&paper(b, a)));
-    }
-}
-
-/// The wider box has every kind of body, layer, gap, hold and start, and what must come of them.
-#[test]
-fn wide_scenes_fill_the_box() {
-    let cases: Vec<_> = (0..1000).map(|index| wide::scene(WIDE, index, Path::new(""))).collect();
-    let some = |what: &str, is: &dyn Fn(&Case) -> bool| {
-        let count = cases.iter().filter(|case| is(case)).count();
-        assert!(count >= 20, "{what}: {count} of {}", cases.len());
-    };
-    for kind in ["Grid", "Rings", "Blocks", "Round", "Cap", "Roll", "Ball", "Small", "Bricks"] {
-        some(kind, &|case| case.line.starts_with(kind));
-    }
-    for law in ["linear = ", "power = ", "exponential = ", "cubic = ", "table = ", "sinh(", "up_to = ", "c^2/"] {
-        some(law, &|case| case.text.contains(law));
-    }
-    for word in ["plane = \"stress\"", "spring = ", "force = ", "gap = \"-", "poisson = 0.4999"] {
-        some(word, &|case| case.text.contains(word));
-    }
-    for outcome in [Expect::Solution, Expect::Gauge, Expect::Nothing] {
-        some(&format!("{outcome:?}"), &|case| case.expect == outcome);
-    }
-    let bodies = |case: &Case| case.text.matches("[[body]]").count();
-    some("many bodies", &|case| bodies(case) >= 6);
-    some("three in space", &|case| case.text.starts_with("dimension = 3") && bodies(case) >= 3);
-    let kinds =
-        |case: &Case| ["linear = ", "power = ", "cubic = "].iter().filter(|law| case.text.contains(*law)).count();
-    some("different laws", &|case| kinds(case) >= 2);
-    some("bodies of 1e-4", &|case| numbers(&case.text, "size = ").contains(&1e-4));
-    some("a given start", &|case| case.start.is_some());
-    some("no start", &|case| case.start.is_none());
-}
-
-/// Slender scenes have every kind of body, aspect ratio, hold, drive and law.
-#[test]
-fn slender_scenes_fill_the_box() {
-    let cases: Vec<_> = (0..1000).map(|index| slender::scene(SLENDER, index, Path::new(""))).collect();
-    let some = |what: &str, is: &dyn Fn(&Case) -> bool| {
-        let count = cases.iter().filter(|case| is(case)).count();
-        assert!(count >= 20, "{what}: {count} of {}", cases.len());
-    };
-    for kind in ["Leaves", "Discs", "Plates", "Frames", "Hoops"] {
-        some(kind, &|case| case.line.starts_with(kind));
-    }
-    for word in ["1:5 ", "1:200 ", "Clamped", "Carried", "bridge true", "moved", "two 1", "inner 1", "gap"] {
-        some(word, &|case| case.line.contains(word));
-    }
-    for law in ["linear = ", "power = ", "exponential = ", "cubic = ", "table = ", "sinh(", "up_to = ", "c^2/"] {
-        some(law, &|case| case.text.contains(law));
-    }
-    for word in ["force = [0, ", "plane = \"axisymmetric\"", "dimension = 3", "gap = \"-", "no gap"] {
-        some(word, &|case| if word == "no gap" { !case.text.contains("gap = ") } else { case.text.contains(word) });
-    }
-    some("no load", &|case| case.expect == Expect::Gauge);
+fn layers_that_saturate() {
+    with_session(|session| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("scene.toml");
+        for index in 0..60 {
+            let case = saturating::scene(1, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+            std::fs::write(&path, &case.text).expect("a scene can be written");
+            let answer = runs::by_method(session, &path, &Recipe::new("auto", &case)).expect("a session that lives");
+            let carried = answer.force.iter().sum::<f64>() / case.carried.expect("a load");
+            let is_right = answer.status == "converged" && (carried - 1.0).abs() < 1e-6;
+            assert!(is_right && answer.iterations <= 30, "{}: {carried}, {}", answer.message, case.line);
+        }
+    });
 }

@@ -15,9 +15,24 @@ use std::rc::Rc;
 
 /// The kind of data lines that follow a keyword.
 enum DataLines {
-    Nodes { set: Option<String>, coordinates: Coordinates },
-    Elements { name: Rc<str>, role: Role, set: Option<String>, open: Vec<u64> },
-    Set { name: String, nodes: bool, generate: bool, shift: u64 },
+    Nodes {
+        set: Option<String>,
+        coordinates: Coordinates,
+    },
+    /// `open` is an element whose line does not have all its nodes, and `comma` tells whether that line ends with a comma.
+    Elements {
+        name: Rc<str>,
+        role: Role,
+        set: Option<String>,
+        open: Vec<u64>,
+        comma: bool,
+    },
+    Set {
+        name: String,
+        nodes: bool,
+        generate: bool,
+        shift: u64,
+    },
     Surface(String),
     NodeSurface(String),
     Union(String),
@@ -151,7 +166,7 @@ impl Reader {
                          hexahedra of order 1 or 2 can, of the families CPS, CPE, CAX and C3D"
                     ));
                 }
-                DataLines::Elements { name, role, set: spelling("ELSET"), open: Vec::new() }
+                DataLines::Elements { name, role, set: spelling("ELSET"), open: Vec::new(), comma: false }
             }
             "NSET" | "ELSET" => self.set(keyword, named(&keyword.name)?)?,
             "SURFACE" => self.surface(keyword, named("NAME")?)?,
@@ -295,7 +310,7 @@ impl Reader {
             DataLines::Nodes { ref set, coordinates } => {
                 self.node(&words, set.as_deref(), coordinates, at).map(|()| data)
             }
-            DataLines::Elements { .. } => self.element(data, &words, line.ends_with(','), at),
+            DataLines::Elements { .. } => self.element(data, &words, !line.ends_with(','), at),
             DataLines::Set { ref name, nodes, generate, shift } => {
                 self.members(name, nodes, generate, shift, &words).map(|()| data)
             }
@@ -328,8 +343,12 @@ impl Reader {
     }
 
     /// Read an element, or a part of it.
-    fn element(&mut self, data: DataLines, words: &[&str], continues: bool, at: SourceLine) -> TextResult<DataLines> {
-        let DataLines::Elements { name, role, set, mut open } = data else { return Ok(data) };
+    ///
+    /// A line goes on in the next one after a comma. Where the number of nodes is known, it also goes on without a comma until all nodes are there, as
+    /// CalculiX reads it; then the lines must have exactly these nodes.
+    fn element(&mut self, data: DataLines, words: &[&str], ends: bool, at: SourceLine) -> TextResult<DataLines> {
+        let DataLines::Elements { name, role, set, mut open, comma } = data else { return Ok(data) };
+        let before = open.len();
         let kind = if let Role::Mesh(kind) = role { Some(kind) } else { None };
         if kind.is_none() {
             // The number of nodes is unknown, so that the element ends where its line does not go on.
@@ -337,10 +356,13 @@ impl Reader {
         } else {
             open.extend(words.iter().map(|word| count(word)).collect::<TextResult<Vec<u64>>>()?);
         }
-        if continues && kind.is_none_or(|kind| open.len() <= kind.nodes()) {
-            return Ok(DataLines::Elements { name, role, set, open });
+        if kind.map_or(!ends, |kind| open.len() <= kind.nodes()) {
+            return Ok(DataLines::Elements { name, role, set, open, comma: !ends });
         }
         if let Some(kind) = kind {
+            if before > 0 && !comma && open.len() > kind.nodes() + 1 {
+                check_count(kind, &open[..before])?;
+            }
             // A beam may have a node more, for its direction.
             self.longer += usize::from(kind.shape.dimension > 1 && open.len() > kind.nodes() + 1);
             open.truncate(kind.nodes() + 1);
@@ -356,7 +378,7 @@ impl Reader {
         if let Some(old) = self.model.elements.insert(tag, element) {
             return Err(format!("the element {tag} stands twice, also in {}", self.lines.show(old.at)));
         }
-        Ok(DataLines::Elements { name, role, set, open: Vec::new() })
+        Ok(DataLines::Elements { name, role, set, open: Vec::new(), comma: false })
     }
 
     fn members(&mut self, name: &str, nodes: bool, generate: bool, shift: u64, words: &[&str]) -> TextResult<()> {

@@ -1,14 +1,14 @@
 //! A roller bearing: twelve and more bodies that only contact and soft springs hold.
 
 use super::{close, solved};
-use crate::common::Run;
+use crate::common::Report;
 
 /// Total load, on the inner ring.
 const LOAD: f64 = 300.0;
 
 /// What the inner ring presses on each roller, whose forces on the ring must add up to the load.
-fn carried(run: &Run, rollers: usize) -> Vec<f64> {
-    let pairs = run.report["pairs"].as_array().expect("pairs");
+fn carried(run: &Report, rollers: usize) -> Vec<f64> {
+    let pairs = run["pairs"].as_array().expect("pairs");
     assert_eq!(pairs.len(), 2 * rollers);
     // the inner ring is the first body, and pairs are found body by body
     let forces: Vec<[f64; 3]> = (0..rollers).map(|k| run.forces(k)[1]).collect();

@@ -9,12 +9,12 @@ mod spheres;
 mod walls;
 mod westergaard;
 
-use crate::common::{Run, case, solve};
+use crate::common::here::solve_here;
+use crate::common::{Report, case};
 
 /// Solves a case with some values of its scene replaced; it must converge.
-fn solved(name: &str, sets: &[&str]) -> Run {
-    let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-    solve(case(name), &args).converged()
+fn solved(name: &str, sets: &[&str]) -> Report {
+    solve_here(case(name), sets).converged()
 }
 
 /// That a value is the expected one within a relative tolerance.

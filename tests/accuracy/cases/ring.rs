@@ -1,13 +1,14 @@
 //! Four bodies in a ring, each in contact with two others.
 
-use super::{case, close, solve, solved};
-use crate::common::{Run, root};
+use super::{case, close, solved};
+use crate::common::here::solve_here;
+use crate::common::{Report, root};
 
 /// Joints in the order of the scene, as angle of the joint and of the normal that points from the first body to the second.
 const JOINTS: [f64; 4] = [45.0, 135.0, 225.0, 315.0];
 
 /// Each joint carries a force along its normal, opposite on both sides; gives the forces.
-fn along_joints(run: &Run) -> [f64; 4] {
+fn along_joints(run: &Report) -> [f64; 4] {
     std::array::from_fn(|joint| {
         let [first, second] = run.forces(joint);
         let angle = (JOINTS[joint] + 90.0).to_radians();
@@ -25,7 +26,7 @@ fn asymmetric() {
     let tilt = 5.0 * (2f64.sqrt() - 1.0);
     let (right, left) = (25.0 - tilt, 25.0 + tilt);
     for method in ["auto", "ncg"] {
-        let run = solve(case("ring"), &["--method", method]).converged();
+        let run = solve_here(case("ring"), &[&format!("method.name={method}")]).converged();
         for (force, exact) in along_joints(&run).into_iter().zip([right, left, left, right]) {
             close(method, force, exact, 1e-7); // bodies are in balance to ten times the residual
         }
@@ -42,7 +43,7 @@ fn asymmetric() {
 fn symmetric() {
     let scene = root().join("meshes/ring/symmetric.toml");
     for method in ["auto", "newton"] {
-        let run = solve(&scene, &["--method", method]).converged();
+        let run = solve_here(&scene, &[&format!("method.name={method}")]).converged();
         for (joint, force) in along_joints(&run).into_iter().enumerate() {
             close("force", force, 20.0, 1e-7);
             let table = run.contact_of(joint);

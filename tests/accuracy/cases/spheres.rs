@@ -1,7 +1,7 @@
 //! Spheres in space: Hertz's contact, and a soft layer between stiff bodies.
 
 use super::{close, solved};
-use crate::common::Run;
+use crate::common::Report;
 
 /// A soft layer between stiff spheres: p = k (delta - r^2 / (2 R)) with F = pi k R delta^2; the layer carries exactly the load.
 #[test]
@@ -19,7 +19,7 @@ fn soft_layer() {
 }
 
 /// Root of the mean square error of the pressures, by the areas of the points, over that of the pressure `exact(r)`.
-fn error(run: &Run, exact: impl Fn(f64) -> f64) -> f64 {
+fn error(run: &Report, exact: impl Fn(f64) -> f64) -> f64 {
     let table = run.contact();
     let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {
         let at = |q: usize| of(table["x"][q].hypot(table["y"][q]), table["pressure"][q]);

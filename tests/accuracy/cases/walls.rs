@@ -1,11 +1,11 @@
 //! Many bodies from one table: walls of bricks and blocks in space. What is normal to the joints passes through them as it is.
 
 use super::{close, solved};
-use crate::common::Run;
+use crate::common::Report;
 
 /// The pairs: names of their bodies, and the force on the second one.
-fn pairs(run: &Run) -> Vec<([String; 2], [f64; 3])> {
-    let count = run.report["pairs"].as_array().expect("pairs").len();
+fn pairs(run: &Report) -> Vec<([String; 2], [f64; 3])> {
+    let count = run["pairs"].as_array().expect("pairs").len();
     let name = |pair: usize, side: usize| run.text(&format!("pairs/{pair}/bodies/{side}")).to_owned();
     (0..count).map(|pair| ([name(pair, 0), name(pair, 1)], run.forces(pair)[1])).collect()
 }
@@ -20,7 +20,7 @@ fn number(name: &str) -> usize {
 fn bricks() {
     let (columns, rows) = (5, 4);
     let run = solved("wall", &["mesh.set.columns=5", "mesh.set.rows=4"]);
-    assert_eq!(run.report["bodies"].as_array().expect("bodies").len(), columns * rows);
+    assert_eq!(run["bodies"].as_array().expect("bodies").len(), columns * rows);
     let row = |name: &str| (number(name) - 1) / columns;
     let mut beds = vec![0.0; rows - 1];
     let mut heads = 0;

@@ -5,7 +5,8 @@
 mod solid;
 mod symbolic;
 
-use crate::common::{Scene, case, root, solve};
+use crate::common::here::solve_here;
+use crate::common::{Scene, case, root};
 use solid::Solid;
 use symbolic::{Expr, cosine, number, sine, x};
 
@@ -131,8 +132,7 @@ fn check_orders(
 ) {
     let errors = sizes.map(|n| {
         let sets = [format!("mesh.set.n={n}"), format!("body.0.order={order}"), format!("body.1.order={order}")];
-        let args: Vec<&str> = sets.iter().flat_map(|set| ["--set", set.as_str()]).collect();
-        let run = solve(scene, &args).converged();
+        let run = solve_here(scene, &sets.each_ref().map(String::as_str)).converged();
         ["error_l2", "error_h1"].map(|norm| {
             let of = |body: usize| run.number(&format!("bodies/{body}/{norm}"));
             of(0).max(of(1))
