@@ -303,7 +303,7 @@ pub fn shown(value: f64) -> String {
     }
 }
 
-/// Join names by "with"; the first words of consecutive names are written once: `rotation about x and y`.
+/// Join names by "and"; the first words of consecutive names are written once: `rotation about x and y`.
 pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for name in names {
@@ -318,7 +318,7 @@ pub fn joined<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
         let list = if list.is_empty() { last.to_owned() } else { format!("{} and {last}", list.join(", ")) };
         format!("{kind} {list}").trim_end().to_owned()
     };
-    groups.into_iter().map(group).collect::<Vec<_>>().join(" with ")
+    groups.into_iter().map(group).collect::<Vec<_>>().join(" and ")
 }
 
 /// Most names in a sentence: with ten letters each and their quotes, they fill two lines of a terminal of 80 columns.
@@ -372,9 +372,9 @@ mod tests {
     #[test]
     fn names_and_numbers_are_short() {
         let names = ["translation along x", "rotation about x", "rotation about y", "rotation about z"];
-        assert_eq!(joined(names), "translation along x with rotation about x, y and z");
-        assert_eq!(joined(["x", "y"]), "x with y");
-        assert_eq!(joined(["translation along y", "rotation"]), "translation along y with rotation");
+        assert_eq!(joined(names), "translation along x and rotation about x, y and z");
+        assert_eq!(joined(["x", "y"]), "x and y");
+        assert_eq!(joined(["translation along y", "rotation"]), "translation along y and rotation");
         assert_eq!([1e308, -2.1e5, 0.0, 1e-7, f64::NAN].map(shown), ["1e308", "-210000", "0", "1e-7", "NaN"]);
     }
 }

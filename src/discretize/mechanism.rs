@@ -11,7 +11,7 @@
 
 use super::unassembled::{FixableDof, NO_WORK, Unassembled};
 use crate::contact::ContactPair;
-use crate::error::few;
+use crate::error::{few, joined};
 use crate::fem::{PointExtent, RigidMotion, rigid};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::{Mechanism, Motions};
@@ -180,9 +180,9 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
                 }));
                 continue;
             }
-            let names: Vec<&str> = set.iter().map(|(name, _)| name.as_str()).collect();
+            let names = set.iter().map(|(name, _)| name.as_str());
             let balanced = if most > self.tilt.max(NO_WORK) { most } else { 0.0 };
-            let mut mechanism = Mechanism { balanced, ..mechanism(rigid::listed(&names)) };
+            let mut mechanism = Mechanism { balanced, ..mechanism(joined(names)) };
             for (_, moving) in set {
                 mechanism.fixed = self.pin(moving, &mut pins).or(mechanism.fixed);
             }

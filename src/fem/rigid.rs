@@ -105,24 +105,6 @@ pub fn apart<const D: usize>(span: Vec<(RigidMotion<D>, DVector<f64>)>) -> Vec<(
     span
 }
 
-/// Return motions in one phrase: `translation along x and y and rotation about z`.
-pub fn listed(names: &[&str]) -> String {
-    let mut kinds: Vec<(&str, Vec<&str>)> = Vec::new();
-    for name in names {
-        let (kind, direction) = name.rsplit_once(' ').unwrap_or((name, ""));
-        match kinds.last_mut() {
-            Some((last, directions)) if *last == kind && !direction.is_empty() => directions.push(direction),
-            _ => kinds.push((kind, vec![direction])),
-        }
-    }
-    let phrase = |(kind, mut directions): (&str, Vec<&str>)| {
-        let last = directions.pop().unwrap_or_default();
-        let all = if directions.is_empty() { last.to_owned() } else { format!("{} and {last}", directions.join(", ")) };
-        format!("{kind} {all}").trim_end().to_owned()
-    };
-    kinds.into_iter().map(phrase).collect::<Vec<_>>().join(" and ")
-}
-
 /// The rigid motions of a free body at its dofs.
 #[derive(Clone, Copy)]
 pub struct AtDofs<'a> {

@@ -34,7 +34,7 @@ struct PairSide<'a> {
     traces: Vec<Option<&'a [f64]>>,
 }
 
-/// A combined motion of one body, named after the motions that it combines: "translation along x with rotation".
+/// A combined motion of one body, named after the motions that it combines: "translation along x and rotation".
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Moved {
     /// Number of the body.
@@ -458,7 +458,7 @@ mod tests {
         let kernel = springs.factor().kernel();
         assert_eq!(kernel, [DVector::from_vec(vec![1.0, 0.0, 1.0, 0.0])]);
         assert_eq!(combined(["x", "y"].into_iter(), [1.0, 1e-7].into_iter()), "x");
-        assert_eq!(combined(["x", "y"].into_iter(), [-0.1, 1.0].into_iter()), "x with y");
+        assert_eq!(combined(["x", "y"].into_iter(), [-0.1, 1.0].into_iter()), "x and y");
     }
 
     /// An amount is rounded to the nearest number of 24 binary digits, and its products with small integers are exact.

@@ -91,7 +91,8 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
         None if *work == 0.0 => "displacements are free up to it".to_owned(),
         None => "there is no solution".to_owned(),
     };
-    format!("{who}: nothing holds {together} {motion}, and {loads}: {end}")
+    let then = if *balanced > 0.0 { ";" } else { ":" };
+    format!("{who}: nothing holds {together} {motion}, and {loads}{then} {end}")
 }
 
 /// Relative error of forces that no run promises to undercut.
