@@ -10,7 +10,7 @@ use crate::expression::Expression;
 use crate::fem::displacement::{self, Internal, Strained};
 use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, PointExtent, Space, assemble, pad};
 use crate::linalg::{Csr, dot};
-use crate::output::{BodyField, CellKind};
+use crate::output::{BodyField, CellKind, LargestStress};
 use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
@@ -156,8 +156,12 @@ impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
         let (u, space) = (self.nodal(v), &self.space);
         let (owned, shown) = space.part(self.owned());
-        let stress = displacement::nodal_stresses(space, &self.elasticity, &self.nodal(bent));
+        let bent = self.nodal(bent);
+        let stress = displacement::nodal_stresses(space, &self.elasticity, &bent);
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
+        let von_mises: Vec<f64> = stress.iter().map(displacement::von_mises).collect();
+        let largest = (0..shown.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j]));
+        let change = |i: usize| displacement::change_within_cells(space, &self.elasticity, &bent, shown[i], &stress[i]);
         let displacement = |&node: &u32| pad(std::array::from_fn::<f64, D, _>(|c| u[D * node as usize + c]));
         BodyField {
             name: self.name.clone(),
@@ -165,7 +169,8 @@ impl<const D: usize> Post for OnPart<D> {
             cell: CellKind::simplex(D, space.order.degree()),
             connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
-            von_mises: stress.iter().map(displacement::von_mises).collect(),
+            von_mises,
+            largest: largest.map(|point| LargestStress { point, change: change(point) }),
             principal: stress.iter().map(displacement::principal).collect(),
             stress,
         }

@@ -35,6 +35,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     report
         .warnings
         .extend(too_large.into_iter().chain((0..model.pairs.len()).filter_map(|i| warnings::beyond_law(done, i))));
+    report.warnings.extend(warnings::nothing_touches(done));
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);

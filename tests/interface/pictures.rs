@@ -366,6 +366,7 @@ fn a_hundred_thousand_triangles_take_less_than_five_megabytes() {
     let field = BodyField {
         name: "slab".into(),
         von_mises: displacement.iter().map(|u| 1.0 + u[2]).collect(),
+        largest: None,
         stress: vec![[0.0; 6]; points.len()],
         principal: displacement.clone(),
         points,
