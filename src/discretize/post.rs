@@ -10,7 +10,7 @@ use crate::expression::Expression;
 use crate::fem::displacement::{self, Internal, Strained};
 use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, PointExtent, Space, Split, assemble, pad};
 use crate::linalg::{Csr, dot};
-use crate::output::{BodyField, CellKind};
+use crate::output::{BodyField, CellKind, LargestStress};
 use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
@@ -162,8 +162,14 @@ impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
         let (u, split) = (self.nodal(v), &self.split);
         let (owned, shown) = split.space.part(self.owned());
-        let stress = displacement::nodal_stresses(&split.space, &self.elasticity, &split.values(&self.nodal(bent)));
+        let nodal = self.nodal(bent);
+        let bent = split.values(&nodal);
+        let stress = displacement::nodal_stresses(&split.space, &self.elasticity, &bent);
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
+        let von_mises: Vec<f64> = stress.iter().map(displacement::von_mises).collect();
+        let largest = (0..shown.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j]));
+        let change =
+            |i: usize| displacement::change_within_cells(&split.space, &self.elasticity, &bent, shown[i], &stress[i]);
         let displacement = |&node: &u32| {
             let first = D * split.origin(node) as usize;
             pad(std::array::from_fn::<f64, D, _>(|c| u[first + c]))
@@ -174,7 +180,8 @@ impl<const D: usize> Post for OnPart<D> {
             cell: CellKind::simplex(D, self.space.order.degree()),
             connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
-            von_mises: stress.iter().map(displacement::von_mises).collect(),
+            von_mises,
+            largest: largest.map(|point| LargestStress { point, change: change(point) }),
             principal: stress.iter().map(displacement::principal).collect(),
             stress,
         }

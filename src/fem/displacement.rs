@@ -15,24 +15,15 @@ use serde::{Deserialize, Serialize};
 /// of one material. Where the elasticity has no value at a node, as on the axis of cylindrical axes, that of an integration
 /// point of the cell is used.
 pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
-    let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });
-    let inside = element::values(space.order, &rule.points[0]);
     let mut sum = vec![[0.0; 6]; space.nodes.len()];
     let mut volume = vec![0.0; space.nodes.len()];
     for index in 0..space.cell_count() {
-        let x = space.cell_nodes(index);
         for (place, &node) in space.cell(index).iter().enumerate() {
             let l = &element::place(D + 1, place)[..=D];
-            let Some(point) = space.point(index, &x, l, 1.0) else { continue };
-            let material = elasticity
-                .at(index, space.in_scene(point.at))
-                .or_else(|_| elasticity.at(index, space.in_scene(element::interpolate(&x, &inside))));
-            // Assembly has evaluated this integration point, so it has a value.
-            let Ok(material) = material else { continue };
-            let stress = material.stress(&point.slope(u).strain());
-            volume[node as usize] += point.measure;
+            let Some((measure, stress)) = stress_in_cell(space, elasticity, u, index, l) else { continue };
+            volume[node as usize] += measure;
             for (sum, stress) in sum[node as usize].iter_mut().zip(stress) {
-                *sum += point.measure * stress;
+                *sum += measure * stress;
             }
         }
     }
@@ -40,6 +31,43 @@ pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity,
         sum.iter_mut().for_each(|s| *s /= volume);
     }
     sum
+}
+
+/// Return the stress of a cell at barycentric coordinates `l`, after its measure per share; none where it has no value.
+fn stress_in_cell<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    u: &[f64],
+    index: usize,
+    l: &[f64],
+) -> Option<(f64, [f64; 6])> {
+    let x = space.cell_nodes(index);
+    let point = space.point(index, &x, l, 1.0)?;
+    let inside = || {
+        let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });
+        element::interpolate(&x, &element::values(space.order, &rule.points[0]))
+    };
+    let material =
+        elasticity.at(index, space.in_scene(point.at)).or_else(|_| elasticity.at(index, space.in_scene(inside())));
+    // Assembly has evaluated the integration point, so it has a value.
+    Some((point.measure, material.ok()?.stress(&point.slope(u).strain())))
+}
+
+/// Return by how much the stress changes from a node, where it is `stress`, to the middles of the cells around the node: the largest von Mises stress
+/// of the differences, relative to that at the node. It is about the relative error of the stress at the node with linear elements, and the square
+/// of it with quadratic ones, where it is small.
+pub fn change_within_cells<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    u: &[f64],
+    node: u32,
+    stress: &[f64; 6],
+) -> f64 {
+    let middle = [1.0 / (D + 1) as f64; 4];
+    let around = (0..space.cell_count()).filter(|&index| space.cell(index).contains(&node));
+    let inside = around.filter_map(|index| stress_in_cell(space, elasticity, u, index, &middle[..=D]));
+    let change = |(_, s): (f64, [f64; 6])| von_mises(&std::array::from_fn(|c| s[c] - stress[c]));
+    inside.map(change).fold(0.0, f64::max) / von_mises(stress)
 }
 
 /// Return the principal stresses of (xx yy zz xy yz xz), the largest first (tension is positive); NaN if the stress is not finite.

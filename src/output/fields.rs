@@ -90,8 +90,19 @@ pub struct BodyField {
     pub stress: Vec<[f64; 6]>,
     /// Von Mises stress at each point.
     pub von_mises: Vec<f64>,
+    /// Where it is largest; none without points.
+    pub largest: Option<LargestStress>,
     /// Principal stresses at each point, the largest first.
     pub principal: Vec<[f64; 3]>,
+}
+
+/// The largest von Mises stress at the points of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LargestStress {
+    /// Its point.
+    pub point: usize,
+    /// Relative change of the stress from there to the middles of the cells around it, the largest.
+    pub change: f64,
 }
 
 impl BodyField {
@@ -437,6 +448,7 @@ mod tests {
             displacement: (0..n).map(|i| std::array::from_fn(|c| number(-100.0, i, c))).collect(),
             stress: (0..n).map(|i| std::array::from_fn(|c| number(1e9, i, c))).collect(),
             von_mises: (0..n).map(|i| number(1e-9, i, 0)).collect(),
+            largest: None,
             principal: (0..n).map(|i| std::array::from_fn(|c| number(-1e9, i, c))).collect(),
         }
     }

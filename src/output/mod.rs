@@ -10,12 +10,13 @@ pub mod report;
 pub mod tables;
 pub mod terminal;
 
-pub use fields::{BodyField, CellKind, Encoding, UnstructuredGrid};
+pub use fields::{BodyField, CellKind, Encoding, LargestStress, UnstructuredGrid};
 pub use folder::{Checksums, Folder, make_folder, safe_name, write_whole};
 pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,
-    LookReport, PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, busiest, warning_lines,
+    LookReport, PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, busiest,
+    warning_lines,
 };
 pub use tables::{ContactTable, HistoryWriter, PairRow, RowFile, StepTable};
 pub use terminal::IterationTable;

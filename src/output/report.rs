@@ -230,6 +230,8 @@ pub struct BodyReport {
     pub max_von_mises: Option<f64>,
     /// Point of the largest von Mises stress (x, y, z).
     pub max_von_mises_at: Option<[f64; 3]>,
+    /// Relative change of the stress from this point to the middles of the cells around it, the largest.
+    pub max_von_mises_change: Option<f64>,
     /// Largest displacement at the nodes.
     pub max_displacement: Option<f64>,
     /// Largest and least principal stress at the nodes.
@@ -585,6 +587,10 @@ fn step_line(number: usize, step: &StepReport) -> String {
     format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
 }
 
+/// Change of the stress within the cells at its largest value beyond which this value may be anything: half of it. There the next mesh of half the
+/// size has half of the change where the stress is smooth, and the same where it is singular.
+pub const UNSETTLED: f64 = 0.5;
+
 /// Return the line of a body with its reactions and imbalances.
 fn balance_line(body: &BodyReport) -> String {
     let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
@@ -593,7 +599,11 @@ fn balance_line(body: &BodyReport) -> String {
         if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
     };
     let reactions = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
-    let place = body.max_von_mises_at.map_or(String::new(), |x| format!(" at {}", point(x)));
+    let change = body.max_von_mises_change.filter(|change| *change > UNSETTLED);
+    let doubt = change.map_or(String::new(), |change| {
+        format!(", not to be trusted: it changes by {:.0} % within a cell there", 100.0 * change)
+    });
+    let place = body.max_von_mises_at.map_or(String::new(), |x| format!(" at {}{doubt}", point(x)));
     let fields = largest(body.max_displacement, body.max_von_mises, &place);
     format!(
         "  {}: {fields}{reactions}imbalance {} of forces, {} of moments",

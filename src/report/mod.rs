@@ -7,7 +7,9 @@ mod picture;
 
 use crate::error::{Error, Kind, Result};
 use crate::linalg::bounds;
-use crate::output::{Color, ConvergenceSeries, Folder, LISTED, Plot, PlotAxis, Series, Style, safe_name, write_whole};
+use crate::output::{
+    Color, ConvergenceSeries, Folder, LISTED, Plot, PlotAxis, Series, Style, UNSETTLED, safe_name, write_whole,
+};
 use crate::problem::units::{Units, force_labels, label};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -284,6 +286,7 @@ impl Results {
             force_unit => unit(|units| &units.force),
             size_unit => label("", self.size_unit().as_deref()),
             is_area => self.is_area(),
+            unsettled => UNSETTLED,
             view,
             pressures => self.pressures(false)?,
             convergence,
@@ -434,15 +437,17 @@ const NONE: u16 = u16::MAX;
 /// Return the numbers of the view, little endian in base64.
 ///
 /// Each part has points relative to the least coordinates and displacements (float32), triangles (uint32), and a value at each
-/// point (uint16). Values are scaled to the range of the parts; 65535 stands for none.
+/// point (uint16). Values are scaled to the range of the parts, pressures to that from zero on; 65535 stands for none.
 fn data(bodies: &[TriangleMesh], surfaces: &[TriangleMesh], scale: f64, is_space: bool) -> Value {
     let [low, high] = bounds(bodies.iter().chain(surfaces).flat_map(|part| &part.points).copied());
+    let stress = range(bodies.iter().flat_map(|part| &part.value));
+    let [_, most] = range(surfaces.iter().flat_map(|part| &part.value));
     json!({
-        "bodies": parts(bodies, low),
-        "surfaces": parts(surfaces, low),
+        "bodies": parts(bodies, low, stress),
+        "surfaces": parts(surfaces, low, [0.0, most]),
         "travel": range(bodies.iter().flat_map(TriangleMesh::travel).collect::<Vec<_>>().iter()),
-        "stress": range(bodies.iter().flat_map(|part| &part.value)),
-        "pressure": range(surfaces.iter().flat_map(|part| &part.value)),
+        "stress": stress,
+        "pressure": [0.0, most],
         "low": [0.0, 0.0, 0.0],
         "high": relative(low, &high),
         "scale": scale,
@@ -456,9 +461,8 @@ fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|c| x[c] - low[c])
 }
 
-/// Return the data of parts, with points relative to `low`.
-fn parts(parts: &[TriangleMesh], low: [f64; 3]) -> Vec<Value> {
-    let ends = range(parts.iter().flat_map(|part| &part.value));
+/// Return the data of parts, with points relative to `low` and values relative to `ends`.
+fn parts(parts: &[TriangleMesh], low: [f64; 3], ends: [f64; 2]) -> Vec<Value> {
     parts.iter().map(|part| part_data(part, low, ends)).collect()
 }
 
@@ -467,7 +471,10 @@ fn part_data(part: &TriangleMesh, low: [f64; 3], [least, most]: [f64; 2]) -> Val
     // float32 has too few digits for a small body far from the origin
     let points: Vec<[f64; 3]> = part.points.iter().map(|x| relative(low, x)).collect();
     let short = |value: &f64| match value.is_finite() {
-        true => ((value - least) / (most - least) * f64::from(NONE - 1)).round() as u16,
+        // the least value is that of open contacts alone
+        true => ((value - least) / (most - least) * f64::from(NONE - 1))
+            .round()
+            .max(f64::from(u8::from(*value > least))) as u16,
         false => NONE,
     };
     let floats = |points: &[[f64; 3]]| -> Vec<u8> {

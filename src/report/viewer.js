@@ -9,25 +9,30 @@
   }
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
   const program = twgl.createProgramInfo(gl, [`#version 300 es
-    in vec3 point, displacement; in float value;
+    in vec3 point, displacement; in float value, known;
     uniform mat4 view; uniform float scale, travels; uniform vec2 travel;
-    out float shade; out vec3 place;
+    // the value, and the share of nodes that have one
+    out vec2 shade; out vec3 place;
     void main() {
       place = point + scale * displacement;
-      shade = travels > 0.5 ? (length(displacement) - travel.x) / (travel.y - travel.x) : value * 65535.0 / 65534.0;
+      float far = (length(displacement) - travel.x) / (travel.y - travel.x);
+      shade = travels > 0.5 ? vec2(far, 1.0) : vec2(value * 65535.0 / 65534.0, known);
       gl_Position = view * vec4(place, 1.0);
     }`, `#version 300 es
     precision highp float;
-    in float shade; in vec3 place; out vec4 color;
-    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform float squares;
+    in vec2 shade; in vec3 place; out vec4 color;
+    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform float squares, opens;
     void main() {
       if (dot(place, cut.xyz) > cut.w) discard;
       vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
       float light = 0.55 + 0.45 * abs(dot(normal, toward));
-      int band = clamp(int((squares > 0.5 ? sqrt(max(shade, 0.0)) : shade) * 12.0), 0, 11);
+      // nodes without a value take part in none: the others alone make it
+      float value = shade.x / max(shade.y, 1e-6);
+      int band = clamp(int((squares > 0.5 ? sqrt(max(value, 0.0)) : value) * 12.0), 0, 11);
       // beyond a section the inner side of the surface is seen, which is grey like points without a value
       bool inner = cut.xyz != vec3(0.0) && !gl_FrontFacing;
-      vec3 paint = inner || shade > 1.00001 ? vec3(0.72) : colors[band];
+      bool none = shade.y < 0.5 || (opens > 0.5 && value < 0.5 / 65534.0);
+      vec3 paint = inner || none ? vec3(0.72) : colors[band];
       // lines have ink
       color = ink.a > 0.5 ? ink : vec4(paint * light, 1.0);
     }`]);
@@ -42,10 +47,12 @@
     return new Uint32Array([...edges.values()].flat());
   };
   const part = (part, kind) => {
+    const values = new Uint16Array(bytes(part.value)), known = Uint8Array.from(values, v => v === 65535 ? 0 : 255);
     const arrays = {
       point: { numComponents: 3, data: new Float32Array(bytes(part.points)) },
       displacement: { numComponents: 3, data: new Float32Array(bytes(part.displacement)) },
-      value: { numComponents: 1, data: new Uint16Array(bytes(part.value)), normalize: true },
+      value: { numComponents: 1, data: values.map(v => v === 65535 ? 0 : v), normalize: true },
+      known: { numComponents: 1, data: known, normalize: true },
       indices: new Uint32Array(bytes(part.triangles)),
     };
     const buffer = twgl.createBufferInfoFromArrays(gl, arrays);
@@ -102,7 +109,7 @@
     for (const part of parts) {
       if (!part.shown || pressure !== (part.kind === "surface")) continue;
       twgl.setBuffersAndAttributes(gl, program, part.buffer);
-      twgl.setUniforms(program, { ...lit, travels: what.value === "travel" ? 1 : 0, squares: what.value === "stress" ? 1 : 0, ink: [0, 0, 0, 0] });
+      twgl.setUniforms(program, { ...lit, travels: what.value === "travel" ? 1 : 0, squares: what.value === "stress" ? 1 : 0, opens: pressure ? 1 : 0, ink: [0, 0, 0, 0] });
       twgl.drawBufferInfo(gl, part.buffer);
       if (!part.outline) continue;
       twgl.setBuffersAndAttributes(gl, program, part.outline);

@@ -37,6 +37,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
         report.warnings.extend(warnings::beyond_law(done, i).into_iter().chain(warnings::by_chords(done, i)));
         report.warnings.extend(warnings::tilted(done, i));
     }
+    report.warnings.extend(warnings::nothing_touches(done));
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);

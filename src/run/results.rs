@@ -12,7 +12,9 @@ use crate::fem::{length, minus};
 use crate::linalg::{around, bounds, dot};
 use crate::model::{Body, BodySlot, Model};
 use crate::output::report::readable;
-use crate::output::{BalanceReport, BodyReport, Extent, ForceReport, ReactionReport, StepPairReport, StepReport, sci};
+use crate::output::{
+    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ReactionReport, StepPairReport, StepReport, sci,
+};
 use crate::problem::history::History;
 use crate::problem::method::Gamma;
 use serde::{Deserialize, Serialize};
@@ -52,6 +54,8 @@ struct Extremes {
     von_mises: f64,
     /// Point of the largest von Mises stress.
     at: [f64; 3],
+    /// Its change within the cells there, relative.
+    change: f64,
     principal: [f64; 2],
     displacement: f64,
     /// Bounding box of the points: least and largest coordinates.
@@ -69,6 +73,7 @@ impl Extremes {
         let mut extremes = Self {
             von_mises: f64::NEG_INFINITY,
             at: [0.0; 3],
+            change: 0.0,
             principal: [f64::INFINITY, f64::NEG_INFINITY],
             displacement: 0.0,
             extent: bounds([]),
@@ -78,10 +83,8 @@ impl Extremes {
         };
         let Ok(recovered) = recovered else { return Self { von_mises: f64::NAN, ..extremes } };
         let field = recovered.field(info);
-        if let Some(largest) =
-            (0..field.points.len()).max_by(|&i, &j| field.von_mises[i].total_cmp(&field.von_mises[j]))
-        {
-            (extremes.von_mises, extremes.at) = (field.von_mises[largest], field.points[largest]);
+        if let Some(LargestStress { point, change }) = field.largest {
+            (extremes.von_mises, extremes.at, extremes.change) = (field.von_mises[point], field.points[point], change);
         }
         for s in &field.principal {
             extremes.principal = [extremes.principal[0].min(s[2]), extremes.principal[1].max(s[0])];
@@ -115,6 +118,7 @@ impl Extremes {
         report.max_displacement = Some(self.displacement);
         (report.max_strain, report.max_strain_at) = (Some(self.strain.most), Some(self.strain.at));
         (report.max_von_mises, report.max_von_mises_at) = (Some(self.von_mises), Some(self.at));
+        report.max_von_mises_change = Some(self.change).filter(|change| change.is_finite());
         report.principal_range = Some([self.principal[1], self.principal[0]]);
         let error = |norm: usize| {
             let [error, solution] = self.norms?;

@@ -320,6 +320,19 @@ pub fn tilted(done: &Done, i: usize) -> Option<String> {
     })
 }
 
+/// Return the warning that no pair carries a pressure, at the solution or in a load step. Then contact has no part in the results.
+pub fn nothing_touches(done: &Done) -> Option<String> {
+    let pairs = 0..done.model().pairs.len();
+    let compressed: Option<Vec<Compressed>> = pairs.map(|i| most_compressed(done, i)).collect();
+    let compressed = compressed.filter(|all| all.iter().all(|found| found.pressure <= 0.0))?;
+    let nearest = (0..compressed.len()).max_by(|&i, &j| compressed[i].most.total_cmp(&compressed[j].most))?;
+    let ([a, b], gap) = (names(&done.built.discrete.contacts[nearest]), -compressed[nearest].most);
+    (gap > 0.0).then(|| format!(
+        "nothing touches: no contact carries a pressure, and `{a}` and `{b}` come nearest, with a gap of {}; look at the loads, the supports and the gaps",
+        sci(gap, 3)
+    ))
+}
+
 /// The largest compression of the layer of a pair.
 struct Compressed {
     most: f64,

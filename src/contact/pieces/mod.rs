@@ -129,6 +129,33 @@ impl<const D: usize> Facet<D> {
         std::array::from_fn(|c| (0..D).map(|k| l[k] * self.normals[k][c]).sum())
     }
 
+    /// Return whether a normal of this facet may meet the convex hull of points, which are measured from its first corner. Where none does, a
+    /// failed search loses nothing.
+    ///
+    /// The points lie in a ball, and the normals in a cone around that in the middle. The facet is within its nodes, curved ones but for a small part.
+    fn may_meet(&self, points: &[[f64; D]]) -> bool {
+        let mean = |points: &[[f64; D]]| -> [f64; D] {
+            std::array::from_fn(|c| points.iter().map(|x| x[c]).sum::<f64>() / points.len() as f64)
+        };
+        let radius = |middle: [f64; D], points: &[[f64; D]]| -> f64 {
+            points.iter().map(|&x| length(minus(x, middle))).fold(0.0, f64::max)
+        };
+        let (middle, center) = (mean(&self.x), mean(points));
+        let (axis, away) = (unit(mean(&self.normals)), minus(center, middle));
+        let across = |v: [f64; D]| {
+            let along = dot(&v, &axis);
+            [length(std::array::from_fn::<f64, D, _>(|c| v[c] - along * axis[c])), along]
+        };
+        let spread = self
+            .normals
+            .iter()
+            .map(|&n| across(n))
+            .map(|[off, along]| if along > 0.0 { off / along } else { f64::INFINITY });
+        let ([off, along], ball) = (across(away), radius(center, points));
+        let cone = spread.fold(0.0, f64::max) * (along.abs() + ball);
+        off <= radius(middle, &self.x) + ball + cone
+    }
+
     /// Return the derivatives of x by the coordinates l_1, ..., of which l_0 is the complement to one.
     fn tangents<const N: usize>(&self, l: &[f64; D]) -> [[f64; D]; N] {
         let d = element::derivatives(self.order, l);

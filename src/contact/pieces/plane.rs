@@ -57,7 +57,12 @@ fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused:
         let directions = [facet.direction, other.direction];
         match FacetSegment::between(facet, other, index) {
             Ok(piece) => pieces.extend(piece.filter(|p| refused.admits(reach, index, p.gap, directions))),
-            Err(Lost) => refused.lost += usize::from(reach.faces(directions[0], directions[1])),
+            Err(Lost) => {
+                let points: Vec<_> =
+                    b.facets.coordinates(index, b.space).into_iter().map(|x| minus(x, facet.from)).collect();
+                let is_met = facet.may_meet(&points);
+                refused.lost += usize::from(is_met && reach.faces(directions[0], directions[1]));
+            }
         }
     }
     pieces.sort_by(|p, q| p.gap.abs().total_cmp(&q.gap.abs()).then(p.index.cmp(&q.index)));

@@ -247,7 +247,10 @@ impl Clipped {
             };
             match piece {
                 Ok(piece) => clipped.pieces.extend(piece),
-                Err(Lost) => clipped.lost += 1,
+                Err(Lost) => {
+                    let at = |[i, j]: [usize; 2]| plus(b.at(&place([i, j].map(|k| k as f64 / parts as f64))), offset);
+                    clipped.lost += usize::from(a.may_meet(&corners.map(at)));
+                }
             }
         }
         clipped

@@ -10,6 +10,7 @@ use crate::linalg::pad;
 use crate::mesh::Mesh;
 use crate::mesh::simplex::EDGES;
 use crate::problem::order::Order;
+use std::collections::HashSet;
 
 /// Share of the largest coefficient of a Jacobian below which a value is rounding. The Jacobian is zero where a cell is flat at
 /// a corner, as at the end of two edges that touch each other.
@@ -134,11 +135,13 @@ fn coefficients(b: &[[[f64; 3]; 4]; 4], dimension: usize) -> (Vec<f64>, Vec<f64>
 
 impl<const D: usize> Mesh<D> {
     /// Make the edges of all folded cells straight until no cell is folded, and count the cells in [`Mesh::straightened`].
-    /// Neighbours share the edges, so a straight edge may fold another cell, which becomes straight in the next pass.
+    /// Neighbours share the edges, so a straight edge may fold another cell, which becomes straight in the next pass. A node moves once: one that serves
+    /// two edges, as with a wrong node number, would move for ever. The checks report it.
     pub fn straighten(&mut self) {
         if self.order == Order::P1 {
             return;
         }
+        let mut straight_edges = HashSet::new();
         loop {
             let folded: Vec<Vec<u32>> = self.folded_cells();
             if folded.is_empty() {
@@ -147,6 +150,9 @@ impl<const D: usize> Mesh<D> {
             let mut has_moved = false;
             for cell in &folded {
                 for (&[i, j], &middle) in EDGES.iter().zip(&cell[D + 1..]) {
+                    if !straight_edges.insert(middle) {
+                        continue;
+                    }
                     let [x, y] = [cell[i], cell[j]].map(|node| self.points[node as usize]);
                     let straight = std::array::from_fn(|c| 0.5 * (x[c] + y[c]));
                     has_moved |= std::mem::replace(&mut self.points[middle as usize], straight) != straight;
@@ -277,6 +283,17 @@ mod tests {
         let mut both = square(0.0, 0.4);
         both.straighten();
         assert_eq!((both.straightened, both.points[6]), (1, [0.5, 0.5]));
+        // a node of two edges, as with a wrong node number, ends the work
+        let mut wrong = square(0.0, 0.4);
+        wrong.groups = vec![Group {
+            name: "body".into(),
+            dimension: 2,
+            stride: 6,
+            connectivity: vec![0, 1, 2, 4, 5, 6, 1, 3, 2, 6, 7, 8],
+            tags: Vec::new(),
+        }]
+        .into();
+        wrong.straighten();
         let mut linear = square(0.6, 0.0).lower_order();
         linear.straighten();
         assert_eq!(linear.straightened, 0);
