@@ -19,6 +19,8 @@ use crate::problem::order::Order;
 #[derive(Clone, Copy)]
 struct Facing<const D: usize> {
     weight: f64,
+    /// Area of the facets around the node, over which the curvature is the plain mean: one that extrapolates could be negative.
+    area: f64,
     normal: [f64; D],
     curvature: f64,
 }
@@ -49,7 +51,7 @@ impl<const D: usize> Side<'_, D> {
 
 /// Return the mean normal and curvature of side b before each node of side a, `None` where nothing faces a node.
 fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) -> Vec<Option<Facing<D>>> {
-    let none = Facing { weight: 0.0, normal: [0.0; D], curvature: 0.0 };
+    let none = Facing { weight: 0.0, area: 0.0, normal: [0.0; D], curvature: 0.0 };
     let mut sums = vec![none; a.nodes.len()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let on = a.on_facet(chunk[0].facet_a);
@@ -64,17 +66,15 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
                     if i < D { vertices.value(i, &point.at_a, &point.at_a) } else { all.value(i, &phi, &point.at_a) };
                 let (mu, sum) = (point.weight * value, &mut sums[at as usize]);
                 sum.weight += mu;
-                sum.curvature += mu * curvature;
+                sum.area += point.weight;
+                sum.curvature += point.weight * curvature;
                 (0..D).for_each(|c| sum.normal[c] += mu * normal[c]);
             }
         }
     }
     let mean = |sum: Facing<D>| {
-        (sum.weight > 0.0 && length(sum.normal) > 0.0).then(|| Facing {
-            weight: sum.weight,
-            normal: unit(sum.normal),
-            curvature: (sum.curvature / sum.weight).max(0.0),
-        })
+        let is_faced = sum.weight > 0.0 && length(sum.normal) > 0.0;
+        is_faced.then(|| Facing { normal: unit(sum.normal), curvature: sum.curvature / sum.area, ..sum })
     };
     let mut means: Vec<Option<Facing<D>>> = sums.into_iter().map(mean).collect();
     spread(a, &mut means);

@@ -40,8 +40,9 @@ fn the_warning_names_the_step() {
     let run = solve(&scene, &["--set", "method.steps=[0.01, 1, 1]"]).converged();
     let warnings = run.warnings();
     assert!(warnings.contains("places in load step 2 where") && warnings.matches(REACHES).count() == 1, "{warnings}");
-    // no facet lies beyond the end of the other sphere, so that each has a partner or is too far away
-    assert_eq!(run.number("pairs/0/facets_far"), run.number("pairs/0/facets_uncovered"), "{warnings}");
+    // no facet lies beyond the end of the other sphere, so that each has a partner or is too far away; one may be cut by the largest distance
+    let cut = run.number("pairs/0/facets_far") - run.number("pairs/0/facets_uncovered");
+    assert!(cut == 0.0 || cut == 1.0, "{warnings}");
     assert!(run.number("pairs/0/facets_far") > 10.0);
 }
 
