@@ -74,7 +74,8 @@ pub struct Reached {
     /// Error of the pressures. It is the largest difference from the law, relative to the largest pressure, or the error of an inexact linear
     /// step, relative to the energy of the contact alone.
     pub pressure: f64,
-    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies.
+    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies, by the pressures in equilibrium and by
+    /// those of the layers, which are the result.
     pub imbalance: f64,
 }
 
@@ -134,17 +135,18 @@ impl Reached {
             error: scale.relative(absolute * absolute, energy),
             is_bound,
             pressure: mismatch.max(missed),
-            imbalance: scale.imbalance(model, &model.forces(pressure), strain),
+            imbalance: scale.imbalance(model, &model.forces(pressure), strain).max(scale.imbalance(
+                model,
+                &places.force,
+                strain,
+            )),
         }
     }
 
     /// Verify the equilibrium after a step that its solver takes for exact: f - K u - B' omega p has the relative length `unbalanced`. An inexact
-    /// factorisation leaves a share of the forces, which is an error then, and no bound holds.
+    /// factorisation leaves a share of the forces, and no bound holds then.
     pub(super) fn verify(&mut self, unbalanced: f64) {
-        if !(unbalanced <= EXACT) {
-            self.is_bound = false;
-            self.error = self.error.max(unbalanced);
-        }
+        self.is_bound &= unbalanced <= EXACT;
     }
 
     /// Return the errors of a result with u'Ku = `strain`. Its layer states `places` have the distance `off` from the laws, and the forces out of

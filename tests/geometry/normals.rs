@@ -26,7 +26,7 @@ Physical Curve(\"top\") = Curve In BoundingBox {16-e, d+3-e, -e, 25+e, d+3+e, e}
 
 /// Flats without friction exert no radial force, so that the mean stress along the axis alone moves the section: a force of 28.9.
 #[test]
-fn a_ring_between_flats_takes_the_same_force_on_either_side() {
+fn a_ring_between_flats_takes_the_same_force_on_any_mesh() {
     let layer = "layer = { linear = { stiffness = 1e4 } }";
     let text = format!(
         "dimension = 2\nplane = \"axisymmetric\"\nmesh = {{ geo = \"part.geo\" }}
@@ -35,13 +35,11 @@ fn a_ring_between_flats_takes_the_same_force_on_either_side() {
 [[body]]\nname = \"above\"\nyoung = 2.1e5\npoisson = 0.3\nfix = [{{ on = \"top\", y = -0.1 }}]
 [[contact]]\nbetween = [\"low\", \"skin\"]\n{layer}\n[[contact]]\nbetween = [\"high\", \"skin\"]\n{layer}\n"
     );
-    let force = |flat: &str, carrier: &str| {
+    for flat in ["0.6", "0.05"] {
         let run = solve_here(scene(RING, text.clone()), &[&format!("mesh.set.flat={flat}")]).converged();
-        assert_eq!(run["pairs"][0]["carrier"], carrier);
-        run.number("pairs/0/force/1/1")
-    };
-    let [of_ring, of_flats] = [force("0.6", "skin"), force("0.05", "low")];
-    assert!((of_ring - 28.9).abs() < 0.06 && (of_flats - 28.9).abs() < 0.06, "{of_ring} {of_flats}");
+        let force = run.number("pairs/0/force/1/1");
+        assert!((force - 28.9).abs() < 0.06, "{flat}: {force}");
+    }
 }
 
 /// A stiff wedge whose faces rise by `beta` degrees stands on a soft block; both are turned by `turn` degrees. The sizes of the facets are `h` on

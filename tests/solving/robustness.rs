@@ -234,9 +234,9 @@ fn shortened_steps_come_to_an_end() {
         let upper =
             format!("order = 1\nload = [{{ on = \"b2_top\", pressure = \"5.7e3 * (1 + {lean} * (2*x - 1))\" }}]");
         let gap = "8.6e-4 * max(0, 1 - ((x - 1) / 0.3)^2)^1.5";
-        let scene = blocks([9e6, 9e7], [1, 8], &upper, gap, "power = { B = 3.6e-13, a = 1 }");
+        let scene = blocks([9e7; 2], [2, 8], &upper, gap, "power = { B = 3.6e-13, a = 1 }");
         let run = solve(scene, &["--set", "body.0.order=1"]).converged();
-        // 22, 20, 19, 18, most of them with smoothed laws
+        // 17 or 18, most of them with smoothed laws
         assert!(run.count("iterations") <= 25, "{lean}: {} steps", run.count("iterations"));
         let history = run.history();
         assert!(history["gamma"].iter().any(|&gamma| gamma < 1.0), "{lean}: no step was shortened");
