@@ -1,6 +1,8 @@
 //! Estimated over true errors of pressures in space, where contact ends inside a surface, as a Markdown table: that of docs/theory.md, in
 //! some minutes. `cargo run --release --example effectivity -- --quick`: the rows that the tests hold between 0.7 and 2.
 
+// the tests have this program as a module, beside the series
+#[allow(clippy::duplicate_mod)]
 #[path = "../tests/common/series.rs"]
 mod series;
 

@@ -10,6 +10,8 @@
 // indices of tensors, rows and nodes read like the formulas
 #![allow(clippy::needless_range_loop)]
 #![warn(missing_docs)]
+// the pages of `internals` are hidden; readers of the source follow their links
+#![allow(rustdoc::private_intra_doc_links)]
 
 pub mod api;
 pub mod cli;

@@ -60,7 +60,7 @@ impl Blocks {
         }
         writeln!(text, "$EndPhysicalNames\n$Nodes\n{}", self.nodes.len()).expect("a text");
         for (number, x) in (1..).zip(&self.nodes) {
-            let [x, y, z] = x.map(|x| written(x));
+            let [x, y, z] = x.map(&written);
             writeln!(text, "{number} {x} {y} {z}").expect("a text");
         }
         writeln!(text, "$EndNodes\n$Elements\n{}", self.elements.len()).expect("a text");

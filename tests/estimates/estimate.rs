@@ -403,14 +403,14 @@ fn errors_of_displacements_are_relative_to_the_tables() {
 fn adapted_meshes_of_a_flange() {
     let now = nanoseconds();
     let sets = |more: &[&str]| -> Vec<String> {
-        let own = [format!("title={now} {}", more.len()), "adapt.error=2e-2".to_owned()];
+        let own = [format!("title={now} {}", more.len()), "adapt.error=3e-2".to_owned()];
         own.into_iter().chain(more.iter().map(|&set| set.to_owned())).collect()
     };
     let run = adapted(case("flange"), &sets(&[]));
     let rounds = run["rounds"].as_array().expect("rounds");
     let number = |round: &serde_json::Value, name: &str| round[name].as_f64().expect("a number");
     let last = &rounds[rounds.len() - 1];
-    assert!(number(last, "pressure") <= 2e-2 && number(last, "displacement") <= 2e-2, "{}", run.said());
+    assert!(number(last, "pressure") <= 3e-2 && number(last, "displacement") <= 3e-2, "{}", run.said());
     assert!((3..=4).contains(&rounds.len()) && !run.warnings().contains("folded"), "{}", run.said());
     assert!(
         rounds.windows(2).skip(1).all(|two| number(&two[1], "cells") >= 1.8 * number(&two[0], "cells")),

@@ -141,7 +141,7 @@ load = [{{ on = \"outer_out\", pressure = \"40 + 12*((x^2-y^2)*{cos} + 2*x*y*{si
             let mut all: Vec<(i64, f64)> =
                 (0..run.contact().rows()).map(|q| (angle(q), run.contact()["pressure"][q])).collect();
             all.retain(|(angle, _)| (-1..=90_001).contains(angle));
-            all.sort_by(|a, b| a.0.cmp(&b.0));
+            all.sort_by_key(|point| point.0);
             all
         };
         let (quarter, whole) = (rings(1, turn), rings(4, 0));

@@ -270,12 +270,6 @@ fn bodies_of_sweeps_are_distributed() {
     same_sweeps(&[3], "patch-3d", &cubes(&["--method", "ncg", "--set", "solver=mumps"]), 1e-7);
     same_sweeps(
         &[3],
-        "patch-3d",
-        &cubes(&["--method", "anderson", "-lower_pc_type", "gamg", "-lower_ksp_type", "cg"]),
-        1e-7,
-    );
-    same_sweeps(
-        &[3],
         "hertz-sphere",
         &[&newton[..], &["--set", "mesh.set.n=3", "--set", "body.1.order=1"]].concat(),
         1e-7,
