@@ -2,7 +2,7 @@
 //!
 //! The paper writes sigma_n = g(w) with w = -c, where c is the compression. Here the pressure is p(c) = -g(-c). A law is monotone
 //! with p(0) = 0 and has a bounded tangent on bounded ranges, conditions (6)-(7) of the paper. A new law is a new type, a form in
-//! [`layer`](crate::problem::layer) and a line in [`make`]. A program that uses this library implements the trait alone:
+//! [`layer`](crate::problem::layer) and a line in `make`. A program that uses this library implements the trait alone:
 //! [`OwnLaws`].
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). A point is found from its compression
