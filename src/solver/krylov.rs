@@ -288,7 +288,7 @@ impl InnerSolver for Krylov {
     }
 }
 
-/// Return the number of levels of PETSc's `mg`, of which it can have up to `most`. PETSc calls interpolations that nobody made.
+/// Return the number of levels of PETSc's `mg`, which must not exceed `most`: PETSc would call interpolations between further levels that do not exist.
 ///
 /// # Errors
 /// There are more levels.
