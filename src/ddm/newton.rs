@@ -36,11 +36,12 @@ const NEAR: f64 = 0.1;
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
 const UNSEEN: f64 = 0.01;
 
-/// Distance from 1 of the length of a descent within which Newton's method for F1 takes whole steps. 0.2 is far inside its neighbourhood of fast
-/// convergence, where lengths tend to 1.
+/// Distance from 1 of the length of a descent at which the descent ends. Lengths tend to 1 where Newton's method for F1 converges fast. With 0.2 none of
+/// 900 random scenes and none of 320 scenes with saturating layers was lost.
 const WHOLE: f64 = 0.2;
 
-/// Accuracy of the search for the least F1 along a descent, relative to its slope at the start: as that of the start.
+/// Accuracy of the search for the least F1 along a descent, relative to its slope there. F1 falls with any accuracy below one; the search of the
+/// automatic start has the same.
 const SEARCH: f64 = 1e-3;
 
 /// Iterate from displacements and layer states until a rule ends the run. `is_near` is whether the states are those of another solution, while the

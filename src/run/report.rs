@@ -74,7 +74,7 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
     let is_measured = matches!(outcome.status, Status::IterationLimit | Status::Paused { .. } | Status::Inaccurate(_))
         || outcome.status.is_solved();
     let measured = last.filter(|_| is_measured);
-    // a relative error of one or more leaves no digit, of the bound neither
+    // a relative error of one or more leaves no digit, and then the bound has none either
     let is_bound = |row: &&Row| row.is_bound && row.residual < 1.0;
     report.error_bound = measured.filter(is_bound).and_then(|row| finite(row.error));
     report.error_estimate = measured
