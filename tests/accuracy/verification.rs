@@ -75,12 +75,10 @@ fn patch_in_space() {
     patch_of("patch-3d", shortening, 2, &[(2, 2), (2, 3), (3, 2)], &[[2, 2], [1, 2]]);
 }
 
-/// V2: order 2 for P1 and 3 for P2, of the wave's amplitude and (a little less on these meshes) at the points, under a wavy gap in full contact, at two stiffnesses of the layer and two wavelengths.
+/// V2: order 2 for P1 and 3 for P2, of the wave's amplitude and (a little less on these meshes) at the points, under a wavy gap in full contact, under a stiff layer with a short wave and under a soft layer with a long one.
 #[test]
 fn wavy() {
-    for (length, stiffness, p1) in
-        [(2, 1e5, 6.350_881_4), (2, 1e6, 14.823_937_8), (8, 1e5, 0.590_303_7), (8, 1e6, 0.623_424_6)]
-    {
+    for (length, stiffness, p1) in [(2, 1e6, 14.823_937_8), (8, 1e5, 0.590_303_7)] {
         for (degree, amplitude, nodal, last) in [(1, 1.9, 1.65, 2e-3), (2, 3.0, 2.6, 2e-5)] {
             let sizes = [16.0, 32.0, 64.0];
             let errors = |n: &f64| {

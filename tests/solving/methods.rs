@@ -38,8 +38,8 @@ fn the_default_is_fast() {
 fn any_power_law_takes_few_steps() {
     for (scene, most) in [("groove-held", 5), ("groove", 12)] {
         for start in ["\"auto\"", "{normal=1e-4}"] {
-            for b in ["1e-12", "1e-7", "1e-5", "2e-4", "1e-2"] {
-                for a in ["0.02", "0.1", "0.3", "1"] {
+            for b in ["1e-12", "1e-7", "2e-4", "1e-2"] {
+                for a in ["0.02", "0.1", "1"] {
                     let sets = [&format!("contact.0.layer.power={{B={b}, a={a}}}"), &format!("method.start={start}")];
                     let run = solve_here(plain(scene), &sets.each_ref().map(|set| set.as_str()));
                     // p'(c) times the rounding of c is 1e-8 of p and more
