@@ -2,14 +2,13 @@
 //!
 //! Ranks that were started with different command lines are refused, since they would wait for each other without end.
 
-use crate::commands::{bench, check, mesh, new, solve, sweep};
+use crate::commands::{bench, check, gone, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result, few};
 use crate::exchange::{all_gather, broadcast};
 use crate::interrupt::Interrupt;
 use crate::output::{make_folder, say};
 use crate::parallel::{Ranks, collectively, differences};
 use crate::petsc::Session;
-use crate::report;
 use crate::solver::options;
 use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
@@ -64,9 +63,9 @@ const SWEEP: &str = "Examples:
   winkler sweep scene.toml --over contact.0.layer.power.a=0.5,1 --over mesh.set.n=16,32 -o results/sweep";
 
 const BENCH: &str = "Examples:
-  winkler bench scene.toml --over mesh.set.n=16,32,64 --solver mumps,hypre --linear
+  winkler bench scene.toml --over mesh.set.n=16,32,64 --solver mumps,hypre
   winkler bench scene.toml --solver \"-ksp_type cg -pc_type icc\" --order 1,2 --repeat 3
-  winkler bench a.toml b.toml --method newton,robin --ranks 1,2 --budget 600";
+  winkler bench a.toml b.toml --method newton,robin --ranks 1,2 --timeout 600";
 
 #[derive(Subcommand)]
 enum Command {
@@ -77,27 +76,6 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Make the mesh of a scene, or find it in the cache, and print what it has
     Mesh(mesh::MeshArgs),
-    /// Write a page with pictures and tables of a run, from its files alone: one HTML file
-    Report {
-        /// Folder of results
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// File to write [default: report.html in the folder]
-        #[arg(short, value_name = "FILE")]
-        output: Option<PathBuf>,
-    },
-    /// Draw one picture of a run as SVG
-    Plot {
-        /// Folder of results
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// What to draw: stress, displacement, pressure, convergence, or over load steps area (in contact over force) or force (over approach)
-        #[arg(value_name = "WHAT")]
-        what: String,
-        /// File to write, .svg [default: WHAT.svg in the folder]
-        #[arg(short, value_name = "FILE")]
-        output: Option<PathBuf>,
-    },
     /// Write a small scene that works, with its script and comments, to begin from
     New {
         /// Folder for it; its last word names the scene
@@ -235,11 +213,14 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
         Err(refusal) => refusal,
     };
     let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
+    let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
+    if let Some(error) = gone::refusal(&word).or_else(|| gone::refusal(&command)) {
+        return Err(CliError::Ours(error));
+    }
     // options of PETSc have underscores, those of this program have none
     if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
         return refuse(format!("`{word}`: PETSc options take one dash"), format!("did you mean -{bare}?"));
     }
-    let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
     if command.ends_with(".toml") {
         return refuse(format!("`{command}` is no command"), format!("did you mean `winkler solve {command}`?"));
     }
@@ -271,12 +252,6 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
             bench::bench(interrupt, &request)
         }
         Command::Mesh(request) => mesh::mesh(interrupt, &request),
-        Command::Report { folder, output } => {
-            report::save(&folder, output.as_deref()).and_then(|path| say(path.display())).map(|()| 0)
-        }
-        Command::Plot { folder, what, output } => report::draw(&folder, &what, output.as_deref())
-            .and_then(|paths| paths.iter().try_for_each(|path| say(path.display())))
-            .map(|()| 0),
     };
     ended.unwrap_or_else(|error| complain(&error))
 }

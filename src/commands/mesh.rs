@@ -10,7 +10,7 @@ use crate::linalg::bounds;
 use crate::mesh::{Group, Loaded, Mesh, MeshOrigin};
 use crate::output::report::readable;
 use crate::output::terminal::ProgressLine;
-use crate::output::{CellKind, Encoding, UnstructuredGrid, say, write_whole};
+use crate::output::{CellKind, FieldArray, UnstructuredGrid, say, write_whole};
 use crate::problem::{MeshSource, Order};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
@@ -234,7 +234,7 @@ fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
         }
         Some("vtu") => {
             let grid = grid(loaded);
-            write_whole(path, |out| grid.write(Encoding::default(), out))
+            write_whole(path, |out| grid.write(false, out))
         }
         _ => Err(Error::new(Kind::Usage, format!("`{}` names no kind of mesh file", path.display()))
             .help("end it with .msh or .vtu")),
@@ -257,6 +257,6 @@ fn grid<const D: usize>(loaded: &Loaded<D>) -> UnstructuredGrid {
         grid.connectivity.extend(&group.connectivity);
         groups.extend(vec![index as f64; group.len()]);
     }
-    grid.at_cells.push(("group".to_owned(), 1, groups));
+    grid.at_cells.push(FieldArray::new("group", 1, groups));
     grid
 }

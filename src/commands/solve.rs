@@ -7,15 +7,14 @@ use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
-use crate::exchange::all_gather;
 use crate::interrupt::Interrupt;
 use crate::output::terminal::ProgressLine;
-use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
+use crate::output::{Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::run::recorder::{is_snapshot, signal};
 use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results, verdict};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The command line of `winkler solve`.
 #[derive(clap::Args)]
@@ -192,26 +191,20 @@ impl Solver<'_> {
 
     /// Return the results of a round that are to be written.
     fn files<'a>(&'a self, done: &'a Done, estimate: Option<&'a Estimate>, fields: bool) -> ResultFiles<'a> {
-        let (session, path, plan) = (self.session, self.folder.path(), &self.plan);
-        ResultFiles { session, path, plan, done, estimate, fields, is_last: false }
+        ResultFiles { session: self.session, folder: &self.folder, plan: &self.plan, done, estimate, fields }
     }
 
     /// Write all results of the last mesh, and return the exit code.
     fn finish(self, Round { done, estimate, tables }: Round) -> Result<i32> {
         let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
         let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
-        let files = ResultFiles { is_last: true, ..self.files(&done, estimate.as_ref(), true) };
-        let (report, written) = files.write(&mut self.clock.clone(), |report| {
+        let (report, written) = self.files(&done, estimate.as_ref(), true).write(&mut self.clock.clone(), |report| {
             report.warnings.extend(plan.costly_end.clone());
             if let Some(limit) = &plan.limit {
                 report.status = "mesh-limit".to_owned();
                 report.message = format!("the error asked for is not reached: {limit}");
             }
         });
-        let written = match plan.scene.output.report {
-            true => written.and(write_page(&done, path, first)),
-            false => written,
-        };
         drop(line);
         let code = if plan.limit.is_some() { 1 } else { verdict::exit_code(&done) };
         if first {
@@ -268,7 +261,6 @@ pub(super) fn claim(session: &Session, path: PathBuf) -> Result<Folder> {
 /// If this run `goes_on` from the checkpoint in the folder, the results are its own and stay. Another checkpoint is renamed, since hours of work
 /// may be in it.
 fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
-    Checksums::withdraw(folder.path());
     if goes_on {
         return Ok(());
     }
@@ -279,12 +271,6 @@ fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
             .map_err(|cause| Error::file(&file, "set aside", &cause)),
         Err(_) => Ok(()),
     }
-}
-
-/// Write the page of the results when all ranks have written their fields. Collective.
-fn write_page(done: &Done, path: &Path, first: bool) -> Result<()> {
-    all_gather(&*done.model().exchange, ());
-    if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 
 /// The tables that grow while a round iterates. They are open only on the rank that writes.
@@ -324,7 +310,6 @@ impl Observer for Solver<'_> {
         self.table.row(row);
         if let Some(history) = &mut self.tables.history {
             history.row(row);
-            history.rows.complaint().iter().for_each(|text| self.table.warn(text));
         }
     }
 
@@ -348,7 +333,6 @@ impl Recorder for Solver<'_> {
         let history = &scene.method.steps;
         if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
             table.row(&history.names, step);
-            table.rows.complaint().iter().for_each(|text| self.table.warn(text));
         }
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
         if !ends {

@@ -4,7 +4,7 @@
 use crate::contact::{Carriers, ContactPair, Side};
 use crate::expression::Field;
 use crate::fem::{element, length, minus};
-use crate::output::fields::{CellKind, UnstructuredGrid};
+use crate::output::{CellKind, FieldArray, UnstructuredGrid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -89,10 +89,9 @@ impl ContactSurface {
         (self.cell, nodes.filter_map(move |(nodes, carriers)| Some((points(nodes), (*carriers)?))))
     }
 
-    /// Return the mesh with arrays of values at the contact points; each array has a name, a number of components per point, and
-    /// its values. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
+    /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
     /// come, so that a pressure is never negative nor above its peak.
-    pub fn grid(&self, name: String, arrays: &[(&str, usize, Vec<f64>)]) -> UnstructuredGrid {
+    pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {
         let spread = |components: usize, values: &[f64]| {
             let at = |sources: &Vec<(usize, f64)>, c: usize| {
                 let of = |q: usize| values[components * q + c];
@@ -113,10 +112,13 @@ impl ContactSurface {
             cell: self.cell,
             connectivity: self.connectivity.clone(),
             at_points: arrays
-                .iter()
-                .map(|(name, components, values)| ((*name).to_owned(), *components as u32, spread(*components, values)))
+                .into_iter()
+                .map(|array| FieldArray { values: spread(array.components, &array.values), ..array })
                 .collect(),
-            at_cells: vec![("cover".to_owned(), 1, self.cover.clone()), ("left_out".to_owned(), 1, self.left.clone())],
+            at_cells: vec![
+                FieldArray::new("cover", 1, self.cover.clone()),
+                FieldArray::new("left_out", 1, self.left.clone()),
+            ],
         }
     }
 }

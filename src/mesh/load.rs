@@ -6,7 +6,7 @@ use super::msh::{self, MeshProducer};
 use super::script::{Script, quoted};
 use super::{Group, Mesh, abaqus, foreign, groups, simplex};
 use crate::error::{Error, Located, Place, Result};
-use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
+use crate::file::{Digested, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
 use crate::problem::body::plain;
 use crate::problem::{GroupArrays, Guard, MeshArrays, MeshSource, Order};
@@ -220,33 +220,6 @@ fn made_anew<const D: usize>(
     let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
     let file = workshop.publish(&made, name)?;
     Ok(Loaded::new(mesh, MeshOrigin::Gmsh, file, digest))
-}
-
-/// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
-/// the mesh depends on more, or if a file cannot be read.
-pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<String> {
-    match source {
-        MeshSource::Geo { file, set, sizes, guard, .. } => {
-            let script = script(&file.value).ok()?;
-            let known = script.inputs.unknown.is_none();
-            let gmsh = Gmsh::find().map(|gmsh| gmsh.identity()).unwrap_or_default();
-            let name = key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard));
-            known.then(|| format!("{name} {gmsh}"))
-        }
-        MeshSource::Msh { file } => {
-            let bytes = crate::file::read(&file.value).ok()?;
-            if foreign::is_input_file(&file.value) {
-                // Other files may be included.
-                let converted = abaqus::convert(&file.value, &with_unix_lines(bytes), dimension).ok()?;
-                return Some(digest_of_bytes(&converted.mesh));
-            }
-            match foreign::is_mesh(&file.value, &bytes) {
-                true => Some(digest(&(Gmsh::find()?.identity(), digest_of_bytes(&bytes)))),
-                false => Some(digest_of_bytes(&bytes)),
-            }
-        }
-        MeshSource::Arrays(_) => None,
-    }
 }
 
 /// Read the script, or the shape of another program.

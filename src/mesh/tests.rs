@@ -2,7 +2,7 @@
 
 mod mutations;
 
-use super::load::{load, made_from, meshed as from_script};
+use super::load::{load, meshed as from_script};
 use super::{Group, Loaded, Mesh, MeshOrigin, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
@@ -346,19 +346,6 @@ fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     assert!(message.contains("the mesh is of order 1") && message.contains("scene.toml"), "{message}");
     let message = load("3", Order::P2).unwrap_err().to_string();
     assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
-}
-
-/// A mesh that Gmsh converts depends on Gmsh, and one that is read directly does not.
-#[test]
-fn converted_meshes_are_made_by_gmsh() {
-    let folder = tempfile::tempdir().unwrap();
-    let made_from = |name: &str| {
-        let file = folder.path().join(name);
-        std::fs::write(&file, "$MeshFormat\n4.1 0 8\n").unwrap();
-        made_from(&MeshSource::Msh { file: located(file) }, 2, Order::P1).unwrap()
-    };
-    let [direct, converted] = ["a.msh", "a.unv"].map(made_from);
-    assert_ne!(direct, converted);
 }
 
 #[test]

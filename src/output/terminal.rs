@@ -59,11 +59,6 @@ impl IterationTable {
         self.bar.finish_and_clear();
     }
 
-    /// Print a warning to standard error, above the progress line.
-    pub fn warn(&self, text: &str) {
-        self.bar.suspend(|| eprintln!("warning: {text}"));
-    }
-
     /// Print a row, the first time after the heading.
     fn print(&mut self, row: &Row) {
         let Some(table) = &mut self.table else { return };

@@ -9,6 +9,7 @@
 
 mod check;
 mod decode;
+mod gone;
 mod spec;
 #[cfg(test)]
 mod tests;
@@ -41,6 +42,7 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     for text in overrides {
         apply(&mut tree, text)?;
     }
+    gone::refuse(&tree)?;
     let scene = decode::scene(&tree, path)?;
     scene.verify().map_err(|refusal| refusal.error.at(tree.place_of(&refusal.key)))?;
     Ok(scene)

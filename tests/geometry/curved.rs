@@ -1,8 +1,8 @@
 //! Contact of curved surfaces that become steep: a punch with rounded edges, a cone, a ball in a socket, flanks of gears.
 
 use crate::common::here::solve_here;
+use crate::common::vtu::Grid;
 use crate::common::{Report, Scene, root, solve};
-use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 
 const PUNCH: usize = 1;
 const CONE: usize = 2;
@@ -124,19 +124,10 @@ fn steep_facets_are_told() {
     assert!(steep >= 2 && run.count("pairs/0/facets_uncovered") + 1 >= steep, "{steep}");
     let expected = " of `upper_face` stand at more than 60 degrees to the other side (key `angle`)";
     assert!(run.warnings().contains(expected), "{}", run.warnings());
-    let surface = Vtk::import(run.folder.join("contact-upper-lower.vtu")).expect("a surface");
-    let DataSet::UnstructuredGrid { pieces, .. } = surface.data else { panic!("no grid") };
-    let [Piece::Inline(piece)] = &pieces[..] else { panic!("no piece") };
-    let cells = |name: &str| -> Vec<f64> {
-        let found = piece.data.cell.iter().find_map(|attribute| match attribute {
-            Attribute::DataArray(array) if array.name == name => array.data.clone().cast_into(),
-            _ => None,
-        });
-        found.unwrap_or_else(|| panic!("no array `{name}`"))
-    };
-    let (cover, left) = (cells("cover"), cells("left_out"));
+    let surface = Grid::read(&run.folder.join("contact-upper-lower.vtu"));
+    let (cover, left) = (&surface.arrays["cover"], &surface.arrays["left_out"]);
     assert_eq!(left.iter().filter(|&&reason| reason == 1.0).count(), steep);
-    assert!(cover.iter().zip(&left).all(|(&share, &reason)| (share > 0.999) == (reason == 0.0)), "{cover:?} {left:?}");
+    assert!(cover.iter().zip(left).all(|(&share, &reason)| (share > 0.999) == (reason == 0.0)), "{cover:?} {left:?}");
 
     let wide = solve(&scene, &[&soft[..], &["--set", "contact.0.angle=90"]].concat()).converged();
     assert_eq!(wide.count("pairs/0/facets_steep"), 0, "{}", wide.warnings());
