@@ -213,13 +213,15 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
         Err(refusal) => refusal,
     };
     let word = refusal.get(ContextKind::InvalidArg).map(ToString::to_string).unwrap_or_default();
-    let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
-    if let Some(error) = gone::refusal(&word).or_else(|| gone::refusal(&command)) {
-        return Err(CliError::Ours(error));
-    }
     // options of PETSc have underscores, those of this program have none
     if let Some(bare) = word.strip_prefix("--").filter(|bare| bare.contains('_')) {
         return refuse(format!("`{word}`: PETSc options take one dash"), format!("did you mean -{bare}?"));
+    }
+    let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
+    for name in [&word, &command] {
+        if let Some(advice) = gone::advice(name) {
+            return refuse(format!("`{name}` is gone"), advice.to_owned());
+        }
     }
     if command.ends_with(".toml") {
         return refuse(format!("`{command}` is no command"), format!("did you mean `winkler solve {command}`?"));

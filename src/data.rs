@@ -13,7 +13,7 @@ mod scattered;
 mod tests;
 
 pub use arrange::Trend;
-pub use grid::{Grid, Roughness, Summits};
+pub use grid::{Grid, Summits};
 pub use raster::has_header;
 pub use rule::{DataSpec, Detrend, Fill, Interpolation, NoData, Outside, Sample};
 

@@ -1,22 +1,19 @@
-//! Commands and options that earlier versions had.
+//! Commands and options that earlier versions knew, each with what to use instead.
 
-use crate::error::{Error, Kind};
-
-/// The words, and what to do instead.
+/// Names that are gone: options with their dashes, and commands.
 pub const GONE: &[(&str, &str)] = &[
-    ("report", "`winkler solve` writes the page of a run: --report, or output.report = true"),
+    ("--adapted", "a run that adapts its mesh writes adapted.msh into the folder of results"),
+    ("--budget", "--timeout bounds each run"),
+    ("--linear", "`winkler solve --method robin --set method.stop.iterations=1` factors and solves each body"),
+    ("--resume", "every benchmark makes all of its runs"),
     (
         "plot",
-        "`winkler solve` draws convergence, pressures and force over approach as SVG; --report shows the bodies, and ParaView opens bodies.pvd",
+        "`winkler solve` draws its plots as SVG, --report shows the bodies, and ParaView opens bodies.pvd of --vtu",
     ),
-    ("--linear", "`winkler solve --set method.name=robin --set method.stop.iterations=1` factors and solves each body"),
-    ("--budget", "--timeout bounds each run"),
-    ("--resume", "every benchmark makes all of its runs"),
+    ("report", "`winkler solve --report` writes the page of a run"),
 ];
 
-/// Return the refusal of a command or option of an earlier version; none for other words. The word of an option may have a value behind `=`.
-pub fn refusal(word: &str) -> Option<Error> {
-    let name = word.split('=').next().unwrap_or_default();
-    let (name, advice) = GONE.iter().find(|(gone, _)| *gone == name)?;
-    Some(Error::new(Kind::Usage, format!("there is no `{name}` any more")).help(*advice))
+/// Return the advice for a name that is gone.
+pub fn advice(name: &str) -> Option<&'static str> {
+    GONE.iter().find(|(gone, _)| *gone == name).map(|(_, advice)| *advice)
 }

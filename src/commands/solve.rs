@@ -215,7 +215,6 @@ impl Solver<'_> {
             self.print(&report, &done, code)?;
         }
         tables.and(written)?;
-        collectively(self.session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
         Ok(code)
     }
 
@@ -322,7 +321,7 @@ impl Recorder for Solver<'_> {
     fn state(&mut self, done: &Done) {
         let Status::Paused { asked } = done.outcome.status else { return };
         let is_due = signal(asked).is_some() || !is_snapshot(asked);
-        let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
+        let Some(head) = is_due.then(|| self.plan.head()) else { return };
         let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
         self.has_checkpoint |= written.is_ok();
         self.note_failure("a checkpoint", written);

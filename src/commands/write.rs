@@ -17,7 +17,9 @@ use crate::run::results::{self, pair_names};
 use crate::run::{All, Clock, Done, Recovered, report};
 use crate::scene::Precision;
 use serde::Serialize;
+use std::fs::File;
 use std::io::Write;
+use std::path::Path;
 
 /// The results of a run, and where they are to be written.
 pub struct ResultFiles<'a> {
@@ -51,6 +53,9 @@ impl ResultFiles<'_> {
         let mut plots = Plots::default();
         plots.add("pressure", done, &shown);
         let mut written = if is_first { self.tables_and_plots(&report, &shown, &plots) } else { Ok(()) };
+        if let Some(mesh) = done.built.mesh_file.as_ref().filter(|_| self.fields && self.plan.adapts()) {
+            written = written.and(copy_mesh(folder, mesh));
+        }
         if self.fields {
             written = written.and(write_fields(done, &recovered, folder, true));
         }
@@ -140,6 +145,11 @@ impl ResultFiles<'_> {
         names.dedup();
         names
     }
+}
+
+/// Copy the mesh with which an adaptation has ended, as `adapted.msh`, which a scene can name as its mesh.
+fn copy_mesh(folder: &Folder, mesh: &Path) -> Result<()> {
+    folder.write("adapted.msh", |out| std::io::copy(&mut File::open(mesh)?, out).map(|_| ()))
 }
 
 /// Return a report, or several, as JSON text that ends with a newline.

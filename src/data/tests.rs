@@ -288,7 +288,7 @@ fn roughness_of_waves_is_known() {
     let values = (0..4 * n * n).map(wave).collect();
     let (interpolation, outside) = (Interpolation::Linear, Outside::Periodic);
     let surface = Grid { axes: [0, 1].map(axis), values, interpolation, outside };
-    let Roughness { range, height, slope, curvature } = surface.roughness();
+    let super::grid::Roughness { range, height, slope, curvature } = surface.roughness();
     let half = 0.5 * k * spacing;
     let factor = half.sin() / half;
     assert!((range[0] + 2.0 * a).abs() < 1e-12 && (range[1] - 2.0 * a).abs() < 1e-12);

@@ -296,28 +296,6 @@ fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
     write(&made, format!("Include {};\n", quoted(&whole)?)).map(|()| Some(made))
 }
 
-/// Keep the final sizes of an adaptation in the cache. `purpose` identifies all that the mesh was made for, scene and error.
-///
-/// # Errors
-/// The cache cannot be written.
-pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
-    let workshop = Workshop::open(&folders())?;
-    let name = final_name(purpose);
-    let made = workshop.path().join(&name);
-    write(&made, sizes)?;
-    workshop.publish(&made, &name).map(|_| ())
-}
-
-/// Return the final sizes of an earlier adaptation for the same `purpose`.
-pub fn recall_final(purpose: &str) -> Option<String> {
-    let name = final_name(purpose);
-    folders().iter().find_map(|folder| std::io::read_to_string(cache::open(&folder.join(&name))?).ok())
-}
-
-fn final_name(purpose: &str) -> String {
-    file_name(purpose, Path::new("sizes")) + ".pos"
-}
-
 /// Name in messages, where meshes from files have their path.
 const NAME: &str = "mesh arrays";
 

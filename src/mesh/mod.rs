@@ -32,7 +32,7 @@ mod trust;
 pub use check::{Asked, BodyCheck, Components, Duty};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
-pub use load::{Loaded, MeshOrigin, keep_final, load, recall_final};
+pub use load::{Loaded, MeshOrigin, load};
 pub use locality::bisect;
 pub use msh::{MeshProducer, parse};
 pub use script::unstructured;

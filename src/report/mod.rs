@@ -5,7 +5,7 @@ mod surface;
 pub use surface::Surface;
 
 use crate::output::{BodyReport, ForceReport, PairReport, Plot, Report, UNSETTLED, trimmed};
-use crate::problem::units::{Units, label};
+use crate::problem::{Units, label};
 use serde_json::Value;
 
 /// Name of the page in the folder of results.

@@ -42,8 +42,7 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     for text in overrides {
         apply(&mut tree, text)?;
     }
-    gone::refuse(&tree)?;
-    let scene = decode::scene(&tree, path)?;
+    let scene = decode::scene(&tree, path).map_err(gone::explain)?;
     scene.verify().map_err(|refusal| refusal.error.at(tree.place_of(&refusal.key)))?;
     Ok(scene)
 }

@@ -251,10 +251,10 @@ fn what_cannot_be_done_is_refused() {
         (&["report", "results/x"][..], 2, "--report"),
         (&["plot", "results/x", "stress"], 2, "bodies.pvd"),
         (&["bench", &scene, "--resume"], 2, "all of its runs"),
-        (&["check", &scene, "--set", "output.compress=false"], 3, "output.precision"),
+        (&["mesh", &scene, "--adapted"], 2, "adapted.msh"),
+        (&["check", &scene, "--set", "output.compress=false"], 3, "precision = "),
     ] {
         let run = winkler(words);
-        assert!(run.code == code && run.stderr.contains("any more"), "{}", run.said());
-        assert!(run.stderr.contains(advice), "{}", run.said());
+        assert!(run.code == code && run.stderr.contains(advice), "{}", run.said());
     }
 }
