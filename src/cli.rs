@@ -55,8 +55,7 @@ Examples:
 
 const CHECK: &str = "Examples:
   winkler check scene.toml
-  winkler check scene.toml --set mesh.set.n=64 --json
-  winkler check scene.toml -o pictures";
+  winkler check scene.toml --set mesh.set.n=64 --json";
 
 const SWEEP: &str = "Examples:
   winkler sweep scene.toml --over method.gamma=0.3,0.6,0.9

@@ -1,6 +1,6 @@
 //! Load steps: each is the solution of its share of the loads, and no body is made or factored anew for it.
 
-use crate::common::{Run, Scene, case, distance, nanoseconds, root, solve, solve_on, winkler};
+use crate::common::{Run, Scene, case, distance, nanoseconds, root, solve, solve_on};
 
 fn groove(method: &str, more: &[&str]) -> Run {
     let method = format!("method={method}");
