@@ -35,37 +35,16 @@ pub struct Page<'a> {
     pub convergence: Option<Plot>,
 }
 
-/// A column of a table, to the right if it has numbers.
-struct Column {
-    title: String,
-    is_number: bool,
-}
-
-/// Return a column of texts.
-fn text(title: impl Into<String>) -> Column {
-    Column { title: title.into(), is_number: false }
-}
-
-/// Return a column of numbers.
-fn number(title: impl Into<String>) -> Column {
-    Column { title: title.into(), is_number: true }
-}
-
-/// Return a table whose cells are HTML.
-fn table(columns: &[Column], rows: impl Iterator<Item = Vec<String>>) -> String {
-    let cell = |element: &str, column: &Column, html: &str| match column.is_number {
-        true => format!("<{element} class=\"n\">{html}</{element}>"),
-        false => format!("<{element}>{html}</{element}>"),
-    };
-    let head: String = columns.iter().map(|column| cell("th", column, &escape(&column.title))).collect();
+/// Return a table whose cells are HTML. Columns whose heading begins with `#` have numbers, and go to the right.
+fn table<T: AsRef<str>>(headings: &[T], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let class = |heading: &T| if heading.as_ref().starts_with('#') { " class=\"n\"" } else { "" };
+    let head = |heading: &T| format!("<th{}>{}</th>", class(heading), escape(heading.as_ref().trim_start_matches('#')));
     let line = |row: Vec<String>| {
-        format!(
-            "<tr>{}</tr>\n",
-            columns.iter().zip(row).map(|(column, html)| cell("td", column, &html)).collect::<String>()
-        )
+        let cells = headings.iter().zip(row).map(|(heading, html)| format!("<td{}>{html}</td>", class(heading)));
+        format!("<tr>{}</tr>\n", cells.collect::<String>())
     };
-    let lines: String = rows.map(line).collect();
-    format!("<div class=\"wide\"><table>\n<tr>{head}</tr>\n{lines}</table></div>")
+    let heads: String = headings.iter().map(head).collect();
+    format!("<div class=\"wide\"><table>\n<tr>{heads}</tr>\n{}</table></div>", rows.map(line).collect::<String>())
 }
 
 /// Return a text for HTML.
@@ -217,15 +196,15 @@ impl Page<'_> {
         let is_area = pairs.first().is_some_and(|pair| pair.extent.is_area());
         let unit = self.units.as_ref().map(|units| format!("{}{}", units.length, if is_area { "²" } else { "" }));
         let columns = [
-            text("pair"),
-            text("surfaces"),
-            text("layer"),
-            number("points"),
-            text(self.label("force on the first", |units| &units.force)),
-            number(self.label("peak pressure", |units| units.stress)),
-            text(self.label("at", |units| units.length)),
-            number(label(if is_area { "area in contact" } else { "length in contact" }, unit.as_deref())),
-            number(label("open", unit.as_deref())),
+            "pair".to_owned(),
+            "surfaces".to_owned(),
+            "layer".to_owned(),
+            "#points".to_owned(),
+            self.label("force on the first", |units| &units.force),
+            self.label("#peak pressure", |units| units.stress),
+            self.label("at", |units| units.length),
+            label(if is_area { "#area in contact" } else { "#length in contact" }, unit.as_deref()),
+            label("#open", unit.as_deref()),
         ];
         let row = |pair: &PairReport| {
             vec![
@@ -248,16 +227,10 @@ impl Page<'_> {
     }
 
     fn body_table(&self) -> String {
-        let columns = [
-            text("body"),
-            number("cells"),
-            number("dofs"),
-            text("inner solver"),
-            number(self.label("largest displacement", |units| units.length)),
-            number(self.label("von Mises stress", |units| units.stress)),
-            number("imbalance of forces"),
-            number("of moments"),
-        ];
+        let displacement = self.label("#largest displacement", |units| units.length);
+        let stress = self.label("#von Mises stress", |units| units.stress);
+        let columns =
+            ["body", "#cells", "#dofs", "inner solver", &displacement, &stress, "#imbalance of forces", "#of moments"];
         let row = |body: &BodyReport| {
             let change = body.max_von_mises_change.filter(|change| *change > UNSETTLED);
             let doubt = change.map_or(String::new(), |change| {
@@ -278,7 +251,8 @@ impl Page<'_> {
     }
 
     fn balance_table(&self) -> String {
-        let columns = [text("body"), text("from"), text(self.label("force", |units| &units.force)), text("moment")];
+        let force = self.label("force", |units| &units.force);
+        let columns = ["body", "from", &force, "moment"];
         let rows = self.report.bodies.iter().take(ROWS).flat_map(|body| {
             let balance = &body.balance;
             let reactions = balance.supports.iter().chain(&balance.springs).chain(&balance.rigid);
@@ -324,7 +298,7 @@ fn scene(settings: &Value) -> String {
             lines(&body["load"], ""),
         ]
     };
-    let columns = ["body", "material and order", "held by", "loads"].map(text);
+    let columns = ["body", "material and order", "held by", "loads"];
     table(&columns, settings["body"].as_array().into_iter().flatten().take(ROWS).map(row))
 }
 
@@ -337,7 +311,7 @@ fn times(report: &Report) -> String {
         let bar = format!("<span class=\"meter\" style=\"width:{:.2}rem\"></span>", 15.0 * seconds / total);
         Some(vec![phase.to_owned(), digits(seconds), digits(report.memory.get(phase).copied()), bar])
     };
-    let columns = [text("phase"), number("seconds"), number("peak memory so far, MB"), text("")];
+    let columns = ["phase", "#seconds", "#peak memory so far, MB", ""];
     let inner = &report.inner_times;
     table(&columns, phases.into_iter().filter_map(row))
         + &format!(
