@@ -7,66 +7,46 @@ use serde_json::Value;
 /// What is known of the run of a case, or of several runs of it. Numbers that a run does not have are empty fields.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Row {
-    /// Status of the report, or why there is none.
+    /// Status of the report, or why there is none, and the status in words; the method that ran.
     pub status: String,
-    /// The status in words.
     pub message: String,
-    /// The method that ran.
     pub method: String,
-    /// Degrees of freedom of all bodies.
+    /// Degrees of freedom of all bodies, contact points of all pairs, and the coupling of the most strongly coupled pair, the geometric mean of
+    /// those of its sides.
     pub dofs: Option<usize>,
-    /// Contact points of all pairs.
     pub points: Option<usize>,
-    /// Coupling of the most strongly coupled pair, the geometric mean of those of its sides.
     pub theta: Option<f64>,
-    /// Updates of the iterate.
+    /// Counters and numbers of the report.
     pub iterations: Option<usize>,
-    /// Sweeps over the bodies.
     pub sweeps: Option<usize>,
-    /// Krylov iterations.
     pub inner_iterations: Option<usize>,
-    /// Factorisations or set-ups of preconditioners.
     pub factorizations: Option<usize>,
-    /// Dense factorisations of condensed bodies.
     pub dense_factorizations: Option<usize>,
-    /// The number of the stopping test.
     pub residual: Option<f64>,
-    /// Relative increment of the last update.
     pub increment: Option<f64>,
-    /// Functional F1 (25).
     #[serde(rename = "F1")]
     pub f1: Option<f64>,
     /// Largest pressure of all pairs.
     pub peak_pressure: Option<f64>,
-    /// Wall seconds: of the process in `bench`, of the run in `sweep`.
+    /// Wall seconds: of the process in `bench`, of the run in `sweep`; then those of its phases, and the parts of set-up and iteration in
+    /// factorisations and solves, summed over the bodies.
     pub seconds: Option<f64>,
-    /// Wall seconds of the mesh.
     pub mesh_seconds: Option<f64>,
-    /// Wall seconds of assembly and contact points.
     pub discretize_seconds: Option<f64>,
-    /// Wall seconds of set-ups and the start.
     pub set_up_seconds: Option<f64>,
-    /// Wall seconds of the iteration.
     pub iterate_seconds: Option<f64>,
-    /// Part of both in factorisations, summed over the bodies.
     pub factor_seconds: Option<f64>,
-    /// Part of both in solves.
     pub solve_seconds: Option<f64>,
     /// Peak resident memory, 10^6 bytes: of the largest process in `bench`, so far in `sweep`.
     pub memory_mb: Option<f64>,
-    /// Error of the displacements against `exact` in the H1 seminorm, the largest of the bodies.
+    /// Errors of the displacements against `exact`, the largest of the bodies; relative error in L2, and what it is measured in and against.
     pub error_h1: Option<f64>,
-    /// The same in the energy norm.
     pub error_energy: Option<f64>,
-    /// Relative error in L2.
     pub error: Option<f64>,
-    /// What the error is measured in and against.
     pub error_of: String,
-    /// Runs of the case.
+    /// Runs of the case in `bench`, CPU seconds of all ranks, and the largest less the shortest wall time over the median.
     pub runs: usize,
-    /// CPU seconds, user and system, of all ranks.
     pub cpu_seconds: Option<f64>,
-    /// Largest less shortest wall time over the median.
     pub spread: Option<f64>,
 }
 

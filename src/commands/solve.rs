@@ -79,8 +79,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
         tables: Tables::default(),
         has_checkpoint,
         has_tables: false,
-        unwritten: Vec::new(),
-        unwritten_before: Vec::new(),
+        written: Ok(()),
     };
     let last = loop {
         let round = solver.solve()?;
@@ -111,18 +110,14 @@ struct Solver<'s> {
     has_checkpoint: bool,
     /// Whether the folder has the tables of this run.
     has_tables: bool,
-    /// Messages about files of this mesh that could not be written.
-    unwritten: Vec<String>,
-    /// Those about files of earlier meshes.
-    unwritten_before: Vec<String>,
+    /// The first failure to write a file, with which the run ends: until then it goes on with what it computes.
+    written: Result<()>,
 }
 
 /// A round that has ended: the solution on one mesh.
 struct Round {
     done: Done,
     estimate: Option<Estimate>,
-    /// Whether its tables were written.
-    tables: Result<()>,
 }
 
 impl Solver<'_> {
@@ -144,36 +139,30 @@ impl Solver<'_> {
         let mut done = run::iterate(ready, interrupt, self, &mut clock)?;
         self.clock = clock;
         drop(stage);
-        done.warnings.append(&mut self.unwritten);
-        done.warnings.extend(self.unwritten_before.drain(..).map(|what| format!("of an earlier mesh: {what}")));
         let stage = session.stage("estimate");
         let mut estimate = run::estimate(&mut done, &mut self.clock)?;
         drop(stage);
         self.table.finish();
         let tables = std::mem::take(&mut self.tables).finish();
+        self.note(tables);
         estimate.iter_mut().for_each(|estimate| self.plan.correct(&done, estimate));
-        Ok(Round { done, estimate, tables })
+        Ok(Round { done, estimate })
     }
 
-    /// Open the tables of a round. If those of a later mesh cannot be written, the run goes on without them, since its results are worth more.
+    /// Open the tables of a round, before the first one of which the folder loses the results of other runs: nothing can be refused any more.
     fn open_tables(&mut self, ready: &Prepared) -> Result<()> {
         if !self.terminal.is_first {
             return Ok(());
         }
-        // nothing can be refused any more: from here on the folder has this run alone
-        if !self.has_tables {
+        if !std::mem::replace(&mut self.has_tables, true) {
             prepare_folder(&self.folder, self.has_checkpoint)?;
         }
-        let is_later = std::mem::replace(&mut self.has_tables, true);
-        match Tables::open(&self.folder, ready) {
-            Err(error) if is_later => self.unwritten_before.push(error.message().to_owned()),
-            opened => self.tables = opened?,
-        }
+        self.tables = Tables::open(&self.folder, ready)?;
         Ok(())
     }
 
     /// Write the results of a mesh that is not the last, so that they exist whatever happens on the next mesh.
-    fn write_round(&mut self, Round { done, estimate, tables }: Round) {
+    fn write_round(&mut self, Round { done, estimate }: Round) {
         let ended = match self.plan.is_stepping() {
             true => "ended while load steps were at work on the last mesh",
             false => "ended while the next mesh was at work: the error asked for is not reached",
@@ -183,10 +172,7 @@ impl Solver<'_> {
             (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
         });
         self.clock = clock;
-        // the run goes on with what it computed: a disk that is full now may have room at the end
-        if let Err(error) = tables.and(written) {
-            self.unwritten_before.push(error.message().to_owned());
-        }
+        self.note(written);
     }
 
     /// Return the results of a round that are to be written.
@@ -195,7 +181,7 @@ impl Solver<'_> {
     }
 
     /// Write all results of the last mesh, and return the exit code.
-    fn finish(self, Round { done, estimate, tables }: Round) -> Result<i32> {
+    fn finish(self, Round { done, estimate }: Round) -> Result<i32> {
         let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
         let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
         let (report, written) = self.files(&done, estimate.as_ref(), true).write(&mut self.clock.clone(), |report| {
@@ -214,17 +200,14 @@ impl Solver<'_> {
             }
             self.print(&report, &done, code)?;
         }
-        tables.and(written)?;
+        self.written.and(written)?;
         Ok(code)
     }
 
-    /// Note a failure to write, each message once. The run goes on: a disk that is full now may have room later.
-    fn note_failure(&mut self, what: &str, written: Result<()>) {
-        if let Err(error) = written {
-            let text = format!("{what} was not written: {}", error.message());
-            if !self.unwritten.contains(&text) {
-                self.unwritten.push(text);
-            }
+    /// Note whether a file was written.
+    fn note(&mut self, written: Result<()>) {
+        if self.written.is_ok() {
+            self.written = written;
         }
     }
 
@@ -324,7 +307,7 @@ impl Recorder for Solver<'_> {
         let Some(head) = is_due.then(|| self.plan.head()) else { return };
         let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
         self.has_checkpoint |= written.is_ok();
-        self.note_failure("a checkpoint", written);
+        self.note(written);
     }
 
     fn step(&mut self, done: &Done, recovered: &All) {
@@ -336,12 +319,12 @@ impl Recorder for Solver<'_> {
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
         if !ends {
             let written = write_fields(done, recovered, &self.folder, false);
-            self.note_failure("a field of a load step", written);
+            self.note(written);
         }
     }
 
     fn results(&mut self, done: &mut Done) {
         let (_, written) = self.files(done, None, true).write(&mut self.clock.clone(), |_| {});
-        self.note_failure("a snapshot", written);
+        self.note(written);
     }
 }
