@@ -2,7 +2,7 @@
 //!
 //! Ranks that were started with different command lines are refused, since they would wait for each other without end.
 
-use crate::commands::{bench, check, mesh, new, solve, sweep};
+use crate::commands::{bench, check, gone, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result, few};
 use crate::exchange::{all_gather, broadcast};
 use crate::interrupt::Interrupt;
@@ -240,6 +240,11 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
         return refuse(format!("`{word}`: PETSc options take one dash"), format!("did you mean -{bare}?"));
     }
     let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
+    for name in [&word, &command] {
+        if let Some(advice) = gone::advice(name) {
+            return refuse(format!("`{name}` is gone"), advice.to_owned());
+        }
+    }
     if command.ends_with(".toml") {
         return refuse(format!("`{command}` is no command"), format!("did you mean `winkler solve {command}`?"));
     }

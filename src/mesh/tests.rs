@@ -2,7 +2,8 @@
 
 mod mutations;
 
-use super::load::{load, made_from, meshed as from_script};
+use super::cache::Cache;
+use super::load::{Meshing, load, made_from};
 use super::{Group, Loaded, Mesh, MeshOrigin, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
@@ -48,9 +49,20 @@ fn located(path: PathBuf) -> Located<PathBuf> {
 }
 
 /// Return the mesh of a script with these numbers, kept in a cache.
-fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &[PathBuf]) -> Result<Loaded<D>> {
-    let limits = (&Guard::default(), &Interrupt::default());
-    from_script(&located(geo.to_owned()), (set, &[]), None, order, limits, cache)
+fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &Path) -> Result<Loaded<D>> {
+    meshed_with(geo, set, order, (None, &Guard::default()), cache)
+}
+
+/// Return the mesh of a script that follows sizes, with settings of Gmsh.
+fn meshed_with<const D: usize>(
+    geo: &Path,
+    set: &[(String, f64)],
+    order: Order,
+    (sizes, guard): (Option<&str>, &Guard),
+    cache: &Path,
+) -> Result<Loaded<D>> {
+    let (file, interrupt) = (&located(geo.to_owned()), &Interrupt::default());
+    Meshing { file, set, places: &[], sizes, order, guard, interrupt }.mesh(&Cache::at(cache.to_owned()))
 }
 
 /// Return the bytes of the mesh of a script in the form that these arguments request.
@@ -190,6 +202,7 @@ fn bad_meshes_are_refused_by_name_and_line() {
     let square = |more: &str, arguments: &[&str]| gmsh(&format!("{SQUARE}{more}"), arguments);
     for (bytes, expected) in [
         (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
+        (square("", &["-2", "-format", "msh1"]), "a.msh:1: this is not a mesh file of Gmsh"),
         (square("", &["-2", "-order", "3"]), "elements of 4 nodes (Gmsh's type 26)"),
         (square("Physical Curve(77) = {3};", &["-2"]), "physical curve 77 has no name"),
         (square("Physical Curve(\"gone\") = {99};", &["-2"]), "the physical curve `gone` has no elements"),
@@ -199,7 +212,10 @@ fn bad_meshes_are_refused_by_name_and_line() {
         (gmsh("Point(1) = {0, 0, 0}; Physical Point(\"pin\") = {1};\n", &["-2"]), "no physical group holds surfaces"),
         (gmsh(CUBE, &["-3"]), "is made of volumes, but the scene has dimension = 2"),
         (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2"]), "has z = "),
-        (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2", "-bin"]), "in $Nodes, at byte "),
+        (
+            gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2", "-bin"]),
+            "has z = 0.001, but the scene has dimension = 2 in $Elements",
+        ),
         (square("", &["-2", "-part", "2"]), "the mesh is partitioned"),
         (b"solid cube".to_vec(), "a.msh:1: this is not a mesh file of Gmsh"),
         (Vec::new(), "this is not a mesh file of Gmsh"),
@@ -227,11 +243,11 @@ fn small_mistakes_in_text_are_refused_at_their_line() {
         ("2 1 2 3 \n$EndE", "2 1 x 3\n$EndE", "a.msh:29: `x` should be a whole number"),
         ("\n1 0 0\n0 1 0\n", "\n1 0 0\n2 1e-13 0\n", "has zero area"),
         ("\n1 0 0\n0 1 0\n", "\n1 0 inf\n0 1 0\n", "a.msh:21: a coordinate is inf"),
-        ("\n1 0 0\n0 1 0\n", "\n1 0 0\n0 1 1e-9\n", "a.msh:22: a node of group `body` has z = 0.000000001"),
+        ("\n1 0 0\n0 1 0\n", "\n1 0 0\n0 1 1e-9\n", "a.msh:29: node 3 of group `body` has z = 0.000000001"),
         ("2 1 2 1\n", "2 7 2 1\n", "a.msh:28: elements of surface 7, which $Entities does not list"),
-        ("2 1 2 1\n", "2 1 2 987654321\n", "a.msh:28: the file is too short for a count of 987654321"),
-        ("2 2 1 2\n", "2 3 1 2\n", "a.msh:25: $Elements announces 3 elements and holds 2"),
-        ("1\n2\n3\n", "1\n2\n2\n", "a.msh:22: node tag 2 stands twice"),
+        ("2 1 2 1\n", "2 1 2 987654321\n", "a.msh:30: `$EndElements` should be a whole number"),
+        ("2 2 1 2\n", "2 3 1 2\n", "$Elements announces 3 elements and holds 2"),
+        ("1\n2\n3\n", "1\n2\n2\n", "node tag 2 stands twice"),
         ("1 3 1 3\n", "1 4 1 3\n", "$Nodes announces 4 nodes and holds 3"),
         ("$EndElements\n", "", "`$EndElements` should stand here"),
         ("$EndNodes\n", "$EndNodes\n$Nodes\n", "the section $Nodes stands twice"),
@@ -256,7 +272,7 @@ fn sections_of_no_use_are_skipped() {
 #[test]
 fn scripts_are_meshed_once_for_each_key() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("main.geo");
     let part = folder.path().join("part.geo");
     std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
@@ -287,14 +303,14 @@ fn scripts_are_meshed_once_for_each_key() {
     std::fs::write(&part, SQUARE).unwrap();
     assert_eq!(run(4.0, Order::P1).origin, MeshOrigin::Cache);
     // Only meshes are left: n = 4, n = 3, order 2, and the one of the changed file.
-    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 4);
 }
 
 /// Gmsh omits the last command of a script whose last line is not ended.
 #[test]
 fn the_last_line_of_a_script_need_not_end() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("main.geo");
     std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
     let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
@@ -302,8 +318,7 @@ fn the_last_line_of_a_script_need_not_end() {
     for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
         std::fs::write(&geo, script).unwrap();
         for sizes in [None, Some(&sizes[..])].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
-            let guard = (&Guard::default(), &Interrupt::default());
-            let loaded = from_script::<2>(&located(geo.clone()), (&[], &[]), sizes, Order::P1, guard, &cache).unwrap();
+            let loaded = meshed_with::<2>(&geo, &[], Order::P1, (sizes, &Guard::default()), &cache).unwrap();
             assert!(loaded.mesh.group("outside").is_some(), "{script}");
         }
     }
@@ -312,7 +327,7 @@ fn the_last_line_of_a_script_need_not_end() {
 #[test]
 fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let refuse = |script: &str, set: &[(String, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
@@ -328,7 +343,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     // Lines and bytes of the mesh mean nothing to someone who wrote a script.
     let message = refuse(&format!("{SQUARE}Physical Curve(\"gone\") = {{99}};"), &[], Order::P1);
     assert!(message.contains("a.geo: ") && message.contains("`gone`") && !message.contains("byte"), "{message}");
-    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 0);
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 0);
 }
 
 #[test]
@@ -364,7 +379,7 @@ fn converted_meshes_are_made_by_gmsh() {
 #[test]
 fn loads_at_the_same_time_do_not_meet() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("a.geo");
     std::fs::write(&geo, SQUARE).unwrap();
     let load = || meshed::<2>(&geo, &[], Order::P1, &cache).unwrap();
@@ -374,7 +389,7 @@ fn loads_at_the_same_time_do_not_meet() {
             assert_eq!(thread.join().unwrap().mesh.points.len(), 15);
         }
     });
-    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 1);
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1);
     assert_eq!(load().origin, MeshOrigin::Cache);
 }
 
@@ -383,15 +398,14 @@ fn loads_at_the_same_time_do_not_meet() {
 #[test]
 fn free_meshes_in_space_by_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("cube.geo");
     let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nMeshSize{:} = 0.2;\n\
                 Physical Volume(\"all\") = {1};\nPhysical Surface(\"bottom\") = {5};\n";
     std::fs::write(&geo, cube).unwrap();
     let run = |threads: Option<usize>| {
         let guard = Guard { threads, ..Guard::default() };
-        let limits = (&guard, &Interrupt::default());
-        let loaded = from_script::<3>(&located(geo.clone()), (&[], &[]), None, Order::P1, limits, &cache).unwrap();
+        let loaded = meshed_with::<3>(&geo, &[], Order::P1, (None, &guard), &cache).unwrap();
         (loaded.origin, loaded.mesh.points)
     };
     let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));

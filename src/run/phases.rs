@@ -202,12 +202,11 @@ fn verified<const D: usize>(
     interrupt: &Interrupt,
 ) -> Result<(Verified<D>, Option<FileRead>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    interrupt.hold();
     let mut file = None;
     let read = || {
-        let Loaded { mesh, digest, unkept, notes, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        file = Some(FileRead { digest, warnings: notes.into_iter().chain(unkept).collect() });
         interrupt.release()?;
+        let Loaded { mesh, digest, notes: warnings, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        file = Some(FileRead { digest, warnings });
         Ok(mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);

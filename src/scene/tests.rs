@@ -411,17 +411,3 @@ fn refusals_of_short_options_point_into_what_was_typed() {
         assert!(shown.contains(&format!("1 | {}", text.trim_end())), "{shown}");
     }
 }
-
-/// A scene that came from somebody else cannot let its script run programs.
-#[test]
-fn only_the_command_line_trusts_a_script() {
-    use crate::problem::mesh::MeshSource;
-    let trusted = |text: &str, more: &[&str]| match load_text(text, more).expect("a scene").mesh {
-        MeshSource::Geo { guard, .. } => guard.trusted,
-        _ => false,
-    };
-    assert!(!trusted(GROOVE, &[]) && trusted(GROOVE, &["--trust-geo"]) && trusted(GROOVE, &["trust_geo=true"]));
-    let error = load_text(&format!("trust_geo = true\n{GROOVE}"), &[]).expect_err("a scene that trusts itself");
-    assert!(error.message().contains("cannot say that it is trusted"), "{error}");
-    assert_eq!(caret(&error), "trust_geo");
-}

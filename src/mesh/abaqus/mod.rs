@@ -1,14 +1,15 @@
-//! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 4.1: nodes, elements, and named sets.
+//! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 2.2: nodes, elements, and named sets.
 //!
 //! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of cells
 //! that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are placed. Names are
 //! written in lower case. Characters that no name can have become `_`. Other keywords are skipped.
 
+mod frame;
 mod lines;
 mod model;
 mod read;
 
-use super::old::{self, Contents};
+use super::msh2::Contents;
 use super::simplex;
 use crate::error::{Error, Result};
 use lines::LineReader;
@@ -19,7 +20,7 @@ use std::path::Path;
 
 /// A converted file.
 pub struct Converted {
-    /// The bytes of the mesh in Gmsh's format 4.1.
+    /// The bytes of the mesh in Gmsh's format 2.2.
     pub mesh: Vec<u8>,
     /// What the user should know of it, in sentences without a full stop.
     pub notes: Vec<String>,
@@ -45,7 +46,7 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
         return Err(Error::mesh(path, None, message).help(help));
     }
     Ok(Converted {
-        mesh: contents(&reader.model, &groups.list).written(),
+        mesh: contents(&reader.model, &groups.list).written().into_bytes(),
         notes: notes(path, &reader, &groups.left_out),
     })
 }
@@ -56,10 +57,9 @@ fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
     let mut contents =
         Contents { nodes: model.nodes.iter().map(|(tag, node)| (*tag, node.x)).collect(), ..Contents::default() };
     for (tag, ElementGroup { dimension, name, elements, points }) in (1..).zip(groups) {
-        contents.names.push(format!("{dimension} {tag} \"{name}\""));
-        let mut add = |number: u64, kind: i32, nodes: &[u64]| {
-            contents.elements.push(old::Element { number, kind, entity: 0, groups: vec![tag], nodes: nodes.to_vec() });
-        };
+        contents.groups.push((*dimension, name.clone()));
+        let mut add =
+            |number: u64, kind: i32, nodes: &[u64]| contents.elements.push((number, kind, tag, nodes.to_vec()));
         for (number, (kind, nodes)) in elements {
             add(*number, simplex::ElementType::number(kind.shape, kind.nodes()), nodes);
         }

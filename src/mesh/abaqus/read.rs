@@ -1,5 +1,6 @@
 //! From the lines of a file to its contents.
 
+use super::frame::{Coordinates, LocalAxes};
 use super::lines::{
     InputLine, Keyword, LineReader, SourceLine, TextResult, coordinates, count, generated, reals, spelled,
 };
@@ -7,7 +8,6 @@ use super::model::{
     AbaqusElement, AbaqusModel, AbaqusNode, AbaqusSurface, AbaqusType, ElementFace, Label, Role, Set, members, normal,
 };
 use crate::error::Result;
-use crate::mesh::frame::{Coordinates, LocalAxes};
 use nalgebra::{Point3, Rotation3, Unit};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Local systems of coordinates and numbers in files of other programs.
+//! Local systems of coordinates, and numbers as Fortran writes them.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,8 +9,6 @@ pub enum Coordinates {
     Rectangular,
     /// Radius, angle from x to y, z.
     Cylindrical,
-    /// Radius, angle from the z axis, angle from x to y, as in Nastran.
-    Spherical,
 }
 
 impl Coordinates {
@@ -19,7 +17,6 @@ impl Coordinates {
         match self {
             Coordinates::Rectangular => [a, b, c],
             Coordinates::Cylindrical => [a * cos(b), a * sin(b), c],
-            Coordinates::Spherical => [a * sin(b) * cos(c), a * sin(b) * sin(c), a * cos(b)],
         }
     }
 }
@@ -106,8 +103,6 @@ mod tests {
     #[test]
     fn local_coordinates_become_global_ones() {
         assert_eq!(Coordinates::Cylindrical.rectangular([2.0, 90.0, 5.0]), [0.0, 2.0, 5.0]);
-        assert_eq!(Coordinates::Spherical.rectangular([2.0, 90.0, 180.0]), [-2.0, 0.0, 0.0]);
-        assert_eq!(Coordinates::Spherical.rectangular([2.0, 0.0, 45.0]), [0.0, 0.0, 2.0]);
         assert!((Coordinates::Cylindrical.rectangular([2.0, 30.0, 5.0])[1] - 1.0).abs() < 1e-15);
         // The third axis is x, and the first one y, so that the second one is z.
         let frame = LocalAxes::by_third_axis([1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.0, 2.0, 1.0]).unwrap();

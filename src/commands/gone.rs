@@ -1,0 +1,12 @@
+//! Commands and options that earlier versions knew, each with what to use instead.
+
+/// Names that are gone: options with their dashes, and commands.
+pub const GONE: &[(&str, &str)] = &[(
+    "--trust-geo",
+    "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",
+)];
+
+/// Return the advice for a name that is gone.
+pub fn advice(name: &str) -> Option<&'static str> {
+    GONE.iter().find(|(gone, _)| *gone == name).map(|(_, advice)| *advice)
+}
