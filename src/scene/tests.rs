@@ -322,8 +322,8 @@ const CASES: &[Case] = &[
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
     ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
     ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` is 0", ""),
-    ("n = 32 }", "n = 32 }, memory = \"all\"", "\"all\"", "expected a number, found a string", ""),
-    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", memory = 1", "memory", "`memory` for a finished mesh", ""),
+    ("n = 32 }", "n = 32 }, memory = 8", "memory", "unknown key `memory`", "`timeout` alone"),
+    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", timeout = 1", "timeout", "`timeout` for a finished mesh", ""),
     ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
     ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
 ];
