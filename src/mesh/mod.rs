@@ -12,6 +12,7 @@ mod cache;
 mod check;
 pub mod datum;
 mod digits;
+pub mod faces;
 mod foreign;
 mod gmsh;
 mod groups;

@@ -2,9 +2,10 @@
 //!
 //! Coincident nodes are a crack with two sets of nodes, other ones are hanging nodes. Quadratic facets count as their flat pieces between nodes.
 
-use super::faces::{Cells, Face};
+use super::faces::Cells;
 use crate::error::Result;
 use crate::linalg::{bounds, cross, dot, length, minus};
+use crate::mesh::faces::Face;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 
@@ -15,17 +16,15 @@ type Point = [f64; 3];
 const TOUCH: f64 = 1e-9;
 
 /// Local nodes of the flat pieces of a facet: a segment or a triangle, or two or four of them between the nodes of a quadratic facet.
-const PIECES: [[&[[usize; 3]]; 2]; 2] = [
-    [&[[0, 1, 1]], &[[0, 2, 2], [2, 1, 1]]],
-    [&[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]],
-];
+const PIECES: [[&[[usize; 3]]; 2]; 2] =
+    [[&[[0, 1, 1]], &[[0, 2, 2], [2, 1, 1]]], [&[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]]];
 
 /// Check that no node of the boundary lies on a facet to which it does not belong. `facets` are those of one cell alone.
 ///
 /// # Errors
 /// A node lies on such a facet. The error gives the place and the cells.
 pub fn check<const D: usize>(cells: &Cells<D>, facets: &[Face<D>]) -> Result<()> {
-    let nodes: Vec<Vec<u32>> = facets.iter().map(|facet| facet.nodes(cells).collect()).collect();
+    let nodes: Vec<Vec<u32>> = facets.iter().map(|facet| facet.nodes(cells.simplices()).collect()).collect();
     let boxed = |(facet, number): (&Vec<u32>, usize)| {
         let [low, high] = bounds(facet.iter().map(|&node| cells.at(node)));
         let slack = TOUCH * length(minus(high, low));

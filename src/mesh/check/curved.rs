@@ -29,7 +29,7 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
         let nodes = cells.cell(cell);
         for j in 0..=D {
             for i in 0..=j {
-                let node = if i == j { nodes[i] } else { cells.middle(cell, [i, j]) };
+                let node = if i == j { nodes[i] } else { cells.simplices().middle(cell, [i, j]) };
                 let own = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
                 if *ends[node as usize].get_or_insert(own) != own {
                     let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
@@ -158,7 +158,8 @@ mod tests {
     /// Return the least Jacobian of the map with these control points on a grid of the cell.
     fn least(b: &[[[f64; 3]; 4]; 4]) -> f64 {
         let n = 12;
-        let grid = (0..=n).flat_map(|i| (0..=n - i).flat_map(move |j| (0..=n - i - j).map(move |k| [n - i - j - k, i, j, k])));
+        let grid =
+            (0..=n).flat_map(|i| (0..=n - i).flat_map(move |j| (0..=n - i - j).map(move |k| [n - i - j - k, i, j, k])));
         let jacobian = |l: [usize; 4]| {
             let l = l.map(|i| i as f64 / n as f64);
             let d = |a: usize| -> [f64; 3] {

@@ -1,7 +1,8 @@
 //! Groups that a scene uses: their facets, edges and points lie where their purpose requires it.
 
-use super::faces::{Cells, Faces, NONE, refuse};
+use super::faces::{Cells, NONE, refuse};
 use crate::error::{Error, Result};
+use crate::mesh::faces::{Face, Faces};
 use crate::mesh::{Group, Mesh};
 use std::collections::HashSet;
 
@@ -58,8 +59,12 @@ impl<'a> InUse<'a> {
             found.serves |= match (dimension, self.duty) {
                 (0, _) => true,
                 (1, _) if D == 3 => edges.contains(&[own[0].min(own[1]), own[0].max(own[1])]),
-                (_, Duty::Acts) => faces.cells_at(cells, own) == 1,
-                (_, Duty::Holds) => faces.cells_at(cells, own) > 0,
+                (_, duty) => {
+                    let has_all =
+                        |face: &Face<D>| face.nodes(cells.simplices()).skip(D).all(|node| own.contains(&node));
+                    let cells = faces.at(own).iter().filter(|face| has_all(face)).count();
+                    cells == 1 || duty == Duty::Holds && cells > 0
+                }
             };
         }
     }
@@ -133,4 +138,3 @@ impl<'a> InUse<'a> {
         refuse(mesh, self.group, what, &[index], at).help(help)
     }
 }
-

@@ -20,11 +20,12 @@ mod parts;
 mod tests;
 
 use super::Mesh;
+use super::faces::Face;
 use crate::error::{Error, Result};
 use crate::problem::order::Order;
-use faces::{Cells, Face, Faces, NONE};
-use groups::InUse;
+use faces::{Cells, NONE};
 pub use groups::Duty;
+use groups::InUse;
 pub use parts::Components;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -81,8 +82,8 @@ impl<const D: usize> Mesh<D> {
                 own_nodes(&cells, index, bodies, &mut owner)?;
             }
             curved::check(&cells)?;
-            let faces = Faces::new(&cells);
-            faces.check(&cells)?;
+            let faces = cells.faces();
+            faces::check(&faces, &cells)?;
             let outer: Vec<Face<D>> = faces.outer().collect();
             boundary::check(&cells, &outer)?;
             let parts = parts::of(&cells, &faces)?;

@@ -1,8 +1,9 @@
 //! The connected parts of a body: cells join through whole facets.
 
-use super::faces::{Cells, Faces, NONE};
+use super::faces::{Cells, NONE};
 use crate::error::Result;
 use crate::linalg::{DisjointSets, bounds};
+use crate::mesh::faces::Faces;
 use crate::mesh::{Group, Mesh};
 use serde::{Deserialize, Serialize};
 
@@ -47,7 +48,7 @@ impl<const D: usize> Mesh<D> {
     pub fn split(&mut self, name: &str) -> std::result::Result<(), String> {
         let Some(group) = self.group(name).filter(|group| group.dimension == D) else { return Ok(()) };
         let cells = Cells::new(self, group, D + 1, &mut vec![NONE; self.points.len()]);
-        let (count, of_cell) = classes(&cells, &Faces::new(&cells));
+        let (count, of_cell) = classes(&cells, &cells.faces());
         let mut members = vec![Vec::new(); count];
         of_cell.iter().zip(0..).for_each(|(&part, cell): (_, u32)| members[part as usize].push(cell));
         let middles: Vec<[f64; 6]> = members.iter().map(|members| middle(&cells, members)).collect();
