@@ -1,7 +1,7 @@
 //! A reader of Gmsh's `.msh` 4.1 and 2.2, text and binary, in one pass from front to back. The sections of 2.2 are read in [`super::msh2`].
 
 use super::builder::{Flaw, MeshBuilder};
-use super::scan::{DAMAGED, Scanner};
+use super::scan::Scanner;
 use super::simplex::{ElementType, THINGS};
 use super::{Mesh, msh2};
 use crate::error::{Error, Result};
@@ -50,7 +50,7 @@ pub fn read<const D: usize>(path: &Path, input: &mut dyn BufRead, maker: MeshPro
             continue;
         }
         if seen.contains(&section) {
-            return Err(scan.error(format!("the section ${section} stands twice")).help(DAMAGED));
+            return Err(scan.damaged(format!("the section ${section} stands twice")));
         }
         let has = |name: &str| seen.iter().any(|seen| seen == name);
         match (section.as_str(), version) {
@@ -66,7 +66,7 @@ pub fn read<const D: usize>(path: &Path, input: &mut dyn BufRead, maker: MeshPro
                 let error = scan.error("the mesh is partitioned");
                 return Err(error.help("save it in one piece: the program divides it among the ranks itself"));
             }
-            _ => return Err(scan.error(format!("${section} stands before what it needs")).help(DAMAGED)),
+            _ => return Err(scan.damaged(format!("${section} stands before what it needs"))),
         }
         scan.leave()?;
         seen.push(section);
@@ -104,36 +104,28 @@ fn read_format(scan: &mut Scanner) -> Result<Version> {
     }
     let line = scan.line()?;
     let words: Vec<&str> = line.split_whitespace().collect();
-    let save_again = |error: Error, path: &Path| {
-        error.help(format!("save it as 4.1: gmsh {} -save -format msh41 -o new.msh", path.display()))
-    };
-    let [version, form, size] = words[..] else {
-        return Err(scan.error("a format such as `4.1 0 8` should stand here").help(DAMAGED));
-    };
-    let known = match version {
-        "4.1" => Version::Four,
-        _ if version.starts_with('2') => Version::Two,
+    let (version, is_binary) = match words[..] {
+        ["4.1", "0", _] => (Version::Four, false),
+        ["4.1", "1", "8"] => (Version::Four, true),
+        [version, "0", _] if version.starts_with('2') => (Version::Two, false),
+        [version, "1", "8"] if version.starts_with('2') => (Version::Two, true),
         _ => {
-            let shown: String = version.chars().take(20).collect();
-            let message = format!("this is version {shown} of the mesh format, not 4.1 or 2.2");
-            return Err(save_again(scan.error(message), scan.path));
+            let shown: String = words.first().unwrap_or(&"").chars().take(20).collect();
+            let message = format!("this is version {shown} of the mesh format, not 4.1 or 2.2 as text or binary");
+            let help = format!("save it as 4.1: gmsh {} -save -format msh41 -o new.msh", scan.path.display());
+            return Err(scan.error(message).help(help));
         }
     };
-    match (form, size) {
-        ("0", _) => {}
-        ("1", "8") => scan.begin_binary()?,
-        _ => {
-            let message = format!("`{form} {size}` is neither text (`0 8`) nor binary (`1 8`)");
-            return Err(save_again(scan.error(message), scan.path));
-        }
+    if is_binary {
+        scan.begin_binary()?;
     }
-    scan.leave().map(|()| known)
+    scan.leave().map(|()| version)
 }
 
 /// Read `$PhysicalNames`, which has lines of dimension, tag and quoted name, in binary files too.
 fn read_names<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>) -> Result<()> {
     let count = scan.line()?.parse::<usize>();
-    let count = count.map_err(|_| scan.error("the number of names should stand here").help(DAMAGED))?;
+    let count = count.map_err(|_| scan.damaged("the number of names should stand here"))?;
     for _ in 0..count {
         let line = scan.line()?;
         let entry = line.split_once('"').and_then(|(numbers, name)| {
@@ -143,7 +135,7 @@ fn read_names<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>) -> 
         });
         let Some((dimension, tag, name)) = entry else {
             let message = "dimension, tag and \"name\" of a physical group should stand here";
-            return Err(scan.error(message).help(DAMAGED));
+            return Err(scan.damaged(message));
         };
         let added = mesh.name(dimension, tag, name);
         scan.place(added)?;
@@ -209,7 +201,7 @@ fn read_entity<const D: usize>(
     scan.end()?;
     match entities.insert((dimension, tag), members) {
         None => Ok(tag),
-        Some(_) => Err(scan.error(format!("{} {tag} stands twice", THINGS[dimension].to_lowercase())).help(DAMAGED)),
+        Some(_) => Err(scan.damaged(format!("{} {tag} stands twice", THINGS[dimension].to_lowercase()))),
     }
 }
 
@@ -224,7 +216,7 @@ fn read_nodes<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>) -> 
         let parameters = match (scan.int()?, dimension) {
             (0, _) => 0,
             (1, 0..=3) => dimension as usize,
-            _ => return Err(scan.error("this is not the head of a block of nodes").help(DAMAGED)),
+            _ => return Err(scan.damaged("this is not the head of a block of nodes")),
         };
         let count = scan.count()?;
         scan.end()?;
@@ -263,7 +255,7 @@ fn check_total(scan: &Scanner, section: &str, seen: usize, total: usize) -> Resu
         true => Ok(()),
         false => {
             let what = section.to_lowercase();
-            Err(scan.error(format!("${section} announces {total} {what} and holds {seen}")).help(DAMAGED))
+            Err(scan.damaged(format!("${section} announces {total} {what} and holds {seen}")))
         }
     }
 }
@@ -283,11 +275,11 @@ fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>, 
         let thing = THINGS[kind.shape.dimension].to_lowercase();
         if kind.shape.dimension as i32 != dimension {
             let message = format!("{} elements in a block of dimension {dimension}", kind.shape.name);
-            return Err(scan.error(message).help(DAMAGED));
+            return Err(scan.damaged(message));
         }
         let Some(groups) = entities.get(&(kind.shape.dimension, tag)) else {
             let message = format!("elements of {thing} {tag}, which $Entities does not list");
-            return Err(scan.error(message).help(DAMAGED));
+            return Err(scan.damaged(message));
         };
         let bytes = 8 * (1 + kind.nodes);
         seen = seen.saturating_add(count);

@@ -6,7 +6,7 @@
 
 use super::builder::{Flaw, MeshBuilder};
 use super::msh::kind_of;
-use super::scan::{DAMAGED, Scanner};
+use super::scan::Scanner;
 use super::simplex::ElementType;
 use crate::error::Result;
 use std::collections::HashSet;
@@ -14,7 +14,7 @@ use std::fmt::Write;
 
 /// Read the line with the number of entries of a section.
 fn count(scan: &mut Scanner) -> Result<usize> {
-    scan.line()?.parse().map_err(|_| scan.error("the number of entries should stand here").help(DAMAGED))
+    scan.line()?.parse().map_err(|_| scan.damaged("the number of entries should stand here"))
 }
 
 /// Read the number of a node or an element.
@@ -23,7 +23,7 @@ fn number(scan: &mut Scanner) -> Result<u64> {
         return scan.size();
     }
     let number = scan.int()?;
-    let is_none = |_| scan.error(format!("{number} is no number of a node or an element")).help(DAMAGED);
+    let is_none = |_| scan.damaged(format!("{number} is no number of a node or an element"));
     u64::try_from(number).map_err(is_none)
 }
 
@@ -64,7 +64,7 @@ pub fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<
             head[1] = scan.int()?;
         }
         if !(1..=left).contains(&followers) {
-            return Err(scan.error(format!("{followers} elements follow here, and {left} are left")).help(DAMAGED));
+            return Err(scan.damaged(format!("{followers} elements follow here, and {left} are left")));
         }
         for _ in 0..followers {
             let element = read_element(scan, head)?;

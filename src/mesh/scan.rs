@@ -55,13 +55,13 @@ impl<'a> Scanner<'a> {
         result.map_err(|Flaw { what, help }| self.error(what).help(help))
     }
 
-    fn damaged(&self, message: impl Into<String>) -> Error {
+    /// Return an error here with the advice about damaged files.
+    pub fn damaged(&self, message: impl Into<String>) -> Error {
         self.error(message).help(DAMAGED)
     }
 
     fn ends_early(&self) -> Error {
-        let section = if self.section.is_empty() { "its header" } else { self.section.as_str() };
-        self.error(format!("the file ends within {section}")).help("it was cut short: save the mesh again with Gmsh")
+        self.damaged(format!("the file ends within `{}`", self.section))
     }
 
     /// Read the next line that is not blank, and return whether there is one.

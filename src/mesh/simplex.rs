@@ -150,20 +150,14 @@ pub fn from_gmsh_order(simplex: &mut [u32]) {
 
 /// Invert the orientation of a cell: exchange its last two vertices and the mid-edges that go with them.
 fn mirror(cell: &mut [u32]) {
-    match cell.len() {
-        3 => cell.swap(1, 2),
-        4 => cell.swap(2, 3),
-        6 => {
-            cell.swap(1, 2);
-            cell.swap(3, 5);
-        }
-        10 => {
-            cell.swap(2, 3);
-            cell.swap(5, 8);
-            cell.swap(6, 7);
-        }
-        _ => {}
-    }
+    let swaps: &[(usize, usize)] = match cell.len() {
+        3 => &[(1, 2)],
+        4 => &[(2, 3)],
+        6 => &[(1, 2), (3, 5)],
+        10 => &[(2, 3), (5, 8), (6, 7)],
+        _ => &[],
+    };
+    swaps.iter().for_each(|&(a, b)| cell.swap(a, b));
 }
 
 /// Turn a simplex to positive volume if it is a cell of `space`. Return `false` if it has no extent.
@@ -212,12 +206,8 @@ pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
 /// Return whether a simplex of unit size with this [`measure`] has no extent, to rounding. A measure that is not finite counts
 /// as none.
 fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
-    let mut longest = 0.0_f64;
-    for (i, a) in vertices.iter().enumerate() {
-        for b in &vertices[..i] {
-            longest = longest.max((Vector3::from(*a) - Vector3::from(*b)).norm());
-        }
-    }
+    let pairs = vertices.iter().enumerate().flat_map(|(i, a)| vertices[..i].iter().map(move |b| (a, b)));
+    let longest = pairs.map(|(a, b)| (Vector3::from(*a) - Vector3::from(*b)).norm()).fold(0.0, f64::max);
     let smallest = 1e-12 * longest.powi(vertices.len() as i32 - 1);
     // A point has measure 1 and passes.
     !measure.is_finite() || measure.abs() <= smallest
@@ -253,21 +243,18 @@ mod tests {
         assert!(!turn(&mut [0, 1], &[a, [f64::INFINITY, 0.0, 0.0]], 1, 3));
     }
 
-    /// Each mid-edge stays between the same two vertices, whatever their order.
+    /// Each mid-edge stays between the same two vertices: its number is the sum of the powers of ten of these.
     #[test]
     fn mirrored_cells_keep_their_edges() {
-        let edges: [(usize, &[[usize; 2]]); 2] =
-            [(3, &[[0, 1], [1, 2], [0, 2]]), (4, &[[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])];
-        for (vertices, edges) in edges {
-            // The number of a mid-edge point is the sum of the powers of ten of its vertices, so it identifies them.
-            let mut cell: Vec<u32> = (0..vertices).map(|vertex| 10_u32.pow(vertex as u32)).collect();
-            cell.extend(edges.iter().map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32)).collect::<Vec<_>>());
+        for vertices in [3, 4] {
+            let edges = &EDGES[..vertices * (vertices - 1) / 2];
+            let corners = (0..vertices as u32).map(|vertex| 10_u32.pow(vertex));
+            let middles = edges.iter().map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32));
+            let mut cell: Vec<u32> = corners.chain(middles).collect();
             let before = cell.clone();
             mirror(&mut cell);
             assert_ne!(before, cell);
-            for (k, [a, b]) in edges.iter().enumerate() {
-                assert_eq!(cell[vertices + k], cell[*a] + cell[*b]);
-            }
+            assert!(edges.iter().zip(&cell[vertices..]).all(|([a, b], middle)| *middle == cell[*a] + cell[*b]));
         }
     }
 }

@@ -3,7 +3,7 @@
 mod mutations;
 
 use super::cache::Cache;
-use super::load::{Meshing, load, made_from};
+use super::load::{Meshing, load};
 use super::{Group, Loaded, Mesh, MeshOrigin, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
@@ -100,17 +100,13 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
 
 /// Assert that every mid-edge point of a straight mesh lies between its two vertices.
 fn assert_mid_edges<const D: usize>(mesh: &Mesh<D>) {
-    const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
     for group in mesh.groups.iter().filter(|group| group.dimension > 0) {
         for simplex in group.simplices() {
             let middles = &simplex[group.dimension + 1..];
             assert_eq!(middles.len(), [0, 1, 3, 6][group.dimension]);
-            for (middle, [a, b]) in middles.iter().zip(EDGES) {
-                for k in 0..D {
-                    let at = |point: u32| mesh.points[point as usize][k];
-                    let between = 0.5 * (at(simplex[a]) + at(simplex[b]));
-                    assert!((at(*middle) - between).abs() < 1e-9, "{} of `{}`", middle, group.name);
-                }
+            for (middle, [a, b]) in middles.iter().zip(simplex::EDGES) {
+                let [x, y, m] = [simplex[a], simplex[b], *middle].map(|point| mesh.points[point as usize]);
+                assert!((0..D).all(|k| (m[k] - 0.5 * (x[k] + y[k])).abs() < 1e-9), "{middle} of `{}`", group.name);
             }
         }
     }
@@ -361,19 +357,6 @@ fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     assert!(message.contains("the mesh is of order 1") && message.contains("scene.toml"), "{message}");
     let message = load("3", Order::P2).unwrap_err().to_string();
     assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
-}
-
-/// A mesh that Gmsh converts depends on Gmsh, and one that is read directly does not.
-#[test]
-fn converted_meshes_are_made_by_gmsh() {
-    let folder = tempfile::tempdir().unwrap();
-    let made_from = |name: &str| {
-        let file = folder.path().join(name);
-        std::fs::write(&file, "$MeshFormat\n4.1 0 8\n").unwrap();
-        made_from(&MeshSource::Msh { file: located(file) }, 2, Order::P1).unwrap()
-    };
-    let [direct, converted] = ["a.msh", "a.unv"].map(made_from);
-    assert_ne!(direct, converted);
 }
 
 #[test]

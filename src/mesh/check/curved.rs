@@ -196,17 +196,9 @@ mod tests {
     /// Return two quadratic triangles on the square of four corners. The mid-edge node of the bottom is at the height `bottom`.
     /// The one of the diagonal is moved by `bent` towards the lower corner.
     fn square(bottom: f64, bent: f64) -> Mesh<2> {
-        let points = vec![
-            [0.0, 0.0],
-            [1.0, 0.0],
-            [1.0, 1.0],
-            [0.0, 1.0],
-            [0.5, bottom],
-            [1.0, 0.5],
-            [0.5 + bent, 0.5 - bent],
-            [0.5, 1.0],
-            [0.0, 0.5],
-        ];
+        let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let middles = [[0.5, bottom], [1.0, 0.5], [0.5 + bent, 0.5 - bent], [0.5, 1.0], [0.0, 0.5]];
+        let points = [&corners[..], &middles].concat();
         let connectivity = vec![0, 1, 2, 4, 5, 6, 0, 2, 3, 6, 7, 8];
         let group = Group { name: "body".into(), dimension: 2, stride: 6, connectivity, tags: Vec::new() };
         Mesh::new("a.msh".into(), points, Order::P2, vec![group].into())
@@ -226,14 +218,7 @@ mod tests {
         assert_eq!((both.straightened, both.points[6]), (1, [0.5, 0.5]));
         // a node of two edges, as with a wrong node number, ends the work
         let mut wrong = square(0.0, 0.4);
-        wrong.groups = vec![Group {
-            name: "body".into(),
-            dimension: 2,
-            stride: 6,
-            connectivity: vec![0, 1, 2, 4, 5, 6, 1, 3, 2, 6, 7, 8],
-            tags: Vec::new(),
-        }]
-        .into();
+        wrong.groups[0].connectivity = vec![0, 1, 2, 4, 5, 6, 1, 3, 2, 6, 7, 8];
         wrong.straighten();
         let mut linear = square(0.6, 0.0).lower_order();
         linear.straighten();
