@@ -216,7 +216,7 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
     let gmsh = || Gmsh::find().map(|gmsh| gmsh.identity()).unwrap_or_default();
     match source {
         MeshSource::Geo { file, set, sizes, guard, .. } => {
-            let script = script_of(&file.value).ok().filter(|script| !script.may_change)?;
+            let script = Script::read(&file.value).ok().filter(|script| !script.may_change)?;
             let name = key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard));
             Some(format!("{name} {}", gmsh()))
         }
@@ -227,11 +227,6 @@ pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<
         }
         MeshSource::Arrays(_) => None,
     }
-}
-
-/// Read the script, or the shape of another program.
-fn script_of(path: &Path) -> Result<Script> {
-    if foreign::is_shape(path) { Script::of_shape(path) } else { Script::read(path) }
 }
 
 /// Return the name in the cache of the mesh of a script, with the numbers that are set in it, the sizes to follow, and the
@@ -268,7 +263,7 @@ impl Meshing<'_> {
     pub fn mesh<const D: usize>(&self, cache: &Cache) -> Result<Loaded<D>> {
         let Self { file, set, places, sizes, order, guard, interrupt } = *self;
         let path = &file.value;
-        let script = script_of(path).map_err(|error| error.at(&file.place))?;
+        let script = Script::read(path).map_err(|error| error.at(&file.place))?;
         for (number, (name, _)) in set.iter().enumerate() {
             script.check(name, path, places.get(number).unwrap_or(&file.place))?;
         }
