@@ -70,43 +70,26 @@ fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
 
 /// Return what was left out, or is not as the user may think.
 fn notes(path: &Path, reader: &Reader, left_out: &LeftOut) -> Vec<String> {
-    let mut notes = Vec::new();
-    let file = path.display();
-    let types: Vec<String> = left_out.elements.iter().map(|(name, count)| format!("{count} {name}")).collect();
-    if !types.is_empty() {
-        notes.push(format!("{file}: elements that are no solids are left out: {}", types.join(", ")));
-    }
-    if left_out.faces > 0 {
-        notes.push(format!("{file}: surfaces lose {} faces of elements that are left out", left_out.faces));
-    }
-    if left_out.nodes > 0 {
-        notes.push(format!("{file}: node sets lose {} nodes that belong to no solid", left_out.nodes));
-    }
-    if let [first, ..] = &reader.twice[..] {
-        let [old, new] = first.lines.map(|at| reader.lines.show(at));
-        notes.push(format!(
-            "{file}: {} nodes stand twice with different coordinates, and the later ones count, as in CalculiX: node {} in {old} \
-             and {new}",
-            reader.twice.len(),
-            first.tag
-        ));
-    }
-    if reader.longer > 0 {
-        notes.push(format!(
-            "{file}: {} elements have more nodes than their type, and the first ones count, as in CalculiX",
-            reader.longer
-        ));
-    }
-    if !left_out.renamed.is_empty() {
-        notes.push(format!("{file}: names of element sets are taken: {}", left_out.renamed.join(", ")));
-    }
-    if reader.transforms > 0 {
-        notes.push(format!(
-            "{file}: {} *TRANSFORM are skipped: supports and loads of the scene are along x, y and z",
-            reader.transforms
-        ));
-    }
-    notes
+    let Reader { twice, longer, transforms, lines, .. } = reader;
+    let LeftOut { elements, faces, nodes, renamed } = left_out;
+    let types: Vec<String> = elements.iter().map(|(name, count)| format!("{count} {name}")).collect();
+    let first = twice.first().map_or(String::new(), |first| {
+        let [old, new] = first.lines.map(|at| lines.show(at));
+        format!("node {} in {old} and {new}", first.tag)
+    });
+    let (types, renamed, double) = (types.join(", "), renamed.join(", "), twice.len());
+    [
+        (!types.is_empty(), format!("elements that are no solids are left out: {types}")),
+        (*faces > 0, format!("surfaces lose {faces} faces of elements that are left out")),
+        (*nodes > 0, format!("node sets lose {nodes} nodes that belong to no solid")),
+        (double > 0, format!("{double} nodes stand twice with different coordinates, and the later ones count, as in CalculiX: {first}")),
+        (*longer > 0, format!("{longer} elements have more nodes than their type, and the first ones count, as in CalculiX")),
+        (!renamed.is_empty(), format!("names of element sets are taken: {renamed}")),
+        (*transforms > 0, format!("{transforms} *TRANSFORM are skipped: supports and loads of the scene are along x, y and z")),
+    ]
+    .into_iter()
+    .filter_map(|(is_so, note)| is_so.then(|| format!("{}: {note}", path.display())))
+    .collect()
 }
 
 struct ElementGroup {

@@ -443,9 +443,8 @@ impl Reader {
         points.extend(numbers.chunks_exact(3).map(|point| [point[0], point[1], point[2]]));
         let frame = match points[..] {
             [origin] => Some(LocalAxes::at(origin)),
-            // The third axis stays where it is.
-            [[x, y, z], first] => LocalAxes::by_third_axis([x, y, z], [x, y, z + 1.0], first),
-            [origin, first, second] => LocalAxes::by_first_axis(origin, first, second),
+            [origin, first] => LocalAxes::about_third(origin, first),
+            [origin, first, second] => LocalAxes::by_plane(origin, first, second),
             _ => return Err("*SYSTEM has three points at most".into()),
         };
         self.scope.frame = frame.ok_or("the points of *SYSTEM lie on a line")?;
