@@ -165,7 +165,7 @@ fn arrays_of_numpy_are_read() {
 
 #[test]
 fn a_plane_is_subtracted() {
-    let wave = |i: usize, j: usize| if (i + j) % 2 == 0 { 1.0 } else { -1.0 };
+    let wave = |i: usize, j: usize| if (i + j).is_multiple_of(2) { 1.0 } else { -1.0 };
     let row = |j| (0..4).map(|i| format!("{}", wave(i, j) + 7.0 + 0.5 * i as f64 - 3.0 * j as f64)).collect::<Vec<_>>();
     let text: String = (0..6).map(|j| row(j).join(" ") + "\n").collect();
     let level = load(text, |spec| spec.detrend = Detrend::Plane).unwrap();
