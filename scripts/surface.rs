@@ -50,7 +50,7 @@ fn main() -> std::io::Result<()> {
         // a header of 128 bytes, then the rows of the matrix one behind the other
         let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({n}, {n}), }}");
         out.write_all(b"\x93NUMPY\x01\x00\x76\x00")?;
-        write!(out, "{header:<117}\n")?;
+        writeln!(out, "{header:<117}")?;
         heights.transpose().iter().try_for_each(|height| out.write_all(&height.to_le_bytes()))?;
     } else {
         for row in heights.row_iter() {
