@@ -1,6 +1,6 @@
 //! Sparse matrices (MATAIJ), the rows that they are made of, and their index sets (IS) and submatrices.
 
-use super::library::{fit, flag, petsc};
+use super::call::{fit, flag, petsc};
 use super::vector::{Vector, check_length};
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
@@ -130,8 +130,8 @@ impl Matrix {
 
     /// Return the stored values, in the order of [`Rows`].
     pub fn values(&self) -> &[f64] {
-        // SAFETY: PETSc keeps the array while `self.mat` lives, and no call with `&self` writes to it: the solver refuses
-        // -ksp_diagonal_scale, which would.
+        // SAFETY: PETSc keeps the array while `self.mat` lives. Its solvers write to it with -ksp_diagonal_scale alone, and have restored it when
+        // their call returns.
         unsafe { std::slice::from_raw_parts(self.values, self.nonzeros) }
     }
 

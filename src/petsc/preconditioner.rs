@@ -1,6 +1,6 @@
 //! Multigrid of two levels (PCMG), whose interpolation the program makes.
 
-use super::library::{flag, petsc};
+use super::call::{flag, petsc};
 use super::matrix::check;
 use super::vector::DETERMINE;
 use super::{Int, Ksp, Matrix, Scope, ffi};
