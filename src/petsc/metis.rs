@@ -17,7 +17,7 @@ pub struct Graph {
 ///
 /// # Errors
 /// When METIS does not return an order.
-#[allow(clippy::useless_conversion)]
+#[allow(clippy::useless_conversion, clippy::unnecessary_fallible_conversions)]
 pub fn nested_dissection(graph: Graph) -> Result<Vec<i32>> {
     let nodes = graph.ptr.len() - 1;
     if graph.col.is_empty() {
@@ -42,7 +42,7 @@ pub fn nested_dissection(graph: Graph) -> Result<Vec<i32>> {
             .because(format!("METIS_NodeND returned {code}"))
             .help("take another solver: --set solver=mumps"));
     }
-    Ok(position.into_iter().map(|at| at as i32).collect())
+    Ok(position.into_iter().map(|at| at.try_into().unwrap_or(-1)).collect())
 }
 
 #[cfg(test)]
