@@ -11,7 +11,6 @@ use std::cell::Cell;
 use std::ffi::CStr;
 use std::fmt;
 use std::ptr::null_mut;
-use std::rc::Rc;
 
 /// The outcome of a linear solve.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,10 +59,8 @@ pub struct Ksp {
     pub(super) ksp: ffi::KSP,
     /// PETSc's headers of right-hand side and solution, created with the operator.
     vectors: Option<[Vector; 2]>,
-    /// The number of updates of the matrix.
-    pub(super) updates: Rc<Cell<u64>>,
-    /// The number of updates of the matrix with which the preconditioner failed, if it did.
-    failed_at: Cell<Option<u64>>,
+    /// Whether the last set-up of the preconditioner failed.
+    has_failed: Cell<bool>,
     /// The subspaces around the preconditioner, the innermost first.
     wrappers: Vec<Wrapper>,
     prefix: String,
@@ -91,8 +88,7 @@ impl Ksp {
         let solver = Ksp {
             ksp,
             vectors: None,
-            updates: Rc::default(),
-            failed_at: Cell::new(None),
+            has_failed: Cell::new(false),
             wrappers: Vec::new(),
             prefix: prefix.to_owned(),
             scope,
@@ -140,9 +136,6 @@ impl Ksp {
             let new = || Vector::new(&self.session, self.scope, matrix.rows(), matrix.block_size());
             self.vectors = Some([new()?, new()?]);
         }
-        self.updates = matrix.updates();
-        // A failure with another matrix says nothing about this one.
-        self.failed_at.set(self.failed_at.get().map(|_| u64::MAX));
         Ok(())
     }
 
@@ -251,7 +244,7 @@ impl Ksp {
         // SAFETY: PETSc's text.
         let mut text =
             unsafe { text_from(|text| petsc!(KSPGetConvergedReasonString(self.ksp, text))) }.unwrap_or_default();
-        if let Some(failure) = self.failure() {
+        if let Some(failure) = self.failure().filter(|_| reason < 0) {
             text = format!("{text}: {failure}");
         }
         Ok(Solved { iterations: iterations as usize, reason: ConvergedReason { number: reason, text }, residual })
@@ -271,26 +264,21 @@ impl Ksp {
         right.map(("r", r), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
     }
 
-    /// Set the relative tolerance.
+    /// Set the relative tolerance, and leave the other limits as they are.
     ///
     /// # Errors
     /// When it is not between 0 and 1.
     pub fn set_tolerance(&self, rtol: f64) -> Result<()> {
-        let Tolerances { atol, dtol, limit, .. } = self.tolerances()?;
-        // SAFETY: the solver of this wrapper; PETSc refuses values that are not numbers.
-        unsafe { petsc!(KSPSetTolerances(self.ksp, rtol, atol, dtol, limit)) }
+        // SAFETY: the solver of this wrapper; -2 is PETSC_DEFAULT, which keeps a value.
+        unsafe { petsc!(KSPSetTolerances(self.ksp, rtol, -2.0, -2.0, -2)) }
     }
 
     /// Return the relative tolerance in force.
     pub fn tolerance(&self) -> f64 {
-        self.tolerances().map_or(f64::NAN, |tolerances| tolerances.rtol)
-    }
-
-    fn tolerances(&self) -> Result<Tolerances> {
-        let mut set = Tolerances { rtol: 0.0, atol: 0.0, dtol: 0.0, limit: 0 };
-        // SAFETY: the solver of this wrapper.
-        unsafe { petsc!(KSPGetTolerances(self.ksp, &mut set.rtol, &mut set.atol, &mut set.dtol, &mut set.limit)) }?;
-        Ok(set)
+        let (mut rtol, none) = (f64::NAN, null_mut());
+        // SAFETY: the solver of this wrapper; PETSc writes to no null pointer. A failure leaves the tolerance unknown.
+        let _ = unsafe { petsc!(KSPGetTolerances(self.ksp, &mut rtol, none, none, null_mut())) };
+        rtol
     }
 
     /// Return the type of the solver, such as `cg`. It is empty until options were read or the solver was set up.
@@ -417,16 +405,6 @@ impl Ksp {
     }
 }
 
-/// The limits of the iteration.
-struct Tolerances {
-    rtol: f64,
-    atol: f64,
-    /// The growth of the residual that counts as divergence.
-    dtol: f64,
-    /// The largest number of iterations.
-    limit: Int,
-}
-
 impl Drop for Ksp {
     fn drop(&mut self) {
         // SAFETY: the one reference of this wrapper.
@@ -447,16 +425,9 @@ impl Ksp {
         })
     }
 
-    /// Reset a preconditioner that failed if the matrix has changed since. PETSc's interface to MUMPS never factors again after a failure.
+    /// Reset a preconditioner that failed: PETSc's interface to MUMPS never factors again after a failure.
     pub(super) fn recover(&self) -> Result<()> {
-        let Some(before) = self.failed_at.get() else {
-            return Ok(());
-        };
-        if self.updates.get() == before {
-            return Ok(());
-        }
-        self.failed_at.set(None);
-        self.reset()
+        if self.has_failed.replace(false) { self.reset() } else { Ok(()) }
     }
 
     /// Reset the preconditioner, and keep the matrix and everything else.
@@ -492,10 +463,9 @@ impl Ksp {
         }
     }
 
-    /// Note with which values of the matrix the preconditioner failed, if it did.
+    /// Note whether the preconditioner failed.
     pub(super) fn note_failure(&self) -> Result<()> {
-        let failed = self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR;
-        self.failed_at.set(failed.then(|| self.updates.get()));
+        self.has_failed.set(self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR);
         Ok(())
     }
 
