@@ -8,6 +8,7 @@
 
 use super::ffi;
 use super::ffi::PetscBool;
+use super::launch::with_quick_start;
 use crate::error::{Error, Kind, Result};
 use std::cell::{Cell, RefCell};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
@@ -67,7 +68,7 @@ pub(super) fn start(words: &[String]) -> Result<()> {
     check_code("PetscPushErrorHandler", || unsafe { ffi::PetscPushErrorHandler(Some(record), null_mut()) })?;
     // SAFETY: words and count live until the end of the process.
     let initialize = || unsafe { ffi::PetscInitialize(count, arguments, null(), null()) };
-    super::session::with_quick_start(|| check_code("PetscInitialize", initialize))?;
+    with_quick_start(|| check_code("PetscInitialize", initialize))?;
     RUNS.set(true);
     for name in OWN {
         let name = text(name)?;

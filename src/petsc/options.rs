@@ -2,12 +2,10 @@
 
 use super::Session;
 use super::call::{self, flag, is_set, petsc, string, text};
+use super::session::{Entry, left};
 use crate::error::{Error, Kind, Result};
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
-
-/// An option: its name with the dash, and its value if it has one.
-pub type Entry = (String, Option<String>);
 
 /// PETSc's table of options, filled from the command line, `PETSC_OPTIONS` and `-options_file`.
 ///
@@ -105,24 +103,6 @@ impl Options {
     pub fn left(&self) -> Result<Vec<Entry>> {
         if call::runs() { left() } else { Ok(Vec::new()) }
     }
-}
-
-/// Return the options of the running PETSc that nobody has read so far, sorted by name.
-pub(super) fn left() -> Result<Vec<Entry>> {
-    let (mut count, mut names, mut values) = (0, null_mut(), null_mut());
-    // SAFETY: PETSc returns `count` names and as many values; a value may be null. They are copied before PETSc takes its two lists back.
-    let mut entries: Vec<Entry> = unsafe {
-        petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
-        let entry = |i: usize| {
-            let value = *values.add(i);
-            (format!("-{}", string(*names.add(i))), (!value.is_null()).then(|| string(value)))
-        };
-        let entries = (0..count as usize).map(entry).collect();
-        petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
-        entries
-    };
-    entries.sort();
-    Ok(entries)
 }
 
 fn dashed(name: &str) -> String {

@@ -1,8 +1,8 @@
 //! Start and end of MPI and PETSc in this process, and stages of PETSc's log, which `-log_view` lists separately.
 
 use super::blas;
-use super::call::{self, petsc, text};
-use super::options;
+use super::call::{self, petsc, string, text};
+use super::launch::{is_launched, with_quick_start};
 use crate::error::{Error, Kind, Result};
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
@@ -10,7 +10,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::env;
 use std::io::Write;
-use std::process::Command;
+use std::ptr::null_mut;
 use std::rc::Rc;
 use std::sync::Once;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -70,7 +70,7 @@ impl Session {
             }
             return Err(error);
         }
-        session.typed().replace(options::left()?.into_iter().collect());
+        session.typed().replace(left()?.into_iter().collect());
         Ok(session)
     }
 
@@ -174,6 +174,27 @@ impl Session {
     }
 }
 
+/// An option: its name with the dash, and its value if it has one.
+pub type Entry = (String, Option<String>);
+
+/// Return the options of the running PETSc that nobody has read so far, sorted by name.
+pub(super) fn left() -> Result<Vec<Entry>> {
+    let (mut count, mut names, mut values) = (0, null_mut(), null_mut());
+    // SAFETY: PETSc returns `count` names and as many values; a value may be null. They are copied before PETSc takes its two lists back.
+    let mut entries: Vec<Entry> = unsafe {
+        petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
+        let entry = |i: usize| {
+            let value = *values.add(i);
+            (format!("-{}", string(*names.add(i))), (!value.is_null()).then(|| string(value)))
+        };
+        let entries = (0..count as usize).map(entry).collect();
+        petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
+        entries
+    };
+    entries.sort();
+    Ok(entries)
+}
+
 /// Note the start of a session.
 fn start_once() -> Result<()> {
     if STARTED.swap(true, Ordering::SeqCst) {
@@ -205,56 +226,6 @@ fn abort_on_panic(several: bool) {
             }
         }));
     });
-}
-
-/// Return whether a launcher such as `mpiexec` or `srun` started this process, by the variables of Open MPI, PMIx and PMI.
-fn is_launched() -> bool {
-    ["OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_RANK"].iter().any(|name| env::var_os(name).is_some())
-}
-
-/// The settings of Open MPI for a process without a launcher. Start and end of PETSc take 0.06 s with all of them, and 0.5 s with none (medians of
-/// twelve on two cores).
-const ALONE: [(&str, &str); 4] = [
-    // no daemon: 0.15 s (Open MPI 4; version 5 has none)
-    ("OMPI_MCA_ess_singleton_isolated", "1"),
-    // no search for networks: 0.2 s
-    ("OMPI_MCA_pml", "ob1"),
-    // no folder in /tmp: all processes would take the same one, and 29 of 400 that started 40 at a time failed
-    ("OMPI_MCA_orte_create_session_dirs", "0"),
-    // no search for cores, caches and graphics cards: 0.03 s
-    ("HWLOC_COMPONENTS", "no_os,stop"),
-];
-
-/// Run `start` with the settings of a process without a launcher, unless the user set one of them.
-///
-/// They are environment variables, which hold only while MPI starts: a child process under `mpiexec` would inherit them and break.
-pub(super) fn with_quick_start<T>(start: impl FnOnce() -> T) -> T {
-    if is_launched() || ALONE.iter().any(|(name, _)| env::var_os(name).is_some()) {
-        return start();
-    }
-    for (name, value) in ALONE {
-        // SAFETY: Rust's own readers and writers of the environment share a lock. The thread that runs the program starts the session, before
-        // the libraries below have threads that might read the environment.
-        unsafe { env::set_var(name, value) };
-    }
-    let result = start();
-    for (name, _) in ALONE {
-        // SAFETY: as above.
-        unsafe { env::remove_var(name) };
-    }
-    result
-}
-
-/// Return the command that starts ranks of a program: the words of `$WINKLER_MPIEXEC`, or else `mpiexec`. Arguments to add are `-n`, the
-/// number of ranks, and the program. Open MPI gets the permission to start more ranks than there are cores.
-pub fn launcher() -> Command {
-    let typed = env::var("WINKLER_MPIEXEC").unwrap_or_default();
-    let mut words = typed.split_whitespace();
-    let mut command = Command::new(words.next().unwrap_or("mpiexec"));
-    command.args(words);
-    command.env("OMPI_MCA_rmaps_base_oversubscribe", "1"); // Open MPI 4
-    command.env("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"); // Open MPI 5
-    command
 }
 
 /// A guard: its stage lasts until it is dropped. Then the enclosing stage goes on.

@@ -180,7 +180,7 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
     let Built { scene, discrete: Discrete { bodies, .. }, .. } = built;
     Report {
         winkler: env!("CARGO_PKG_VERSION").to_owned(),
-        petsc: Some(session.petsc_version()),
+        petsc: session.petsc_version(),
         blas: session.blas_name(),
         ranks: session.size(),
         title: scene.title.clone(),
