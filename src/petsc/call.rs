@@ -45,10 +45,13 @@ pub(super) use petsc;
 
 /// Run a call of PETSc, which is started without options if it does not run, and check its code.
 pub(super) fn check(function: &str, call: impl FnOnce() -> ffi::PetscErrorCode) -> Result<()> {
-    if !runs() {
-        start(&[])?;
-    }
+    ensure_running()?;
     check_code(function, call)
+}
+
+/// Start PETSc without options, and MPI with it, if it does not run.
+pub(super) fn ensure_running() -> Result<()> {
+    if runs() { Ok(()) } else { start(&[]) }
 }
 
 /// Start PETSc with the options in `words`, in the environment, and in files that these name. It starts MPI if that does not run.
