@@ -9,6 +9,7 @@
 
 mod check;
 mod decode;
+mod gone;
 mod spec;
 #[cfg(test)]
 mod tests;
@@ -41,7 +42,7 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     for text in overrides {
         apply(&mut tree, text)?;
     }
-    let scene = decode::scene(&tree, path)?;
+    let scene = decode::scene(&tree, path).map_err(gone::explain)?;
     scene.verify().map_err(|refusal| refusal.error.at(tree.place_of(&refusal.key)))?;
     Ok(scene)
 }
