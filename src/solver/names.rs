@@ -52,14 +52,15 @@ pub(super) fn is_common(bare: &str) -> bool {
 pub(super) fn meant(name: &str, bodies: &[&str]) -> Option<String> {
     let name = name.trim_start_matches('-');
     let common = || COMMON.split_whitespace();
-    if let Some(near) = nearest(bare(name, bodies), common()) {
-        let prefix = &name[..name.len() - bare(name, bodies).len()];
-        return Some(format!("{prefix}{near}"));
-    }
-    // the prefix may be mistyped, too
-    common().find_map(|known| {
+    // the prefix may be mistyped, or the rest
+    let with_prefix = common().find_map(|known| {
         let prefix = nest_of(name, known)?.trim_end_matches('_');
         nearest(prefix, bodies.iter().chain([&WHOLE]).copied()).map(|body| format!("{body}_{known}"))
+    });
+    with_prefix.or_else(|| {
+        let rest = bare(name, bodies);
+        let prefix = &name[..name.len() - rest.len()];
+        nearest(rest, common()).map(|near| format!("{prefix}{near}"))
     })
 }
 
