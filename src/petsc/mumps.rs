@@ -270,6 +270,8 @@ impl Schur {
             self.mumps.icntl[number - 1] = value.parse().map_err(|_| refuse("not a whole number".to_owned()))?;
         } else if let Some(number) = number("mat_mumps_cntl_", 15) {
             self.mumps.cntl[number - 1] = value.parse().map_err(|_| refuse("not a number".to_owned()))?;
+        } else {
+            return Err(refuse("MUMPS has no such control".to_owned()));
         }
         Ok(())
     }
