@@ -1,10 +1,14 @@
 //! Commands and options that earlier versions knew, each with what to use instead.
 
 /// Names that are gone: options with their dashes, and commands.
-pub const GONE: &[(&str, &str)] = &[(
-    "--trust-geo",
-    "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",
-)];
+pub const GONE: &[(&str, &str)] = &[
+    ("--color", "messages have colours on a terminal, and none where NO_COLOR is set"),
+    (
+        "--trust-geo",
+        "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",
+    ),
+    ("man", "`winkler COMMAND --help` has all that the man pages had"),
+];
 
 /// Return the advice for a name that is gone.
 pub fn advice(name: &str) -> Option<&'static str> {

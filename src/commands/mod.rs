@@ -90,13 +90,7 @@ impl Terminal {
             ));
         }
         for chosen in built.options.iter().take(LISTED) {
-            // PETSc's table has the options of a solver only while they are lent to it
-            let all = chosen.lend(session, || session.options().all())?;
-            let prefix = format!("-{}_", chosen.prefix());
-            let own = all.into_iter().filter(|(name, _)| name.starts_with(&prefix));
-            let own: Vec<String> =
-                own.map(|(name, value)| value.map_or(name.clone(), |value| format!("{name} {value}"))).collect();
-            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
+            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), chosen.in_words()));
         }
         Ok(if self.is_first { lines } else { Vec::new() })
     }

@@ -10,7 +10,6 @@ use crate::problem::{Guard, MeshSource, Preset, SolverSpec, contact, name_of};
 use crate::setting::{
     Context, Entries, Keys, Node, Setting, TableEntry, TableShape, Value, ValueKind, choose, entries, file, word,
 };
-use crate::solver::options;
 use serde_json::{Map, Value as Json, json};
 use std::borrow::Cow;
 use std::path::Path;
@@ -291,33 +290,19 @@ impl Setting for SolverSpec {
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
         if let Value::String(_) = node.value {
-            return Ok(Self { preset: Some(Preset::read(node, context)?), options: Vec::new() });
+            return Ok(Self { preset: Some(Preset::read(node, context)?) });
         }
         let keys = Keys::open(node, &solver_shape())?;
-        let options = keys.read("options", petsc_options)?.unwrap_or_default();
-        Ok(Self { preset: keys.read("preset", |node| Preset::read(node, context))?, options })
+        Ok(Self { preset: keys.read("preset", |node| Preset::read(node, context))? })
     }
 
     fn echo(&self, dimension: usize) -> Json {
-        entries([("preset", self.preset.echo(dimension)), ("options", json!(self.options.join(" ")))]).into()
+        entries([("preset", self.preset.echo(dimension))]).into()
     }
 }
 
 fn solver_shape() -> TableShape {
-    TableShape::new("the solver").optional("preset", Preset::kind(), "the inner solver of all bodies").optional(
-        "options",
-        ValueKind::Text,
-        "PETSc options that choose solvers and set their parameters: \"-ksp_rtol 1e-10\"",
-    )
-}
-
-/// Return the words of PETSc options that choose solvers and set their parameters. Options that do anything else are refused.
-fn petsc_options(node: &Node) -> Result<Vec<String>> {
-    let words: Vec<String> = node.string()?.split_whitespace().map(str::to_owned).collect();
-    for (name, value) in options::pairs(&words).map_err(|error| error.at(&node.place))? {
-        options::check_of_scene(name, value).map_err(|error| error.at(&node.place_of_word(name)))?;
-    }
-    Ok(words)
+    TableShape::new("the solver").optional("preset", Preset::kind(), "the inner solver of all bodies")
 }
 
 /// Return the schema (draft 2020-12), made of the shapes by which scenes are decoded.

@@ -8,6 +8,7 @@ pub const GONE: &[(&str, &str)] = &[
     ("fill", HEIGHTS),
     ("memory", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
     ("missing", HEIGHTS),
+    ("options", "PETSc options follow the scene on the command line, or stand in a file: -options_file FILE"),
     ("parabola", HEIGHTS),
     ("points", HEIGHTS),
 ];
