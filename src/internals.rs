@@ -28,7 +28,7 @@ pub mod fem {
 
 pub mod mesh {
     //! Meshes.
-    pub use crate::mesh::{Asked, Duty, Group, Mesh, MeshProducer, breach, load, parse, unstructured};
+    pub use crate::mesh::{Asked, Duty, Group, Mesh, MeshProducer, load, parse, unstructured};
 }
 
 pub mod model {

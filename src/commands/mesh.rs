@@ -1,6 +1,5 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use super::flags;
 use crate::discretize::{Verified, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
@@ -27,9 +26,6 @@ pub struct MeshArgs {
     /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Run the mesh's .geo script even if it can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
     /// File to write, .msh, which a scene can name as its mesh
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -84,10 +80,7 @@ struct GroupFacts {
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
-    interrupt.hold();
-    let flags = flags([(request.trust_geo, "--trust-geo")]);
-    let overrides: Vec<String> = request.overrides.iter().cloned().chain(flags).collect();
-    let scene = crate::scene::load(&request.scene, &overrides)?;
+    let scene = crate::scene::load(&request.scene, &request.overrides)?;
     let facts = match scene.dimension.value {
         2 => load::<2>(&scene, interrupt, request)?,
         _ => load::<3>(&scene, interrupt, request)?,
@@ -104,10 +97,10 @@ fn load<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &MeshArgs
     let began = Instant::now();
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     let line = (!request.json).then(|| ProgressLine::new("mesh", None));
-    let Loaded { mesh, origin, file, unkept, notes, .. } = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
+    let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
     drop(line);
     let seconds = began.elapsed().as_secs_f64();
-    request.output.as_ref().map_or(Ok(()), |path| write(path, &file))?;
+    request.output.as_ref().map_or(Ok(()), |path| write(path, &file, D))?;
     let verified = verify(scene, &Serial, || Ok(mesh))?;
     let mesh = &verified.mesh;
     let of_mesh = [in_parts(mesh.split), made_straight(mesh.straightened)];
@@ -122,7 +115,7 @@ fn load<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &MeshArgs
         warnings: [notes, verified.notes.clone()]
             .concat()
             .into_iter()
-            .chain(unkept)
+            
             .chain(of_mesh.into_iter().flatten())
             .collect(),
         seconds,
@@ -187,12 +180,12 @@ fn in_lines(facts: &MeshFacts) -> String {
     lines.join("\n")
 }
 
-/// Write the file of the mesh to another place.
-fn write(path: &Path, mesh: &Path) -> Result<()> {
+/// Write the mesh to another file.
+fn write(path: &Path, mesh: &Path, dimension: usize) -> Result<()> {
     if path.extension().is_none_or(|ending| ending != "msh") {
         return Err(Error::new(Kind::Usage, format!("`{}` is no name for a mesh file", path.display()))
             .help("end it with .msh; `winkler solve --vtu` writes bodies for ParaView"));
     }
-    let bytes = std::fs::read(mesh).map_err(|cause| Error::file(mesh, "read", &cause))?;
+    let bytes = crate::mesh::as_msh(mesh, dimension)?;
     write_whole(path, |out| out.write_all(&bytes))
 }

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 pub struct Report {
     /// Version of the program.
     pub winkler: String,
-    /// Version of PETSc; `None` for a run that needed no PETSc object and did not load it.
-    pub petsc: Option<String>,
+    /// Version of PETSc.
+    pub petsc: String,
     /// BLAS library in use.
     pub blas: String,
     /// MPI ranks.

@@ -18,7 +18,7 @@ use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, LinearStep};
 use crate::parallel::{Ranks, collectively, differences};
-use crate::petsc::{Session, keep_apart, keep_at_hand};
+use crate::petsc::Session;
 use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
@@ -72,7 +72,6 @@ pub fn build_after(
             kept = last.into_condensed();
         }
     }
-    collectively(session, options::refuse_log(session))?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::in_plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::in_space, kept, interrupt, clock),
@@ -138,9 +137,6 @@ where
         let stage = session.stage("discretize");
         let mut bodies = verified.bodies.clone();
         scene.method.steps.apply(step, &mut bodies);
-        let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        collectively(session, options::set_of_scene(session, &names, &scene.solver.options))?;
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
@@ -155,7 +151,7 @@ where
         clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
-        let mut warnings = warnings::of_problem(session, &discrete, D);
+        let mut warnings = warnings::of_problem(session, &discrete);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
         let mut built = Built {
@@ -206,12 +202,11 @@ fn verified<const D: usize>(
     interrupt: &Interrupt,
 ) -> Result<(Verified<D>, Option<FileRead>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    interrupt.hold();
     let mut file = None;
     let read = || {
-        let Loaded { mesh, file: path, digest, unkept, notes, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        file = Some(FileRead { digest, path, warnings: notes.into_iter().chain(unkept).collect() });
         interrupt.release()?;
+        let Loaded { mesh, file: path, digest, notes: warnings, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        file = Some(FileRead { digest, path, warnings });
         Ok(mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);
@@ -241,7 +236,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         start = full;
     }
     let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-    let warnings = collectively(session, options::unread(session, &names, &built.options))?;
+    let warnings = collectively(session, options::unread(session, &names))?;
     if built.options.is_empty() && session.options().has("-help") {
         options::show_help(session)?;
     }
@@ -255,13 +250,10 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
 /// PETSc fails. A run that does not converge is not an error but a status of the outcome.
 pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
-    keep_at_hand();
-    let done = match ready.built.scene.method.steps.is_empty() {
+    let mut done = match ready.built.scene.method.steps.is_empty() {
         true => recorder::solve(ready, true, keep),
         false => steps::iterate(ready, keep, clock),
-    };
-    keep_apart();
-    let mut done = done?;
+    }?;
     warnings::note_ends(&mut done);
     clock.phase("iterate");
     Ok(done)

@@ -3,10 +3,20 @@
 use crate::error::Error;
 
 /// Names that are gone: a key, or a word that was the value of a key.
-pub const GONE: &[(&str, &str)] = &[(
-    "compress",
-    "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder",
-)];
+pub const GONE: &[(&str, &str)] = &[
+    ("asperities", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
+    ("compress", "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder"),
+    ("fill", HEIGHTS),
+    ("memory", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
+    ("missing", HEIGHTS),
+    ("options", "PETSc options follow the scene on the command line, or stand in a file: -options_file FILE"),
+    ("parabola", HEIGHTS),
+    ("points", HEIGHTS),
+];
+
+/// Advice for heights that are no whole grid.
+const HEIGHTS: &str =
+    "data are a grid without gaps: scripts/library/heights.py makes one, with gaps filled and a form subtracted";
 
 /// Replace the advice of a refusal of an unknown key or value if its name is gone.
 pub fn explain(error: Error) -> Error {

@@ -55,9 +55,6 @@ pub struct BenchArgs {
     /// Replace a key of the scene in all runs; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Run the meshes' .geo scripts even if they can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
     /// Print errors, warnings and the folder of the results only
     #[arg(short, long)]
     quiet: bool,
@@ -154,9 +151,8 @@ impl Benchmark {
         if let Some(order) = request.orders.iter().find(|order| !matches!(order, 1 | 2)) {
             return Err(usage(format!("there are no elements of order {order}")).help("--order 1,2"));
         }
-        let trust = request.trust_geo.then(|| "trust_geo=true".to_owned());
-        let common: Vec<String> = request.overrides.iter().cloned().chain(trust).collect();
-        let scenes = request.scenes.iter().map(|path| crate::scene::load(path, &common)).collect::<Result<Vec<_>>>()?;
+        let common = &request.overrides;
+        let scenes = request.scenes.iter().map(|path| crate::scene::load(path, common)).collect::<Result<Vec<_>>>()?;
         let names = names(&scenes);
         let keys = over.iter().map(|axis| axis.name.as_str());
         let mut plan = Plan::new(["scene"].into_iter().chain(keys).chain(COLUMNS).map(str::to_owned).collect());

@@ -3,7 +3,7 @@
 
 use super::forms;
 use super::numeric::{integral, line_intersection, root};
-use super::table::{Table, asperities};
+use super::table::Table;
 use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
 use crate::expression::Expression;
@@ -21,7 +21,6 @@ use std::rc::Rc;
 pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match spec {
         LayerSpec::Form { form, values } => forms::make(form, values, position),
-        LayerSpec::Asperities(spec) => Ok(Rc::new(asperities(spec))),
         LayerSpec::Own(name) => own(laws, name, position, extent(position)),
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {
