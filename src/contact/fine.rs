@@ -62,8 +62,6 @@ pub struct Fine<const D: usize> {
     pub points: FinePoints,
     /// Unit normal from side a to side b at each point.
     pub normal: Vec<[f64; D]>,
-    /// Sum of the outer unit normals of both sides at each point, zero where they are opposite.
-    pub tilt: Vec<[f64; D]>,
     /// Location of the points on each side.
     pub sides: [FineSide<D>; 2],
     /// Location of the contact points on side b.
@@ -124,10 +122,6 @@ impl<const D: usize> Fine<D> {
             is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].left == Left::Nothing,
             nearest: 0,
         };
-        let tilt = |point: &IntegrationPoint<D>| {
-            let (n_a, n_b) = (normal_a(point), vector_at(b, point.facet_b, &point.at_b, |at| at.normal));
-            std::array::from_fn(|c| n_a[c] + n_b[c])
-        };
         let mut points = FinePoints {
             order: a.facets.order,
             each: shared.iter().map(of_point).collect(),
@@ -138,7 +132,6 @@ impl<const D: usize> Fine<D> {
         Self {
             points,
             normal: shared.iter().map(direction).collect(),
-            tilt: shared.iter().map(tilt).collect(),
             near: Projections::new(a, b, common, pair, (!touching).then_some(gap)),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
         }

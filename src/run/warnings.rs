@@ -112,10 +112,7 @@ pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<Strin
     })
 }
 
-/// Least change of the pressures with the side of the normals that is worth a warning: one per cent.
-const ONE_SIDED: f64 = 0.01;
-
-/// Return warnings of pressures whose estimated error is a guess, or that depend on the side that gives the normals by more than that error.
+/// Return warnings of pressures whose estimated error is a guess.
 pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
     for (i, pair) in discrete.model.pairs.iter().enumerate() {
@@ -133,14 +130,6 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
                 }
             };
             warnings.push(format!("the estimated error of the pressures between `{a}` and `{b}` is a guess: {reason}"));
-        }
-        let change = estimate.sides[i];
-        if change > estimate.pressure[i].max(ONE_SIDED) {
-            warnings.push(format!(
-                "the pressures between `{a}` and `{b}` depend by about {:.0} % on which of their normals count, more than by their estimated \
-                 error: the surfaces slide or tilt too far for small displacements",
-                100.0 * change
-            ));
         }
     }
     warnings
