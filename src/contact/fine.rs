@@ -4,8 +4,8 @@
 //! points are also projected to side b, and facets at rims of the contact are marked.
 
 use super::basis::{Carriers, PressureBasis};
-use super::pair::{ContactPair, Coverage, Left};
-use super::pieces::{IntegrationPoint, Intersection, WHOLE};
+use super::pair::{ContactPair, Coverage};
+use super::pieces::{IntegrationPoint, Intersection};
 use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
 use crate::fem::{Facets, element, length, minus, unit};
@@ -119,7 +119,7 @@ impl<const D: usize> Fine<D> {
             size: size_under(a, point),
             at_rim: at_rim[point.facet_a],
             at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
-            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].left == Left::Nothing,
+            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].is_whole(),
             nearest: 0,
         };
         let mut points = FinePoints {
@@ -327,7 +327,7 @@ fn facets_at_rim<const D: usize>(
         at_interface[point.facet_a] |=
             at_jump(0, a.facets.facet(point.facet_a)) || at_jump(1, b.facets.facet(point.facet_b));
     }
-    let ends_on = |i: usize| cover[i].share < WHOLE;
+    let ends_on = |i: usize| !cover[i].is_whole();
     let beside = |i: usize| a.facets.edges(i).into_iter().flat_map(|edge| &edges_a[&edge]).filter(move |&&k| k != i);
     let ends_beside = |i: usize| beside(i).any(|&k| ends_on(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
     let at_rim = |i: usize| {

@@ -8,7 +8,7 @@ use super::patterns::{Owners, find_group, point};
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, UncoveredPoint};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
@@ -34,7 +34,7 @@ pub struct ContactFacts {
     origin: PairOrigin,
     swapped: bool,
     chords: Option<Chords>,
-    ends: Vec<UncoveredPoint>,
+    ends: Vec<usize>,
     surface: ContactSurface,
 }
 
@@ -53,7 +53,7 @@ pub struct ContactInfo {
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
-    pub ends: Vec<UncoveredPoint>,
+    pub ends: Vec<usize>,
     /// Whether side a, which carries the points, is the second of `spec.between`.
     pub swapped: bool,
     /// Mesh of side a, for output.
@@ -212,10 +212,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
         let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
-        let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
-        let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
-        let ends =
-            spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
+        let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, chords, ends, surface } }))
     }
 }
