@@ -162,8 +162,13 @@ fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     let ([a, b], without) = (names(contact), pair.uncovered());
     let distance = contact.spec.distance.map_or(String::new(), |distance| format!(" and `distance` = {distance}"));
     let within = format!("within `angle` = {}{distance}", contact.spec.angle);
-    (without > 0)
-        .then(|| format!("{a} - {b}: {without} of {} facets of `{}` have no partner {within}", pair.cover.len(), pair.surfaces[0]))
+    (without > 0).then(|| {
+        format!(
+            "{a} - {b}: {without} of {} facets of `{}` have no partner {within}",
+            pair.cover.len(),
+            pair.surfaces[0]
+        )
+    })
 }
 
 /// Least change of the pressures by the height of curved surfaces above straight facets that is worth a warning. The height is that of parabolas
