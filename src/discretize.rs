@@ -4,6 +4,7 @@ mod approach;
 mod assembler;
 mod auto;
 mod carrier;
+mod chords;
 mod distribute;
 mod local;
 mod mechanism;

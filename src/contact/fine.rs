@@ -82,7 +82,7 @@ pub struct FineSide<const D: usize> {
 
 impl<const D: usize> Fine<D> {
     /// Collect the integration points of `pair`, which was made of these sides and common pieces. `jumps` has the nodes of both sides where the
-    /// material of their body jumps.
+    /// material of their body jumps, or the law of the layer.
     ///
     /// `gap(x)` is the gap that the scene adds to the distance of the meshes. If the surfaces are `touching`, the difference
     /// between that distance at a contact point and its mean around it counts as zero, as does the height of surfaces above their facets.
@@ -312,6 +312,7 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
 /// of b: the covered part of that facet may be a sliver.
 ///
 /// The pressure may be singular where an interface of two materials ends in the contact, too, on the softer one as at a corner of the stiffer one.
+/// It jumps with the law of a layer, and no polynomial on a facet follows that.
 fn facets_at_rim<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,

@@ -1,7 +1,7 @@
 //! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is paired.
 
 use super::basis::{Carriers, PressureBasis};
-use super::law::{LayerLaw, LinearLaw};
+use super::law::{LawMaker, LayerLaw, LinearLaw};
 use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, Side, along};
 use crate::error::{Error, Result};
@@ -123,9 +123,6 @@ pub enum Fault {
     /// The scene's law is invalid at a point.
     Law(Error),
 }
-
-/// A function from the contact points of a pair to its law.
-pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
 /// Integrate over common pieces. Return the integrals of each node (on a face) that carries a point, and the coverage of each facet of side a.
 ///

@@ -210,7 +210,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
         }
         let surface = ContactSurface::new(&a, &pair);
         let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
-        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
+        let fine = match fine {
+            true => {
+                let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
+                at_a.extend(a.layer_jumps(&law)?);
+                Some(Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&at_a, &at_b]))
+            }
+            false => None,
+        };
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, chords, ends, surface } }))

@@ -121,7 +121,9 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
             let place = point(guess.place);
             let reason = match guess.cause {
                 Cause::Rim => {
-                    format!("most of it is at the edge of the contact, at {place}, where pressures may be singular")
+                    format!(
+                        "most of it is at {place}, at an edge of the contact or where a material or the layer jumps, where pressures may be singular"
+                    )
                 }
                 Cause::FewFacets => {
                     format!(

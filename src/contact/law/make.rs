@@ -39,6 +39,9 @@ fn extent(position: &[[f64; 3]]) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
+/// A function from the contact points of a pair to its law.
+pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
+
 /// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.
 pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 

@@ -22,7 +22,7 @@ mod tests;
 pub use forms::LinearLaw;
 #[cfg(test)]
 pub use forms::Power;
-pub use make::{OwnLaws, make};
+pub use make::{LawMaker, OwnLaws, make};
 pub use table::Table;
 
 use std::rc::Rc;
