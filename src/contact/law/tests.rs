@@ -311,7 +311,7 @@ fn the_bound_of_the_gap_is_above_it() {
                 let on_graph = law.compression(0, other);
                 let conjugate = on_graph * other - law.response(0, on_graph).energy;
                 let gap = energy + conjugate - c * other;
-                let rounding = 1e-13 * (energy + conjugate.abs() + c * other);
+                let rounding = 1e-10 * (energy + conjugate.abs() + c * other);
                 let bound = law.duality_gap(0, c, other);
                 assert!(bound >= gap - rounding, "{law:?} at {c}, {ratio} p: {bound} {gap}");
                 let open = law.duality_gap(0, -3.0 * scale, other);
@@ -322,7 +322,7 @@ fn the_bound_of_the_gap_is_above_it() {
                 let bound = law.duality_gap(0, c, pressure * (1.0 - away));
                 let straight = pressure * away * (pressure * away / tangent);
                 let within = 1e-3 + 64.0 * f64::EPSILON * (1.0 + c * tangent / pressure) / away;
-                let is_smooth = !format!("{law:?}").contains("max");
+                let is_smooth = !["max", "Table"].iter().any(|bent| format!("{law:?}").contains(bent));
                 assert!(
                     !is_smooth || (bound / straight - 1.0).abs() < within,
                     "{law:?} at {c}, {away:e}: {bound:e} {straight:e}"
