@@ -308,7 +308,7 @@ Mesh.MeshSizeExtendFromBoundary = 0; Mesh.MeshSizeFromPoints = 0;
 ";
 
 /// A cylinder slides along itself on one that crosses it, whose curvature is as large but across: a spring alone resists it. With one curvature for all
-/// directions, the contact would carry a third of this load.
+/// directions, the contact would carry half of this load.
 #[test]
 fn a_cylinder_slides_along_itself_on_one_that_crosses_it() {
     let text = "dimension = 3\nmesh = { geo = \"part.geo\" }
@@ -318,5 +318,5 @@ spring = [{ on = \"roof\", stiffness = [1e-1, 0, 0] }]\nload = [{ on = \"roof\",
 [[contact]]\nbetween = [\"skin_a\", \"skin_b\"]\nlayer = { linear = { stiffness = 1e5 } }\n";
     let run = solve_here(scene(CROSS, text.to_owned()), &[]).converged();
     let force = [0, 2].map(|c| run.number(&format!("pairs/0/force/1/{c}")).abs());
-    assert!(force[1] > 10.0 && force[0] < 0.02, "{force:?}");
+    assert!(force[1] > 10.0 && force[0] < 0.04, "{force:?}");
 }
