@@ -82,6 +82,11 @@ impl LayerLaw for LinearLaw {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         Response { pressure: self.stiffness * c, tangent: self.stiffness, energy: 0.5 * self.stiffness * c * c }
     }
+
+    /// In closed form, so that a linear layer in full contact is on its law without rounding.
+    fn resolvent(&self, _point: usize, s: f64, rho: f64) -> f64 {
+        if s > 0.0 && s < f64::INFINITY { s / (1.0 + self.stiffness / rho) } else { s }
+    }
 }
 
 /// The law p(c) = (c/B)^(1/a) of the rough surface in the paper's numerical section.
