@@ -18,6 +18,7 @@ mod surface;
 mod unassembled;
 mod verify;
 
+pub use approach::mean_normal;
 pub use assembler::{Assembled, Factory, Outline};
 pub use local::BodyInfo;
 pub use pairs::ContactInfo;

@@ -84,11 +84,11 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
                     if info.rank != self.rank {
                         made.scale = 0.0;
                     }
-                    evaluate(&mut info, part, local.nodal_rows, &load, own)?
+                    evaluate(&mut info, part, [local.nodal_rows, local.approach], &load, own)?
                 }
             };
-            let (unloaded, motions) = (local.unloaded, unsupported);
-            self.shapes.push(FemBody { space, split: OnceCell::new(), held, elasticity, unloaded, motions });
+            let motions = unsupported;
+            self.shapes.push(FemBody { space, split: OnceCell::new(), held, elasticity, motions });
         }
         let Made { local, imposed, scale, row_stiffness } = made;
         let name = info.name.clone();
@@ -161,11 +161,12 @@ fn loads<const D: usize>(
 }
 
 /// Give `info` the evaluation of displacements and forces of a body at the nodes that this rank has. `own` marks the nodes that
-/// belong to this rank. Return the space and the supports of the body.
+/// belong to this rank, `rows` and `approach` are rows with displacements of nodes as columns. Return the space and the supports of the
+/// body.
 fn evaluate<const D: usize>(
     info: &mut BodyInfo,
     part: SceneBody<D>,
-    rows: Csr,
+    [rows, approach]: [Csr; 2],
     load: &NodalForces<D>,
     own: Vec<bool>,
 ) -> Result<(Rc<Space<D>>, Rc<Constraints<D>>)> {
@@ -174,8 +175,8 @@ fn evaluate<const D: usize>(
     let post = OnPart {
         name: info.name.clone(),
         exact: part.spec.exact.clone(),
-        outer: part.facts.outer,
         rows,
+        approach,
         springs: part.springs,
         supports: part.spec.fix.len(),
         load: load.all(space.nodes.len()),

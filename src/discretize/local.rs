@@ -104,6 +104,8 @@ pub struct LocalBody<const D: usize> {
     pub rows: Csr,
     /// Contact rows with displacements of nodes as columns.
     pub nodal_rows: Csr,
+    /// The displacement towards each contact surface, with displacements of nodes as columns.
+    pub approach: Csr,
     /// Nodal forces of the loads at owned nodes, and at nodes tied to these.
     pub load: NodalForces<D>,
     /// Displacements that the supports prescribe.
@@ -114,8 +116,6 @@ pub struct LocalBody<const D: usize> {
     pub share: Option<Share>,
     /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
     pub is_owned: bool,
-    /// See [`Unassembled::unloaded`].
-    pub unloaded: Vec<f64>,
     /// Coupling of nodes by K, if it was computed on this rank.
     #[serde(skip)]
     pub graph: Option<NodeGraph>,
@@ -124,7 +124,7 @@ pub struct LocalBody<const D: usize> {
 impl<const D: usize> LocalBody<D> {
     /// Take the whole body.
     pub fn whole(body: Unassembled<D>, is_owned: bool) -> Self {
-        let Unassembled { part, rows, nodal_rows, nodal_load, supported, unloaded, graph, .. } = body;
+        let Unassembled { part, rows, nodal_rows, approach, nodal_load, supported, graph, .. } = body;
         let cells = if part.spec.regions.is_empty() { 0 } else { part.space.cell_count() };
         Self {
             regions: (0..cells).map(|cell| part.elasticity.region(cell)).collect(),
@@ -134,12 +134,12 @@ impl<const D: usize> LocalBody<D> {
             facts: part.facts,
             rows,
             nodal_rows,
+            approach,
             load: nodal_load,
             supported,
             works: None,
             share: None,
             is_owned,
-            unloaded,
             graph: graph.into_inner(),
         }
     }
@@ -173,6 +173,7 @@ impl<const D: usize> LocalBody<D> {
             facts: part.facts.on(&nodes),
             rows: rows_here(&body.rows),
             nodal_rows: rows_here(&body.nodal_rows),
+            approach: rows_here(&body.approach),
             load: body.nodal_load.only(is_assembled).on(&nodes),
             supported: Supported {
                 imposed: supported.imposed.clone(),
@@ -180,7 +181,6 @@ impl<const D: usize> LocalBody<D> {
             },
             works: on_dofs.map(|on| on.works.clone()),
             is_owned: true,
-            unloaded: body.unloaded.clone(),
             graph: None,
             share: Some(partition.share::<D>(number, nodes, &body.rows, products, rank)),
         }

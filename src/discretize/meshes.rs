@@ -18,9 +18,6 @@ pub trait Meshes {
     /// Recover smoother fields from the displacements `u` of all nodes of a body.
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a>;
 
-    /// Return the nodal forces of a body that the quadrature of its loads misses. The slice is empty if there are none.
-    fn unloaded(&self, body: usize) -> &[f64];
-
     /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these amounts.
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
 
@@ -87,8 +84,6 @@ pub struct FemBody<const D: usize> {
     pub elasticity: Rc<Elasticity>,
     /// Supports of the body, which define its dofs.
     pub held: Rc<Constraints<D>>,
-    /// See [`Meshes::unloaded`].
-    pub unloaded: Vec<f64>,
     /// Rigid motions that the supports leave, in the order of [`Motions::with_springs`](crate::model::Motions::with_springs).
     pub motions: Vec<RigidMotion<D>>,
 }
@@ -115,10 +110,6 @@ impl<const D: usize> Meshes for Kept<D> {
         let split = shape.split.get_or_init(|| Split::new(&shape.space, &shape.elasticity));
         let recovery = Recovery::new(&split.space, &shape.elasticity, split.values(u));
         Box::new(OnBody { kept: self, shape, split, u, recovery })
-    }
-
-    fn unloaded(&self, body: usize) -> &[f64] {
-        &self.shapes[body].unloaded
     }
 
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {

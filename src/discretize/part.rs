@@ -1,19 +1,17 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
-use super::approach::{LoadForces, Outer};
 use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
 use crate::error::{Error, Result, shown};
-use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
     ElasticBody, Elasticity, Facets, NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space,
-    Subdivision, assemble, rigid, support, surface,
+    assemble, rigid, support, surface,
 };
-use crate::linalg::{Total, axpy, countable, dot};
+use crate::linalg::{Total, countable, dot};
 use crate::mesh::{self, Group, Mesh};
 use crate::problem::body::{Load, LoadKind};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
@@ -140,45 +138,15 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// # Errors
     /// A load is not finite somewhere, or a surface is not on the body or has no area.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let load =
-            body_force(self.spec, &self.space, Subdivision::Whole)?.and(self.on_surfaces(mesh, Subdivision::Whole)?);
+        let mut load = body_force(self.spec, &self.space)?;
+        for spec in &self.spec.load {
+            load = load.and(self.on_surface(spec, spec.factor, mesh)?);
+        }
         if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) }
     }
 
-    /// Return the nodal forces of all loads that the quadrature misses. The result is empty if all loads are constant.
-    ///
-    /// # Errors
-    /// See [`SceneBody::load`].
-    pub fn unloaded(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
-        let is_constant = |load: &Load| match &load.kind {
-            LoadKind::Pressure(pressure) => pressure.is_constant(),
-            LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
-            LoadKind::Force { .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => true,
-        };
-        let force = self.spec.force.iter().flatten();
-        if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
-            return Ok(Vec::new());
-        }
-        let all = |parts: Subdivision| {
-            let load = body_force(self.spec, &self.space, parts)?.and(self.on_surfaces(mesh, parts)?);
-            Ok(load.all(self.space.nodes.len()))
-        };
-        let (mut missed, load) = (all(Subdivision::Halves)?, all(Subdivision::Whole)?);
-        axpy(-1.0, &load, &mut missed);
-        Ok(missed)
-    }
-
-    /// Return the nodal forces of all loads on surfaces that are not rigid.
-    fn on_surfaces(&self, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
-        let mut load = NodalForces::default();
-        for spec in &self.spec.load {
-            load = load.and(self.on_surface(spec, spec.factor, mesh, parts)?);
-        }
-        Ok(load)
-    }
-
     /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
-    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
+    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
         let group = find_group(mesh, &spec.on, load_dimensions::<D>(&spec.kind), "load")?;
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
@@ -193,11 +161,11 @@ impl<'a, const D: usize> SceneBody<'a, D> {
             return Err(without_area(&spec.on, self.spec));
         }
         if let LoadKind::Moment(moment) = spec.kind {
-            let load = moment_load(&self.space, &facets, parts, moment.map(|component| factor * component));
+            let load = moment_load(&self.space, &facets, moment.map(|component| factor * component));
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
         let values = FieldValues::of("this load", &name.value);
-        let load = surface::surface_load(&self.space, &facets, parts, &|x, n| match &spec.kind {
+        let load = surface::surface_load(&self.space, &facets, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
                 let pressure = factor * values.at(field, self.space.in_scene(x));
                 n.map(|n| -pressure * n)
@@ -227,19 +195,18 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(nodes.into_iter().map(|node| (node, each)).collect())
     }
 
-    /// Return the nodal forces of a load of the scene at its full value. A force on a rigid surface is spread over its area.
+    /// Return the nodal forces of a load of the scene without its factor. A force on a rigid surface is spread over its area.
     ///
     /// # Errors
     /// See [`SceneBody::load`].
-    fn load_forces(&self, load: &Load, mesh: &Mesh<D>) -> Result<LoadForces> {
-        let spread = match &load.kind {
+    pub fn full_load(&self, load: &Load, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
+        match load.kind {
             LoadKind::Force { total, rigid: true } | LoadKind::Turning { force: total, .. } => {
-                LoadKind::Force { total: *total, rigid: false }
+                let kind = LoadKind::Force { total, rigid: false };
+                self.on_surface(&Load { kind, ..load.clone() }, 1.0, mesh)
             }
-            _ => return Ok(LoadForces::new(self.on_surface(load, 1.0, mesh, Subdivision::Whole)?.iter())),
-        };
-        let load = Load { kind: spread, ..load.clone() };
-        Ok(LoadForces::new(self.on_surface(&load, 1.0, mesh, Subdivision::Whole)?.iter()))
+            _ => self.on_surface(load, 1.0, mesh),
+        }
     }
 
     /// Return the forces on rigid surfaces, at few nodes of each.
@@ -292,54 +259,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         })
     }
 
-    /// Check a body in several unconnected parts. Supports and springs must leave it no more rigid motions than a connected body
-    /// would have. The reason is that contact and loads treat its rigid motions as those of one body.
-    ///
-    /// # Errors
-    /// Supports and springs leave more. The error names the place of a free part.
-    fn check_held(&self, parts: &mesh::Components, mesh: &Mesh<D>) -> Result<()> {
-        if parts.count == 1 {
-            return Ok(());
-        }
-        let space = &self.space;
-        let part_of = |node: u32| parts.of_node[node as usize] as usize;
-        let mut extents = vec![PointExtent::default(); parts.count];
-        let mut first: Vec<Option<[f64; D]>> = vec![None; parts.count];
-        for (node, x) in (0..).zip(&space.nodes) {
-            extents[part_of(node)].add(*x);
-            first[part_of(node)].get_or_insert(*x);
-        }
-        let motions: Vec<Vec<RigidMotion<D>>> =
-            extents.iter().map(|extent| rigid::of(extent, space.axisymmetric)).collect();
-        // In each of these motions one part moves and the others stay at rest.
-        let each: Vec<(usize, &RigidMotion<D>)> = motions
-            .iter()
-            .enumerate()
-            .flat_map(|(number, own)| own.iter().map(move |motion| (number, motion)))
-            .collect();
-        let left = |moving: &[(usize, &RigidMotion<D>)]| {
-            let at = |k: usize, node: u32| match moving[k].0 == part_of(node) {
-                true => moving[k].1.at(&space.nodes[node as usize]),
-                false => [0.0; D],
-            };
-            self.left(moving.len(), &at).len()
-        };
-        let free = self.free();
-        let whole = self.left(free.len(), &|k, node| free[k].at(&space.nodes[node as usize])).len();
-        if left(&each) <= whole {
-            return Ok(());
-        }
-        // Contact may resist a part to which supports leave some motions. The part with the most free motions is reported.
-        let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
-        let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
-        let at = first[most].map_or([0.0; 3], |x| space.in_scene(x));
-        let (name, count) = (&self.spec.name.value, parts.count);
-        let message =
-            format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));
-        Err(Error::mesh(&mesh.path, None, message)
-            .help("make a body of each part (`split = true` in its table), support each of them, or let them share facets (in the script: `Coherence;`)"))
-    }
-
     /// Return the nodes of linear displacements, sorted.
     pub fn coarse_nodes(&self) -> Vec<u32> {
         coarse_nodes(&self.space, &self.held.frame)
@@ -389,14 +308,14 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 ///
 /// # Errors
 /// The force is not finite somewhere, or beyond the range of numbers.
-fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Subdivision) -> Result<NodalForces<D>> {
+fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = FieldValues::of("this body force", &name.value);
     let density = |x: [f64; D]| {
         let x = space.in_scene(x);
         std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x))
     };
-    let load = assemble::body_force(space, parts, &density);
+    let load = assemble::body_force(space, &density);
     values.refused()?;
     if !load.is_finite() {
         return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
@@ -424,18 +343,12 @@ pub struct BodyFacts {
     pub volume: f64,
     /// Means over the body of the moduli along x, y, z ([`Elasticity::moduli`]).
     pub moduli: [f64; 3],
-    /// Nodes at which the body is loaded or constrained.
-    pub outer: Outer,
 }
 
 impl BodyFacts {
     /// Restrict the facts to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
     pub fn on(&self, nodes: &[u32]) -> Self {
-        Self {
-            points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
-            outer: self.outer.on(nodes),
-            ..*self
-        }
+        Self { points: nodes.iter().map(|&node| self.points[node as usize]).collect(), ..*self }
     }
 }
 
@@ -453,16 +366,13 @@ pub fn parts<'a, const D: usize>(
     for (index, spec) in bodies.iter().enumerate() {
         let space = space(spec, mesh, scene.plane)?;
         let checked = &checked[index];
+        refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
         let facts = facts(spec, &space, &elasticity, checked.points.clone());
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        let mut part = SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
-        let loaded = spec.load.iter().map(|load| part.load_forces(load, mesh)).collect::<Result<_>>()?;
-        part.facts.outer = Outer::new(spec, &part.space, mesh, loaded)?;
-        part.check_held(&checked.parts, mesh)?;
-        parts.push(part);
+        parts.push(SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts });
     }
     Ok(parts)
 }
@@ -484,6 +394,23 @@ fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Resul
     Err(Error::mesh(&mesh.path, None, message).help(help))
 }
 
+/// Check that all cells of a body are connected by facets.
+///
+/// # Errors
+/// They are not. The error names the place of the second part.
+fn refuse_parts<const D: usize>(
+    spec: &BodySpec,
+    space: &Space<D>,
+    parts: &mesh::Components,
+    mesh: &Mesh<D>,
+) -> Result<()> {
+    let Some(other) = parts.of_node.iter().position(|&part| part == 1) else { return Ok(()) };
+    let (name, at) = (&spec.name.value, point(space.in_scene(space.nodes[other])));
+    let message = format!("body `{name}` is in {} parts that share no facet, one of them at {at}", parts.count);
+    Err(Error::mesh(&mesh.path, None, message)
+        .help("make a body of each part (`split = true` in its table), or let them share facets (in the script: `Coherence;`)"))
+}
+
 /// Return the facts of a body whose nodes are these `points` of the mesh.
 fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> BodyFacts {
     let cells = space.cell_count();
@@ -493,7 +420,7 @@ fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elastic
         false => moduli(space, elasticity, 0..cells).map(|sum| sum / volume),
     };
     let extent = PointExtent::of(space.nodes.iter().copied());
-    BodyFacts { points, extent, cells, volume, moduli, outer: Outer::default() }
+    BodyFacts { points, extent, cells, volume, moduli }
 }
 
 /// Return the elasticity of the cells of a body.

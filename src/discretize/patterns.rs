@@ -1,11 +1,11 @@
 //! The groups of the mesh that a scene means: the single bodies of its tables, and the groups on which their lines act. Tables, and the
-//! lines in them, may stand for many bodies by patterns of names. Errors point into the scene.
+//! lines in them, may stand for many bodies by patterns of names; the last table that matches counts. Errors point into the scene.
 
-use crate::error::{Error, Located, Place, Result, few};
+use crate::error::{Error, Located, Result, few};
 use crate::expression::Field;
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, LoadKind, fault, plain, plain_pattern};
-use crate::problem::pattern::{BODY, Pattern, Rank, is_pattern};
+use crate::problem::pattern::{BODY, Pattern, is_pattern};
 use crate::scene::Scene;
 use std::cell::RefCell;
 use std::collections::{BTreeSet, HashMap};
@@ -110,12 +110,11 @@ pub fn point(x: [f64; 3]) -> String {
 
 /// Return the bodies of a scene, table by table. The bodies of a pattern are in the order of the mesh.
 ///
-/// A body that several tables match belongs to the narrowest one. A line on groups named by a pattern acts on all groups that
+/// A body that several tables match belongs to the last of these. A line on groups named by a pattern acts on all groups that
 /// match and lie on the body. In a table of a pattern, every line acts on those bodies on which its group lies.
 ///
 /// # Errors
-/// A pattern matches nothing, two tables match a body equally well, a group cannot name a body, or a total force acts on several
-/// surfaces.
+/// A table has no body, a group cannot name a body, or a total force acts on several surfaces.
 pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> Result<Vec<BodySpec>> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(scene.bodies.clone());
@@ -197,32 +196,30 @@ pub fn pattern(name: &Located<String>) -> Result<Pattern<'_>> {
     Pattern::new(&name.value).map_err(|flaw| Error::scene(&name.place, flaw))
 }
 
-/// Return how narrow the name of a table that stands for many bodies is. A name whose group is split ranks like the pattern of the
-/// names of its parts.
-fn rank(table: &BodySpec) -> Result<Rank> {
-    let name = &table.name;
-    let parts = Located::new(format!("{}_*", name.value), name.place.clone());
-    pattern(if table.split { &parts } else { name }).map(|pattern| pattern.rank())
+/// Return the last table of the scene that matches a group of cells by its name, where `whole` is the group of which it is a connected
+/// part. A table that splits groups stands for the parts of the groups that it matches.
+fn table_of(scene: &Scene, patterns: &[Pattern], name: &str, whole: Option<&str>) -> Option<usize> {
+    let called = |table: usize| if scene.bodies[table].split { whole } else { Some(name) };
+    (0..patterns.len()).rev().find(|&table| called(table).is_some_and(|name| patterns[table].matches(name)))
 }
 
-/// Split the groups of cells whose narrowest table asks for it into connected parts, which become groups of their own.
+/// Return the patterns of the names of all tables.
+fn patterns_of(scene: &Scene) -> Result<Vec<Pattern<'_>>> {
+    scene.bodies.iter().map(|table| pattern(&table.name)).collect()
+}
+
+/// Split the groups of cells whose table asks for it into connected parts, which become groups of their own.
 ///
 /// # Errors
 /// A name of a table is no pattern, or a part would have the name of another group.
 pub fn split<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<()> {
-    let mut asked = Vec::new();
-    for table in scene.bodies.iter().filter(|table| table.split) {
-        for name in mesh.group_names(D).filter(|name| pattern(&table.name).is_ok_and(|own| own.matches(name))) {
-            let others = scene.bodies.iter().filter(|other| !other.split);
-            let mut matching = others.filter(|other| pattern(&other.name).is_ok_and(|own| own.matches(name)));
-            let own = rank(table)?;
-            if matching.all(|other| is_for_many(other) && rank(other).is_ok_and(|rank| rank < own)) {
-                asked.push((name.to_owned(), table));
-            }
-        }
-    }
-    for (name, table) in asked {
-        if mesh.groups.is_split(&name) {
+    let patterns = patterns_of(scene)?;
+    let names: Vec<String> = mesh.group_names(D).map(str::to_owned).collect();
+    for name in names {
+        let Some(table) = table_of(scene, &patterns, &name, Some(&name)).map(|table| &scene.bodies[table]) else {
+            continue;
+        };
+        if !table.split || mesh.groups.is_split(&name) {
             continue;
         }
         mesh.split(&name).map_err(|taken| {
@@ -235,54 +232,39 @@ pub fn split<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<()> {
 }
 
 /// Return the names of the bodies of each table.
+///
+/// # Errors
+/// A table has no body, or a group cannot name a body.
 pub fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Result<Vec<Vec<&'a str>>> {
-    let patterns = scene.bodies.iter().map(|table| pattern(&table.name)).collect::<Result<Vec<_>>>()?;
-    let single = (0..patterns.len()).filter(|&table| !is_for_many(&scene.bodies[table]));
-    let named: HashMap<&str, usize> = single.map(|table| (scene.bodies[table].name.value.as_str(), table)).collect();
-    let mut plural: Vec<(usize, &Pattern, Rank)> = Vec::new();
-    for (number, table) in scene.bodies.iter().enumerate().filter(|(_, table)| is_for_many(table)) {
-        plural.push((number, &patterns[number], rank(table)?));
-    }
+    let patterns = patterns_of(scene)?;
     let mut members = vec![Vec::new(); patterns.len()];
-    named.iter().for_each(|(&name, &table)| members[table].push(name));
-    let mut unmatched: BTreeSet<usize> = plural.iter().map(|&(table, ..)| table).collect();
     for name in mesh.group_names(D).filter(|name| !mesh.groups.is_split(name)) {
-        // A table that splits groups stands for the parts of these groups.
-        let called = |table: usize| if scene.bodies[table].split { mesh.groups.whole(name) } else { Some(name) };
-        let is_for = |table: usize, pattern: &Pattern| called(table).is_some_and(|called| pattern.matches(called));
-        let matching: Vec<_> = plural.iter().filter(|(table, pattern, _)| is_for(*table, pattern)).collect();
-        unmatched.retain(|table| matching.iter().all(|(own, ..)| own != table));
-        let Some(narrowest) = matching.iter().map(|(.., rank)| rank).max().filter(|_| !named.contains_key(name)) else {
-            continue;
-        };
-        let mut best = matching.iter().filter(|(.., rank)| rank == narrowest).map(|&&(table, ..)| table);
-        let own = best.next().unwrap_or_default();
-        if let Some(other) = best.next() {
-            let [own, other] = [own, other].map(|table| &scene.bodies[table].name);
-            return Err(tie(name, [&own.value, &other.value], &other.place));
-        }
+        let Some(table) = table_of(scene, &patterns, name, mesh.groups.whole(name)) else { continue };
         if let Some([label, help]) = fault(name) {
-            let message =
-                format!("`{name}`, which `{}` matches, cannot be the name of a body", scene.bodies[own].name.value);
-            return Err(Error::scene(&scene.bodies[own].name.place, message).label(label).help(help));
+            let own = &scene.bodies[table].name;
+            let message = format!("`{name}`, which `{}` matches, cannot be the name of a body", own.value);
+            return Err(Error::scene(&own.place, message).label(label).help(help));
         }
-        members[own].push(name);
+        members[table].push(name);
     }
-    match unmatched.first().map(|&table| &scene.bodies[table].name) {
-        None => Ok(members),
-        Some(name) => {
-            let message = format!("no group of cells matches `{}`", name.value);
-            let error = Error::scene(&name.place, message).because(format!("mesh {}", mesh.path.display()));
-            Err(error.help(format!("its groups of cells: {}", few(mesh.group_names(D)).join(", "))))
+    for (table, members) in members.iter_mut().enumerate().filter(|(_, members)| members.is_empty()) {
+        let name = &scene.bodies[table].name;
+        let mut matching = mesh.group_names(D).filter(|group| patterns[table].matches(group));
+        if let Some(taken) = matching.next() {
+            let message = format!("all bodies of `{}`, such as `{taken}`, belong to later tables", name.value);
+            return Err(Error::scene(&name.place, message)
+                .help("the last table that matches a body counts: let the table of few bodies follow that of many"));
         }
+        if is_for_many(&scene.bodies[table]) {
+            let error = Error::scene(&name.place, format!("no group of cells matches `{}`", name.value));
+            return Err(error
+                .because(format!("mesh {}", mesh.path.display()))
+                .help(format!("its groups of cells: {}", few(mesh.group_names(D)).join(", "))));
+        }
+        // a group that the mesh lacks is refused with the space of its body
+        members.push(&name.value);
     }
-}
-
-/// Return the error of two patterns that match a body, or a pair of bodies, equally well.
-pub fn tie(what: &str, [first, second]: [&str; 2], place: &Place) -> Error {
-    Error::scene(place, format!("`{first}` and `{second}` match `{what}` equally well"))
-        .label("this one and an earlier one")
-        .help("the name itself wins, then the pattern with more characters of its own: give one of them more")
+    Ok(members)
 }
 
 /// Indices of the groups that lie on each body, for the bodies of each table in turn. The list is empty if no table or line

@@ -1,7 +1,6 @@
 //! Evaluation of the displacements of a body: fields for output, forces and their balance, unbalanced forces and the energy in
 //! them, errors against a known solution. Each rank evaluates its part.
 
-use super::approach::Outer;
 use super::patterns::point;
 use super::supports::Constraints;
 use crate::contact::add;
@@ -51,9 +50,8 @@ pub trait Post {
     /// Return the contribution of owned nodes to B v, one entry per contact row, for a field v with one entry per dof.
     fn trace(&self, field: &[f64]) -> Vec<f64>;
 
-    /// Return the contribution of the owned nodes to the mean displacement (x, y, z) of the outer part of the body. The outer
-    /// part is where the body is loaded along `direction`, else where it is constrained along it, else the whole body.
-    fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
+    /// Return the contribution of owned nodes to the displacement of the body towards each of its contact surfaces.
+    fn approach(&self, v: &[f64]) -> Vec<f64>;
 
     /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are
     /// the L2 norm, the H1 seminorm and the energy norm ([`displacement::norms_of_error`]) on the cells that this rank writes. The result is
@@ -70,8 +68,6 @@ pub struct OnPart<const D: usize> {
     pub name: String,
     /// Known displacements, if the scene has them.
     pub exact: Option<Vec<Expression>>,
-    /// Where the body is loaded or constrained.
-    pub outer: Outer,
     /// Cells and nodes.
     pub space: Rc<Space<D>>,
     /// The same, cut apart where the material jumps.
@@ -91,6 +87,8 @@ pub struct OnPart<const D: usize> {
     pub rigid: Vec<(u32, [f64; D])>,
     /// Contact rows with displacements of nodes as columns.
     pub rows: Csr,
+    /// The displacement towards each contact surface, with displacements of nodes as columns.
+    pub approach: Csr,
     /// Extent of the whole body.
     pub extent: PointExtent,
     /// Number of nodes of the whole body.
@@ -146,6 +144,13 @@ impl<const D: usize> OnPart<D> {
         let force = |row: usize| stiffness.row(row).map(|(j, k)| k * u[dof(j)]).sum::<f64>() - known[dof(row)];
         let at = |place: usize| (nodes[place], std::array::from_fn(|c| force(D * place + c)));
         (0..nodes.len()).filter(|&place| held[nodes[place] as usize]).map(at).collect()
+    }
+
+    /// Return the contribution of owned nodes to the products of rows, whose columns are displacements of nodes, with a field.
+    fn products_with(&self, rows: &Csr, field: &[f64]) -> Vec<f64> {
+        let nodal = self.nodal(field);
+        let own = |row: usize| rows.row(row).filter(|(dof, _)| self.own[dof / D]);
+        (0..rows.rows()).map(|row| own(row).map(|(dof, b)| b * nodal[dof]).sum()).collect()
     }
 
     fn own_dofs(&self) -> impl Iterator<Item = usize> {
@@ -342,13 +347,11 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn trace(&self, field: &[f64]) -> Vec<f64> {
-        let nodal = self.held.frame.displacements(field);
-        let own = |row: usize| self.rows.row(row).filter(|(dof, _)| self.own[dof / D]);
-        (0..self.rows.rows()).map(|row| own(row).map(|(dof, b)| b * nodal[dof]).sum()).collect()
+        self.products_with(&self.rows, field)
     }
 
-    fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
-        self.outer.mean::<D>(&self.nodal(v), &self.own, direction)
+    fn approach(&self, v: &[f64]) -> Vec<f64> {
+        self.products_with(&self.approach, v)
     }
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {

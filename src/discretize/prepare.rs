@@ -100,9 +100,6 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         let body = &mut bodies[index];
         (body.owner, body.ranks) = (owner, ranks);
         body.on_dofs = place_of(&partitions, index).map(|_| body.on_dofs());
-        if keep {
-            body.unloaded = body.part.unloaded(mesh)?;
-        }
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();

@@ -5,9 +5,7 @@ use super::patterns::{FieldValues, earlier, find_group, not_on_body, of_body, po
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
-use crate::fem::{
-    Facets, Frame, Levers, NodalBlock, NodalForces, Space, Subdivision, cross, length, minus, place, surface,
-};
+use crate::fem::{Facets, Frame, Levers, NodalBlock, NodalForces, Space, cross, length, minus, place, surface};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
 use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec};
@@ -159,7 +157,7 @@ impl<const D: usize> Constraints<D> {
         if surface::measure(space, facets) == 0.0 {
             return Err(without_area(&load.on, spec));
         }
-        let centre = centre(space, facets, Subdivision::Whole);
+        let centre = centre(space, facets);
         let levers = Levers::new(nodes, |node| space.nodes[node as usize], std::array::from_fn(|c| centre[c]));
         for component in 0..if D == 2 { 1 } else { D } {
             self.prescribed.remove(&(D * levers.pole as usize + component));
@@ -385,9 +383,8 @@ pub fn spring_blocks<const D: usize>(
 }
 
 /// Return the centre of a surface: the mean place over its area.
-pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Subdivision) -> [f64; 3] {
-    let sum =
-        |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
+pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> [f64; 3] {
+    let sum = |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, &|x, _| density(x)).sum();
     let area = sum(&|_| axis_vector(0))[0];
     sum(&|x| x).map(|sum| sum / area)
 }
@@ -398,14 +395,9 @@ pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Subdi
 /// The traction is theta x r with r = x - c, where c is the centre of the surface: stresses of a beam in bending. Its moment is
 /// J theta with J = int |r|^2 I - r r^T over the surface. All integrals are those of the quadrature of loads, so that the nodal forces
 /// have the moment to rounding on curved facets, too.
-pub fn moment_load<const D: usize>(
-    space: &Space<D>,
-    facets: &Facets<D>,
-    parts: Subdivision,
-    moment: [f64; 3],
-) -> NodalForces<D> {
-    let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| traction(x));
-    let centre = centre(space, facets, parts);
+pub fn moment_load<const D: usize>(space: &Space<D>, facets: &Facets<D>, moment: [f64; 3]) -> NodalForces<D> {
+    let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, &|x, _| traction(x));
+    let centre = centre(space, facets);
     let from_centre = |x: [f64; D]| {
         let x = pad(x);
         std::array::from_fn(|c| x[c] - centre[c])

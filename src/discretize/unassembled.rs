@@ -1,6 +1,7 @@
 //! A body before its matrix is assembled, on the first rank: its contact rows, its loads, the rigid motions that supports leave, and that by
 //! which they move it.
 
+use super::approach;
 use super::part::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -28,6 +29,8 @@ pub struct Unassembled<'a, const D: usize> {
     pub rows: Csr,
     /// The same rows with displacements of nodes as columns.
     pub nodal_rows: Csr,
+    /// The displacement towards each contact surface, with displacements of nodes as columns ([`approach::rows`]).
+    pub approach: Csr,
     /// Rigid motions of the free body.
     pub free: Vec<RigidMotion<D>>,
     /// Nodal forces of the loads, without those on rigid surfaces.
@@ -44,8 +47,6 @@ pub struct Unassembled<'a, const D: usize> {
     pub owner: usize,
     /// Ranks that own nodes of the body.
     pub ranks: Vec<usize>,
-    /// Nodal forces that the quadrature of the loads misses, if an estimate of the error needs them.
-    pub unloaded: Vec<f64>,
     /// The unconstrained motions on all dofs, if the dofs are distributed.
     pub on_dofs: Option<OnDofs>,
 }
@@ -117,6 +118,7 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         let mut body = Self {
             rows: all(|pair| &pair.rows),
             nodal_rows: all(|pair| &pair.nodal),
+            approach: approach::rows(&part, &segments, pairs, mesh)?,
             free: part.free(),
             load: part.load_on_dofs(&nodal_load),
             nodal_load,
@@ -127,7 +129,6 @@ impl<'a, const D: usize> Unassembled<'a, D> {
             graph: OnceCell::new(),
             owner: 0,
             ranks: Vec::new(),
-            unloaded: Vec::new(),
             on_dofs: None,
         };
         body.find_motions();

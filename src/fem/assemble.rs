@@ -4,7 +4,7 @@
 //! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
 use super::elasticity::{Elasticity, Flaw, Material};
-use super::element::{self, Rule, Subdivision};
+use super::element::{self, Rule};
 use super::frame::{Frame, Movers, Rotation, place};
 use super::space::{CellPoint, Space};
 use super::{length, pad};
@@ -404,18 +404,11 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
 }
 
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
-pub fn body_force<const D: usize>(
-    space: &Space<D>,
-    parts: Subdivision,
-    density: &dyn Fn([f64; D]) -> [f64; D],
-) -> NodalForces<D> {
+pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D]) -> NodalForces<D> {
     let (space, nodes) = space.part(0..space.cell_count());
     let mut load = vec![0.0; space.dofs()];
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let mut rule = element::rule(D + 1, if low { 2 } else { 5 });
-    if parts == Subdivision::Halves {
-        rule = rule.on_parts();
-    }
+    let rule = element::rule(D + 1, if low { 2 } else { 5 });
     for index in 0..space.cell_count() {
         for point in space.points(index, &rule).flatten() {
             let force = density(point.at);
