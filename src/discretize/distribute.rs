@@ -90,8 +90,8 @@ impl Partition {
         let of_body = |&body: &usize| all.by_ref().take(nodes_of(body).len()).collect();
         let mut owner: Vec<Vec<u32>> = set.iter().map(of_body).collect();
         for (owner, &body) in owner.iter_mut().zip(&set) {
-            for (&master, levers) in &bodies[body].part.held.frame.levers {
-                owner[levers.pole as usize] = owner[master as usize];
+            for [pole, master] in bodies[body].part.held.frame.poles() {
+                owner[pole as usize] = owner[master as usize];
             }
         }
         let coarse_nodes =

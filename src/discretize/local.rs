@@ -234,7 +234,7 @@ impl<const D: usize> Unassembled<'_, D> {
             ranks: self.ranks.clone(),
             supports: spec.fix.iter().map(|support| support.on.value.clone()).collect(),
             springs: spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
-            rigid: part.held.rigid.iter().map(|(load, _)| spec.load[*load].on.value.clone()).collect(),
+            rigid: part.held.rigid.iter().map(|surface| spec.load[surface.load].on.value.clone()).collect(),
             post: None,
         }
     }

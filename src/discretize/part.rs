@@ -211,19 +211,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 
     /// Return the forces on rigid surfaces, at few nodes of each.
     pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
-        self.held.rigid.iter().flat_map(|(index, nodes)| {
-            let Load { kind, factor, .. } = &self.spec.load[*index];
-            let in_space = |force: &[f64; 3]| std::array::from_fn(|c| factor * force[c]);
-            let master = nodes.first().copied();
-            match (master, kind) {
-                (Some(master), LoadKind::Force { total, .. }) => vec![(master, in_space(total))],
-                (Some(master), LoadKind::Turning { force, moment }) => {
-                    let moment = moment.map(|component| factor * component);
-                    self.held.frame.levers[&master].forces(master, in_space(force), moment)
-                }
-                _ => Vec::new(),
-            }
-        })
+        self.held.rigid.iter().flat_map(|surface| surface.forces.iter().copied())
     }
 
     /// Return the nodal forces of [`SceneBody::load`] and those on rigid surfaces as forces at dofs.
@@ -297,7 +285,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         }
         let frame = &self.held.frame;
         self.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
-        frame.turn_matrix(&mut stiffness);
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
         Ok(support(stiffness, load, prescribed, imposed))

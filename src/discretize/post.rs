@@ -225,7 +225,7 @@ impl<const D: usize> Post for OnPart<D> {
         let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
         for (node, reaction) in self.reactions(&u, &known) {
             sum.grow(node, reaction);
-            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
+            match self.held.rigid.iter().position(|surface| surface.nodes.binary_search(&node).is_ok()) {
                 Some(surface) => rigid[surface].add(space, node, reaction),
                 None => {
                     for (support, part) in self.held.split(node, reaction) {
@@ -291,7 +291,7 @@ impl<const D: usize> Post for OnPart<D> {
         let mut sums = Vec::new();
         let force = self.held.frame.displacements(&unbalanced.force);
         let nodes = (0..unbalanced.bulk.len()).filter(|&node| self.own[node]);
-        let nodes: Vec<usize> = nodes.filter(|node| !self.held.frame.master.contains_key(&(*node as u32))).collect();
+        let nodes: Vec<usize> = nodes.filter(|node| self.held.frame.node(*node as u32) == *node as u32).collect();
         for grid in grids::<D>(&self.extent, self.nodes) {
             let begin = sums.len();
             sums.resize(begin + (D + 2) * grid.len(), 0.0);
