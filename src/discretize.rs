@@ -93,7 +93,7 @@ where
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, imposed, mut pairs, contacts, mechanisms, fine, plan } = shared;
     let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
@@ -102,14 +102,13 @@ where
             pair.law = law::make(&contact.spec.layer, &scene.laws, &pair.position)?;
         }
     }
-    let imposed: Vec<Vec<f64>> = shared.iter().map(|body| body.imposed.clone()).collect();
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
     let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
-    let (mut slots, mut infos) = (Vec::new(), Vec::new());
-    for ((spec, shared), local) in bodies.iter().zip(shared).zip(locals) {
-        let (slot, info) = assembler.make(spec, shared, local)?;
-        slots.push(slot);
-        infos.push(info);
+    let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
+    for (body, local) in locals.into_iter().enumerate() {
+        if let Some(local) = local {
+            assembler.make(&bodies[body], local, &mut slots[body], &mut infos[body])?;
+        }
     }
     let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);

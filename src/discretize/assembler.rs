@@ -1,12 +1,11 @@
 //! The step from what one rank has of a body to its matrix and its solver, which a factory makes.
 
 use super::distribute::Share;
-use super::local::{BodyInfo, LocalBody, SharedBody};
+use super::local::{BodyInfo, LocalBody};
 use super::meshes::FemBody;
 use super::part::{SceneBody, elasticity_of};
 use super::post::{OnPart, Post};
 use super::supports::Constraints;
-use super::unassembled::{Supported, Unconstrained};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::{self, AtDofs};
@@ -35,65 +34,50 @@ pub struct Assembler<'a, const D: usize, F> {
     pub shapes: Vec<FemBody<D>>,
 }
 
-/// What only the ranks with a part of a body have of it, until [`Discrete::share`](super::Discrete::share).
-#[derive(Default)]
-struct Made {
-    local: Local,
-    imposed: Vec<f64>,
-    scale: f64,
-    row_stiffness: Vec<f64>,
-}
-
 impl<const D: usize, F: Factory> Assembler<'_, D, F> {
-    /// Assemble a body and give it a solver, from what all ranks have of it and what this rank has, if anything. The facts for reports
-    /// receive the evaluation of displacements.
+    /// Assemble a body and give it a solver, from what this rank has of it. `slot` receives the body, and `info` the evaluation of its
+    /// displacements. On ranks other than the owner the scale stays zero until [`Discrete::share`](super::Discrete::share).
     ///
     /// # Errors
     /// The scene contradicts its mesh in a way that shows when K is assembled, or the factory fails.
     pub fn make(
         &mut self,
         spec: &BodySpec,
-        shared: SharedBody<D>,
-        local: Option<LocalBody<D>>,
-    ) -> Result<(BodySlot, BodyInfo)> {
-        let SharedBody { mut info, segments, unconstrained, modulus, depth, .. } = shared;
-        let Unconstrained { left, motions, sprung, unsupported, .. } = unconstrained;
-        let mut made = Made::default();
-        if let Some(local) = local {
-            let elasticity = Rc::new(elasticity_of(spec, local.regions, D, self.plane)?);
-            let LocalBody { space, held, springs, facts, share, load, .. } = local;
-            let part = SceneBody { spec, space, held, springs, elasticity: elasticity.clone(), facts };
-            let (space, held) = match local.is_owned {
-                false => (Rc::new(part.space), Rc::new(part.held)),
-                true => {
-                    let is_own =
-                        |node| share.as_ref().is_none_or(|s| s.is_own::<D>(part.held.frame.node(node) as usize));
-                    let own = (0..part.space.nodes.len() as u32).map(is_own).collect();
-                    let (loads, free) = loads(&part, &load, local.supported, left, local.works);
-                    let kept = self.factory.kept(&info.name).filter(|_| share.is_none());
-                    made = match reload(kept, &loads)? {
-                        Some(before) => {
-                            self.avoided += 1;
-                            before
-                        }
-                        None => {
-                            self.assemblies += usize::from(info.rank == self.rank);
-                            self.assemble(&part, local.rows, local.graph, share, free, loads)?
-                        }
-                    };
-                    if info.rank != self.rank {
-                        made.scale = 0.0;
+        local: LocalBody<D>,
+        slot: &mut BodySlot,
+        info: &mut BodyInfo,
+    ) -> Result<()> {
+        let elasticity = Rc::new(elasticity_of(spec, local.regions, D, self.plane)?);
+        let LocalBody { space, held, springs, points, extent, share, load, .. } = local;
+        let part = SceneBody { spec, space, held, springs, elasticity: elasticity.clone(), points, extent };
+        let (space, held) = match local.is_owned {
+            false => (Rc::new(part.space), Rc::new(part.held)),
+            true => {
+                let is_own = |node| share.as_ref().is_none_or(|s| s.is_own::<D>(part.held.frame.node(node) as usize));
+                let own = (0..part.space.nodes.len() as u32).map(is_own).collect();
+                let (loads, free) = loads(&part, &load, local.imposed, local.prescribed, local.left, local.works);
+                slot.imposed = loads.imposed.clone();
+                let kept = self.factory.kept(&info.name).filter(|_| share.is_none());
+                match reload(kept, &loads)? {
+                    Some(before) => {
+                        self.avoided += 1;
+                        (slot.local, slot.scale, slot.row_stiffness) =
+                            (before.local, before.scale, before.row_stiffness);
                     }
-                    evaluate(&mut info, part, [local.nodal_rows, local.approach], &load, own)?
+                    None => {
+                        self.assemblies += usize::from(info.rank == self.rank);
+                        self.assemble(&part, local.rows, local.graph, share, free, loads, slot)?;
+                    }
                 }
-            };
-            let motions = unsupported;
-            self.shapes.push(FemBody { space, split: OnceCell::new(), held, elasticity, motions });
-        }
-        let Made { local, imposed, scale, row_stiffness } = made;
-        let name = info.name.clone();
-        let slot = BodySlot { name, local, imposed, segments, motions, sprung, scale, modulus, depth, row_stiffness };
-        Ok((slot, info))
+                if info.rank != self.rank {
+                    slot.scale = 0.0;
+                }
+                evaluate(info, part, [local.nodal_rows, local.approach], &load, own)?
+            }
+        };
+        let motions = local.unsupported;
+        self.shapes.push(FemBody { space, split: OnceCell::new(), held, elasticity, motions });
+        Ok(())
     }
 
     /// Assemble the matrix of a body on its rows, or on those of this rank, and make its solver.
@@ -105,7 +89,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         share: Option<Share>,
         left: Vec<FreeMotion>,
         loads: Loads,
-    ) -> Result<Made> {
+        slot: &mut BodySlot,
+    ) -> Result<()> {
         let name = &part.spec.name.value;
         let mut graph = graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
         if let Some(share) = &share {
@@ -114,8 +99,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let Loads { force, prescribed, imposed, .. } = loads;
         let mut body = part.assemble(self.mesh, &graph, force, prescribed, &imposed)?;
         drop(graph);
-        let scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-        let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+        slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+        slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
         if let Some(share) = &share {
             body = share.own::<D>(body);
         }
@@ -125,8 +110,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         });
         // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
         // displacements and rotations of its section as a plane body.
-        let smooth = || rigid::modes(&part.facts.extent).iter().map(|motion| part.dofs_of(motion)).collect();
-        let local = self.factory.make(Assembled {
+        let smooth = || rigid::modes(&part.extent).iter().map(|motion| part.dofs_of(motion)).collect();
+        slot.local = self.factory.make(Assembled {
             name: name.clone(),
             dimension: D,
             body,
@@ -136,7 +121,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             left,
             interpolation,
         })?;
-        Ok(Made { local, imposed, scale, row_stiffness })
+        Ok(())
     }
 }
 
@@ -145,7 +130,8 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 fn loads<const D: usize>(
     part: &SceneBody<D>,
     load: &NodalForces<D>,
-    Supported { imposed, prescribed }: Supported<D>,
+    imposed: Option<RigidMotion<D>>,
+    prescribed: Vec<(usize, f64)>,
     left: Vec<RigidMotion<D>>,
     works: Option<Vec<f64>>,
 ) -> (Loads, Vec<FreeMotion>) {
@@ -181,7 +167,7 @@ fn evaluate<const D: usize>(
         supports: part.spec.fix.len(),
         load: load.all(space.nodes.len()),
         rigid,
-        extent: part.facts.extent,
+        extent: part.extent,
         nodes: info.nodes,
         held: held.clone(),
         split: Split::new(&space, &part.elasticity),
@@ -191,20 +177,19 @@ fn evaluate<const D: usize>(
     };
     post.check_exact()?;
     let shown = post.split.space.part(post.owned()).1;
-    info.points = shown.into_iter().map(|node| part.facts.points[post.split.origin(node) as usize]).collect();
+    info.points = shown.into_iter().map(|node| part.points[post.split.origin(node) as usize]).collect();
     info.post = Some(Box::new(post) as Box<dyn Post>);
     Ok((space, held))
 }
 
 /// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
-fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
-    let Some(BodySlot { mut local, scale, row_stiffness, .. }) = kept else { return Ok(None) };
-    let serves = match local.as_mut() {
+fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<BodySlot>> {
+    let Some(mut slot) = kept else { return Ok(None) };
+    let serves = match slot.local.as_mut() {
         Some(body) => body.reload(loads)?,
         None => false,
     };
-    let made = Made { local, imposed: loads.imposed.clone(), scale, row_stiffness };
-    Ok(serves.then_some(made))
+    Ok(serves.then_some(slot))
 }
 
 /// What the first rank has of a body before it is assembled.

@@ -25,6 +25,10 @@ pub struct Partition {
     nodes: Numbers,
     /// Numbers of the nodes of each body from which displacements are interpolated, if an interpolation is requested.
     coarse: Numbers,
+    /// Products over all dofs, without the prescribed ones, of the rigid motions that supports and springs leave each body.
+    products: Vec<DMatrix<f64>>,
+    /// Work of all loads on each of these motions.
+    pub works: Vec<Vec<f64>>,
 }
 
 /// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body in the
@@ -99,7 +103,11 @@ impl Partition {
         let coarse: Vec<Vec<u32>> = set.iter().map(coarse_nodes).collect();
         let nodes = Numbers::new(&owner, ranks, |_, _| true);
         let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
-        Self { bodies: set, ranks, owner, nodes, coarse }
+        let load = |body: &Unassembled<D>| body.part.load_vector(&body.nodal_load);
+        let on_dofs = set.iter().map(|&body| &bodies[body]);
+        let (products, works) =
+            on_dofs.map(|body| body.part.products(&body.left, &body.prescribed, &load(body))).unzip();
+        Self { bodies: set, ranks, owner, nodes, coarse, products, works }
     }
 
     /// Return the rank that owns a node. `number` is the index of the body among those of the matrix.
@@ -150,14 +158,7 @@ impl Partition {
     }
 
     /// Return the distribution of the dofs of a body for a rank that has these `nodes`. `rows` are the contact rows of the body.
-    pub fn share<const D: usize>(
-        &self,
-        number: usize,
-        nodes: Vec<u32>,
-        rows: &Csr,
-        products: DMatrix<f64>,
-        rank: usize,
-    ) -> Share {
+    pub fn share<const D: usize>(&self, number: usize, nodes: Vec<u32>, rows: &Csr, rank: usize) -> Share {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
@@ -183,7 +184,7 @@ impl Partition {
             own,
             places,
             near: others,
-            products,
+            products: self.products[number].clone(),
             total,
             rows: rows.of_columns(total, column),
             leads: self.leader(number) == rank,
@@ -193,12 +194,10 @@ impl Partition {
         let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
         Share {
             distribution,
-            coarse: CoarseNodes {
-                nodes: of_coarse,
-                number: coarse,
-                all: self.coarse.sum(0..self.ranks),
-                own: self.coarse.counts[rank][number],
-            },
+            coarse_nodes: of_coarse,
+            coarse_number: coarse,
+            coarse_count: self.coarse.sum(0..self.ranks),
+            own_coarse: self.coarse.counts[rank][number],
             number: nodes.iter().map(|&node| numbers[node as usize]).collect(),
             nodes,
         }
@@ -214,35 +213,27 @@ pub struct Share {
     pub nodes: Vec<u32>,
     /// Number of each of these nodes in the matrix with the rows of the body.
     number: Vec<u32>,
-    /// Coarse nodes; empty if no interpolation is requested.
-    coarse: CoarseNodes,
-}
-
-/// The coarse nodes of a body on one rank.
-#[derive(Serialize, Deserialize)]
-struct CoarseNodes {
-    /// Local indices of the coarse nodes among the nodes of this rank.
-    nodes: Vec<u32>,
+    /// Local indices of the coarse nodes among the nodes of this rank; empty if no interpolation is requested.
+    coarse_nodes: Vec<u32>,
     /// Numbers of these nodes among the coarse nodes of the bodies in one matrix.
-    number: Vec<u32>,
+    coarse_number: Vec<u32>,
     /// Number of coarse nodes of these bodies on all ranks.
-    all: usize,
+    coarse_count: usize,
     /// Number of coarse nodes of this body that this rank owns.
-    own: usize,
+    own_coarse: usize,
 }
 
 impl Share {
     /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
     /// bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
-        let CoarseNodes { nodes, number, all, own } = &self.coarse;
-        let whole = whole(nodes);
-        let mut rows = Csr::new(D * all);
+        let whole = whole(&self.coarse_nodes);
+        let mut rows = Csr::new(D * self.coarse_count);
         for &dof in &self.distribution.places {
-            let number = |j: usize| D * number[j / D] as usize + j % D;
+            let number = |j: usize| D * self.coarse_number[j / D] as usize + j % D;
             rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
         }
-        Prolongation { rows, own: D * own }
+        Prolongation { rows, own: D * self.own_coarse }
     }
 
     /// Return whether this rank owns a node, given by its local index.

@@ -57,11 +57,11 @@ struct MechanismSearch<'p, 's, const D: usize> {
 impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions that supports and springs leave to a body at present.
     fn left(&self, body: usize) -> &[RigidMotion<D>] {
-        &self.bodies[body].unconstrained.left
+        &self.bodies[body].left
     }
 
     fn extent(&self, body: usize) -> &PointExtent {
-        &self.bodies[body].part.facts.extent
+        &self.bodies[body].part.extent
     }
 
     /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies.
@@ -129,7 +129,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             pair.weight.iter().map(|weight| weight / all).collect::<Vec<_>>()
         };
         let weight: Vec<f64> = self.pairs.iter().flat_map(share).collect();
-        let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.unconstrained.motions[..]));
+        let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..]));
         Motions::new(motions, &points).springs(&weight).kernel(TOLERANCE.max(self.tilt * self.tilt))
     }
 

@@ -17,7 +17,6 @@ use crate::problem::body::{Load, LoadKind};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 use crate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
 /// Poisson's ratio above which linear elements lock.
@@ -36,8 +35,10 @@ pub struct SceneBody<'a, const D: usize> {
     pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Elasticity of the cells.
     pub elasticity: Rc<Elasticity>,
-    /// Facts of the whole body.
-    pub facts: BodyFacts,
+    /// Point of the mesh of each node.
+    pub points: Vec<u32>,
+    /// Number of nodes of the whole body and their extent.
+    pub extent: PointExtent,
 }
 
 impl<'a, const D: usize> SceneBody<'a, D> {
@@ -48,7 +49,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 
     /// Return the rigid motions of the free body.
     pub fn free(&self) -> Vec<RigidMotion<D>> {
-        rigid::of(&self.facts.extent, self.space.axisymmetric)
+        rigid::of(&self.extent, self.space.axisymmetric)
     }
 
     /// Return the displacements of the dofs of a node in a rigid motion.
@@ -97,6 +98,23 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// Return the displacement of a node in a rigid motion.
     fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
         motion.at(&self.space.nodes[node as usize])
+    }
+
+    /// Return the area (volume) of the body, in a body of revolution the volume of the rings, and the means of the moduli along x, y, z
+    /// ([`Elasticity::moduli`]). A cell whose constants make no material at its middle contributes zero; assembly refuses it.
+    pub fn volume_and_moduli(&self) -> (f64, [f64; 3]) {
+        let Self { space, elasticity, .. } = self;
+        let cells = || 0..space.cell_count();
+        let volume = cells().map(|cell| space.share(cell)).collect::<Total>().value();
+        if self.spec.regions.is_empty() && elasticity.is_constant() {
+            return (volume, elasticity.moduli(0, [0.0; 3]).unwrap_or_default());
+        }
+        let mut sum = [0.0; 3];
+        for cell in cells() {
+            let moduli = elasticity.moduli(cell, space.in_scene(space.centroid(cell))).unwrap_or_default();
+            crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
+        }
+        (volume, sum.map(|sum| sum / volume))
     }
 
     /// Return the prescribed (dof, value), sorted by dof.
@@ -317,28 +335,6 @@ fn too_large(spec: &BodySpec) -> Error {
         .label("their forces are beyond the range of numbers")
 }
 
-/// Facts of a whole body, and the points of the mesh that its nodes come from.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct BodyFacts {
-    /// Point of the mesh of each node.
-    pub points: Vec<u32>,
-    /// Number of nodes of the body and their extent.
-    pub extent: PointExtent,
-    /// Number of cells.
-    pub cells: usize,
-    /// Area (volume) of the body; in a body of revolution the volume of the rings.
-    pub volume: f64,
-    /// Means over the body of the moduli along x, y, z ([`Elasticity::moduli`]).
-    pub moduli: [f64; 3],
-}
-
-impl BodyFacts {
-    /// Restrict the facts to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
-    pub fn on(&self, nodes: &[u32]) -> Self {
-        Self { points: nodes.iter().map(|&node| self.points[node as usize]).collect(), ..*self }
-    }
-}
-
 /// Return the bodies with their spaces, elasticity, supports and springs.
 ///
 /// # Errors
@@ -355,11 +351,11 @@ pub fn parts<'a, const D: usize>(
         let checked = &checked[index];
         refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
-        let facts = facts(spec, &space, &elasticity, checked.points.clone());
+        let (points, extent) = (checked.points.clone(), PointExtent::of(space.nodes.iter().copied()));
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        parts.push(SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts });
+        parts.push(SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), points, extent });
     }
     Ok(parts)
 }
@@ -396,18 +392,6 @@ fn refuse_parts<const D: usize>(
     let message = format!("body `{name}` is in {} parts that share no facet, one of them at {at}", parts.count);
     Err(Error::mesh(&mesh.path, None, message)
         .help("make a body of each part (`split = true` in its table), or let them share facets (in the script: `Coherence;`)"))
-}
-
-/// Return the facts of a body whose nodes are these `points` of the mesh.
-fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> BodyFacts {
-    let cells = space.cell_count();
-    let volume = (0..cells).map(|cell| space.share(cell)).collect::<Total>().value();
-    let moduli = match spec.regions.is_empty() && elasticity.is_constant() {
-        true => elasticity.moduli(0, [0.0; 3]).unwrap_or_default(),
-        false => moduli(space, elasticity, 0..cells).map(|sum| sum / volume),
-    };
-    let extent = PointExtent::of(space.nodes.iter().copied());
-    BodyFacts { points, extent, cells, volume, moduli }
 }
 
 /// Return the elasticity of the cells of a body.
@@ -482,15 +466,4 @@ fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> 
             .label("strains of the meridian cause shear stresses along the circles")
             .help("in axisymmetric scenes one axis of the material runs along the circles: turn axes 1 and 2 alone"),
     }
-}
-
-/// Return the moduli against pressure along x, y, z, integrated over some cells. A cell whose constants make no material at its
-/// middle contributes zero; assembly refuses it.
-fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity, cells: impl Iterator<Item = usize>) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for cell in cells {
-        let moduli = elasticity.moduli(cell, space.in_scene(space.centroid(cell))).unwrap_or_default();
-        crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
-    }
-    sum
 }

@@ -4,7 +4,7 @@
 
 use super::assembler::{Factory, Outline};
 use super::distribute::Partition;
-use super::local::{LocalBody, SharedBody};
+use super::local::{BodyInfo, LocalBody};
 use super::mechanism;
 use super::pairs::{self, ContactFacts};
 use super::part::parts;
@@ -15,7 +15,7 @@ use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
-use crate::model::Mechanism;
+use crate::model::{BodySlot, Mechanism};
 use crate::problem::BodySpec;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -24,8 +24,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, P: Plain")]
 pub struct ReplicatedProblem<const D: usize, P> {
-    /// Bodies in the order of the scene.
-    pub bodies: Vec<SharedBody<D>>,
+    /// Bodies in the order of the scene: arrays of the model, and facts for reports.
+    pub bodies: Vec<(BodySlot, BodyInfo)>,
+    /// Trace of each body of the rigid motion that its supports impose.
+    pub imposed: Vec<Vec<f64>>,
     /// Arrays on which the method works.
     pub pairs: Vec<ContactPair>,
     /// Origin of each pair.
@@ -99,11 +101,11 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
         let body = &mut bodies[index];
         (body.owner, body.ranks) = (owner, ranks);
-        body.on_dofs = place_of(&partitions, index).map(|_| body.on_dofs());
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, fine, plan };
+    let imposed = bodies.iter().map(Unassembled::imposed_trace).collect();
+    let shared = ReplicatedProblem { bodies: shared, imposed, pairs, contacts, mechanisms, fine, plan };
     Ok((shared, Whole { bodies, partitions, keep }))
 }
 
@@ -117,13 +119,13 @@ fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) 
     let at: Vec<_> =
         bodies.iter().map(|body| move |k: usize, dof: usize| body.part.dof_of(&body.free[k], dof)).collect();
     let outline = |index: usize| {
-        let Unassembled { part, rows, supported, free, .. } = &bodies[index];
+        let Unassembled { part, rows, prescribed, free, .. } = &bodies[index];
         Outline {
             name: &part.spec.name.value,
             dimension: D,
             order: part.space.order,
             rows,
-            prescribed: &supported.prescribed,
+            prescribed,
             motions: AtDofs { count: free.len(), at: &at[index] },
             graph: &graphs[index],
         }

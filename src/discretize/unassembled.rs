@@ -5,13 +5,11 @@ use super::approach;
 use super::part::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::exchange::Plain;
 use crate::fem::{NodalForces, NodeGraph, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::collections::HashSet;
 
@@ -37,53 +35,24 @@ pub struct Unassembled<'a, const D: usize> {
     pub nodal_load: NodalForces<D>,
     /// Forces of all loads at dofs.
     pub load: NodalForces<D>,
-    /// Rigid motions that supports and springs leave at present.
-    pub unconstrained: Unconstrained<D>,
-    /// Displacements that the supports prescribe.
-    pub supported: Supported<D>,
+    /// Combinations of the motions of the free body that supports and springs leave at present.
+    pub left: Vec<RigidMotion<D>>,
+    /// The same motions as traces on the contact rows and works of the loads.
+    pub motions: Vec<Motion>,
+    /// Combinations of the motions of the free body that supports alone leave.
+    pub unsupported: Vec<RigidMotion<D>>,
+    /// The same with the stiffness of the springs, if springs resist some of them.
+    pub sprung: Option<Sprung>,
+    /// Rigid motion by which the supports move the body as one.
+    pub imposed: Option<RigidMotion<D>>,
+    /// Prescribed (dof, value) relative to this motion, sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
     /// Coupling of nodes by K, once it was requested.
     pub graph: OnceCell<NodeGraph>,
     /// Rank that owns the body or, if it is distributed, most of it.
     pub owner: usize,
     /// Ranks that own nodes of the body.
     pub ranks: Vec<usize>,
-    /// The unconstrained motions on all dofs, if the dofs are distributed.
-    pub on_dofs: Option<OnDofs>,
-}
-
-/// The rigid motions that supports and springs leave to a body.
-#[derive(Clone, Default, Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct Unconstrained<const D: usize> {
-    /// Combinations of the motions of the free body.
-    pub left: Vec<RigidMotion<D>>,
-    /// The same motions as traces on the contact rows and works of the loads.
-    pub motions: Vec<Motion>,
-    /// Motions that supports alone leave, if springs resist some of them.
-    pub sprung: Option<Sprung>,
-    /// Combinations of the motions of the free body that supports alone leave.
-    pub unsupported: Vec<RigidMotion<D>>,
-    /// Combinations of `left` that no contact row resists: name and weights.
-    pub unresisted: Vec<(String, DVector<f64>)>,
-}
-
-/// The displacements that supports prescribe.
-#[derive(Clone, Default, Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct Supported<const D: usize> {
-    /// Rigid motion by which the supports move the body as one.
-    pub imposed: Option<RigidMotion<D>>,
-    /// Prescribed (dof, value) relative to this motion, sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
-}
-
-/// The rigid motions that supports and springs leave a body, on all of its dofs.
-#[derive(Clone)]
-pub struct OnDofs {
-    /// Products of the motions over all dofs without the prescribed ones.
-    pub products: DMatrix<f64>,
-    /// Work of all loads on each motion.
-    pub works: Vec<f64>,
 }
 
 /// A dof that can be fixed against a motion.
@@ -124,12 +93,15 @@ impl<'a, const D: usize> Unassembled<'a, D> {
             nodal_load,
             part,
             segments,
-            unconstrained: Unconstrained::default(),
-            supported: Supported::default(),
+            left: Vec::new(),
+            motions: Vec::new(),
+            unsupported: Vec::new(),
+            sprung: None,
+            imposed: None,
+            prescribed: Vec::new(),
             graph: OnceCell::new(),
             owner: 0,
             ranks: Vec::new(),
-            on_dofs: None,
         };
         body.find_motions();
         Ok(body)
@@ -141,8 +113,18 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         self.graph.get_or_init(|| NodeGraph::with_rows(space, &self.rows, &held.frame))
     }
 
+    /// Return the names of the motions that neither supports nor springs nor any contact row of the body resist.
+    pub fn unresisted(&self) -> Vec<String> {
+        let motions = &self.motions;
+        let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
+        let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
+        let names = || motions.iter().map(|motion| motion.name.as_str());
+        let named = |weights: DVector<f64>| joint::combined(names(), weights.iter().copied());
+        Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
+    }
+
     /// Return the traces of motions on the contact rows, with the work of the loads on each.
-    pub fn motions(&self, all: &[RigidMotion<D>]) -> Vec<Motion> {
+    fn with_works(&self, all: &[RigidMotion<D>]) -> Vec<Motion> {
         let of = |(motion, work): (&RigidMotion<D>, f64)| Motion {
             name: motion.name.clone(),
             trace: self.trace(motion),
@@ -179,12 +161,10 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         let at = |k: usize, node: u32| self.free[k].at(&self.part.space.nodes[node as usize]);
         let left = self.part.left(self.free.len(), &at);
         let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
-        let motions = self.motions(&left);
-        let unresisted = unresisted(&motions);
         let sprung = self.part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
-        let unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
-        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(&all), stiffness });
-        self.unconstrained = Unconstrained { left, motions, sprung, unsupported, unresisted };
+        self.unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
+        self.sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.with_works(&all), stiffness });
+        (self.motions, self.left) = (self.with_works(&left), left);
     }
 
     /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the
@@ -207,27 +187,11 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         let prescribed = self.part.prescribed_sorted();
         let value = |k: usize, dof: usize| self.part.dof_of(&self.free[k], dof);
         let imposed = imposed_motion(self.free.len(), &value, &prescribed).filter(|_| self.part.springs.is_empty());
-        self.supported = match imposed {
-            None => Supported { imposed: None, prescribed },
-            Some((weights, rest)) => Supported { imposed: Some(rigid::sum(&self.free, &weights)), prescribed: rest },
+        (self.imposed, self.prescribed) = match imposed {
+            None => (None, prescribed),
+            Some((weights, rest)) => (Some(rigid::sum(&self.free, &weights)), rest),
         };
     }
-
-    /// Return the unconstrained motions on all dofs.
-    pub fn on_dofs(&self) -> OnDofs {
-        let load = self.part.load_vector(&self.nodal_load);
-        let (products, works) = self.part.products(&self.unconstrained.left, &self.supported.prescribed, &load);
-        OnDofs { products, works }
-    }
-}
-
-/// Return the combinations of motions that no contact row resists: name and weights.
-fn unresisted(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
-    let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
-    let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
-    let names = || motions.iter().map(|motion| motion.name.as_str());
-    let named = |weights: DVector<f64>| (joint::combined(names(), weights.iter().copied()), weights);
-    Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
 }
 
 /// Share of the largest prescribed displacement up to which supports agree with a rigid motion.
