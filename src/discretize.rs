@@ -24,7 +24,6 @@ pub use local::BodyInfo;
 pub use pairs::ContactInfo;
 pub use patterns::point;
 pub use post::{ForceBalance, Unbalanced};
-pub use surface::{Resolution, resolution};
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};

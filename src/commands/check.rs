@@ -3,7 +3,7 @@
 use super::{SceneArgs, clock_with_phases, load};
 use crate::contact::{ContactPair, Left};
 use crate::data::{Data, Detrend, Fill, Roughness, Trend};
-use crate::discretize::{BodyInfo, Resolution, resolution};
+use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::linalg::range;
@@ -334,30 +334,9 @@ fn changes(data: &Data) -> Vec<String> {
     gaps.into_iter().chain(trend).collect()
 }
 
-/// Return how well the mesh follows the gap of a pair; none for a gap without data.
-fn gap_resolution(built: &Built, pair: usize) -> Option<Resolution> {
-    let info = &built.discrete.contacts[pair];
-    let spacing = |data: &Arc<Data>| {
-        let axes = data.grid().map_or(&[][..], |grid| &grid.axes);
-        axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.spacing).fold(f64::INFINITY, f64::min)
-    };
-    let detail = info.spec.gap.data().map(spacing).reduce(f64::min)?;
-    Some(resolution(&info.surface, &info.spec.gap, detail))
-}
-
-/// Return the lines that describe what the mesh of a pair leaves out of a measured gap, and the pair's layer if that is made of asperities.
+/// Return the lines that describe the layer of a pair if that is made of asperities.
 fn pair_lines(built: &Built, pair: usize) -> Vec<String> {
     let mut lines = Vec::new();
-    lines.extend(gap_resolution(built, pair).map(|Resolution { height, variance, area, side }| {
-        format!(
-            "    the gap has an rms height of {}; facets with sides of {} leave out {:.1} % of its variance, and more than a tenth of \
-             the rms height on {:.1} % of the surface",
-            sci(height, 3),
-            sci(side, 3),
-            100.0 * variance,
-            100.0 * area
-        )
-    }));
     if let LayerSpec::Asperities(spec) = &built.discrete.contacts[pair].spec.layer {
         lines.push(format!("    layer of asperities: {}; law:", described(spec)));
         lines.push("      compression  pressure     tangent".to_owned());
@@ -422,16 +401,13 @@ fn data_to_json(built: &Built) -> Value {
     .collect()
 }
 
-/// Return the resolution of a pair's gap and the table of its law, for `--json`.
+/// Return the table of a pair's law, for `--json`.
 fn surface_to_json(built: &Built, pair: usize) -> Value {
-    let resolution = gap_resolution(built, pair).map(|Resolution { height, variance, area, side }| {
-        json!({ "rms_height": height, "variance_left_out": variance, "area_left_out": area, "side": side })
-    });
     let table = match &built.discrete.contacts[pair].spec.layer {
         LayerSpec::Asperities(spec) => Some(law(built, pair, spec, SHOWN)),
         _ => None,
     };
-    json!({ "gap_followed": resolution, "law": table })
+    json!({ "law": table })
 }
 
 /// Draw the data of contacts and their laws into a folder.
