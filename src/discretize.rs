@@ -3,6 +3,7 @@
 mod approach;
 mod assembler;
 mod auto;
+mod body;
 mod carrier;
 mod distribute;
 mod local;
@@ -35,7 +36,7 @@ use crate::problem::contact::Carrier;
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
 use assembler::Assembler;
-use local::LocalBody;
+use body::BodyMesh;
 use meshes::{Kept, Meshes};
 use prepare::{ReplicatedProblem, Whole, prepare};
 use std::rc::Rc;
@@ -118,7 +119,7 @@ where
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
-fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Vec<Option<LocalBody<D>>>>
+fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Vec<Option<BodyMesh<D>>>>
 where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
@@ -128,7 +129,7 @@ where
         prepared => prepared,
     };
     let part = |rank| prepared.as_ref().map_or_else(Vec::new, |whole| whole.on(rank));
-    let mut locals: Vec<Option<LocalBody<D>>> = scatter(&**exchange, part)?;
+    let mut locals: Vec<Option<BodyMesh<D>>> = scatter(&**exchange, part)?;
     for share in locals.iter_mut().flatten().filter_map(|local| local.share.as_mut()) {
         share.distribution.exchange = exchange.clone();
     }

@@ -44,7 +44,7 @@ pub fn rows<const D: usize>(
     pairs: &[ContactPair],
     mesh: &Mesh<D>,
 ) -> Result<Csr> {
-    let mut rows = Csr::new(body.space.dofs());
+    let mut rows = Csr::new(body.mesh.space.dofs());
     let holders = holders(body, mesh)?;
     let loads = body.spec.load.iter().map(|load| body.full_load(load, mesh)).collect::<Result<Vec<_>>>()?;
     for &Segment { pair, side } in segments {
@@ -56,7 +56,7 @@ pub fn rows<const D: usize>(
         let weights = mean(&holders, n, true)
             .or_else(|| working(&loads, n))
             .or_else(|| mean(&holders, n, false))
-            .unwrap_or_else(|| shapes(&assemble::body_force(&body.space, &|_| axis_vector(0))));
+            .unwrap_or_else(|| shapes(&assemble::body_force(&body.mesh.space, &|_| axis_vector(0))));
         let total: f64 = weights.iter().map(|entry| entry.1).sum();
         rows.push_row(weights.iter().flat_map(|&(node, weight)| {
             n.into_iter().enumerate().map(move |(c, n)| (D * node as usize + c, n * weight / total))
@@ -99,10 +99,10 @@ fn holders<const D: usize>(body: &SceneBody<D>, mesh: &Mesh<D>) -> Result<Vec<Ho
 }
 
 fn holder<const D: usize>(body: &SceneBody<D>, group: &Group, directions: Vec<([f64; D], bool)>) -> Holder<D> {
-    let facets = (group.dimension + 1 == D).then(|| body.space.facets(group));
-    let areas = facets.map(|facets| shapes(&surface::surface_load(&body.space, &facets, &|_, _| axis_vector(0))));
+    let facets = (group.dimension + 1 == D).then(|| body.mesh.space.facets(group));
+    let areas = facets.map(|facets| shapes(&surface::surface_load(&body.mesh.space, &facets, &|_, _| axis_vector(0))));
     let is_surface = areas.as_ref().is_some_and(|areas| !areas.is_empty());
-    let nodes = || body.space.nodes_on(group).into_iter().map(|node| (node, 1.0)).collect();
+    let nodes = || body.mesh.space.nodes_on(group).into_iter().map(|node| (node, 1.0)).collect();
     Holder { directions, weights: areas.filter(|_| is_surface).unwrap_or_else(nodes), is_surface }
 }
 
@@ -148,7 +148,7 @@ fn normal<const D: usize>(body: &SceneBody<D>, group: &Group) -> Option<[f64; D]
     if group.dimension + 1 != D {
         return None;
     }
-    let normals = body.space.facets(group).normals(&body.space);
+    let normals = body.mesh.space.facets(group).normals(&body.mesh.space);
     let sum = normals.into_iter().fold([0.0; D], |sum: [f64; D], n| std::array::from_fn(|c| sum[c] + n[c]));
     (length(sum) > 0.0).then(|| unit(sum))
 }

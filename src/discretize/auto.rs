@@ -49,7 +49,7 @@ pub fn find<'a, const D: usize>(
         return Ok(Vec::new());
     }
     let whole: Vec<Side<D>> =
-        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary(), 180.0)).collect();
+        parts.iter().map(|part| part.side(&part.spec.name.value, part.mesh.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
         all.push(meeting(rules, cut, &whole, &possible));

@@ -1,7 +1,7 @@
 //! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a number in that
 //! matrix. The coupling of the nodes determines the work and the memory of each.
 
-use super::part::SceneBody;
+use super::body::BodyMesh;
 use super::unassembled::Unassembled;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
@@ -25,10 +25,8 @@ pub struct Partition {
     nodes: Numbers,
     /// Numbers of the nodes of each body from which displacements are interpolated, if an interpolation is requested.
     coarse: Numbers,
-    /// Products over all dofs, without the prescribed ones, of the rigid motions that supports and springs leave each body.
+    /// [`BodyMesh::products`] of each body.
     products: Vec<DMatrix<f64>>,
-    /// Work of all loads on each of these motions.
-    pub works: Vec<Vec<f64>>,
 }
 
 /// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body in the
@@ -88,26 +86,23 @@ impl Partition {
         ranks: usize,
         wants_coarse: &dyn Fn(usize) -> bool,
     ) -> Self {
-        let nodes_of = |body: usize| &bodies[body].part.space.nodes;
+        let nodes_of = |body: usize| &bodies[body].part.mesh.space.nodes;
         let places: Vec<[f64; D]> = set.iter().flat_map(|&body| nodes_of(body).iter().copied()).collect();
         let mut all = bisect(&places, &couplings(bodies, &set, pairs), ranks).into_iter();
         let of_body = |&body: &usize| all.by_ref().take(nodes_of(body).len()).collect();
         let mut owner: Vec<Vec<u32>> = set.iter().map(of_body).collect();
         for (owner, &body) in owner.iter_mut().zip(&set) {
-            for [pole, master] in bodies[body].part.held.frame.poles() {
+            for [pole, master] in bodies[body].part.mesh.held.frame.poles() {
                 owner[pole as usize] = owner[master as usize];
             }
         }
         let coarse_nodes =
-            |&body: &usize| if wants_coarse(body) { bodies[body].part.coarse_nodes() } else { Vec::new() };
+            |&body: &usize| if wants_coarse(body) { bodies[body].part.mesh.coarse_nodes() } else { Vec::new() };
         let coarse: Vec<Vec<u32>> = set.iter().map(coarse_nodes).collect();
         let nodes = Numbers::new(&owner, ranks, |_, _| true);
         let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
-        let load = |body: &Unassembled<D>| body.part.load_vector(&body.nodal_load);
-        let on_dofs = set.iter().map(|&body| &bodies[body]);
-        let (products, works) =
-            on_dofs.map(|body| body.part.products(&body.left, &body.prescribed, &load(body))).unzip();
-        Self { bodies: set, ranks, owner, nodes, coarse, products, works }
+        let products = set.iter().map(|&body| bodies[body].part.mesh.products()).collect();
+        Self { bodies: set, ranks, owner, nodes, coarse, products }
     }
 
     /// Return the rank that owns a node. `number` is the index of the body among those of the matrix.
@@ -128,8 +123,8 @@ impl Partition {
     /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
     /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
     /// their master.
-    pub fn cells<const D: usize>(&self, number: usize, part: &SceneBody<D>, rank: usize) -> Vec<usize> {
-        let SceneBody { space, held, .. } = part;
+    pub fn cells<const D: usize>(&self, number: usize, body: &BodyMesh<D>, rank: usize) -> Vec<usize> {
+        let BodyMesh { space, held, .. } = body;
         let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
         let cells = || space.cells.chunks_exact(space.stride);
         let mut is_near = vec![false; space.nodes.len()];
@@ -142,14 +137,8 @@ impl Partition {
 
     /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its cells and of
     /// contact rows, and those that move tied nodes.
-    pub fn nodes<const D: usize>(
-        &self,
-        number: usize,
-        body: &Unassembled<D>,
-        cells: &[usize],
-        rank: usize,
-    ) -> Vec<u32> {
-        let SceneBody { space, held, .. } = &body.part;
+    pub fn nodes<const D: usize>(&self, number: usize, body: &BodyMesh<D>, cells: &[usize], rank: usize) -> Vec<u32> {
+        let BodyMesh { space, held, .. } = body;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
         let of_cells = space.corners(cells).into_iter();
         let of_rows = [&body.rows, &body.nodal_rows].into_iter().flat_map(|rows| &rows.col);
@@ -205,7 +194,7 @@ impl Partition {
 }
 
 /// What one rank has of the dofs of a distributed body.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Share {
     /// Dofs of this rank.
     pub distribution: Distribution,
@@ -278,7 +267,7 @@ fn couplings<const D: usize>(bodies: &[Unassembled<D>], set: &[usize], pairs: &[
     let (mut first, mut all) = (HashMap::new(), Vec::new());
     for &body in set {
         first.insert(body, all.len());
-        all.extend(bodies[body].graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
+        all.extend(bodies[body].part.mesh.graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
     }
     for pair in pairs.iter().filter(|pair| pair.bodies.iter().all(|body| first.contains_key(body))) {
         let nodes = |side: usize, q: usize| pair.rows[side].row(q).map(|(dof, _)| (dof / D) as u32);

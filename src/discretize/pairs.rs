@@ -96,7 +96,7 @@ pub fn all<const D: usize>(
 ) -> Result<Vec<Contact<D>>> {
     let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
     let owners =
-        Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
+        Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
     let named = scene.contacts.iter().enumerate();
     let mut found = named.map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
@@ -253,7 +253,7 @@ fn bounded<const D: usize>(
     let touching: BTreeSet<usize> = group.connectivity.iter().flat_map(|&point| owners.of(point)).collect();
     let mut found: Vec<(usize, Facets<D>)> = touching
         .into_iter()
-        .map(|body| (body, parts[body].space.facets(group)))
+        .map(|body| (body, parts[body].mesh.space.facets(group)))
         .filter(|(_, facets)| facets.count() > 0)
         .collect();
     let all = group.connectivity.len() / group.stride;

@@ -1,109 +1,52 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
+use super::body::BodyMesh;
 use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
 use crate::error::{Error, Result, shown};
 use crate::fem::elasticity::Flaw;
-use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Facets, NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space,
-    assemble, rigid, support, surface,
+    ElasticBody, Elasticity, Facets, NodalForces, NodeGraph, PointExtent, Space, assemble, support, surface,
 };
-use crate::linalg::{Total, countable, dot};
+use crate::linalg::{Csr, Total, countable};
 use crate::mesh::{self, Group, Mesh};
 use crate::problem::body::{Load, LoadKind};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 use crate::scene::Scene;
-use nalgebra::{DMatrix, DVector};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.49;
 
-/// A body of the scene with its space, supports and springs.
+/// A body of the scene on its mesh.
 #[derive(Clone)]
 pub struct SceneBody<'a, const D: usize> {
     /// Description in the scene.
     pub spec: &'a BodySpec,
-    /// Finite element space.
-    pub space: Space<D>,
-    /// Constraints from supports and rigid surfaces.
-    pub held: Constraints<D>,
-    /// Springs to the ground: the stiffness blocks between nodes for each spring of the scene.
-    pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Elasticity of the cells.
     pub elasticity: Rc<Elasticity>,
-    /// Point of the mesh of each node.
-    pub points: Vec<u32>,
-    /// Number of nodes of the whole body and their extent.
-    pub extent: PointExtent,
+    /// Nodes, and all that is tied to them.
+    pub mesh: BodyMesh<D>,
 }
 
 impl<'a, const D: usize> SceneBody<'a, D> {
-    /// Return the displacements of all dofs in a rigid motion.
-    pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
-        self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
-    }
-
-    /// Return the rigid motions of the free body.
-    pub fn free(&self) -> Vec<RigidMotion<D>> {
-        rigid::of(&self.extent, self.space.axisymmetric)
-    }
-
-    /// Return the displacements of the dofs of a node in a rigid motion.
-    pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
-        self.held.frame.at(node, |node| self.at(motion, node))
-    }
-
-    /// Return the displacement of a dof in a rigid motion.
-    pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
-        self.held.frame.dof(dof, |node| self.at(motion, node))
-    }
-
     /// Return a contact surface of the body, with edges where facets turn by more than `edge` degrees.
     pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>, edge: f64) -> Side<'s, D> {
-        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame, edge)
+        Side::new(name, &self.mesh.space, facets, &self.mesh.held.prescribed, &self.mesh.held.frame, edge)
     }
 
     /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity differs between cells.
     pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
-        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.space.cells_at(facets) }
-    }
-
-    /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
-    /// motion.
-    pub fn products(
-        &self,
-        motions: &[RigidMotion<D>],
-        prescribed: &[(usize, f64)],
-        load: &[f64],
-    ) -> (DMatrix<f64>, Vec<f64>) {
-        let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
-        let (mut products, mut work) = (DMatrix::zeros(count, count), vec![0.0; count]);
-        for node in 0..self.space.nodes.len() {
-            let mut at: Vec<[f64; D]> = motions.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
-            while let Some(dof) = held.next_if(|dof| dof / D <= node) {
-                at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
-            }
-            for (i, u) in at.iter().enumerate() {
-                at.iter().enumerate().for_each(|(j, v)| products[(i, j)] += dot(u, v));
-                work[i] += dot(u, &load[D * node..][..D]);
-            }
-        }
-        (products, work)
-    }
-
-    /// Return the displacement of a node in a rigid motion.
-    fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
-        motion.at(&self.space.nodes[node as usize])
+        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.mesh.space.cells_at(facets) }
     }
 
     /// Return the area (volume) of the body, in a body of revolution the volume of the rings, and the means of the moduli along x, y, z
     /// ([`Elasticity::moduli`]). A cell whose constants make no material at its middle contributes zero; assembly refuses it.
     pub fn volume_and_moduli(&self) -> (f64, [f64; 3]) {
-        let Self { space, elasticity, .. } = self;
+        let (space, elasticity) = (&self.mesh.space, &self.elasticity);
         let cells = || 0..space.cell_count();
         let volume = cells().map(|cell| space.share(cell)).collect::<Total>().value();
         if self.spec.regions.is_empty() && elasticity.is_constant() {
@@ -117,46 +60,12 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         (volume, sum.map(|sum| sum / volume))
     }
 
-    /// Return the prescribed (dof, value), sorted by dof.
-    pub fn prescribed_sorted(&self) -> Vec<(usize, f64)> {
-        let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
-        all.sort_unstable_by_key(|entry| entry.0);
-        all
-    }
-
-    /// Return the weights of those combinations of `count` motions that neither supports nor springs resist. `u(k, node)` is the
-    /// displacement of motion k at a node.
-    pub fn left(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let left = self.left_by_supports(count, u);
-        let springs = self.springs.concat();
-        if springs.is_empty() { left } else { rigid::left_by_springs(left, &rigid::of_springs(count, u, &springs)) }
-    }
-
-    fn left_by_supports(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let value = |k: usize, dof: usize| self.held.frame.dof(dof, |node| u(k, node));
-        rigid::left_by_supports(count, value, &self.prescribed_sorted())
-    }
-
-    /// Return the rigid motions that supports leave, with the stiffness of the springs in terms of them. The result is `None`
-    /// without springs.
-    pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
-        let springs = self.springs.concat();
-        if springs.is_empty() {
-            return None;
-        }
-        let left = self.left_by_supports(free.len(), &|k, node| free[k].at(&self.space.nodes[node as usize]));
-        let left: Vec<_> = left.iter().map(|weights| rigid::combine(free, weights)).collect();
-        let at = |k: usize, node: u32| left[k].at(&self.space.nodes[node as usize]);
-        let stiffness = rigid::of_springs(left.len(), at, &springs);
-        Some((left, stiffness))
-    }
-
     /// Return the nodal forces of the loads without those on rigid surfaces. Supports are not taken into account.
     ///
     /// # Errors
     /// A load is not finite somewhere, or a surface is not on the body or has no area.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let mut load = body_force(self.spec, &self.space)?;
+        let mut load = body_force(self.spec, &self.mesh.space)?;
         for spec in &self.spec.load {
             load = load.and(self.on_surface(spec, spec.factor, mesh)?);
         }
@@ -170,26 +79,26 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
             return self.at_nodes(spec, group, total.map(|total| factor * total));
         }
-        let facets = self.space.facets(group);
+        let facets = self.mesh.space.facets(group);
         if facets.count() == 0 {
             return Err(not_on_body(&spec.on, &name.value));
         }
-        let area = surface::measure(&self.space, &facets);
+        let area = surface::measure(&self.mesh.space, &facets);
         if area == 0.0 {
             return Err(without_area(&spec.on, self.spec));
         }
         if let LoadKind::Moment(moment) = spec.kind {
-            let load = moment_load(&self.space, &facets, moment.map(|component| factor * component));
+            let load = moment_load(&self.mesh.space, &facets, moment.map(|component| factor * component));
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
         let values = FieldValues::of("this load", &name.value);
-        let load = surface::surface_load(&self.space, &facets, &|x, n| match &spec.kind {
+        let load = surface::surface_load(&self.mesh.space, &facets, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
-                let pressure = factor * values.at(field, self.space.in_scene(x));
+                let pressure = factor * values.at(field, self.mesh.space.in_scene(x));
                 n.map(|n| -pressure * n)
             }
             LoadKind::Traction(fields) => {
-                let x = self.space.in_scene(x);
+                let x = self.mesh.space.in_scene(x);
                 std::array::from_fn(|c| factor * values.at(&fields[c], x))
             }
             LoadKind::Force { rigid: true, .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => [0.0; D],
@@ -205,7 +114,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 
     /// Return a total force as equal forces at the nodes of a group of points.
     fn at_nodes(&self, spec: &Load, group: &Group, total: [f64; 3]) -> Result<NodalForces<D>> {
-        let nodes = self.space.nodes_on(group);
+        let nodes = self.mesh.space.nodes_on(group);
         if nodes.is_empty() {
             return Err(not_on_body(&spec.on, &self.spec.name.value));
         }
@@ -227,33 +136,13 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         }
     }
 
-    /// Return the forces on rigid surfaces, at few nodes of each.
-    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
-        self.held.rigid.iter().flat_map(|surface| surface.forces.iter().copied())
-    }
-
-    /// Return the nodal forces of [`SceneBody::load`] and those on rigid surfaces as forces at dofs.
-    pub fn load_on_dofs(&self, load: &NodalForces<D>) -> NodalForces<D> {
-        load.iter().chain(self.rigid_forces()).flat_map(|(node, force)| self.held.frame.force(node, force)).collect()
-    }
-
-    /// Return the load vector f at all dofs, from the nodal forces at all nodes.
-    pub fn load_vector(&self, load: &NodalForces<D>) -> Vec<f64> {
-        let mut load = load.all(self.space.nodes.len());
-        for (node, total) in self.rigid_forces() {
-            (0..D).for_each(|c| load[D * node as usize + c] += total[c]);
-        }
-        self.held.frame.forces(&mut load);
-        load
-    }
-
     /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane stress. There the
     /// volume can hardly change.
     pub fn locking(&self, plane: Plane) -> Option<String> {
         if self.spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
             return None;
         }
-        let places = || self.space.nodes.iter().map(|&x| self.space.in_scene(x));
+        let places = || self.mesh.space.nodes.iter().map(|&x| self.mesh.space.in_scene(x));
         let largest = |spec: &ElasticitySpec| match &spec.constants {
             Constants::Isotropic { poisson, .. } => places().map(|x| poisson.eval(x)).fold(0.0, f64::max),
             _ => 0.0,
@@ -263,16 +152,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         (poisson > LOCKING).then(|| {
             format!("body {name}: Poisson's ratio is {poisson}: linear elements are far too stiff there; set order = 2")
         })
-    }
-
-    /// Return the nodes of linear displacements, sorted.
-    pub fn coarse_nodes(&self) -> Vec<u32> {
-        coarse_nodes(&self.space, &self.held.frame)
-    }
-
-    /// Return the interpolation of the dofs from those at these nodes.
-    pub fn interpolation(&self, coarse: &[u32]) -> Prolongation {
-        from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
     /// Assemble K on its graph, with f and the supports. `imposed` is the rigid motion that was subtracted from `prescribed`, if
@@ -287,22 +166,21 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-        let mut stiffness = assemble::stiffness(&self.space, graph, &self.held.frame, &self.elasticity).map_err(
-            |defect| match defect {
+        let mut stiffness = assemble::stiffness(&self.mesh.space, graph, &self.mesh.held.frame, &self.elasticity)
+            .map_err(|defect| match defect {
                 assemble::Defect::Inverted(cell) => {
-                    let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
+                    let corner = self.mesh.space.in_scene(self.mesh.space.cell_nodes(cell)[0]);
                     let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
                     Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
                 }
                 assemble::Defect::Elasticity(number, x, flaw) => refusal(self.spec, number, Some(x), &flaw),
-            },
-        )?;
+            })?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
             return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
         }
-        let frame = &self.held.frame;
-        self.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
+        let frame = &self.mesh.held.frame;
+        self.mesh.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
         Ok(support(stiffness, load, prescribed, imposed))
@@ -355,7 +233,30 @@ pub fn parts<'a, const D: usize>(
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        parts.push(SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), points, extent });
+        let cells = if spec.regions.is_empty() { 0 } else { space.cell_count() };
+        let regions = (0..cells).map(|cell| elasticity.region(cell)).collect();
+        let none = || Csr::new(space.dofs());
+        let (rows, nodal_rows, approach) = (none(), none(), none());
+        let mesh = BodyMesh {
+            space: Rc::new(space),
+            regions,
+            held,
+            springs,
+            points,
+            extent,
+            rows,
+            nodal_rows,
+            approach,
+            load: NodalForces::default(),
+            left: Vec::new(),
+            unsupported: Vec::new(),
+            imposed: None,
+            prescribed: Vec::new(),
+            share: None,
+            is_owned: true,
+            graph: OnceCell::new(),
+        };
+        parts.push(SceneBody { spec, elasticity: Rc::new(elasticity), mesh });
     }
     Ok(parts)
 }

@@ -3,8 +3,9 @@
 //! The factory requests facts about each body, chooses solvers, and decides which bodies share a matrix.
 
 use super::assembler::{Factory, Outline};
+use super::body::BodyMesh;
 use super::distribute::Partition;
-use super::local::{BodyInfo, LocalBody};
+use super::local::BodyInfo;
 use super::mechanism;
 use super::pairs::{self, ContactFacts};
 use super::part::parts;
@@ -50,17 +51,17 @@ pub struct Whole<'a, const D: usize> {
 
 impl<const D: usize> Whole<'_, D> {
     /// Return everything, for the only rank.
-    pub fn into_locals(self) -> Vec<Option<LocalBody<D>>> {
-        self.bodies.into_iter().map(|body| Some(LocalBody::whole(body, true))).collect()
+    pub fn into_locals(self) -> Vec<Option<BodyMesh<D>>> {
+        self.bodies.into_iter().map(|body| Some(body.part.mesh)).collect()
     }
 
     /// Return what a rank receives of each body.
-    pub fn on(&self, rank: usize) -> Vec<Option<LocalBody<D>>> {
+    pub fn on(&self, rank: usize) -> Vec<Option<BodyMesh<D>>> {
         let of_body = |(index, body): (usize, &Unassembled<D>)| {
             let is_owned = body.owner == rank;
             match place_of(&self.partitions, index) {
-                Some((partition, number)) => Some(LocalBody::restrict(body, partition, number, rank, self.keep)),
-                None => (is_owned || self.keep).then(|| LocalBody::whole(body.clone(), is_owned)),
+                Some((partition, number)) => Some(body.part.mesh.restrict(partition, number, rank, self.keep)),
+                None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.part.mesh.clone() }),
             }
         };
         self.bodies.iter().enumerate().map(of_body).collect()
@@ -115,17 +116,17 @@ pub fn prepare<'a, const D: usize, F: Factory>(
 /// See [`Factory::plan`].
 fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) -> Result<F::SolverPlan> {
     // Facts of a body are computed when they are requested.
-    let graphs: Vec<_> = bodies.iter().map(|body| move || body.graph()).collect();
+    let graphs: Vec<_> = bodies.iter().map(|body| move || body.part.mesh.graph()).collect();
     let at: Vec<_> =
-        bodies.iter().map(|body| move |k: usize, dof: usize| body.part.dof_of(&body.free[k], dof)).collect();
+        bodies.iter().map(|body| move |k: usize, dof: usize| body.part.mesh.dof_of(&body.free[k], dof)).collect();
     let outline = |index: usize| {
-        let Unassembled { part, rows, prescribed, free, .. } = &bodies[index];
+        let Unassembled { part, free, .. } = &bodies[index];
         Outline {
             name: &part.spec.name.value,
             dimension: D,
-            order: part.space.order,
-            rows,
-            prescribed,
+            order: part.mesh.space.order,
+            rows: &part.mesh.rows,
+            prescribed: &part.mesh.prescribed,
             motions: AtDofs { count: free.len(), at: &at[index] },
             graph: &graphs[index],
         }
@@ -152,7 +153,7 @@ fn owners<const D: usize>(
     partitions: &[Partition],
     ranks: usize,
 ) -> Vec<(usize, Vec<usize>)> {
-    let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.space.dofs() };
+    let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.mesh.space.dofs() };
     let owners = crate::parallel::owners(&(0..bodies.len()).map(dofs).collect::<Vec<_>>(), ranks);
     let of_body = |(body, owner): (usize, usize)| match place_of(partitions, body) {
         Some((partition, number)) => (partition.leader(number), partition.ranks(number)),

@@ -5,12 +5,11 @@ use super::approach;
 use super::part::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::fem::{NodalForces, NodeGraph, RigidMotion, rigid};
+use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
-use std::cell::OnceCell;
 use std::collections::HashSet;
 
 /// Share of the largest possible work below which the work of the loads is rounding.
@@ -23,32 +22,14 @@ pub struct Unassembled<'a, const D: usize> {
     pub part: SceneBody<'a, D>,
     /// Contact rows of the body, pair by pair.
     pub segments: Vec<Segment>,
-    /// These rows with dofs as columns.
-    pub rows: Csr,
-    /// The same rows with displacements of nodes as columns.
-    pub nodal_rows: Csr,
-    /// The displacement towards each contact surface, with displacements of nodes as columns ([`approach::rows`]).
-    pub approach: Csr,
     /// Rigid motions of the free body.
     pub free: Vec<RigidMotion<D>>,
-    /// Nodal forces of the loads, without those on rigid surfaces.
-    pub nodal_load: NodalForces<D>,
     /// Forces of all loads at dofs.
     pub load: NodalForces<D>,
-    /// Combinations of the motions of the free body that supports and springs leave at present.
-    pub left: Vec<RigidMotion<D>>,
-    /// The same motions as traces on the contact rows and works of the loads.
+    /// The motions that supports and springs leave at present, as traces on the contact rows and works of the loads.
     pub motions: Vec<Motion>,
-    /// Combinations of the motions of the free body that supports alone leave.
-    pub unsupported: Vec<RigidMotion<D>>,
-    /// The same with the stiffness of the springs, if springs resist some of them.
+    /// The motions that supports alone leave, with the stiffness of the springs, if springs resist some of them.
     pub sprung: Option<Sprung>,
-    /// Rigid motion by which the supports move the body as one.
-    pub imposed: Option<RigidMotion<D>>,
-    /// Prescribed (dof, value) relative to this motion, sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
-    /// Coupling of nodes by K, once it was requested.
-    pub graph: OnceCell<NodeGraph>,
     /// Rank that owns the body or, if it is distributed, most of it.
     pub owner: usize,
     /// Ranks that own nodes of the body.
@@ -75,42 +56,22 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         parts.into_iter().zip(segments).map(|(part, segments)| Self::new(part, segments, pairs, mesh)).collect()
     }
 
-    fn new(part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
-        let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
-            let mut all = Csr::new(part.space.dofs());
+    fn new(mut part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
+        let rows = |of: fn(&ContactPair) -> &[Csr; 2]| {
+            let mut all = Csr::new(part.mesh.space.dofs());
             for &Segment { pair, side } in &segments {
-                (0..pairs[pair].len()).for_each(|q| all.push_row(rows(&pairs[pair])[side].row(q)));
+                (0..pairs[pair].len()).for_each(|q| all.push_row(of(&pairs[pair])[side].row(q)));
             }
             all
         };
-        let nodal_load = part.load(mesh)?;
-        let mut body = Self {
-            rows: all(|pair| &pair.rows),
-            nodal_rows: all(|pair| &pair.nodal),
-            approach: approach::rows(&part, &segments, pairs, mesh)?,
-            free: part.free(),
-            load: part.load_on_dofs(&nodal_load),
-            nodal_load,
-            part,
-            segments,
-            left: Vec::new(),
-            motions: Vec::new(),
-            unsupported: Vec::new(),
-            sprung: None,
-            imposed: None,
-            prescribed: Vec::new(),
-            graph: OnceCell::new(),
-            owner: 0,
-            ranks: Vec::new(),
-        };
+        (part.mesh.rows, part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
+        part.mesh.approach = approach::rows(&part, &segments, pairs, mesh)?;
+        part.mesh.load = part.load(mesh)?;
+        let (free, load) = (part.mesh.free(), part.mesh.load_on_dofs());
+        let mut body =
+            Self { part, segments, free, load, motions: Vec::new(), sprung: None, owner: 0, ranks: Vec::new() };
         body.find_motions();
         Ok(body)
-    }
-
-    /// Return the coupling of the nodes by K, which is computed when it is first requested.
-    pub fn graph(&self) -> &NodeGraph {
-        let SceneBody { space, held, .. } = &self.part;
-        self.graph.get_or_init(|| NodeGraph::with_rows(space, &self.rows, &held.frame))
     }
 
     /// Return the names of the motions that neither supports nor springs nor any contact row of the body resist.
@@ -135,13 +96,13 @@ impl<'a, const D: usize> Unassembled<'a, D> {
 
     /// Return the trace of a motion on the contact rows.
     pub fn trace(&self, motion: &RigidMotion<D>) -> Vec<f64> {
-        let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * self.part.dof_of(motion, dof)).sum();
-        (0..self.rows.rows()).map(row).collect()
+        let row = |q: usize| self.part.mesh.rows.row(q).map(|(dof, b)| b * self.part.mesh.dof_of(motion, dof)).sum();
+        (0..self.part.mesh.rows.rows()).map(row).collect()
     }
 
     /// Return the work of the loads on motions. It is exactly zero where it is rounding.
     fn works(&self, all: &[RigidMotion<D>]) -> Vec<f64> {
-        let of = |motion: &RigidMotion<D>| self.load.works(|node| self.part.at_dofs(motion, node));
+        let of = |motion: &RigidMotion<D>| self.load.works(|node| self.part.mesh.at_dofs(motion, node));
         let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
         all.iter().map(of).map(work).collect()
     }
@@ -149,45 +110,46 @@ impl<'a, const D: usize> Unassembled<'a, D> {
     /// Change each nodal force f by -|f| u, where u is the vector at the position of its node.
     pub fn change_loads(&mut self, u: impl Fn(&[f64; D]) -> [f64; D]) {
         let change = |(node, force): (u32, [f64; D])| {
-            let (size, u) = (dot(&force, &force).sqrt(), u(&self.part.space.nodes[node as usize]));
+            let (size, u) = (dot(&force, &force).sqrt(), u(&self.part.mesh.space.nodes[node as usize]));
             (node, std::array::from_fn(|c| force[c] - size * u[c]))
         };
-        self.nodal_load = self.nodal_load.iter().map(change).collect();
-        self.load = self.part.load_on_dofs(&self.nodal_load);
+        self.part.mesh.load = self.part.mesh.load.iter().map(change).collect();
+        self.load = self.part.mesh.load_on_dofs();
     }
 
     /// Find the motions that supports and springs leave to the body at present.
     pub fn find_motions(&mut self) {
-        let at = |k: usize, node: u32| self.free[k].at(&self.part.space.nodes[node as usize]);
-        let left = self.part.left(self.free.len(), &at);
+        let at = |k: usize, node: u32| self.free[k].at(&self.part.mesh.space.nodes[node as usize]);
+        let left = self.part.mesh.unconstrained(self.free.len(), &at);
         let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
-        let sprung = self.part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
-        self.unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
+        let sprung = self.part.mesh.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
+        self.part.mesh.unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
         self.sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.with_works(&all), stiffness });
-        (self.motions, self.left) = (self.with_works(&left), left);
+        (self.motions, self.part.mesh.left) = (self.with_works(&left), left);
     }
 
     /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the
     /// contact rows so that these do not change. The result is `None` if that displacement is small.
     pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<FixableDof> {
-        let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
-        let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.held.prescribed.contains_key(dof);
-        let all = (0..self.part.space.dofs()).filter(is_free);
-        let sizes = all.map(|dof| FixableDof { dof, size: self.part.dof_of(motion, dof) });
+        let in_rows: HashSet<usize> = self.part.mesh.rows.col.iter().map(|&dof| dof as usize).collect();
+        let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.mesh.held.prescribed.contains_key(dof);
+        let all = (0..self.part.mesh.space.dofs()).filter(is_free);
+        let sizes = all.map(|dof| FixableDof { dof, size: self.part.mesh.dof_of(motion, dof) });
         sizes.max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())).filter(|found| found.size.abs() > 1e-3)
     }
 
     /// Fix a dof. The motions of the body are not found anew.
     pub fn fix(&mut self, found: &FixableDof) {
-        self.part.held.prescribed.insert(found.dof, 0.0);
+        self.part.mesh.held.prescribed.insert(found.dof, 0.0);
     }
 
     /// Find the displacements that the supports prescribe.
     pub fn support(&mut self) {
-        let prescribed = self.part.prescribed_sorted();
-        let value = |k: usize, dof: usize| self.part.dof_of(&self.free[k], dof);
-        let imposed = imposed_motion(self.free.len(), &value, &prescribed).filter(|_| self.part.springs.is_empty());
-        (self.imposed, self.prescribed) = match imposed {
+        let prescribed = self.part.mesh.prescribed_sorted();
+        let value = |k: usize, dof: usize| self.part.mesh.dof_of(&self.free[k], dof);
+        let imposed =
+            imposed_motion(self.free.len(), &value, &prescribed).filter(|_| self.part.mesh.springs.is_empty());
+        (self.part.mesh.imposed, self.part.mesh.prescribed) = match imposed {
             None => (None, prescribed),
             Some((weights, rest)) => (Some(rigid::sum(&self.free, &weights)), rest),
         };
