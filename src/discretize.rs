@@ -6,6 +6,7 @@ mod auto;
 mod body;
 mod carrier;
 mod distribute;
+mod groups;
 mod local;
 mod mechanism;
 pub mod meshes;
@@ -21,9 +22,9 @@ mod verify;
 
 pub use approach::mean_normal;
 pub use assembler::{Assembled, Factory, Outline};
+pub use groups::point;
 pub use local::BodyInfo;
 pub use pairs::ContactInfo;
-pub use patterns::point;
 pub use post::{ForceBalance, Unbalanced};
 pub use verify::{Verified, verify};
 

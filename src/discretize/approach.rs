@@ -1,7 +1,7 @@
 //! The displacement of a body towards its contact, as a row of weights of nodal displacements for each of its contact surfaces.
 
+use super::groups::Line;
 use super::part::SceneBody;
-use super::patterns::find_group;
 use super::supports::axis_vector;
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -81,14 +81,14 @@ struct Holder<const D: usize> {
 fn holders<const D: usize>(body: &SceneBody<D>, mesh: &Mesh<D>) -> Result<Vec<Holder<D>>> {
     let (spec, mut all) = (body.spec, Vec::new());
     for fix in &spec.fix {
-        let group = find_group(mesh, &fix.on, &(0..=D).rev().collect::<Vec<_>>(), "support")?;
+        let group = fix.group(mesh)?;
         let components = (0..D).filter_map(|c| Some((axis_vector(c), fix.value[c].as_ref()?)));
         let along = fix.normal.as_ref().and_then(|value| Some((normal(body, group)?, value)));
         let directions = components.chain(along).map(|(n, value)| (n, !value.is_zero())).collect();
         all.push(holder(body, group, directions));
     }
     for spring in &spec.spring {
-        let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+        let group = spring.group(mesh)?;
         let directions: Vec<[f64; D]> = match &spring.kind {
             SpringKind::Vector(fields) => (0..D).filter(|&c| !fields[c].is_zero()).map(axis_vector).collect(),
             SpringKind::Normal(_) => normal(body, group).into_iter().collect(),

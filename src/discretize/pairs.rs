@@ -3,8 +3,8 @@
 
 use super::auto::{self, ContactEntry, SurfacePair};
 use super::carrier;
+use super::groups::{Owners, find_group, point};
 use super::part::SceneBody;
-use super::patterns::{Owners, find_group, point};
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Reach};

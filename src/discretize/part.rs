@@ -1,7 +1,7 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
 use super::body::BodyMesh;
-use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
+use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
@@ -75,7 +75,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
     fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
-        let group = find_group(mesh, &spec.on, load_dimensions::<D>(&spec.kind), "load")?;
+        let group = spec.group(mesh)?;
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
             return self.at_nodes(spec, group, total.map(|total| factor * total));
         }
@@ -302,7 +302,7 @@ fn refuse_parts<const D: usize>(
 fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
     let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
     for (number, region) in spec.regions.iter().enumerate() {
-        let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);
+        let cells = space.cells_in(region.group(mesh)?);
         if cells.is_empty() {
             return Err(not_on_body(&region.on, &spec.name.value));
         }

@@ -2,7 +2,7 @@
 //! them, errors against a known solution. Each rank evaluates its part.
 
 use super::body::BodyMesh;
-use super::patterns::point;
+use super::groups::point;
 use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;

@@ -1,7 +1,7 @@
 //! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on surfaces are here, too,
 //! since rigid surfaces turn about the same centre.
 
-use super::patterns::{FieldValues, earlier, find_group, not_on_body, of_body, point, without_area};
+use super::groups::{FieldValues, Line, earlier, not_on_body, of_body, point, without_area};
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
@@ -65,8 +65,7 @@ impl<const D: usize> Constraints<D> {
         held.tie(spec, space, mesh)?;
         let mut conditions = held.symmetry(space);
         for (support, fix) in spec.fix.iter().enumerate() {
-            let dimensions: Vec<usize> = if fix.normal.is_some() { vec![D - 1] } else { (0..=D).rev().collect() };
-            let group = find_group(mesh, &fix.on, &dimensions, "support")?;
+            let group = fix.group(mesh)?;
             let nodes = space.nodes_on(group);
             if nodes.is_empty() {
                 return Err(not_on_body(&fix.on, &spec.name.value));
@@ -133,7 +132,7 @@ impl<const D: usize> Constraints<D> {
                 LoadKind::Turning { force, moment } => (force, Some(moment)),
                 _ => continue,
             };
-            let group = find_group(mesh, &load.on, &[D - 1], "load")?;
+            let group = load.group(mesh)?;
             let nodes = space.nodes_on(group);
             let Some(&master) = nodes.first() else {
                 return Err(not_on_body(&load.on, &spec.name.value));
@@ -364,7 +363,7 @@ pub fn spring_blocks<const D: usize>(
     space: &Space<D>,
     mesh: &Mesh<D>,
 ) -> Result<Vec<NodalBlock<D>>> {
-    let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+    let group = spring.group(mesh)?;
     let values = FieldValues::of("the stiffness of this spring", &spec.name.value);
     let value = |field: &Field, x: [f64; D]| {
         let x = space.in_scene(x);

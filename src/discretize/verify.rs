@@ -1,7 +1,8 @@
 //! Checks of the mesh against the scene before anything is assembled. Surfaces that a scene names by sets of nodes, as meshes of other
 //! programs have them, become groups of facets first.
 
-use super::patterns::{self, Lying, earlier};
+use super::groups::earlier;
+use super::patterns::{self, Lying};
 use crate::error::{Error, Located, Result, few};
 use crate::exchange::{Exchange, broadcast};
 use crate::fem::PointExtent;
