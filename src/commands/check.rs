@@ -3,7 +3,7 @@
 use super::{SceneArgs, clock_with_phases, load};
 use crate::contact::{ContactPair, Left};
 use crate::data::Data;
-use crate::discretize::{BodyInfo, Resolution, resolution};
+use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::linalg::range;
@@ -98,7 +98,6 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
         "theta": coupling.theta,
         "expected_sweeps": sweeps.map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
-        "surface": surface_to_json(built, i),
     })
 }
 
@@ -193,7 +192,6 @@ fn each_pair(built: &Built) -> Vec<String> {
                 expected(&coupling)
             ),
         });
-        lines.extend(pair_lines(built, i));
     }
     lines
 }
@@ -289,46 +287,11 @@ fn lines_of_data(data: &Data) -> Vec<String> {
     ]
 }
 
-/// Return how well the mesh follows the gap of a pair; none for a gap without data.
-fn gap_resolution(built: &Built, pair: usize) -> Option<Resolution> {
-    let info = &built.discrete.contacts[pair];
-    let spacing = |data: &Arc<Data>| {
-        let axes = data.grid().map_or(&[][..], |grid| &grid.axes);
-        axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.spacing).fold(f64::INFINITY, f64::min)
-    };
-    let detail = info.spec.gap.data().map(spacing).reduce(f64::min)?;
-    Some(resolution(&info.surface, &info.spec.gap, detail))
-}
-
-/// Return the lines that describe what the mesh of a pair leaves out of a measured gap,
-fn pair_lines(built: &Built, pair: usize) -> Vec<String> {
-    let mut lines = Vec::new();
-    lines.extend(gap_resolution(built, pair).map(|Resolution { height, variance, area, side }| {
-        format!(
-            "    the gap has an rms height of {}; facets with sides of {} leave out {:.1} % of its variance, and more than a tenth of \
-             the rms height on {:.1} % of the surface",
-            sci(height, 3),
-            sci(side, 3),
-            100.0 * variance,
-            100.0 * area
-        )
-    }));
-    lines
-}
-
 /// Return the range of the data of contacts by name, for `--json`.
 fn data_to_json(built: &Built) -> Value {
     let data = in_contacts(built).into_iter();
     data.filter_map(|(name, data)| Some((name, json!({ "range": range(data.grid()?.values.iter().copied()) }))))
         .collect()
-}
-
-/// Return the resolution of a pair's gap, for `--json`.
-fn surface_to_json(built: &Built, pair: usize) -> Value {
-    let resolution = gap_resolution(built, pair).map(|Resolution { height, variance, area, side }| {
-        json!({ "rms_height": height, "variance_left_out": variance, "area_left_out": area, "side": side })
-    });
-    json!({ "gap_followed": resolution })
 }
 
 /// Draw the data of contacts into a folder.

@@ -218,8 +218,6 @@ pub struct BodyReport {
     pub inner_facets: usize,
     /// Facets of the boundary, which does not intersect itself.
     pub boundary_facets: usize,
-    /// Parts that share no facet; more than one if the body is in pieces.
-    pub parts: usize,
     /// Degrees of freedom.
     pub dofs: usize,
     /// Inner solver in words; empty if nothing was solved.

@@ -205,7 +205,6 @@ fn body_report(info: &BodyInfo, solver: &str) -> BodyReport {
         cells: info.cells,
         inner_facets: info.facets.inner,
         boundary_facets: info.facets.outer,
-        parts: info.facets.parts.count,
         dofs: info.dofs,
         solver: solver.to_owned(),
         rank: info.rank,
