@@ -5,6 +5,7 @@ mod assembler;
 mod auto;
 mod body;
 mod carrier;
+mod chords;
 mod distribute;
 mod groups;
 mod local;

@@ -1,7 +1,7 @@
 //! `winkler check`: build the problem of a scene and print what it has, without solving it, measured surfaces included.
 
 use super::{SceneArgs, clock_with_phases, load};
-use crate::contact::{ContactPair, Left};
+use crate::contact::ContactPair;
 use crate::data::Data;
 use crate::discretize::BodyInfo;
 use crate::error::Result;
@@ -91,8 +91,6 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "length": pair.weight.iter().sum::<f64>(),
         "gap": [low, high],
         "facets_uncovered": pair.uncovered(),
-        "facets_steep": pair.left(Left::Steep),
-        "facets_far": pair.left(Left::Far),
         "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
         "facets_averaged": pair.averaged(),
         "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),

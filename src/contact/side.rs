@@ -1,6 +1,8 @@
 //! One contact surface of a body: its facets, its nodes with their normals and curvatures, its smooth faces, and the order of nodes along it.
 
+use super::law::LawMaker;
 use super::mirror::Mirrors;
+use crate::error::Result;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, bounds, dot};
 use crate::mesh::datum;
@@ -39,8 +41,9 @@ pub struct FaceNode<const D: usize> {
     pub direction: [f64; D],
     /// Length of the sum of the own normal and that of the other side before it, zero if they are opposite.
     pub tilt: f64,
-    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
-    pub curvature: f64,
+    /// Curvature (1/length): the symmetric matrix K with K dx nearest to dn for two nodes of the facets around, which are apart by dx and
+    /// whose normals differ by dn.
+    pub curvature: [[f64; D]; D],
 }
 
 impl<'a, const D: usize> Side<'a, D> {
@@ -64,7 +67,7 @@ impl<'a, const D: usize> Side<'a, D> {
                     (0..D).for_each(|c| normal[c] += area[c]);
                 }
                 let normal = unit(mirrors.mean(space, node, normal, least));
-                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0 });
+                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: [[0.0; D]; D] });
             }
         }
         let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
@@ -98,23 +101,35 @@ impl<'a, const D: usize> Side<'a, D> {
         }
     }
 
-    /// Compute the curvature of the surface at each node.
+    /// Compute the curvature of the surface at each node, by least squares with a weight of one for each direction.
     fn bend(&mut self) {
         let flat = self.tilt().max(ROUNDING);
+        // sums of dn dx' and dx dx' over |dx|^2; K n = 0 adds n n' to the second
+        let normal = |at: &FaceNode<D>| [[[0.0; D]; D], outer(at.normal, at.normal)];
+        let mut sums: Vec<[[[f64; D]; D]; 2]> = self.nodes.iter().map(normal).collect();
         for i in 0..self.facets.count() {
-            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
-            let mut curvature: f64 = 0.0;
-            for k in 0..on.len() {
-                for l in 0..k {
-                    let [p, q] = [on[k], on[l]].map(|corner| self.nodes[corner as usize].normal);
-                    let turn = length(minus(p, q));
-                    curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
+            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i));
+            for (k, l) in (0..on.len()).flat_map(|k| (0..k).map(move |l| (k, l))) {
+                let along = minus(x[k], x[l]);
+                let square = dot(&along, &along);
+                let turn = minus(self.nodes[on[k] as usize].normal, self.nodes[on[l] as usize].normal);
+                let turn = if length(turn) > flat { turn } else { [0.0; D] };
+                for at in [on[k], on[l]] {
+                    let sum = &mut sums[at as usize];
+                    add(&mut sum[0], outer(turn, along.map(|x| x / square)));
+                    add(&mut sum[1], outer(along, along.map(|x| x / square)));
                 }
             }
-            for corner in on {
-                let largest = &mut self.nodes[corner as usize].curvature;
-                *largest = largest.max(curvature);
+        }
+        for (at, [mut turns, mut places]) in self.nodes.iter_mut().zip(sums) {
+            for plane in self.mirrors.across(self.space, at.node, at.normal) {
+                for sum in [&mut turns, &mut places] {
+                    add(sum, reflected(*sum, plane));
+                }
             }
+            let Some((inverse, _)) = element::invert(&places) else { continue };
+            let of = |i: usize, j: usize| (0..D).map(|c| turns[i][c] * inverse[c][j]).sum::<f64>();
+            at.curvature = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (of(i, j) + of(j, i))));
         }
     }
 
@@ -141,6 +156,27 @@ impl<'a, const D: usize> Side<'a, D> {
             on.windows(2).for_each(|ends| joined.join(ends[0], ends[1]));
         }
         joined.classes().1
+    }
+
+    /// Return the nodes of facets within which a law of the layer jumps.
+    ///
+    /// # Errors
+    /// A law that is invalid at a point.
+    pub fn layer_jumps(&self, law: &LawMaker) -> Result<HashSet<u32>> {
+        let place = |at: u32| self.space.in_scene(self.space.nodes[self.nodes[at as usize].node as usize]);
+        let all = law(&(0..self.nodes.len() as u32).map(place).collect::<Vec<_>>())?;
+        let c = SLIGHT * self.mean_measure().powf(1.0 / (D - 1) as f64);
+        let mut found = HashSet::new();
+        for on in self.corners.chunks_exact(self.facets.stride) {
+            for (k, &p) in on[..D].iter().enumerate() {
+                for &q in on[..k].iter().filter(|q| all.pressure(p as usize, c) != all.pressure(**q as usize, c)) {
+                    if has_jump([place(p), place(q)], |x| Ok(law(&[x])?.pressure(0, c)))? {
+                        found.extend([p, q].map(|at| self.nodes[at as usize].node));
+                    }
+                }
+            }
+        }
+        Ok(found)
     }
 
     /// Return the mean length (area) of a facet.
@@ -196,6 +232,27 @@ fn areas_around<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> BTreeMa
     around
 }
 
+/// Return the matrix a b'.
+fn outer<const D: usize>(a: [f64; D], b: [f64; D]) -> [[f64; D]; D] {
+    a.map(|a| b.map(|b| a * b))
+}
+
+/// Add a matrix to `sum`.
+fn add<const D: usize>(sum: &mut [[f64; D]; D], matrix: [[f64; D]; D]) {
+    sum.as_flattened_mut().iter_mut().zip(matrix.as_flattened()).for_each(|(sum, value)| *sum += value);
+}
+
+/// Return R A R for the reflection R in a plane with this unit normal.
+fn reflected<const D: usize>(a: [[f64; D]; D], normal: [f64; D]) -> [[f64; D]; D] {
+    let reflect = |x: [f64; D]| -> [f64; D] {
+        let part = 2.0 * dot(&x, &normal);
+        std::array::from_fn(|c| x[c] - part * normal[c])
+    };
+    let rows = a.map(reflect);
+    let columns: [[f64; D]; D] = std::array::from_fn(|j| reflect(std::array::from_fn(|i| rows[i][j])));
+    std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
+}
+
 /// Divide the facets around a node into faces, within which neighbours turn by an angle with the cosine `least` or more.
 fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(usize, [f64; D])>> {
     let normals: Vec<[f64; D]> = around.iter().map(|&(_, area)| unit(area)).collect();
@@ -207,6 +264,25 @@ fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(
     let mut faces = vec![Vec::new(); count];
     around.iter().zip(face).for_each(|(&facet, face)| faces[face as usize].push(facet));
     faces
+}
+
+/// Compression at which laws at two places are compared, as a share of the size of a facet: layers are thinner than facets.
+const SLIGHT: f64 = 1e-3;
+
+/// Number of halvings of a line after which the difference of a smooth function at its ends is a thousandth of what it was.
+const HALVINGS: usize = 10;
+
+/// Return whether most of the difference of a function at the ends of a line is a jump: whether it stays in one half, again and again.
+fn has_jump(mut ends: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> Result<f64>) -> Result<bool> {
+    let mut values = [value(ends[0])?, value(ends[1])?];
+    let whole = (values[1] - values[0]).abs();
+    for _ in 0..HALVINGS {
+        let middle = std::array::from_fn(|c| 0.5 * (ends[0][c] + ends[1][c]));
+        let half = value(middle)?;
+        let replaced = usize::from((half - values[0]).abs() > (values[1] - half).abs());
+        (ends[replaced], values[replaced]) = (middle, half);
+    }
+    Ok((values[1] - values[0]).abs() > 0.5 * whole)
 }
 
 /// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of

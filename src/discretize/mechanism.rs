@@ -17,14 +17,13 @@ use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::{Mechanism, Motions};
 use nalgebra::{DMatrix, DVector};
 
-/// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for. A traction
-/// on an arc with chords of 9 degrees lacks as much, and forces in equilibrium that people write have three digits or more.
+/// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
 const LACKING: f64 = 1e-3;
 
-/// Find the motions that nothing resists. Fix those on which no load works.
-pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair]) -> Vec<Mechanism> {
+/// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
+pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
-    let mut search = MechanismSearch { bodies, pairs, tilt, found: Vec::new() };
+    let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
     for group in search.groups() {
         search.settle(search.as_one(&group));
     }
@@ -51,6 +50,8 @@ struct MechanismSearch<'p, 's, const D: usize> {
     pairs: &'p [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
+    /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
+    lack: f64,
     found: Vec<Mechanism>,
 }
 
@@ -162,7 +163,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let works: Vec<Vec<f64>> =
             named.iter().map(|set| set.iter().map(|(_, moving)| self.work(moving).abs()).collect()).collect();
         let worst = works.iter().flatten().copied().fold(0.0, f64::max);
-        if worst <= LACKING {
+        if worst <= self.lack {
             self.balance(named.iter().flatten().map(|(_, moving)| moving).collect());
         }
         let mut pins = Vec::new();
@@ -170,7 +171,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let most = works.iter().copied().fold(0.0, f64::max);
             let mechanism =
                 |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, ..Default::default() };
-            if worst > LACKING {
+            if worst > self.lack {
                 // The motion on which loads work most is the reason, and the others of its bodies are not of interest.
                 let reason = works.iter().position(|work| *work == worst);
                 self.found.extend(reason.map(|i| Mechanism {

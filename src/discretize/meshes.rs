@@ -63,9 +63,6 @@ pub trait RecoveredFields {
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
-    /// Return the displacement at the integration points of a side of a pair, times [`Fine::tilt`].
-    fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
-
     /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is replaced by the
     /// value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its nodal displacements.
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64>;
@@ -215,13 +212,6 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
         self.visit(pair, side, |g, normal, at| values[g] = dot(&normal, &self.displacement(&at)));
-        values
-    }
-
-    fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
-        let tilt = &self.kept.fine[pair].tilt;
-        let mut values = vec![0.0; tilt.len()];
-        self.visit(pair, side, |g, _, at| values[g] = dot(&tilt[g], &self.displacement(&at)));
         values
     }
 

@@ -8,7 +8,7 @@ use super::part::SceneBody;
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, Side, UncoveredPoint};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
@@ -36,7 +36,7 @@ pub struct ContactFacts {
     names: [String; 2],
     swapped: bool,
     chords: Option<Chords>,
-    ends: Vec<UncoveredPoint>,
+    ends: Vec<usize>,
     surface: ContactSurface,
 }
 
@@ -55,7 +55,7 @@ pub struct ContactInfo {
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
-    pub ends: Vec<UncoveredPoint>,
+    pub ends: Vec<usize>,
     /// Whether side a, which carries the points, is the second of `spec.between`.
     pub swapped: bool,
     /// Mesh of side a, for output.
@@ -204,12 +204,16 @@ impl<'a, const D: usize> Opposite<'a, D> {
         }
         let surface = ContactSurface::new(&a, &pair);
         let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
-        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
+        let fine = match fine {
+            true => {
+                let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
+                at_a.extend(a.layer_jumps(&law)?);
+                Some(Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&at_a, &at_b]))
+            }
+            false => None,
+        };
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
-        let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
-        let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
-        let ends =
-            spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
+        let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         Ok(Some(Contact { pair, fine, facts: ContactFacts { entry, names, swapped, chords, ends, surface } }))
     }
 }

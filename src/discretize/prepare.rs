@@ -6,11 +6,11 @@ use super::assembler::{Factory, Outline};
 use super::body::BodyMesh;
 use super::distribute::Partition;
 use super::local::BodyInfo;
-use super::mechanism;
 use super::pairs::{self, ContactFacts};
 use super::part::parts;
 use super::unassembled::Unassembled;
 use super::verify::Verified;
+use super::{chords, mechanism};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
@@ -94,8 +94,9 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         contacts.push(found.facts);
         fine.extend(found.fine);
     }
+    let lack = chords::lack(&parts, mesh)?;
     let mut bodies = Unassembled::all(parts, &pairs, mesh)?;
-    let mechanisms = mechanism::fix(&mut bodies, &pairs);
+    let mechanisms = mechanism::fix(&mut bodies, &pairs, lack);
     bodies.iter_mut().for_each(Unassembled::support);
     let plan = plan(&bodies, factory)?;
     let partitions = partitions(&bodies, &pairs, factory, ranks);

@@ -18,8 +18,6 @@ pub struct ContactSurface {
     sources: Vec<Vec<(usize, f64)>>,
     /// Share of each facet that is paired.
     cover: Vec<f64>,
-    /// Number of the reason why a facet is not paired as a whole.
-    left: Vec<f64>,
 }
 
 impl ContactSurface {
@@ -39,14 +37,12 @@ impl ContactSurface {
             connectivity: Vec::new(),
             sources: Vec::new(),
             cover: Vec::new(),
-            left: Vec::new(),
         };
         let mut number: HashMap<u32, u32> = HashMap::new();
         let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();
         for (facet, cover) in pair.cover.iter().enumerate() {
             let nodes = a.on_facet(facet);
             surface.cover.push(cover.share);
-            surface.left.push(cover.left as u8 as f64);
             for (place, node) in places.iter().zip(nodes) {
                 let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
@@ -103,7 +99,7 @@ impl ContactSurface {
                 .iter()
                 .map(|(name, components, values)| ((*name).to_owned(), *components as u32, spread(*components, values)))
                 .collect(),
-            at_cells: vec![("cover".to_owned(), 1, self.cover.clone()), ("left_out".to_owned(), 1, self.left.clone())],
+            at_cells: vec![("cover".to_owned(), 1, self.cover.clone())],
         }
     }
 }

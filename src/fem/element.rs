@@ -110,7 +110,7 @@ pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Opt
 }
 
 /// Return the inverse and the determinant of a matrix; `None` if it is singular or the determinant overflows.
-fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)> {
+pub fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)> {
     let mut inverse = [[0.0; D]; D];
     let det;
     if D == 2 {

@@ -297,10 +297,6 @@ pub struct PairReport {
     pub theta: [f64; 2],
     /// Facets of the carrier without a partner.
     pub facets_uncovered: usize,
-    /// Facets of the carrier that are excluded, wholly or in part, since they are too steep to the other side.
-    pub facets_steep: usize,
-    /// Facets of the carrier that are excluded, wholly or in part, since they are too far from the other side.
-    pub facets_far: usize,
     /// Pieces of the carrier without common points because the search failed. A warning names their position.
     pub pieces_lost: usize,
     /// Partially covered facets of the carrier, which use plain means.
