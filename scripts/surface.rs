@@ -5,7 +5,6 @@
 
 use clap::Parser;
 use nalgebra::DMatrix;
-use npyz::WriterBuilder;
 use std::f64::consts::PI;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -48,11 +47,11 @@ fn main() -> std::io::Result<()> {
     let mut out = BufWriter::new(File::create(&asked.file)?);
     let n = asked.points;
     if asked.file.extension().is_some_and(|extension| extension == "npy") {
-        let options = npyz::WriteOptions::new().default_dtype().shape(&[n as u64, n as u64]);
-        let mut writer = options.writer(&mut out).begin_nd()?;
-        // rows of the matrix follow each other in the file
-        writer.extend(heights.transpose().iter().copied())?;
-        writer.finish()?;
+        // a header of 128 bytes, then the rows of the matrix one behind the other
+        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({n}, {n}), }}");
+        out.write_all(b"\x93NUMPY\x01\x00\x76\x00")?;
+        writeln!(out, "{header:<117}")?;
+        heights.transpose().iter().try_for_each(|height| out.write_all(&height.to_le_bytes()))?;
     } else {
         for row in heights.row_iter() {
             let numbers: Vec<String> = row.iter().map(|height| format!("{height:.6e}")).collect();

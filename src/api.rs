@@ -35,7 +35,7 @@
 //! ```
 
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
-pub use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, NoData, Outside};
+pub use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
 pub use crate::ddm::gamma::GammaRule;
 pub use crate::ddm::robin::Iterate;
 pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
@@ -45,10 +45,9 @@ pub use crate::model::field::Unbounded;
 pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{
-    AsperitySpec, AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, GroupArrays,
-    History, LawKind, LayerSpec, Linear, Load, LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec,
-    Order, Overlap, Plane, Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support,
-    Units, Zone,
+    AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LawKind,
+    LayerSpec, Linear, Load, LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Overlap, Plane,
+    Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Units, Zone,
 };
 pub use crate::robin::Ritz;
 pub use crate::run::recorder::Recorder;

@@ -1,23 +1,17 @@
 //! The command line: arguments -> request -> command -> exit code.
-//!
-//! Ranks that were started with different command lines are refused, since they would wait for each other without end.
 
-use crate::commands::{bench, check, mesh, new, solve, sweep};
-use crate::error::{Error, Kind, Result, few};
-use crate::exchange::{all_gather, broadcast};
+use crate::commands::{bench, check, gone, mesh, new, solve, sweep};
+use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::{make_folder, say};
-use crate::parallel::{Ranks, collectively, differences};
+use crate::output::say;
 use crate::petsc::Session;
 use crate::report;
 use crate::solver::options;
-use anstream::{AutoStream, ColorChoice};
 use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 
 /// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
@@ -27,8 +21,6 @@ use std::path::{Path, PathBuf};
 #[derive(Parser)]
 #[command(name = "winkler", version, after_help = after_help())]
 struct Cli {
-    #[command(flatten)]
-    color: colorchoice_clap::Color,
     #[command(subcommand)]
     command: Command,
 }
@@ -118,12 +110,6 @@ enum Command {
         #[arg(value_name = "SHELL")]
         shell: Shell,
     },
-    /// Write man pages, one a command
-    Man {
-        /// Folder for them
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-    },
 }
 
 /// The commands that need MPI and PETSc.
@@ -170,41 +156,21 @@ impl CliError {
             },
         }
     }
-
-    fn exit_code(&self) -> i32 {
-        match self {
-            Self::Ours(error) => error.kind().exit_code(),
-            Self::Parser(refusal) => refusal.exit_code(),
-        }
-    }
 }
 
 /// Run the program with the words of its command line, the program's name first, and return the exit code.
 pub fn run(words: Vec<OsString>) -> i32 {
-    // MPI starts first: the other ranks would wait for a rank that ended before, say after printing help
-    let session = match Session::is_one_of_several().then(Session::start_mpi).transpose() {
-        Ok(session) => session,
-        Err(error) if error.is_silent() => return error.kind().exit_code(),
-        Err(error) => return complain(&error),
-    };
-    let is_first = session.as_ref().is_none_or(|session| session.rank() == 0);
-    let are_alike = session.as_ref().map_or(Ok(()), |session| refuse_other_words(session, &words));
-    let (cli, petsc) = match are_alike.map_err(CliError::Ours).and_then(|()| parse(words)) {
+    let (cli, petsc) = match parse(words) {
         Ok(parsed) => parsed,
-        Err(refusal) => return if is_first { refusal.print() } else { refusal.exit_code() },
+        Err(refusal) => return refusal.print(),
     };
     let interrupt = match Interrupt::watch() {
         Ok(interrupt) => interrupt,
         Err(error) => return complain(&error),
     };
-    cli.color.write_global();
-    match (cli.command, session) {
-        (Command::Solving(command), session) => with_session(session, &petsc, &interrupt, command),
-        (command, None) => without_session(&interrupt, command, petsc),
-        // only the first rank runs a command that is not parallel
-        (command, Some(session)) => {
-            broadcast(&Ranks::new(&session), || Ok(without_session(&interrupt, command, petsc))).unwrap_or(1)
-        }
+    match cli.command {
+        Command::Solving(command) => with_session(&petsc, &interrupt, command),
+        command => without_session(&interrupt, command, petsc),
     }
 }
 
@@ -240,6 +206,11 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
         return refuse(format!("`{word}`: PETSc options take one dash"), format!("did you mean -{bare}?"));
     }
     let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
+    for name in [&word, &command] {
+        if let Some(advice) = gone::advice(name) {
+            return refuse(format!("`{name}` is gone"), advice.to_owned());
+        }
+    }
     if command.ends_with(".toml") {
         return refuse(format!("`{command}` is no command"), format!("did you mean `winkler solve {command}`?"));
     }
@@ -265,7 +236,6 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
             clap_complete::generate(shell, &mut Cli::command(), "winkler", &mut std::io::stdout());
             Ok(0)
         }
-        Command::Man { folder } => manual(&folder),
         Command::Bench(mut request) => {
             request.petsc = petsc;
             bench::bench(interrupt, &request)
@@ -281,34 +251,18 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
     ended.unwrap_or_else(|error| complain(&error))
 }
 
-/// Write a man page of the program and one of each command.
-fn manual(folder: &Path) -> Result<i32> {
-    make_folder(folder)?;
-    // pages are made in a folder of their own and moved: a link with the name of a page is replaced, never written through
-    let made_in = folder.join(format!(".winkler-{}-man", std::process::id()));
-    let move_pages = || {
-        let mut pages = std::fs::read_dir(&made_in)?.flatten();
-        pages.try_for_each(|page| std::fs::rename(page.path(), folder.join(page.file_name())))
+/// Run a command that solves, in a session with PETSc. `check` starts MPI and PETSc only if something needs them.
+fn with_session(petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
+    let is_lone = petsc.is_empty() && std::env::var_os("PETSC_OPTIONS").is_none() && !Session::is_one_of_several();
+    let session = match command {
+        Solving::Check(_) if is_lone => Session::alone(),
+        _ => Session::start(petsc),
     };
-    let made = std::fs::create_dir(&made_in)
-        .and_then(|()| clap_mangen::generate_to(Cli::command(), &made_in))
-        .and_then(|()| move_pages());
-    // pages that are left after a failure are of no use
-    let _ = std::fs::remove_dir_all(&made_in);
-    made.map_err(|cause| Error::file(folder, "write man pages to", &cause)).map(|()| 0)
-}
-
-/// Run a command that solves. With several ranks the session has started MPI already.
-fn with_session(session: Option<Session>, petsc: &[String], interrupt: &Interrupt, command: Solving) -> i32 {
-    let session = match session.map_or_else(Session::start_mpi, Ok) {
+    let session = match session {
         Ok(session) => session,
         Err(error) => return complain(&error),
     };
-    let ended = session
-        .start_petsc(petsc)
-        .and_then(|()| collectively(&session, options::refuse_traps(&session)))
-        .and_then(|()| dispatch(&session, interrupt, command));
-    match ended {
+    match dispatch(&session, interrupt, command) {
         Ok(code) => match session.finish() {
             Err(error) if code == 0 => complain(&error),
             _ => code,
@@ -337,72 +291,11 @@ fn dispatch(session: &Session, interrupt: &Interrupt, command: Solving) -> Resul
 
 /// Print an error, and return its exit code.
 fn complain(error: &Error) -> i32 {
-    // colors follow NO_COLOR, CLICOLOR_FORCE and `--color`; without these a terminal has them
-    let color = AutoStream::choice(&std::io::stderr()) != ColorChoice::Never;
-    eprintln!("{}", error.render(color));
+    let is_colored =
+        std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    eprintln!("{}", error.render(is_colored));
     if error.kind() == Kind::Usage {
         eprintln!("`winkler --help` shows the command line");
     }
     error.kind().exit_code()
-}
-
-/// Variables with options of PETSc, which uses those of the first rank on all ranks.
-const VARIABLES: [&str; 2] = ["PETSC_OPTIONS", "PETSC_OPTIONS_YAML"];
-
-/// Refuse ranks that differ in the version of the program, in the words of the command line after the program's name, or in the options of PETSc
-/// in the environment. Collective.
-fn refuse_other_words(session: &Session, words: &[OsString]) -> Result<()> {
-    let words = words.iter().skip(1).map(shown).collect::<Vec<_>>().join(" ");
-    let mut facts =
-        BTreeMap::from([(PROGRAM.to_owned(), env!("CARGO_PKG_VERSION").to_owned()), (WORDS.to_owned(), words)]);
-    let variables = VARIABLES.map(|name| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned()));
-    let first = broadcast(&Ranks::new(session), || Ok(variables.clone()))?;
-    for ((name, own), first) in VARIABLES.iter().zip(variables).zip(first) {
-        // a launcher need not pass variables on to other machines: a rank without a variable has that of the first rank
-        facts.extend(own.or(first).map(|value| ((*name).to_owned(), value)));
-    }
-    let different: BTreeSet<String> = differences(session, &facts).into_iter().map(|found| found.what).collect();
-    let Some(what) = [PROGRAM, WORDS].into_iter().chain(VARIABLES).find(|what| different.contains(*what)) else {
-        return Ok(());
-    };
-    let values = all_gather(&Ranks::new(session), facts.remove(what).unwrap_or_default());
-    let kind = if VARIABLES.contains(&what) { Kind::Solver } else { Kind::Usage };
-    let mut error = Error::new(kind, format!("the ranks were started with different {}", plural(what)));
-    for text in few(groups(&values)) {
-        error = error.because(text);
-    }
-    Err(error.help("start all ranks alike: mpiexec -n 2 winkler solve SCENE").common())
-}
-
-const PROGRAM: &str = "version";
-const WORDS: &str = "command line";
-
-fn plural(what: &str) -> String {
-    if VARIABLES.contains(&what) { format!("values of {what}") } else { format!("{what}s") }
-}
-
-/// Return a line for each different value with the ranks that have it, in the order of the first such rank.
-fn groups(values: &[String]) -> Vec<String> {
-    let mut groups: Vec<(&String, Vec<usize>)> = Vec::new();
-    for (rank, value) in values.iter().enumerate() {
-        match groups.iter_mut().find(|(known, _)| *known == value) {
-            Some((_, ranks)) => ranks.push(rank),
-            None => groups.push((value, vec![rank])),
-        }
-    }
-    let line = |(value, ranks): (&String, Vec<usize>)| {
-        let word = if ranks.len() == 1 { "rank" } else { "ranks" };
-        format!("{word} {}: {}", few(ranks).join(", "), if value.is_empty() { "nothing" } else { value })
-    };
-    groups.into_iter().map(line).collect()
-}
-
-/// Return a word as it could be typed.
-fn shown(word: &OsString) -> String {
-    match word.to_str() {
-        Some(text) if !text.is_empty() && !text.contains(|c: char| c.is_whitespace() || "\"'\\".contains(c)) => {
-            text.to_owned()
-        }
-        _ => format!("{word:?}"),
-    }
 }

@@ -1,24 +1,17 @@
 //! Functions that are given by files, heights of measured surfaces and profiles, for the expressions of a scene.
 //!
-//! Data flow: file -> numbers in rows (`read`) -> points without a height counted, a trend subtracted, gaps filled -> [`Grid`], knots of
-//! a profile, or triangulation (`arrange`) -> value and gradient at any place ([`Data::sample`]).
+//! Data flow: file -> numbers in rows (`read`) -> a plane subtracted -> [`Grid`] -> value and gradient at any place ([`Data::sample`]).
 
-mod arrange;
 mod grid;
-mod raster;
 mod read;
 mod rule;
-mod scattered;
 #[cfg(test)]
 mod tests;
 
-pub use arrange::Trend;
-pub use grid::{Grid, Roughness, Summits};
-pub use raster::has_header;
-pub use rule::{DataSpec, Detrend, Fill, Interpolation, NoData, Outside, Sample};
+pub use grid::{Grid, GridAxis};
+pub use rule::{DataSpec, Detrend, Interpolation, Outside, Sample};
 
 use crate::error::{Error, Place, Result, shown};
-use arrange::{Arranged, PointLayout};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
@@ -31,13 +24,13 @@ pub struct Data {
     /// The settings of the scene.
     pub spec: DataSpec,
     /// The function, once the file is read.
-    arranged: OnceLock<Arranged>,
+    grid: OnceLock<Grid>,
 }
 
 impl Data {
     /// Return a function whose file is not read yet.
     pub fn new(spec: DataSpec) -> Self {
-        Self { spec, arranged: OnceLock::new() }
+        Self { spec, grid: OnceLock::new() }
     }
 
     /// Read the file, unless that was done.
@@ -45,92 +38,46 @@ impl Data {
     /// # Errors
     /// The file cannot be read, or is no surface and no profile; the refusal names its line.
     pub fn load(&self) -> Result<()> {
-        if self.arranged.get().is_some() {
-            return Ok(());
+        if self.grid.get().is_none() {
+            let grid = Grid::new(&self.spec, read::rows(&self.spec)?)?;
+            self.grid.get_or_init(|| grid);
         }
-        let arranged = arrange::shape(&self.spec, read::rows(&self.spec)?)?;
-        self.arranged.get_or_init(|| arranged);
         Ok(())
     }
 
     /// Return the function, if the file is read.
-    fn shape(&self) -> Option<&PointLayout> {
-        self.arranged.get().map(|arranged| &arranged.shape)
-    }
-
-    /// Return the number of points of the file without a height; zero if the file is not read yet.
-    pub fn missing(&self) -> usize {
-        self.arranged.get().map_or(0, |arranged| arranged.missing)
-    }
-
-    /// Return the polynomial that was subtracted from the heights, if any.
-    pub fn trend(&self) -> Option<Trend> {
-        self.arranged.get().and_then(|arranged| arranged.trend)
+    pub fn grid(&self) -> Option<&Grid> {
+        self.grid.get()
     }
 
     /// Return the number of arguments: 1 for a profile, 2 for a surface.
     pub fn arguments(&self) -> usize {
-        match self.shape() {
-            Some(PointLayout::Grid(grid)) if grid.axes[1].count > 1 => 2,
-            Some(PointLayout::Scattered(..)) => 2,
-            _ => 1,
-        }
+        self.grid().map_or(1, |grid| if grid.axes[1].count > 1 { 2 } else { 1 })
     }
 
     /// Return value and gradient at a place, which has as many coordinates as there are arguments.
     pub fn sample(&self, place: &[f64]) -> Sample {
         let at = [place.first(), place.get(1)].map(|x| x.copied().unwrap_or(0.0));
-        let holds = self.spec.outside == Outside::Clamp;
-        match self.shape() {
-            Some(PointLayout::Grid(grid)) => grid.sample(at),
-            Some(PointLayout::Knots(knots)) => knots.sample(at[0], holds),
-            Some(PointLayout::Scattered(scattered, _)) => scattered.sample(at, holds),
-            None => Sample::NONE,
-        }
+        self.grid().map_or(Sample::NONE, |grid| grid.sample(at))
     }
 
     /// Return all its numbers in a fixed order; none if the file is not read yet.
-    pub fn numbers(&self) -> Box<dyn Iterator<Item = f64> + '_> {
-        match self.shape() {
-            Some(PointLayout::Grid(Grid { axes, values, .. })) => {
-                let counts = axes.iter().flat_map(|axis| [axis.origin, axis.spacing, axis.count as f64]);
-                Box::new(counts.chain(values.iter().copied()))
-            }
-            Some(PointLayout::Knots(knots)) => Box::new(knots.0.iter().flatten().copied()),
-            Some(PointLayout::Scattered(scattered, _)) => Box::new(scattered.numbers()),
-            None => Box::new(std::iter::empty()),
-        }
-    }
-
-    /// Return the regular grid, if the file is read and has one.
-    pub fn grid(&self) -> Option<&Grid> {
-        match self.shape() {
-            Some(PointLayout::Grid(grid)) => Some(grid),
-            _ => None,
-        }
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + '_ {
+        self.grid().into_iter().flat_map(|Grid { axes, values, .. }| {
+            let counts = axes.iter().flat_map(|axis| [axis.origin, axis.spacing, axis.count as f64]);
+            counts.chain(values.iter().copied())
+        })
     }
 
     /// Return the refusal of a place without a value. `what` is the quantity whose expression, at `here`, needs the value.
     pub fn outside(&self, here: &Place, what: &str, place: &[f64]) -> Error {
-        let join = |coordinates: &[f64]| coordinates.iter().map(|&x| shown(x)).collect::<Vec<_>>().join(", ");
-        let range = match self.shape() {
-            Some(PointLayout::Grid(grid)) => grid.axes.map(|axis| axis.range()),
-            Some(PointLayout::Knots(knots)) => [knots.range(); 2],
-            Some(PointLayout::Scattered(_, range)) => *range,
-            None => [[f64::NAN; 2]; 2],
-        };
-        let range: Vec<String> = range[..place.len().min(2)]
-            .iter()
-            .map(|[from, to]| format!("{} to {}", shown(*from), shown(*to)))
-            .collect();
-        let advice = match self.grid() {
-            Some(_) => "\"clamp\" or \"periodic\"",
-            None => "\"clamp\"",
-        };
+        let at: Vec<String> = place.iter().map(|&x| shown(x)).collect();
+        let axes = self.grid().map_or(&[][..], |grid| &grid.axes[..place.len().min(2)]);
+        let range = axes.iter().map(GridAxis::range).map(|[from, to]| format!("{} to {}", shown(from), shown(to)));
         let name = &self.spec.name;
-        Error::scene(here, format!("{what}: data `{name}` have no value at ({})", join(place)))
+        Error::scene(here, format!("{what}: data `{name}` have no value at ({})", at.join(", ")))
             .label("asked for it")
-            .because(format!("`{name}` has values for {}", range.join(" and ")))
-            .help(format!("move them by `origin` and `spacing`, or say what is beyond: outside = {advice}"))
+            .because(format!("`{name}` has values for {}", range.collect::<Vec<_>>().join(" and ")))
+            .help("move them by `origin` and `spacing`, or say what is beyond: outside = \"clamp\" or \"periodic\"")
     }
 }

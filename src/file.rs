@@ -4,7 +4,7 @@ use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fs::{File, FileType};
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Read};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
@@ -75,45 +75,29 @@ fn bytes_on_line(text: &str, line: &str) -> Option<u64> {
     rest.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes * 1024)
 }
 
-/// A source of bytes that are digested while they are read, each byte once, however often a reader goes back.
+/// A source of bytes that are digested while they are read.
 pub struct Digested<R> {
     source: R,
-    /// Position of the next byte that is read.
-    at: u64,
-    /// Number of bytes from the start that are in the digest.
-    summed: u64,
     sum: Sha256,
 }
 
-impl<R: Read + Seek> Digested<R> {
+impl<R: Read> Digested<R> {
     /// Start at the first byte of a source.
     pub fn new(source: R) -> Self {
-        Self { source, at: 0, summed: 0, sum: Sha256::new() }
+        Self { source, sum: Sha256::new() }
     }
 
-    /// Return the SHA-256 of the bytes from the start to the first one that was not read, in hexadecimal digits.
+    /// Return the SHA-256 of the bytes that were read, in hexadecimal digits.
     pub fn digest(self) -> String {
         hexadecimal(&self.sum.finalize())
     }
 }
 
-impl<R: Read + Seek> Read for Digested<R> {
+impl<R: Read> Read for Digested<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.source.read(buffer)?;
-        let (from, end) = (self.at, self.at + count as u64);
-        self.at = end;
-        if (from..end).contains(&self.summed) {
-            self.sum.update(&buffer[(self.summed - from) as usize..count]);
-            self.summed = end;
-        }
+        self.sum.update(&buffer[..count]);
         Ok(count)
-    }
-}
-
-impl<R: Read + Seek> Seek for Digested<R> {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.at = self.source.seek(to)?;
-        Ok(self.at)
     }
 }
 
@@ -160,19 +144,6 @@ mod tests {
         assert_eq!(other_encoding(b"\xff\xfea\0"), Some("is UTF-16 text, not UTF-8"));
         assert_eq!(other_encoding(b"a"), None);
         assert!(other_encoding(b"a\0").is_some());
-    }
-
-    #[test]
-    fn bytes_are_digested_once_as_they_are_read() {
-        let bytes: Vec<u8> = (0..100).collect();
-        let mut source = Digested::new(io::Cursor::new(&bytes));
-        source.seek(SeekFrom::End(0)).unwrap();
-        source.seek(SeekFrom::Start(0)).unwrap();
-        let mut some = [0; 60];
-        source.read_exact(&mut some).unwrap();
-        source.seek(SeekFrom::Start(10)).unwrap();
-        source.read_to_end(&mut Vec::new()).unwrap();
-        assert_eq!(source.digest(), digest_of_bytes(&bytes));
     }
 
     #[test]

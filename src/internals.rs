@@ -22,14 +22,12 @@ pub mod expression {
 
 pub mod fem {
     //! Finite elements.
-    pub use crate::fem::{
-        EDGES, Elasticity, Facets, Frame, Space, Subdivision, assemble, cross, displacement, pad, surface,
-    };
+    pub use crate::fem::{EDGES, Elasticity, Facets, Frame, Space, assemble, cross, displacement, pad, surface};
 }
 
 pub mod mesh {
     //! Meshes.
-    pub use crate::mesh::{Asked, Duty, Group, Mesh, MeshProducer, breach, load, parse, unstructured};
+    pub use crate::mesh::{Asked, Duty, Group, Mesh, MeshProducer, load, parse, unstructured};
 }
 
 pub mod model {

@@ -144,6 +144,9 @@ pub struct Difference {
 /// Compare facts (name and value) that should be the same on all ranks. Return the differences, the same list on all ranks. If there are none, this
 /// takes one short message. Collective.
 pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<Difference> {
+    if session.size() == 1 {
+        return Vec::new();
+    }
     let sum = Sha256::digest(pack(facts));
     let sum = u64::from_le_bytes(std::array::from_fn(|byte| sum[byte]));
     // the largest of all sums, and the smallest as the complement of the largest complement

@@ -48,7 +48,6 @@ fn run(words: &[String]) -> Result<()> {
             }
         },
     };
-    options.mark_used("-n")?;
 
     let h = 1.0 / (n + 1) as f64;
     let first = |rank: usize| n * n * rank / session.size();
@@ -74,7 +73,7 @@ fn run(words: &[String]) -> Result<()> {
     let mut error = 0.0;
     session.world().all_reduce_into(&mine, &mut error, SystemOperation::max());
     if session.rank() == 0 {
-        println!("PETSc {}, {}", session.petsc_version().unwrap_or_default(), session.blas_name());
+        println!("PETSc {}, {}", session.petsc_version(), session.blas_name());
         println!("{} unknowns, {} with {}", n * n, ksp.ksp_type(), ksp.pc_type());
         println!("{} iterations: {}", solved.iterations, solved.reason);
         println!("largest error {error:.3e}");

@@ -173,7 +173,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
 pub fn settings_digest(scene: &Scene) -> String {
     let mut problem = scene.problem();
     problem["method"]["stop"] = Value::Null;
-    remove(&mut problem, "/mesh", &["timeout", "memory"]);
+    remove(&mut problem, "/mesh", &["timeout"]);
     digest(&problem.to_string())
 }
 

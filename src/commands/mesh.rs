@@ -1,6 +1,6 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use super::{adapt, flags};
+use super::adapt;
 use crate::discretize::{Verified, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
@@ -33,9 +33,6 @@ pub struct MeshArgs {
     /// The mesh that `winkler solve` has adapted to the error of the scene's `adapt`, or of --tolerance, which implies this
     #[arg(long)]
     adapted: bool,
-    /// Run the mesh's .geo script even if it can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
     /// File to write: .msh, which a scene can name as its mesh, or .vtu
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -46,15 +43,13 @@ pub struct MeshArgs {
 
 /// Make the mesh of a scene or find it in the cache, and return the exit code.
 ///
-/// Bodies with the quality of their cells and groups are printed. With `-o` the mesh is written to a file.
+/// Bodies and groups are printed. With `-o` the mesh is written to a file.
 ///
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
-    interrupt.hold();
     let tolerance = request.tolerance.iter().map(|error| format!("--tolerance {error}"));
-    let flags = flags([(request.trust_geo, "--trust-geo")]);
-    let overrides: Vec<String> = request.overrides.iter().cloned().chain(tolerance).chain(flags).collect();
+    let overrides: Vec<String> = request.overrides.iter().cloned().chain(tolerance).collect();
     let mut scene = crate::scene::load(&request.scene, &overrides)?;
     let is_adapted = request.adapted || request.tolerance.is_some();
     let is_reached = is_adapted.then(|| follow_adapted(&mut scene)).transpose()?;
@@ -113,7 +108,7 @@ fn show<const D: usize>(
 
 /// Return all that is printed about a mesh, as JSON.
 fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Result<Value> {
-    let Loaded { mesh, origin, file, unkept, notes, .. } = loaded;
+    let Loaded { mesh, origin, file, notes, .. } = loaded;
     let verified = verify(scene, &Serial, || Ok(mesh))?;
     let mesh = &verified.mesh;
     let bodies = bodies(&verified)?;
@@ -126,7 +121,6 @@ fn facts<const D: usize>(scene: &Scene, loaded: Loaded<D>, seconds: f64) -> Resu
             MeshOrigin::Cache => "from the cache",
             MeshOrigin::Gmsh => "made by Gmsh",
         },
-        "unkept": unkept,
         "notes": notes.iter().chain(&verified.notes).collect::<Vec<_>>(),
         "seconds": seconds,
         "dimension": D,
@@ -153,12 +147,10 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<Value>> {
                 .help(format!("its groups of cells: {}", known.join(", "))));
         };
         let space = Space::new(mesh, group, body.order);
-        let quality = mesh.quality(group);
         let facets = checked.next().map(|found| [found.inner, found.outer, found.parts.count]).unwrap_or_default();
         bodies.push(json!({
             "name": name, "cells": group.len(), "nodes": space.nodes.len(), "dofs": space.dofs(),
             "inner_facets": facets[0], "boundary_facets": facets[1], "parts": facets[2],
-            "quality": { "least": quality.least, "mean": quality.mean },
         }));
     }
     Ok(bodies)
@@ -188,16 +180,14 @@ fn print(facts: &Value) -> Result<()> {
     }
     for body in list("bodies") {
         say(format_args!(
-            "  body {}: {} cells, {} nodes, {} dofs, quality at least {:.3}, mean {:.3}",
+            "  body {}: {} cells, {} nodes, {} dofs",
             text(&body["name"]),
             body["cells"],
             body["nodes"],
-            body["dofs"],
-            number(&body["quality"]["least"]),
-            number(&body["quality"]["mean"])
+            body["dofs"]
         ))?;
     }
-    for note in list("notes").iter().chain(Some(&facts["unkept"])).filter_map(Value::as_str) {
+    for note in list("notes").iter().filter_map(Value::as_str) {
         say(format_args!("  warning: {note}"))?;
     }
     if facts["reached"] == json!(false) {
@@ -225,11 +215,11 @@ fn print(facts: &Value) -> Result<()> {
     Ok(())
 }
 
-/// Write the mesh: as `.msh` a copy of the file that was read, as `.vtu` cells with the index of their group.
+/// Write the mesh: as `.msh` the file that was read, as `.vtu` cells with the index of their group.
 fn write<const D: usize>(path: &Path, loaded: &Loaded<D>) -> Result<()> {
     match path.extension().and_then(|end| end.to_str()) {
         Some("msh") => {
-            let bytes = std::fs::read(&loaded.file).map_err(|cause| Error::file(&loaded.file, "read", &cause))?;
+            let bytes = crate::mesh::as_msh(&loaded.file, D)?;
             write_whole(path, |out| out.write_all(&bytes))
         }
         Some("vtu") => {

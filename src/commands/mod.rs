@@ -6,6 +6,7 @@ mod axes;
 pub(crate) mod bench;
 pub(crate) mod check;
 pub mod checkpoint;
+pub(crate) mod gone;
 mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;
@@ -89,13 +90,7 @@ impl Terminal {
             ));
         }
         for chosen in built.options.iter().take(LISTED) {
-            // PETSc's table has the options of a solver only while they are lent to it
-            let all = chosen.lend(session, || session.options().all())?;
-            let prefix = format!("-{}_", chosen.prefix());
-            let own = all.into_iter().filter(|(name, _)| name.starts_with(&prefix));
-            let own: Vec<String> =
-                own.map(|(name, value)| value.map_or(name.clone(), |value| format!("{name} {value}"))).collect();
-            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), own.join(" ")));
+            lines.push(format!("  PETSc options of {}: {}", chosen.prefix(), chosen.in_words()));
         }
         Ok(if self.is_first { lines } else { Vec::new() })
     }
@@ -119,9 +114,6 @@ pub struct SceneArgs {
     /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
     #[arg(long, value_name = "E", allow_hyphen_values = true)]
     tolerance: Option<String>,
-    /// Run the mesh's .geo script even if it can start programs or write files
-    #[arg(long)]
-    trust_geo: bool,
     /// Print the report as JSON
     #[arg(long)]
     pub json: bool,
@@ -132,7 +124,7 @@ impl SceneArgs {
     pub fn overrides(&self) -> Vec<String> {
         let method = self.method.iter().map(|name| format!("--method {name}"));
         let tolerance = self.tolerance.iter().map(|error| format!("--tolerance {error}"));
-        let flags = flags([(self.estimate, "--estimate"), (self.trust_geo, "--trust-geo")]);
+        let flags = flags([(self.estimate, "--estimate")]);
         self.overrides.iter().cloned().chain(method).chain(tolerance).chain(flags).collect()
     }
 }

@@ -133,8 +133,8 @@ impl Solver<'_> {
         let built = self.plan.build(session, interrupt, &mut self.clock)?;
         let begin = collectively(session, self.plan.begin(&built))?;
         let ready = run::set_up(session, built, begin, &mut self.clock)?;
-        let all = session.options().all()?;
-        let is_monitored = all.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
+        let typed = session.options().typed();
+        let is_monitored = typed.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         self.terminal.decisions(session, &ready)?.iter().for_each(|line| eprintln!("{line}"));
         self.open_tables(&ready)?;
         let scene = &self.plan.scene;

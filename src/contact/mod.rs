@@ -20,4 +20,4 @@ pub use law::LayerLaw;
 pub use law::Response;
 pub use pair::{ContactPair, Fault, LostPieces, add, assemble, moment_in_scene};
 pub use review::{Chords, ends};
-pub use side::{ROUNDING, Side};
+pub use side::Side;

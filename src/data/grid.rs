@@ -1,7 +1,9 @@
-//! Values at the points of a regular grid in one direction or two, their interpolation, and their roughness. A lookup takes the same few
-//! operations whatever the size.
+//! Values at the points of a regular grid in one direction or two, and their interpolation. A lookup takes the same few operations
+//! whatever the size.
 
-use super::rule::{Interpolation, Outside, Sample};
+use super::read::NumberRows;
+use super::rule::{DataSpec, Detrend, Interpolation, Outside, Sample};
+use crate::error::Result;
 
 /// A direction of a grid.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +48,48 @@ struct Stencil {
 }
 
 impl Grid {
+    /// Return the function of heights in rows and columns. A single row or column is a profile.
+    ///
+    /// # Errors
+    /// Numbers that are no function, or too few for the interpolation.
+    pub(super) fn new(spec: &DataSpec, NumberRows { columns, values }: NumberRows) -> Result<Self> {
+        let mut counts = [columns, values.len() / columns.max(1)];
+        if counts[0] == 1 {
+            counts.swap(0, 1);
+        }
+        if counts[0] < 2 {
+            return Err(spec.refuse("has no two numbers", "write heights in rows: two points or more make a function"));
+        }
+        if spec.interpolation == Interpolation::Cubic && counts.contains(&2) {
+            return Err(
+                spec.refuse("has two points in a direction", "cubic interpolation needs three: take \"linear\"")
+            );
+        }
+        let axes = [0, 1].map(|d| GridAxis { origin: spec.origin[d], spacing: spec.spacing[d], count: counts[d] });
+        let values = values.iter().map(|value| spec.unit * value).collect();
+        let mut grid = Self { axes, values, interpolation: spec.interpolation, outside: spec.outside };
+        if spec.detrend == Detrend::Plane {
+            grid.subtract_plane();
+        }
+        Ok(grid)
+    }
+
+    /// Subtract the plane of least squares. On a grid, with coordinates from its middle, the constant and both slopes are orthogonal:
+    /// each is the mean of the heights times its function, over the mean square of the function.
+    fn subtract_plane(&mut self) {
+        let columns = self.axes[0].count;
+        let middle = self.axes.map(|axis| 0.5 * (axis.count - 1) as f64);
+        let functions = move |k: usize| [1.0, (k % columns) as f64 - middle[0], (k / columns) as f64 - middle[1]];
+        let factors = [0, 1, 2].map(|i| {
+            let products = self.values.iter().enumerate().map(|(k, height)| functions(k)[i] * height).sum::<f64>();
+            let squares = (0..self.values.len()).map(|k| functions(k)[i].powi(2)).sum::<f64>();
+            if squares > 0.0 { products / squares } else { 0.0 }
+        });
+        for (k, height) in self.values.iter_mut().enumerate() {
+            *height -= functions(k).iter().zip(factors).map(|(value, factor)| value * factor).sum::<f64>();
+        }
+    }
+
     /// Return value and gradient at a place. A profile does not depend on the second coordinate.
     pub fn sample(&self, place: [f64; 2]) -> Sample {
         let [Some(across), Some(down)] = [0, 1].map(|axis| self.stencil(axis, place[axis])) else {
@@ -134,133 +178,4 @@ fn cubic(t: f64) -> Stencil {
     ];
     let slope = [-0.5 + t * (2.0 - 1.5 * t), t * (-5.0 + 4.5 * t), 0.5 + t * (4.0 - 4.5 * t), t * (-1.0 + 1.5 * t)];
     Stencil { weight, slope, ..Stencil::default() }
-}
-
-/// Moments of heights on a grid.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Roughness {
-    /// Least and largest height.
-    pub range: [f64; 2],
-    /// Root mean square of the heights from their mean: Sq of ISO 25178-2, Rq of a profile.
-    pub height: f64,
-    /// Root mean square of the gradient, by differences of neighbours: that of the (bi)linear interpolation along the lines of the grid.
-    pub slope: f64,
-    /// Root mean square of the mean curvature (h_xx + h_yy)/2, or of h_xx for a profile, by second differences of the heights h.
-    pub curvature: f64,
-}
-
-/// The summits of a surface: points higher than their eight neighbours.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Summits {
-    /// Number per area.
-    pub density: f64,
-    /// Radius that belongs to the mean of their curvatures.
-    pub radius: f64,
-    /// Their heights, the highest first.
-    pub heights: Vec<f64>,
-}
-
-impl Grid {
-    /// Return the roughness. A periodic surface has differences across its border, too.
-    pub fn roughness(&self) -> Roughness {
-        let count = self.values.len() as f64;
-        let mean = self.values.iter().sum::<f64>() / count;
-        let height = (self.values.iter().map(|h| (h - mean).powi(2)).sum::<f64>() / count).sqrt();
-        let (mut slope, mut curvature) = (0.0, Mean::default());
-        for axis in 0..2 {
-            let mut square = Mean::default();
-            self.points().for_each(|at| {
-                if let Some(next) = self.step(at, axis, 1) {
-                    square.add(((self.height(next) - self.height(at)) / self.axes[axis].spacing).powi(2));
-                }
-            });
-            slope += square.value();
-        }
-        self.points().filter_map(|at| self.curvature(at)).for_each(|value| curvature.add(value * value));
-        let range = [f64::min, f64::max].map(|pick| self.values.iter().copied().reduce(pick).unwrap_or(f64::NAN));
-        Roughness { range, height, slope: slope.sqrt(), curvature: curvature.value().sqrt() }
-    }
-
-    /// Return the summits; none for a profile, and none if no point is higher than its neighbours.
-    pub fn summits(&self) -> Option<Summits> {
-        if self.axes[1].count == 1 {
-            return None;
-        }
-        let (mut heights, mut curvature) = (Vec::new(), Mean::default());
-        for at in self.points() {
-            let (Some(bend), Some(neighbours)) = (self.curvature(at), self.neighbours(at)) else { continue };
-            if neighbours.iter().all(|&height| height < self.height(at)) {
-                heights.push(self.height(at));
-                curvature.add(-bend);
-            }
-        }
-        heights.sort_by(|a, b| b.total_cmp(a));
-        let area: f64 = self.axes.iter().map(|axis| axis.spacing * axis.count as f64).product();
-        let radius = 1.0 / curvature.value();
-        (!heights.is_empty()).then(|| Summits { density: heights.len() as f64 / area, radius, heights })
-    }
-
-    /// Return the indices of all points, along a row and of the row.
-    fn points(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
-        let [columns, rows] = self.axes.map(|axis| axis.count);
-        (0..rows).flat_map(move |j| (0..columns).map(move |i| [i, j]))
-    }
-
-    fn height(&self, [i, j]: [usize; 2]) -> f64 {
-        self.values[i + self.axes[0].count * j]
-    }
-
-    /// Return the point that is `steps` further along an axis; none beyond the border, or if the axis has only one point.
-    fn step(&self, mut at: [usize; 2], axis: usize, steps: isize) -> Option<[usize; 2]> {
-        let count = self.axes[axis].count;
-        let next = at[axis].wrapping_add_signed(steps);
-        at[axis] = match next < count {
-            _ if count == 1 => return None,
-            true => next,
-            false if self.outside == Outside::Periodic => next.wrapping_add(count) % count,
-            false => return None,
-        };
-        Some(at)
-    }
-
-    /// Return the mean of the second differences along all axes.
-    fn curvature(&self, at: [usize; 2]) -> Option<f64> {
-        let axes = (0..2).filter(|&axis| self.axes[axis].count > 1);
-        let mut sum = Mean::default();
-        for axis in axes {
-            let (before, after) = (self.step(at, axis, -1)?, self.step(at, axis, 1)?);
-            let difference = self.height(before) - 2.0 * self.height(at) + self.height(after);
-            sum.add(difference / self.axes[axis].spacing.powi(2));
-        }
-        Some(sum.value())
-    }
-
-    /// Return the eight heights around a point; none at the border.
-    fn neighbours(&self, at: [usize; 2]) -> Option<[f64; 8]> {
-        let mut heights = [0.0; 8];
-        let around = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))).filter(|&both| both != (0, 0));
-        for (height, (i, j)) in heights.iter_mut().zip(around) {
-            let beside = if i == 0 { at } else { self.step(at, 0, i)? };
-            *height = self.height(if j == 0 { beside } else { self.step(beside, 1, j)? });
-        }
-        Some(heights)
-    }
-}
-
-/// A mean of numbers that are added one by one; zero without any.
-#[derive(Default)]
-struct Mean {
-    sum: f64,
-    count: usize,
-}
-
-impl Mean {
-    fn add(&mut self, value: f64) {
-        self.sum += value;
-        self.count += 1;
-    }
-
-    fn value(&self) -> f64 {
-        self.sum / self.count.max(1) as f64
-    }
 }

@@ -1,7 +1,7 @@
 //! How much of the balance that loads have on curved surfaces they may lack on the facets of a mesh.
 
+use super::groups::Line;
 use super::part::SceneBody;
-use super::patterns::{find_group, load_dimensions};
 use crate::error::Result;
 use crate::fem::{Facets, Space, minus, unit};
 use crate::linalg::dot;
@@ -18,11 +18,11 @@ use std::f64::consts::FRAC_PI_3;
 /// A load on a surface that the mesh does not have.
 pub fn lack<const D: usize>(parts: &[SceneBody<D>], mesh: &Mesh<D>) -> Result<f64> {
     let mut largest = 0.0f64;
-    for part in parts.iter().filter(|part| part.space.order == Order::P1) {
+    for part in parts.iter().filter(|part| part.mesh.space.order == Order::P1) {
         for load in &part.spec.load {
-            let group = find_group(mesh, &load.on, load_dimensions::<D>(&load.kind), "load")?;
+            let group = load.group(mesh)?;
             if group.dimension == D - 1 {
-                largest = turns(&part.space, &part.space.facets(group)).fold(largest, f64::max);
+                largest = turns(&part.mesh.space, &part.mesh.space.facets(group)).fold(largest, f64::max);
             }
         }
     }

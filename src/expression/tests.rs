@@ -1,5 +1,5 @@
 use super::*;
-use crate::data::{DataSpec, Detrend, Fill, Interpolation, Outside};
+use crate::data::{DataSpec, Detrend, Interpolation, Outside};
 use crate::error::Source;
 use crate::linalg::portable;
 
@@ -270,12 +270,9 @@ fn derivatives_of_data_agree_with_differences() {
         name: "f".into(),
         file,
         place: place.clone(),
-        points: false,
         origin: [0.0; 2],
         spacing: [0.5, 0.8],
         unit: 1.0,
-        missing: None,
-        fill: Fill::Error,
         detrend: Detrend::None,
         interpolation: Interpolation::Cubic,
         outside: Outside::Error,

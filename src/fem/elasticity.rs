@@ -5,7 +5,7 @@ use super::space::{PAIRS, Slope, component};
 use super::{cross, length};
 use crate::linalg::dot;
 use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
-use nalgebra::{Matrix3, Matrix6};
+use nalgebra::{Matrix3, Matrix6, Rotation3, Unit, Vector3};
 
 /// The elasticity of a body, cell by cell.
 #[derive(Debug, Clone)]
@@ -217,7 +217,8 @@ fn directions(axes: &AxesSpec, x: [f64; 3]) -> Result<[[f64; 3]; 3], Flaw> {
             if !angle.is_finite() {
                 return Err(Flaw::Constant("angle", angle, "must be finite"));
             }
-            (rotated([1.0, 0.0, 0.0], axis, angle), rotated([0.0, 1.0, 0.0], axis, angle))
+            let turn = Rotation3::from_axis_angle(&Unit::new_unchecked(axis.into()), angle);
+            ((turn * Vector3::x()).into(), (turn * Vector3::y()).into())
         }
     };
     let along = dot(&first, &second);
@@ -227,14 +228,6 @@ fn directions(axes: &AxesSpec, x: [f64; 3]) -> Result<[[f64; 3]; 3], Flaw> {
     }
     let second = unit(across, "`second` has no direction")?;
     Ok([first, second, cross(first, second)])
-}
-
-/// Return a vector rotated by an angle about a unit axis (Rodrigues).
-fn rotated(v: [f64; 3], axis: [f64; 3], angle: f64) -> [f64; 3] {
-    let (sine, cosine) = angle.sin_cos();
-    let along = dot(&axis, &v);
-    let across = cross(axis, v);
-    std::array::from_fn(|c| cosine * v[c] + sine * across[c] + (1.0 - cosine) * along * axis[c])
 }
 
 /// Return the vector scaled to length one.
@@ -428,11 +421,8 @@ impl Material {
         local: &mut [[[f64; D]; D]],
     ) {
         match self.lame {
-            Some((lambda, mu)) => {
-                isotropic_blocks(weight * lambda, weight * mu, gradient, local);
-                isotropic_hoops(weight * lambda, weight * mu, gradient, hoop, local);
-            }
-            None => self.blocks(gradient, hoop, weight, local),
+            Some((lambda, mu)) if hoop.is_empty() => isotropic_blocks(weight * lambda, weight * mu, gradient, local),
+            _ => self.blocks(gradient, hoop, weight, local),
         }
     }
 
@@ -481,28 +471,6 @@ fn isotropic_blocks<const D: usize>(lambda: f64, mu: f64, gradient: &[[f64; D]],
                 }
                 block[i][i] += mu * product;
             }
-        }
-    }
-}
-
-/// Add what the strains u_r/r of the circles in a body of revolution contribute to lambda e e' + 2 mu (u_r/r) (u_r'/r). Here
-/// e = div u + u_r/r, and primes mark the second displacement.
-fn isotropic_hoops<const D: usize>(
-    lambda: f64,
-    mu: f64,
-    gradient: &[[f64; D]],
-    hoop: &[f64],
-    local: &mut [[[f64; D]; D]],
-) {
-    let n = hoop.len();
-    for a in 0..n {
-        for b in a..n {
-            let block = &mut local[a * n + b];
-            for i in 0..D {
-                block[0][i] += lambda * hoop[a] * gradient[b][i];
-                block[i][0] += lambda * gradient[a][i] * hoop[b];
-            }
-            block[0][0] += (lambda + 2.0 * mu) * hoop[a] * hoop[b];
         }
     }
 }

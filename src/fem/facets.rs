@@ -2,8 +2,8 @@
 
 use super::space::Space;
 use super::{cross, element, length, minus, pad, unit};
-use crate::linalg::dot;
 use crate::mesh::Group;
+use crate::mesh::faces::{Face, Faces, Simplices};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -51,65 +51,32 @@ impl<const D: usize> Space<D> {
 
     /// Return the cell that each of these facets of the boundary bounds.
     pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
-        let mut on_facets = vec![false; self.nodes.len()];
-        facets.nodes.iter().for_each(|&node| on_facets[node as usize] = true);
-        let mut cells: HashMap<[u32; D], usize> = HashMap::new();
-        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
-            if cell[..=D].iter().filter(|&&node| on_facets[node as usize]).count() >= D {
-                cells.extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), index)));
-            }
-        }
-        (0..facets.count()).map(|i| cells[&key(facets.facet(i))]).collect()
+        let faces = Faces::new(self.simplices(), self.nodes.len());
+        (0..facets.count()).map(|i| faces.at(facets.facet(i))[0].cell()).collect()
+    }
+
+    /// Return the cells without coordinates.
+    fn simplices(&self) -> Simplices<'_, D> {
+        Simplices { nodes: &self.cells, stride: self.stride }
     }
 
     /// Return all facets that bound one cell only, oriented outwards.
     pub fn boundary(&self) -> Facets<D> {
-        self.facets_of(self.lone_facets())
+        self.facets_of(self.lone_facets().into_iter())
     }
 
-    /// Return the same facets, each as its cell and the local vertex opposite to it.
-    pub fn lone_facets(&self) -> impl Iterator<Item = (usize, usize)> + use<D> {
-        let mut faces: Vec<([u32; D], u32)> = Vec::with_capacity(self.cell_count() * (D + 1));
-        for (index, cell) in self.cells.chunks_exact(self.stride).enumerate() {
-            faces
-                .extend((0..=D).map(|opposite| (key(&face::<D>(cell, opposite)), (index * (D + 1) + opposite) as u32)));
-        }
-        faces.sort_unstable();
-        let lone = faces.chunk_by(|a, b| a.0 == b.0).filter(|group| group.len() == 1);
-        let mut places: Vec<u32> = lone.map(|group| group[0].1).collect();
+    /// Return the same facets in the order of the cells, each as its cell and the local vertex opposite to it.
+    pub fn lone_facets(&self) -> Vec<(usize, usize)> {
+        let faces = Faces::new(self.simplices(), self.nodes.len());
+        let mut places: Vec<_> = faces.outer().map(|face| (face.cell(), face.opposite())).collect();
         places.sort_unstable();
-        places.into_iter().map(|place| (place as usize / (D + 1), place as usize % (D + 1)))
+        places
     }
 
     /// Return the facets that are given as a cell and the local vertex opposite to the facet, oriented out of the cell.
     pub fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
-        let mut nodes = Vec::new();
-        for (index, opposite) in places {
-            let cell = self.cell(index);
-            let mut facet = face::<D>(cell, opposite).to_vec();
-            if self.points_inwards(&facet, cell[opposite]) {
-                facet.swap(0, 1);
-            }
-            if self.order == Order::P2 {
-                let local = |node: u32| cell.iter().position(|&other| other == node).unwrap_or(0);
-                let ends: Vec<usize> = facet.iter().map(|&node| local(node)).collect();
-                for &(i, j) in &element::EDGES[..D * (D - 1) / 2] {
-                    let (from, to) = (ends[i].min(ends[j]), ends[i].max(ends[j]));
-                    let edge = element::EDGES.iter().position(|&edge| edge == (from, to)).unwrap_or(0);
-                    facet.push(cell[D + 1 + edge]);
-                }
-            }
-            nodes.extend(facet);
-        }
-        Facets::new(self.order, nodes)
-    }
-
-    /// Return whether the normal of a facet points into its cell, whose vertex `opposite` is not on the facet.
-    fn points_inwards(&self, facet: &[u32], opposite: u32) -> bool {
-        let x: Vec<_> = facet[..D].iter().map(|&node| self.nodes[node as usize]).collect();
-        let normal = area_vector::<D>(Order::P1, &x, &[1.0 / D as f64; D]);
-        let inner = self.nodes[opposite as usize];
-        dot(&normal, &minus(inner, x[0])) > 0.0
+        let nodes = |(cell, opposite)| Face::at(cell, opposite).nodes(self.simplices());
+        Facets::new(self.order, places.flat_map(nodes).collect())
     }
 }
 

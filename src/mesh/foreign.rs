@@ -1,11 +1,8 @@
 //! Files of other programs: shapes that Gmsh meshes, and meshes that it converts.
 
 use super::cache::write;
-use super::nastran;
-use super::trust::is_kind;
-use crate::error::{Located, Result};
-use std::collections::HashSet;
-use std::fmt::Write;
+use super::simplex::THINGS;
+use crate::error::{Error, Located, Result};
 use std::path::{Path, PathBuf};
 
 /// Kinds of file with the shape of bodies.
@@ -17,6 +14,11 @@ const MESHES: [&str; 6] = ["unv", "bdf", "nas", "mesh", "med", "inp"];
 /// Return whether a file has the shape of bodies, by its name.
 pub fn is_shape(path: &Path) -> bool {
     is_kind(path, &SHAPES)
+}
+
+/// Return whether a file has a shape or a mesh, by its name, so that Gmsh reads no script in it.
+pub fn is_data(path: &Path) -> bool {
+    is_kind(path, &SHAPES) || is_kind(path, &MESHES)
 }
 
 /// Return whether a file holds a mesh of another program, or of Gmsh's format 4.0.
@@ -34,7 +36,7 @@ pub fn is_mesh(path: &Path, bytes: &[u8]) -> bool {
 /// # Errors
 /// The folder cannot be written.
 pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, work: &Path) -> Result<PathBuf> {
-    let kind = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let kind = ending(path);
     // The copy has a name of our own, since the user's may contain any characters.
     let copy = format!("shape.{kind}");
     write(&work.join(&copy), bytes)?;
@@ -49,8 +51,8 @@ pub fn script(path: &Path, bytes: &[u8], dimension: usize, size: Option<f64>, wo
     if let Some(size) = size {
         text += &format!("Mesh.MeshSizeMax = {size};\nends() = Point{{:}};\nMeshSize{{ends()}} = {size};\n");
     }
-    let things = ["Point", "Curve", "Surface", "Volume"];
-    for (thing, of) in [(things[dimension], dimension), (things[dimension - 1], dimension - 1), (things[0], 0)] {
+    for of in [dimension, dimension - 1, 0] {
+        let thing = THINGS[of];
         let (name, list) = (thing.to_lowercase(), format!("list{of}"));
         text += &format!(
             "{list}() = {thing}{{:}};\nFor i In {{0:#{list}()-1}}\n  \
@@ -66,155 +68,44 @@ pub fn is_input_file(path: &Path) -> bool {
     is_kind(path, &["inp"])
 }
 
-/// Write a mesh of another program into the folder `work` in a form that Gmsh reads, and return its path.
+/// Copy a mesh of another program into the folder `work`, and return the path of the copy. Gmsh chooses its reader by the name, and reads files
+/// beside a mesh as scripts, so that the copy has a name of our own. A file of no other kind begins like a mesh of Gmsh.
 ///
 /// # Errors
-/// The file is not such a mesh, or the folder cannot be written.
-pub fn mesh(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBuf> {
-    let path = &file.value;
-    // A file that begins like a mesh of Gmsh must not be read as a script, whatever its name.
-    let kind = match is_kind(path, &MESHES) {
-        true => path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase(),
+/// A deck has local systems of coordinates, which Gmsh ignores without a word. The folder cannot be written.
+pub fn copied(file: &Located<PathBuf>, bytes: &[u8], work: &Path) -> Result<PathBuf> {
+    let kind = match is_kind(&file.value, &MESHES) {
+        true => ending(&file.value),
         false => "msh".to_owned(),
     };
+    if ["bdf", "nas"].contains(&kind.as_str()) {
+        refuse_local_systems(file, bytes)?;
+    }
     let made = work.join(format!("mesh.{kind}"));
-    let written = match kind.as_str() {
-        "unv" => write(&made, readable(&String::from_utf8_lossy(bytes))),
-        "bdf" | "nas" => {
-            let text = nastran::readable(path, &String::from_utf8_lossy(bytes));
-            write(&made, text.map_err(|error| error.at(&file.place))?)
-        }
-        _ => write(&made, bytes),
-    };
-    written.map(|()| made)
+    write(&made, bytes).map(|()| made)
 }
 
-/// Datasets of groups with four numbers per member. Gmsh reads groups from the second one, 2477.
-const GROUPS: [&str; 5] = ["2467", "2477", "2452", "2435", "2432"];
-
-/// Kinds of elements with an additional line: beams.
-const BEAMS: [&str; 5] = ["11", "21", "22", "23", "24"];
-
-/// Code of members that are elements.
-const ELEMENT: &str = "8";
-
-/// Number of the dataset of elements.
-const ELEMENTS: &str = "2412";
-
-/// Return the file with groups that contain only elements of the file, and with elements of no material if there are groups.
-pub fn readable(text: &str) -> String {
-    let lines: Vec<&str> = text.lines().collect();
-    let number = |dataset: &[&str]| dataset.first().map_or("", |line| line.trim()).to_owned();
-    let has_groups = datasets(&lines).any(|dataset| GROUPS.contains(&number(dataset).as_str()));
-    let mut elements = HashSet::new();
-    for dataset in datasets(&lines).filter(|dataset| number(dataset) == ELEMENTS) {
-        elements
-            .extend(records(&dataset[1..]).filter_map(|record| record[0].split_whitespace().next()).map(str::to_owned));
-    }
-    let mut made = String::with_capacity(text.len());
-    for dataset in datasets(&lines) {
-        made += "    -1\n";
-        match dataset.split_first() {
-            Some((number, groups)) if GROUPS.contains(&number.trim()) => {
-                made += "  2477\n";
-                write_groups(groups, &elements, &mut made);
-            }
-            Some((number, lines)) if has_groups && number.trim() == ELEMENTS => {
-                let _ = writeln!(made, "  {ELEMENTS}");
-                records(lines).for_each(|record| write_element(record, &mut made));
-            }
-            _ => dataset.iter().for_each(|line| {
-                made += line;
-                made.push('\n');
-            }),
+/// Refuse a deck of Nastran that defines local systems of coordinates (`CORD2R` and the like) or a default one (`GRDSET`).
+fn refuse_local_systems(file: &Located<PathBuf>, bytes: &[u8]) -> Result<()> {
+    let text = String::from_utf8_lossy(bytes).to_ascii_uppercase();
+    let is_local = |line: &str| ["CORD", "GRDSET"].iter().any(|card| line.trim_start().starts_with(card));
+    match text.lines().zip(1..).find(|(line, _)| is_local(line)) {
+        Some((_, number)) => {
+            let what = "the deck has a local system of coordinates, and Gmsh reads all points as global ones";
+            Err(Error::mesh(&file.value, Some(number), what)
+                .at(&file.place)
+                .help("write the deck with all grid points in the basic system"))
         }
-        made += "    -1\n";
-    }
-    made
-}
-
-/// Return the lines between each two lines of `-1`.
-fn datasets<'a>(lines: &'a [&'a str]) -> impl Iterator<Item = &'a [&'a str]> {
-    lines.split(|line| line.trim() == "-1").filter(|dataset| dataset.iter().any(|line| !line.trim().is_empty()))
-}
-
-/// Return the lines of each element of a dataset.
-fn records<'a>(mut lines: &'a [&'a str]) -> impl Iterator<Item = &'a [&'a str]> {
-    std::iter::from_fn(move || {
-        let words: Vec<&str> = lines.first()?.split_whitespace().collect();
-        let nodes: usize = words.get(5).and_then(|word| word.parse().ok()).unwrap_or(0);
-        let count = 1 + usize::from(BEAMS.contains(words.get(1)?)) + nodes.div_ceil(8);
-        let (record, rest) = lines.split_at(count.min(lines.len()));
-        lines = rest;
-        Some(record)
-    })
-}
-
-/// Write an element without its material, which is the fourth number.
-fn write_element(record: &[&str], made: &mut String) {
-    let words = record[0].split_whitespace().enumerate();
-    let words = words.map(|(at, word)| format!("{:>10}", if at == 3 { "0" } else { word }));
-    let _ = writeln!(made, "{}", words.collect::<String>());
-    record[1..].iter().for_each(|line| {
-        let _ = writeln!(made, "{line}");
-    });
-}
-
-/// Write the groups without members that are not elements of the file. Groups that become empty are omitted.
-fn write_groups(mut lines: &[&str], elements: &HashSet<String>, made: &mut String) {
-    while let [head, name, rest @ ..] = lines {
-        let head: Vec<&str> = head.split_whitespace().collect();
-        let (Some(number), Some(count)) = (head.first(), head.last().and_then(|word| word.parse::<usize>().ok()))
-        else {
-            return;
-        };
-        // Most programs write two members a line.
-        let (mut words, mut members) = (Vec::new(), rest.iter());
-        while words.len() < count.saturating_mul(4) {
-            let Some(line) = members.next() else { break };
-            words.extend(line.split_whitespace());
-        }
-        lines = members.as_slice();
-        let known: Vec<&str> = words
-            .chunks(4)
-            .filter(|member| member[0] == ELEMENT && member.get(1).is_some_and(|tag| elements.contains(*tag)))
-            .map(|member| member[1])
-            .collect();
-        if known.is_empty() {
-            continue;
-        }
-        let _ = writeln!(made, "{number:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", 0, 0, 0, 0, 0, 0, known.len());
-        let _ = writeln!(made, "{}", name.trim());
-        for pair in known.chunks(2) {
-            pair.iter().for_each(|tag| {
-                let _ = write!(made, "{ELEMENT:>10}{tag:>10}{:>10}{:>10}", 0, 0);
-            });
-            made.push('\n');
-        }
+        None => Ok(()),
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
+}
 
-    #[test]
-    fn groups_keep_the_elements_that_are_there() {
-        let text = "    -1\n  2412\n         1        11         0         1         7         2\n 0 1 1\n 1 2\n\
-                    \x20        2        41         2         1         7         3\n 1 2 3\n    -1\n    -1\n  2467\n\
-                    \x201 0 0 0 0 0 0 3\nLow\n 8 2 0 0 7 1 0 0\n 8 9 0 0\n 2 0 0 0 0 0 0 1\nNodes\n 7 1 0 0\n\
-                    \x203 0 0 0 0 0 0 1\nBeam\n 8 1 0 0\n    -1\n";
-        let made = readable(text);
-        assert!(made.contains("         2        41         2         0         7         3\n 1 2 3\n"), "{made}");
-        assert!(made.contains("  2477\n") && !made.contains("2467") && !made.contains("Nodes"), "{made}");
-        let groups: Vec<&str> = made.lines().skip_while(|line| line.trim() != "2477").skip(1).collect();
-        assert_eq!(groups.len(), 7, "{made}");
-        assert_eq!([groups[1], groups[4]], ["Low", "Beam"]);
-        assert_eq!(groups[2].split_whitespace().collect::<Vec<_>>(), ["8", "2", "0", "0"]);
-        for members in [" 8 2 0 0\n 7 1 0 0\n 8 9 0 0\n", " 8 2 0 0 7 1 0 0 8 9 0 0\n", " 8 2\n0 0 7 1 0 0 8\n9 0 0\n"]
-        {
-            let other = readable(&text.replace(" 8 2 0 0 7 1 0 0\n 8 9 0 0\n", members));
-            assert_eq!(other, made, "{members}");
-        }
-    }
+/// Return whether the name of a file ends in one of these, in lower or upper case. Gmsh does not recognize a mixture.
+fn is_kind(path: &Path, kinds: &[&str]) -> bool {
+    let end = path.extension().unwrap_or_default();
+    kinds.iter().any(|kind| end == *kind || end == kind.to_ascii_uppercase().as_str())
 }

@@ -1,17 +1,16 @@
 //! The way from the scene's mesh source to a mesh: by Gmsh, from the cache, from a file, or from arrays.
 
-use super::cache::{self, Workshop, file_name, folders, write};
+use super::cache::{self, Cache, write};
 use super::gmsh::{Gmsh, MeshingTask};
 use super::msh::{self, MeshProducer};
-use super::script::{Script, quoted};
-use super::{Group, Mesh, abaqus, foreign, groups, simplex};
+use super::script::{self, Script, quoted};
+use super::{Mesh, abaqus, arrays, foreign};
 use crate::error::{Error, Located, Place, Result};
 use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
-use crate::problem::body::plain;
-use crate::problem::{GroupArrays, Guard, MeshArrays, MeshSource, Order};
+use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// A mesh and its origin.
@@ -20,26 +19,18 @@ pub struct Loaded<const D: usize> {
     pub mesh: Mesh<D>,
     /// Where the mesh came from.
     pub origin: MeshOrigin,
-    /// The `.msh` file that was read: the user's own, or the one in the cache. It is empty for arrays.
+    /// The file that was read: the user's own, or the one in the cache. It is empty for arrays.
     pub file: PathBuf,
     /// SHA-256 of the contents of the file; empty for arrays.
     pub digest: String,
-    /// The reason, in words, why the mesh cannot be taken from the cache, if there is one.
-    pub unkept: Option<String>,
     /// What of the file was left out, or is not as the user may think.
     pub notes: Vec<String>,
-}
-
-impl<const D: usize> Loaded<D> {
-    fn new(mesh: Mesh<D>, origin: MeshOrigin, file: PathBuf, digest: String) -> Self {
-        Self { mesh, origin, file, digest, unkept: None, notes: Vec::new() }
-    }
 }
 
 /// The origin of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshOrigin {
-    /// The `.msh` file that the scene names, or arrays.
+    /// The mesh file that the scene names, or arrays.
     File,
     /// The cache: Gmsh meshed the same script with the same numbers before.
     Cache,
@@ -49,7 +40,7 @@ pub enum MeshOrigin {
 
 /// Load the mesh of a scene for displacements of an order, unless a signal ends it.
 ///
-/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A `.msh` file of order 2 serves order 1
+/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of order 2 serves order 1
 /// without its mid-edge points. Folded quadratic cells become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
@@ -62,13 +53,17 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            meshed(file, (set, places), sizes.as_deref(), order, (guard, interrupt), &folders())
+            let sizes = sizes.as_deref();
+            Meshing { file, set, places, sizes, order, guard, interrupt }.mesh(&Cache::of_user()?)
         }
         MeshSource::Msh { file } => from_file(file, order, interrupt),
-        MeshSource::Arrays(arrays) => {
-            let mesh = of_arrays(arrays, order)?;
-            Ok(Loaded::new(mesh, MeshOrigin::File, PathBuf::new(), String::new()))
-        }
+        MeshSource::Arrays(arrays) => Ok(Loaded {
+            mesh: arrays::mesh(arrays, order)?,
+            origin: MeshOrigin::File,
+            file: PathBuf::new(),
+            digest: String::new(),
+            notes: Vec::new(),
+        }),
     }?;
     loaded.mesh.find_uncertainty();
     loaded.mesh.straighten();
@@ -80,25 +75,20 @@ const START: u64 = 1000;
 
 fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
-    let mut source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
     let mut start = Vec::new();
-    let read = source.by_ref().take(START).read_to_end(&mut start);
+    let source = crate::file::open(path).map_err(|error| error.at(&file.place))?;
+    let read = source.take(START).read_to_end(&mut start);
     read.map_err(|cause| Error::file(path, "read", &cause).at(&file.place))?;
-    refuse_old_lines(path, &start)?;
+    let whole = || crate::file::read(path).map(with_unix_lines).map_err(|error| error.at(&file.place));
     let mut loaded = match foreign::is_mesh(path, &start) {
-        true => {
-            let bytes = crate::file::read(path).map_err(|error| error.at(&file.place))?;
-            let bytes = with_unix_lines(bytes);
-            match foreign::is_input_file(path) {
-                true => input_file(path, &bytes).map_err(|error| error.at(&file.place))?,
-                false => converted(file, &bytes, interrupt)?,
-            }
+        true if foreign::is_input_file(path) => {
+            let abaqus::Converted { mesh: bytes, notes } =
+                abaqus::convert(path, &whole()?, D).map_err(|error| error.at(&file.place))?;
+            let mesh = msh::parse(path, &bytes, MeshProducer::Other)?;
+            Loaded { mesh, origin: MeshOrigin::File, file: path.clone(), digest: digest_of_bytes(&bytes), notes }
         }
-        false => {
-            let mut source = Digested::new(source);
-            let mesh = msh::read(path, Box::new(&mut source), MeshProducer::User)?;
-            Loaded::new(mesh, MeshOrigin::File, path.clone(), source.digest())
-        }
+        true => converted(file, &whole()?, interrupt)?,
+        false => read_file(path, path, MeshProducer::User, MeshOrigin::File)?,
     };
     loaded.mesh = match (loaded.mesh.order, order) {
         (Order::P2, Order::P1) => loaded.mesh.lower_order(),
@@ -115,34 +105,39 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     Ok(loaded)
 }
 
-/// Refuse text of Gmsh whose line ends Gmsh does not read.
-fn refuse_old_lines(path: &Path, start: &[u8]) -> Result<()> {
-    let end = start.iter().position(|byte| matches!(byte, b'\r' | b'\n'));
-    let is_old_mac = end.is_some_and(|at| start[at] == b'\r' && start.get(at + 1) != Some(&b'\n'));
-    match start.starts_with(b"$") && is_old_mac && !foreign::is_mesh(path, start) {
-        true => Err(Error::mesh(path, None, "its lines end with carriage returns alone, as on old Macs")
-            .help(format!("give them the ends of today: tr '\\r' '\\n' < {} > new.msh", path.display()))),
-        false => Ok(()),
-    }
+/// Read a `.msh` file. `shown` is the file that the user named.
+fn read_file<const D: usize>(shown: &Path, file: &Path, maker: MeshProducer, origin: MeshOrigin) -> Result<Loaded<D>> {
+    let mut source = Digested::new(File::open(file).map_err(|cause| Error::file(file, "read", &cause))?);
+    let mesh = msh::read(shown, &mut BufReader::with_capacity(WINDOW, &mut source), maker)?;
+    Ok(Loaded { mesh, origin, file: file.to_owned(), digest: source.digest(), notes: Vec::new() })
 }
 
-/// Return the mesh of an input file of Abaqus or CalculiX. The cache keeps it as a mesh file for `winkler mesh -o`; it is made anew
-/// in each run.
-fn input_file<const D: usize>(path: &Path, bytes: &[u8]) -> Result<Loaded<D>> {
-    let abaqus::Converted { mesh: bytes, notes } = abaqus::convert(path, bytes, D)?;
-    let name = file_name(("input file", digest_of_bytes(&bytes)), path);
-    let loaded = made_anew((path, &name), None, &folders(), |_, made| write(made, &bytes))?;
-    Ok(Loaded { origin: MeshOrigin::File, notes, ..loaded })
+/// Bytes that are read at a time.
+const WINDOW: usize = 1 << 18;
+
+/// Return the contents of a mesh file as a `.msh` file: those of a deck of Abaqus or CalculiX are converted.
+///
+/// # Errors
+/// The file cannot be read, or is no mesh.
+pub fn as_msh(file: &Path, dimension: usize) -> Result<Vec<u8>> {
+    let bytes = crate::file::read(file)?;
+    match foreign::is_input_file(file) {
+        true => abaqus::convert(file, &with_unix_lines(bytes), dimension).map(|converted| converted.mesh),
+        false => Ok(bytes),
+    }
 }
 
 /// Return a mesh of another program, or of Gmsh's format 4.0, as Gmsh converts it.
 fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &Interrupt) -> Result<Loaded<D>> {
     let path = &file.value;
-    let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let name = file_name(("converted", ending, digest_of_bytes(bytes)), path);
-    let guard = &Guard::default();
-    let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
-        let script = &foreign::mesh(file, bytes, work)?;
+    let name = cache::name(
+        ("converted", path.extension().unwrap_or_default().to_string_lossy(), digest_of_bytes(bytes)),
+        path,
+    );
+    let wanted = Wanted { path, name, order: None, is_kept: true };
+    let loaded = wanted.find_or_make(&Cache::of_user()?, |gmsh, work, made| {
+        let script = &foreign::copied(file, bytes, work)?;
+        let guard = &Guard::default();
         let task = MeshingTask {
             script,
             shown: path,
@@ -154,108 +149,88 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
             interrupt,
         };
         gmsh.run(&task, made, work)
-    };
-    kept((path, &name), None, None, &folders(), make).map_err(|error| error.at(&file.place))
+    });
+    loaded.map_err(|error| error.at(&file.place))
 }
 
-/// Read a mesh that was made from the file at `path`, and return it with the digest of its file. The mesh of a script must have the
-/// requested `order`; that of another program has none.
-fn read_made<const D: usize>(path: &Path, order: Option<Order>, file: File) -> Result<(Mesh<D>, String)> {
-    let mut source = Digested::new(file);
-    let maker = if order.is_some() { MeshProducer::Script } else { MeshProducer::Other };
-    let mesh: Mesh<D> = msh::read(path, Box::new(&mut source), maker).map_err(|error| match error.advice() {
-        // Advice for scripts does not help with a file of another program.
-        advice if order.is_none() && advice.is_none_or(|advice| advice.contains("Physical")) => {
-            error.help(format!("see what Gmsh makes of it: gmsh {}", path.display()))
-        }
-        _ => error,
-    })?;
-    if order.is_some_and(|order| mesh.order != order) {
-        let error = Error::mesh(path, None, "Gmsh made a mesh of another order than the scene asks for");
-        return Err(error.help("remove `Mesh.ElementOrder` and `SetOrder` from the script"));
-    }
-    Ok((mesh, source.digest()))
-}
-
-/// Return the mesh `name` from the cache, which is in one of `folders`, or make it from `path`. Only the latter takes Gmsh.
-///
-/// `make` gets Gmsh, a folder to work in and the path of the file that it must write there. `unkept` gives a reason why the name does
-/// not identify all that the mesh is made from; then the mesh is always made anew.
-fn kept<const D: usize>(
-    (path, name): (&Path, &str),
+/// A mesh that Gmsh makes of a file, unless the cache has it.
+struct Wanted<'a> {
+    /// The file that the user named.
+    path: &'a Path,
+    /// What its name in the cache begins with.
+    name: String,
+    /// The order that the mesh of a script must have; the mesh of another program has none.
     order: Option<Order>,
-    unkept: Option<String>,
-    folders: &[PathBuf],
-    make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
-) -> Result<Loaded<D>> {
-    let gmsh = Gmsh::find();
-    let candidates = |folder: &PathBuf| match &gmsh {
-        Some(gmsh) => vec![folder.join(cache::made_by(name, &gmsh.identity()))],
-        None => cache::made_by_any(folder, name),
-    };
-    // A file of the cache that cannot be read or is damaged counts as absent.
-    for cached in folders.iter().filter(|_| unkept.is_none()).flat_map(candidates) {
-        if let Some((mesh, digest)) = cache::open(&cached).and_then(|file| read_made(path, order, file).ok()) {
-            return Ok(Loaded::new(mesh, MeshOrigin::Cache, cached, digest));
-        }
-    }
-    let gmsh = gmsh.ok_or_else(|| unkept.iter().fold(Gmsh::missing(path), Error::because))?;
-    let name = cache::made_by(name, &gmsh.identity());
-    let loaded = made_anew((path, &name), order, folders, |work, made| make(&gmsh, work, made))?;
-    Ok(Loaded { unkept, ..loaded })
+    /// Whether the name identifies all that the mesh is made from. Otherwise it is always made anew.
+    is_kept: bool,
 }
 
-/// Make the mesh `name` and put it into the cache. `make` gets a folder to work in and the path of the file that it must write there.
-fn made_anew<const D: usize>(
-    (path, name): (&Path, &str),
-    order: Option<Order>,
-    folders: &[PathBuf],
-    make: impl FnOnce(&Path, &Path) -> Result<()>,
-) -> Result<Loaded<D>> {
-    let workshop = Workshop::open(folders)?;
-    let made = workshop.path().join(name);
-    let open = || File::open(&made).map_err(|cause| Error::file(&made, "read", &cause));
-    let mesh = make(workshop.path(), &made).and_then(|()| read_made(path, order, open()?));
-    // A file that is cut short because the disk is full is not the script's fault.
-    let (mesh, digest) = mesh.map_err(|error| workshop.blame(error))?;
-    let file = workshop.publish(&made, name)?;
-    Ok(Loaded::new(mesh, MeshOrigin::Gmsh, file, digest))
+impl Wanted<'_> {
+    /// Return the mesh from the cache, or make it. `make` gets Gmsh, a folder to work in and the path of the file that it must write there.
+    fn find_or_make<const D: usize>(
+        &self,
+        cache: &Cache,
+        make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
+    ) -> Result<Loaded<D>> {
+        let gmsh = Gmsh::find();
+        let full_name = gmsh.as_ref().map(|gmsh| format!("{}{:.16}.msh", self.name, digest(&gmsh.identity())));
+        let known = match &full_name {
+            Some(name) => vec![cache.file(name)],
+            None => cache.all(&self.name),
+        };
+        // A file of the cache that cannot be read or is damaged counts as absent.
+        if let Some(loaded) =
+            known.iter().filter(|_| self.is_kept).find_map(|file| self.read(file, MeshOrigin::Cache).ok())
+        {
+            return Ok(loaded);
+        }
+        let (Some(gmsh), Some(name)) = (gmsh, full_name) else { return Err(Gmsh::missing(self.path)) };
+        let loaded = cache.make(&name, |work, made| {
+            make(&gmsh, work, made)?;
+            self.read(made, MeshOrigin::Gmsh)
+        })?;
+        Ok(Loaded { file: cache.file(&name), ..loaded })
+    }
+
+    /// Read a file that was made.
+    fn read<const D: usize>(&self, file: &Path, origin: MeshOrigin) -> Result<Loaded<D>> {
+        let maker = if self.order.is_some() { MeshProducer::Script } else { MeshProducer::Other };
+        let loaded: Loaded<D> = read_file(self.path, file, maker, origin).map_err(|error| match error.advice() {
+            // Advice for scripts does not help with a file of another program.
+            advice if self.order.is_none() && advice.is_none_or(|advice| advice.contains("Physical")) => {
+                error.help(format!("see what Gmsh makes of it: gmsh {}", self.path.display()))
+            }
+            _ => error,
+        })?;
+        if self.order.is_some_and(|order| loaded.mesh.order != order) {
+            let error = Error::mesh(self.path, None, "Gmsh made a mesh of another order than the scene asks for");
+            return Err(error.help("remove `Mesh.ElementOrder` and `SetOrder` from the script"));
+        }
+        Ok(loaded)
+    }
 }
 
 /// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
 /// the mesh depends on more, or if a file cannot be read.
 pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<String> {
+    let gmsh = || Gmsh::find().map(|gmsh| gmsh.identity()).unwrap_or_default();
     match source {
         MeshSource::Geo { file, set, sizes, guard, .. } => {
-            let script = script(&file.value).ok()?;
-            let known = script.inputs.unknown.is_none();
-            let gmsh = Gmsh::find().map(|gmsh| gmsh.identity()).unwrap_or_default();
+            let script = Script::read(&file.value).ok().filter(|script| !script.may_change)?;
             let name = key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard));
-            known.then(|| format!("{name} {gmsh}"))
+            Some(format!("{name} {}", gmsh()))
         }
         MeshSource::Msh { file } => {
-            let bytes = crate::file::read(&file.value).ok()?;
-            if foreign::is_input_file(&file.value) {
-                // Other files may be included.
-                let converted = abaqus::convert(&file.value, &with_unix_lines(bytes), dimension).ok()?;
-                return Some(digest_of_bytes(&converted.mesh));
-            }
-            match foreign::is_mesh(&file.value, &bytes) {
-                true => Some(digest(&(Gmsh::find()?.identity(), digest_of_bytes(&bytes)))),
-                false => Some(digest_of_bytes(&bytes)),
-            }
+            let bytes = as_msh(&file.value, dimension).ok()?;
+            let by_gmsh = foreign::is_mesh(&file.value, &bytes) && !foreign::is_input_file(&file.value);
+            Some(digest(&(digest_of_bytes(&bytes), by_gmsh.then(gmsh))))
         }
         MeshSource::Arrays(_) => None,
     }
 }
 
-/// Read the script, or the shape of another program.
-fn script(path: &Path) -> Result<Script> {
-    if foreign::is_shape(path) { Script::of_shape(path) } else { Script::read(path) }
-}
-
 /// Return the name in the cache of the mesh of a script, with the numbers that are set in it, the sizes to follow, and the
-/// limits.
+/// settings of Gmsh.
 fn key(
     path: &Path,
     script: &Script,
@@ -266,61 +241,59 @@ fn key(
     // The algorithm depends on whether a number of threads is given, not on the number.
     let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
     let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
-    file_name((asked, files, script.is_ended(), script.inputs.environment()), path)
+    cache::name((asked, files, script.is_ended()), path)
 }
 
-/// Mesh a script, with the cache in one of `folders`. `set` holds the numbers to set in it. `places` holds their places in the
-/// scene, where these differ from that of the script.
-pub(super) fn meshed<const D: usize>(
-    file: &Located<PathBuf>,
-    (set, places): (&[(String, f64)], &[Place]),
-    sizes: Option<&str>,
-    order: Order,
-    (guard, interrupt): (&Guard, &Interrupt),
-    folders: &[PathBuf],
-) -> Result<Loaded<D>> {
-    let path = &file.value;
-    let is_shape = foreign::is_shape(path);
-    let script = script(path).map_err(|error| error.at(&file.place))?;
-    for (number, (name, _)) in set.iter().enumerate() {
-        script.check(name, path, places.get(number).unwrap_or(&file.place))?;
+/// A script or shape to mesh.
+pub(super) struct Meshing<'a> {
+    pub file: &'a Located<PathBuf>,
+    /// The numbers to set in it.
+    pub set: &'a [(String, f64)],
+    /// Their places in the scene, where these differ from that of the script.
+    pub places: &'a [Place],
+    /// The view of the sizes to follow.
+    pub sizes: Option<&'a str>,
+    pub order: Order,
+    pub guard: &'a Guard,
+    pub interrupt: &'a Interrupt,
+}
+
+impl Meshing<'_> {
+    /// Return the mesh from a cache, or by Gmsh.
+    pub fn mesh<const D: usize>(&self, cache: &Cache) -> Result<Loaded<D>> {
+        let Self { file, set, places, sizes, order, guard, interrupt } = *self;
+        let path = &file.value;
+        let script = Script::read(path).map_err(|error| error.at(&file.place))?;
+        for (number, (name, _)) in set.iter().enumerate() {
+            script.check(name, path, places.get(number).unwrap_or(&file.place))?;
+        }
+        let name = key(path, &script, D, order, (set, sizes, guard));
+        let wanted = Wanted { path, name, order: Some(order), is_kept: !script.may_change };
+        wanted.find_or_make(cache, |gmsh, work, made| {
+            let script = &self.written::<D>(&script, work)?;
+            let task = MeshingTask { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt };
+            gmsh.run(&task, made, work)
+        })
     }
-    if !guard.trusted {
-        script.judge(file)?;
-    }
-    let name = key(path, &script, D, order, (set, sizes, guard));
-    let unkept = script.inputs.unknown.as_ref();
-    let unkept = unkept.map(|word| format!("{} is meshed anew in each run, since it uses `{word}`", path.display()));
-    let make = |gmsh: &Gmsh, work: &Path, made: &Path| {
-        let own = match is_shape {
-            true => foreign::script(path, &script.files[0], D, guard.size, work)?,
+
+    /// Return the path of the script for Gmsh: the user's own, or one in the folder `work` that loads a shape, follows sizes, or includes a script whose
+    /// last line is not ended.
+    fn written<const D: usize>(&self, script: &Script, work: &Path) -> Result<PathBuf> {
+        let path = &self.file.value;
+        let own = match foreign::is_shape(path) {
+            true => foreign::script(path, &script.files[0], D, self.guard.size, work)?,
             false => path.clone(),
         };
-        let sized = match sizes {
-            Some(view) => {
-                Some(super::script::script(&Located::new(own.clone(), file.place.clone()), &script, view, work)?)
+        match self.sizes {
+            Some(view) => script::sized(&Located::new(own, self.file.place.clone()), script, view, work),
+            None if script.is_ended() || own != *path => Ok(own),
+            None => {
+                let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;
+                let made = work.join("ended.geo");
+                write(&made, format!("Include {};\n", quoted(&whole)?)).map(|()| made)
             }
-            None => ended(&own, &script, work)?,
-        };
-        let script = sized.as_deref().unwrap_or(&own);
-        gmsh.run(
-            &MeshingTask { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt },
-            made,
-            work,
-        )
-    };
-    kept((path, &name), Some(order), unkept, folders, make)
-}
-
-/// Return the path of a script in the folder `work` that includes the one at `path`, or `None` if the last line of that script
-/// is ended.
-fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
-    if script.is_ended() {
-        return Ok(None);
+        }
     }
-    let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;
-    let made = work.join("ended.geo");
-    write(&made, format!("Include {};\n", quoted(&whole)?)).map(|()| Some(made))
 }
 
 /// Keep the final sizes of an adaptation in the cache. `purpose` identifies all that the mesh was made for, scene and error.
@@ -328,125 +301,14 @@ fn ended(path: &Path, script: &Script, work: &Path) -> Result<Option<PathBuf>> {
 /// # Errors
 /// The cache cannot be written.
 pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
-    let workshop = Workshop::open(&folders())?;
-    let name = final_name(purpose);
-    let made = workshop.path().join(&name);
-    write(&made, sizes)?;
-    workshop.publish(&made, &name).map(|_| ())
+    Cache::of_user()?.make(&final_name(purpose), |_, made| write(made, sizes))
 }
 
 /// Return the final sizes of an earlier adaptation for the same `purpose`.
 pub fn recall_final(purpose: &str) -> Option<String> {
-    let name = final_name(purpose);
-    folders().iter().find_map(|folder| std::io::read_to_string(cache::open(&folder.join(&name))?).ok())
+    std::fs::read_to_string(Cache::of_user().ok()?.file(&final_name(purpose))).ok()
 }
 
 fn final_name(purpose: &str) -> String {
-    file_name(purpose, Path::new("sizes")) + ".pos"
-}
-
-/// Name in messages, where meshes from files have their path.
-const NAME: &str = "mesh arrays";
-
-/// Return the mesh of these arrays, with cells turned to positive volume. Points keep their numbers.
-///
-/// # Errors
-/// A coordinate is not finite, or a point is off the plane if `D` is 2. A group has no name or no simplices, or two groups have
-/// the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension above `D`. `order`
-/// is above that of the arrays.
-fn of_arrays<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
-    let MeshArrays { points, order: own, groups } = arrays;
-    if *own < order {
-        return Err(
-            refuse_arrays("the mesh is of order 1, the scene asks for order 2").help("give mid-edge points, too")
-        );
-    }
-    let largest = points.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
-    if let Some(number) = points.iter().position(|x| x.iter().any(|x| !x.is_finite())) {
-        return Err(refuse_arrays(format!("point {number} has the coordinates {:?}", points[number])));
-    }
-    if let Some(number) = points.iter().position(|x| D == 2 && x[2].abs() > 1e-12 * largest) {
-        let message = format!("point {number} has z = {}, but the scene has dimension 2", points[number][2]);
-        return Err(refuse_arrays(message).help("draw plane bodies in the plane z = 0"));
-    }
-    let groups = groups.iter().map(|group| group_of::<D>(group, points, *own)).collect::<Result<Vec<_>>>()?;
-    if let Some(twice) = groups::twice(&groups) {
-        return Err(refuse_arrays(format!("two groups are called `{twice}`")));
-    }
-    let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
-    Ok(Mesh::new(NAME.into(), points, *own, groups.into()))
-}
-
-fn group_of<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order) -> Result<Group> {
-    let GroupArrays { name, dimension, connectivity } = arrays;
-    let (corners, edges) = (dimension + 1, dimension * (dimension + 1) / 2);
-    let stride = if order == Order::P1 { corners } else { corners + edges };
-    let refuse = |what: String| refuse_arrays(format!("group `{name}` {what}"));
-    if name.is_empty() || *dimension > D {
-        return Err(refuse(format!("is of dimension {dimension}"))
-            .help(format!("groups have names, and dimensions from 0, points, to {D}, cells")));
-    }
-    if connectivity.is_empty() || connectivity.len() % stride != 0 {
-        let count = connectivity.len();
-        return Err(refuse(format!("has {count} numbers of points, its simplices have {stride} each"))
-            .help("give one number a corner, and for order 2 one a mid-edge point, too"));
-    }
-    if let Some(number) = connectivity.iter().find(|number| **number as usize >= points.len()) {
-        return Err(
-            refuse(format!("has point {number}")).help(format!("there are {} points, numbered from 0", points.len()))
-        );
-    }
-    let mut connectivity = connectivity.clone();
-    for (index, simplex) in connectivity.chunks_exact_mut(stride).enumerate() {
-        if !simplex::turn(simplex, points, *dimension, D) {
-            return Err(refuse(format!("has no extent in its simplex {index}, of the points {simplex:?}")));
-        }
-    }
-    let tags = (0..(connectivity.len() / stride) as u64).collect();
-    let name = if *dimension == D { plain(name) } else { name.clone() };
-    Ok(Group { name, dimension: *dimension, stride, connectivity, tags })
-}
-
-fn refuse_arrays(message: impl Into<String>) -> Error {
-    Error::mesh(Path::new(NAME), None, message)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Return two triangles of the unit square, with the second one inverted, and its lower side.
-    fn square() -> MeshArrays {
-        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [9.0, 9.0, 0.0]];
-        MeshArrays::new(points).group("all", 2, vec![0, 1, 2, 0, 3, 2]).group("low", 1, vec![1, 0])
-    }
-
-    #[test]
-    fn cells_are_turned_and_points_keep_their_numbers() {
-        let mesh = of_arrays::<2>(&square(), Order::P1).expect("a mesh");
-        assert_eq!(mesh.group("all").expect("cells").connectivity, [0, 1, 2, 0, 2, 3]);
-        assert_eq!(mesh.group("low").expect("a side").connectivity, [1, 0]);
-        assert_eq!(mesh.points.len(), 5);
-    }
-
-    #[test]
-    fn what_is_no_mesh_is_refused() {
-        let bad = |change: fn(&mut MeshArrays), order: Order, words: &str| {
-            let mut arrays = square();
-            change(&mut arrays);
-            let error = of_arrays::<2>(&arrays, order).expect_err(words);
-            assert!(error.to_string().contains(words), "{error}");
-        };
-        bad(|a| a.points[2][0] = f64::NAN, Order::P1, "point 2 has the coordinates [NaN");
-        bad(|a| a.points[3][2] = 1e-3, Order::P1, "point 3 has z = 0.001");
-        bad(|a| a.groups[1].name = "all".into(), Order::P1, "two groups are called `all`");
-        bad(|a| a.groups[1].name.clear(), Order::P1, "groups have names");
-        bad(|a| a.groups[0].dimension = 3, Order::P1, "`all` is of dimension 3");
-        bad(|a| a.groups[0].connectivity.clear(), Order::P1, "0 numbers of points");
-        bad(|a| a.groups[0].connectivity.truncate(5), Order::P1, "5 numbers of points, its simplices have 3");
-        bad(|a| a.groups[0].connectivity[4] = 7, Order::P1, "has point 7");
-        bad(|a| a.groups[0].connectivity[1] = 0, Order::P1, "simplex 0, of the points [0, 0, 2]");
-        bad(|_| {}, Order::P2, "the scene asks for order 2");
-        bad(|a| a.order = Order::P2, Order::P2, "simplices have 3 each");
-    }
+    cache::name(purpose, Path::new("sizes")) + ".pos"
 }

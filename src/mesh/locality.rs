@@ -101,78 +101,45 @@ mod tests {
     use super::*;
     use crate::problem::order::Order;
 
-    #[test]
-    fn bits_interleave() {
-        assert_eq!(spread(0b1011), 0b001_000_001_001);
-        assert_eq!(spread((1 << BITS) - 1).count_ones(), BITS);
-    }
-
+    /// Tetrahedra on a line, in an order that jumps.
     #[test]
     fn neighbours_come_one_after_the_other() {
-        // The cells lie on a line, in an order that jumps.
-        let at = [3, 0, 2, 1];
-        let cell = |i: usize| {
-            [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|x| [x[0] + i as f64, x[1], x[2]])
-        };
-        let group = Group {
-            name: "body".into(),
-            dimension: 3,
-            stride: 4,
-            connectivity: (0..16).collect(),
-            tags: vec![7, 8, 9, 10],
-        };
-        let points = at.iter().flat_map(|&i| cell(i)).collect();
+        let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let cell = |i: u8| corners.map(|x: [f64; 3]| [x[0] + f64::from(i), x[1], x[2]]);
+        let points = [3, 0, 2, 1].into_iter().flat_map(cell).collect();
+        let (name, connectivity, tags) = ("body".into(), (0..16).collect(), vec![7, 8, 9, 10]);
+        let group = Group { name, dimension: 3, stride: 4, connectivity, tags };
         let mut mesh = Mesh::new("line.msh".into(), points, Order::P1, vec![group].into());
         mesh.sort_cells();
         let first: Vec<f64> = mesh.groups[0].simplices().map(|cell| mesh.points[cell[0] as usize][0]).collect();
-        assert_eq!(first, [0.0, 1.0, 2.0, 3.0]);
-        assert_eq!(mesh.groups[0].tags, [8, 10, 9, 7]);
+        assert_eq!((first, &mesh.groups[0].tags[..]), (vec![0.0, 1.0, 2.0, 3.0], &[8, 10, 9, 7][..]));
         assert!(mesh.groups[0].simplices().all(|cell| cell[1] == cell[0] + 1 && cell[3] == cell[0] + 3));
     }
 
-    fn parts<const D: usize>(points: &[[f64; D]], count: usize) -> Vec<u32> {
-        bisect(points, &vec![1; points.len()], count)
-    }
-
-    /// A long box is cut across. A plane of points that does not belong to one part as a whole is cut along the next axis.
-    /// Parts differ by at most one point and do not depend on the order of the points.
+    /// A long box is cut across. A plane of points that does not belong to one part as a whole is cut along the next axis. Parts have equal weights to
+    /// within those of a few points, and do not depend on the order of the points.
     #[test]
     fn boxes_are_cut_across() {
         let points: Vec<[f64; 3]> =
             (0..480).map(|i| [f64::from(i % 4), f64::from(i / 4 % 5), f64::from(i / 20)]).collect();
-        let halves = parts(&points, 2);
-        assert!(points.iter().zip(&halves).all(|(x, &half)| (x[2] < 12.0) == (half == 0)));
+        let parts = |points: &[[f64; 3]], count| bisect(points, &vec![1; points.len()], count);
+        assert!(points.iter().zip(&parts(&points, 2)).all(|(x, &half)| (x[2] < 12.0) == (half == 0)));
         let fifths = parts(&points, 5);
-        let counts: Vec<usize> = (0..5).map(|part| fifths.iter().filter(|&&of| of == part).count()).collect();
-        assert_eq!(counts, [96; 5]);
-        // Planes of the lower half weigh twice as much and have two thirds of the weight. Half of the weight is that of the
-        // first nine of 24 planes.
-        let weights: Vec<u32> = points.iter().map(|x| if x[2] < 12.0 { 2 } else { 1 }).collect();
-        let halves = bisect(&points, &weights, 2);
-        assert!(points.iter().zip(&halves).all(|(x, &half)| (x[2] < 9.0) == (half == 0)));
+        assert!((0..5).all(|part| fifths.iter().filter(|&&of| of == part).count() == 96));
         let back: Vec<[f64; 3]> = points.iter().rev().copied().collect();
         assert!(parts(&back, 5).iter().rev().eq(&fifths));
-        // Two points at the same position may be in two parts, and more parts than points leave some parts empty.
-        assert_eq!(parts(&[[0.0, 0.0]; 2], 2), [0, 1]);
-        let few = parts(&[[0.0], [1.0]], 5);
-        assert!(few[0] < few[1] && few[1] < 5);
-        assert!(parts::<2>(&[], 3).is_empty());
-    }
-
-    /// Parts have equal weights to within those of a few points, whatever the weights of the points.
-    #[test]
-    fn parts_weigh_the_same() {
-        let points: Vec<[f64; 3]> =
-            (0..3000).map(|i| [f64::from(i % 10), f64::from(i / 10 % 15), 0.1 * f64::from(i / 150 % 7)]).collect();
-        let weights: Vec<u32> = (0..3000).map(|number| number % 5 + number / 1000).collect();
-        for parts in [2, 3, 8, 13] {
-            let mut sums = vec![0; parts];
-            bisect(&points, &weights, parts)
+        let weights: Vec<u32> = (0..480).map(|number| number % 5 + number / 160).collect();
+        for count in [2, 3, 8, 13] {
+            let mut sums = vec![0; count];
+            bisect(&points, &weights, count)
                 .iter()
                 .zip(&weights)
                 .for_each(|(&part, weight)| sums[part as usize] += weight);
             let (least, most) = (sums.iter().min().expect("parts"), sums.iter().max().expect("parts"));
             assert!(most - least < 30, "{sums:?}");
         }
+        // Two points at the same position may be in two parts, and more parts than points leave some parts empty.
+        assert_eq!(bisect(&[[0.0, 0.0]; 2], &[1, 1], 2), [0, 1]);
+        assert!(bisect::<2>(&[], &[], 3).is_empty());
     }
 }

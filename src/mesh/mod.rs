@@ -5,40 +5,37 @@
 //! Gmsh and cached, too. Arrays of a Rust program are checked. All later code sees a [`Mesh`] only.
 
 mod abaqus;
+mod arrays;
 mod axis;
+mod builder;
 mod cache;
 mod check;
-mod cursor;
 pub mod datum;
 mod digits;
-mod elements;
+pub mod faces;
 mod foreign;
-mod frame;
 mod gmsh;
 mod groups;
 mod load;
 mod locality;
 mod msh;
-mod nastran;
-mod old;
-mod physical;
+mod msh2;
+mod scan;
 mod script;
 mod simplex;
 mod split;
 #[cfg(test)]
 mod tests;
-mod trust;
 
 pub use check::{Asked, BodyCheck, Components, Duty};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
-pub use load::{Loaded, MeshOrigin, keep_final, load, made_from, recall_final};
+pub use load::{Loaded, MeshOrigin, as_msh, keep_final, load, made_from, recall_final};
 pub use locality::bisect;
 pub use msh::{MeshProducer, parse};
 pub use script::unstructured;
 pub use script::view;
 pub use simplex::EDGES;
-pub use trust::breach;
 
 use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;

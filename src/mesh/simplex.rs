@@ -1,6 +1,5 @@
-//! Single simplices: measure, orientation, and quality of shape.
+//! Shapes of elements, and single simplices: measure and orientation.
 
-use super::{Group, Mesh};
 use crate::problem::order::Order;
 use nalgebra::Vector3;
 
@@ -151,20 +150,14 @@ pub fn from_gmsh_order(simplex: &mut [u32]) {
 
 /// Invert the orientation of a cell: exchange its last two vertices and the mid-edges that go with them.
 fn mirror(cell: &mut [u32]) {
-    match cell.len() {
-        3 => cell.swap(1, 2),
-        4 => cell.swap(2, 3),
-        6 => {
-            cell.swap(1, 2);
-            cell.swap(3, 5);
-        }
-        10 => {
-            cell.swap(2, 3);
-            cell.swap(5, 8);
-            cell.swap(6, 7);
-        }
-        _ => {}
-    }
+    let swaps: &[(usize, usize)] = match cell.len() {
+        3 => &[(1, 2)],
+        4 => &[(2, 3)],
+        6 => &[(1, 2), (3, 5)],
+        10 => &[(2, 3), (5, 8), (6, 7)],
+        _ => &[],
+    };
+    swaps.iter().for_each(|&(a, b)| cell.swap(a, b));
 }
 
 /// Turn a simplex to positive volume if it is a cell of `space`. Return `false` if it has no extent.
@@ -213,57 +206,11 @@ pub fn measure(vertices: &[[f64; 3]], space: usize) -> f64 {
 /// Return whether a simplex of unit size with this [`measure`] has no extent, to rounding. A measure that is not finite counts
 /// as none.
 fn is_degenerate(vertices: &[[f64; 3]], measure: f64) -> bool {
-    let mut longest = 0.0_f64;
-    for (i, a) in vertices.iter().enumerate() {
-        for b in &vertices[..i] {
-            longest = longest.max((Vector3::from(*a) - Vector3::from(*b)).norm());
-        }
-    }
+    let pairs = vertices.iter().enumerate().flat_map(|(i, a)| vertices[..i].iter().map(move |b| (a, b)));
+    let longest = pairs.map(|(a, b)| (Vector3::from(*a) - Vector3::from(*b)).norm()).fold(0.0, f64::max);
     let smallest = 1e-12 * longest.powi(vertices.len() as i32 - 1);
     // A point has measure 1 and passes.
     !measure.is_finite() || measure.abs() <= smallest
-}
-
-/// The shape of the cells of a group by their mean ratio, which is 1 for an equilateral simplex and near 0 for a flat one.
-///
-/// In the plane the mean ratio is 4 sqrt(3) area / (sum of squared edges), in space 12 (3 volume)^(2/3) / (sum of squared
-/// edges). It uses the vertices only, so curved edges count as straight.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Quality {
-    /// Mean ratio of the worst cell.
-    pub least: f64,
-    /// Mean over all cells.
-    pub mean: f64,
-}
-
-impl<const D: usize> Mesh<D> {
-    /// Return the shape of the cells of a group. The result is meaningless for groups of lower dimension.
-    pub fn quality(&self, group: &Group) -> Quality {
-        let (mut least, mut sum) = (f64::INFINITY, 0.0);
-        for cell in group.simplices() {
-            let ratio = mean_ratio::<D>(&std::array::from_fn::<_, 4, _>(|i| self.points[cell[i.min(D)] as usize]));
-            least = least.min(ratio);
-            sum += ratio;
-        }
-        Quality { least, mean: sum / group.len() as f64 }
-    }
-}
-
-/// Return the mean ratio of the simplex given by the first D + 1 vertices.
-fn mean_ratio<const D: usize>(vertices: &[[f64; D]; 4]) -> f64 {
-    let edge = |i: usize, j: usize| -> [f64; D] { std::array::from_fn(|c| vertices[j][c] - vertices[i][c]) };
-    let mut squares = 0.0;
-    for j in 1..=D {
-        for i in 0..j {
-            squares += edge(i, j).iter().map(|x| x * x).sum::<f64>();
-        }
-    }
-    // The determinant of the edges from the first vertex is D! times the measure.
-    let jacobian = nalgebra::DMatrix::from_fn(D, D, |row, column| edge(0, row + 1)[column]).determinant().abs();
-    match D {
-        2 => 2.0 * 3f64.sqrt() * jacobian / squares,
-        _ => 12.0 * (jacobian / 2.0).powf(2.0 / 3.0) / squares,
-    }
 }
 
 #[cfg(test)]
@@ -296,33 +243,18 @@ mod tests {
         assert!(!turn(&mut [0, 1], &[a, [f64::INFINITY, 0.0, 0.0]], 1, 3));
     }
 
-    /// Each mid-edge stays between the same two vertices, whatever their order.
+    /// Each mid-edge stays between the same two vertices: its number is the sum of the powers of ten of these.
     #[test]
     fn mirrored_cells_keep_their_edges() {
-        let edges: [(usize, &[[usize; 2]]); 2] =
-            [(3, &[[0, 1], [1, 2], [0, 2]]), (4, &[[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]])];
-        for (vertices, edges) in edges {
-            // The number of a mid-edge point is the sum of the powers of ten of its vertices, so it identifies them.
-            let mut cell: Vec<u32> = (0..vertices).map(|vertex| 10_u32.pow(vertex as u32)).collect();
-            cell.extend(edges.iter().map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32)).collect::<Vec<_>>());
+        for vertices in [3, 4] {
+            let edges = &EDGES[..vertices * (vertices - 1) / 2];
+            let corners = (0..vertices as u32).map(|vertex| 10_u32.pow(vertex));
+            let middles = edges.iter().map(|[a, b]| 10_u32.pow(*a as u32) + 10_u32.pow(*b as u32));
+            let mut cell: Vec<u32> = corners.chain(middles).collect();
             let before = cell.clone();
             mirror(&mut cell);
             assert_ne!(before, cell);
-            for (k, [a, b]) in edges.iter().enumerate() {
-                assert_eq!(cell[vertices + k], cell[*a] + cell[*b]);
-            }
+            assert!(edges.iter().zip(&cell[vertices..]).all(|([a, b], middle)| *middle == cell[*a] + cell[*b]));
         }
-    }
-
-    #[test]
-    fn shapes_in_closed_form() {
-        let h = 0.75f64.sqrt();
-        assert!((mean_ratio(&[[0.0, 0.0], [1.0, 0.0], [0.5, h], [0.0; 2]]) - 1.0).abs() < 1e-14);
-        assert!((mean_ratio(&[[0.0, 0.0], [3.0, 0.0], [0.0, 3.0], [0.0; 2]]) - h).abs() < 1e-14);
-        let regular = [[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]];
-        assert!((mean_ratio(&regular) - 1.0).abs() < 1e-14);
-        let corner = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assert!((mean_ratio(&corner) - 12.0 / 9.0 * 0.25f64.cbrt()).abs() < 1e-14);
-        assert!(mean_ratio(&[[0.0, 0.0], [1.0, 0.0], [0.5, 1e-9], [0.0; 2]]) < 1e-8);
     }
 }

@@ -146,10 +146,11 @@ mod tests {
         (volume, faces)
     }
 
-    /// Whatever the numbers of the vertices, the pieces fill the cell. The pieces of two cells have the same triangles on the
-    /// common face.
+    /// Whatever the numbers of the vertices, the pieces fill the cell, and those of two cells have the same triangles on the common face. The points
+    /// are those of a cube and, beside its face x = 1, of a prism with the vertices 1 2 6 5 8 9.
     #[test]
     fn pieces_fill_cells_and_fit_across_faces() {
+        let named = [&CUBE[..], &[[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [3.0, 0.5, 0.5], [0.0; 3]]].concat();
         let mut seed = 7_u64;
         for _ in 0..500 {
             let mut order: Vec<u32> = (0..12).collect();
@@ -157,96 +158,65 @@ mod tests {
                 seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
                 order.swap(at, (seed >> 33) as usize % (at + 1));
             }
-            // The points are those of a cube and, beside its face x = 1, of a prism with the vertices 1 2 6 5 8 9.
             let mut points = vec![[0.0; 3]; 12];
-            let named = [&CUBE[..], &[[2.0, 0.0, 0.0], [2.0, 1.0, 0.0], [3.0, 0.5, 0.5], [0.0; 3]]].concat();
-            order.iter().zip(named).for_each(|(&at, x)| points[at as usize] = x);
+            order.iter().zip(&named).for_each(|(&at, x)| points[at as usize] = *x);
             let of = |vertices: &[usize]| vertices.iter().map(|&v| order[v]).collect::<Vec<_>>();
-            let (cube, of_cube) = pieces(&HEXAHEDRON, &of(&[0, 1, 2, 3, 4, 5, 6, 7]), &points);
-            assert!((cube - 6.0).abs() < 1e-12);
-            let (prism, of_prism) = pieces(&PRISM, &of(&[2, 9, 6, 1, 8, 5]), &points);
-            assert!((prism - 3.0).abs() < 1e-12);
-            let (pyramid, of_pyramid) = pieces(&PYRAMID, &of(&[2, 6, 5, 1, 10]), &points);
-            assert!((pyramid - 4.0).abs() < 1e-12);
             let common = of(&[1, 2, 5, 6]);
             let shared = |faces: &BTreeMap<Vec<u32>, usize>| -> Vec<Vec<u32>> {
                 faces.keys().filter(|face| face.iter().all(|v| common.contains(v))).cloned().collect()
             };
-            assert_eq!((shared(&of_cube).len(), shared(&of_cube)), (2, shared(&of_prism)));
-            assert_eq!(shared(&of_cube), shared(&of_pyramid));
-            // A triangle inside the cube is a face of two pieces, and one on the boundary of one. A cube has 12 triangles on
-            // its boundary.
-            assert_eq!(of_cube.values().filter(|&&count| count == 1).count(), 12);
-            assert!(of_cube.values().all(|&count| count <= 2));
-            // A quadrangle of the surface has the same diagonal.
-            let triangles = divided(&QUADRANGLE, &of(&[1, 2, 6, 5]));
-            for triangle in triangles.chunks_exact(3) {
-                let mut triangle = triangle.to_vec();
+            let (cube, of_cube) = pieces(&HEXAHEDRON, &of(&[0, 1, 2, 3, 4, 5, 6, 7]), &points);
+            // A triangle inside the cube is a face of two pieces. A cube has 12 triangles on its boundary.
+            assert!((cube - 6.0).abs() < 1e-12 && shared(&of_cube).len() == 2);
+            assert!(
+                of_cube.values().filter(|&&count| count == 1).count() == 12
+                    && of_cube.values().all(|&count| count <= 2)
+            );
+            for (shape, vertices, volume) in
+                [(&PRISM, &[2, 9, 6, 1, 8, 5][..], 3.0), (&PYRAMID, &[2, 6, 5, 1, 10], 4.0)]
+            {
+                let (found, faces) = pieces(shape, &of(vertices), &points);
+                assert!((found - volume).abs() < 1e-12 && shared(&faces) == shared(&of_cube));
+            }
+            for triangle in divided(&QUADRANGLE, &of(&[1, 2, 6, 5])).chunks_exact_mut(3) {
                 triangle.sort_unstable();
-                assert!(shared(&of_cube).contains(&triangle));
+                assert!(shared(&of_cube).contains(&triangle.to_vec()));
             }
         }
-    }
-
-    #[test]
-    fn a_hexahedron_with_an_edge_drawn_into_a_point_is_a_prism() {
-        let points = [&CUBE[..]].concat();
-        let (volume, _) = pieces(&HEXAHEDRON, &[0, 1, 2, 2, 4, 5, 6, 6], &points);
-        assert!((volume - 3.0).abs() < 1e-12);
-    }
-
-    fn hexahedron() -> ElementType {
-        ElementType::of(17).expect("a kind")
-    }
-
-    /// Return the nodes of a hexahedron that a map takes from the unit cube, at the numbers `order`.
-    fn placed(order: &[u32], map: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f64; 3]> {
-        let middle = |[a, b]: &[usize; 2]| [0, 1, 2].map(|c| 0.5 * (CUBE[*a][c] + CUBE[*b][c]));
-        let mut points = vec![[0.0; 3]; 20];
-        let all = CUBE.into_iter().chain(HEXAHEDRON.edges.iter().map(middle));
-        order.iter().zip(all).for_each(|(&at, x)| points[at as usize] = map(x));
-        points
+        let (volume, _) = pieces(&HEXAHEDRON, &[0, 1, 2, 2, 4, 5, 6, 6], &CUBE);
+        assert!((volume - 3.0).abs() < 1e-12, "an edge drawn into a point");
     }
 
     /// Cells of all kinds use the same node on a common face, which a full kind has among its own.
     #[test]
     fn faces_have_one_node() {
+        let kind = |number| ElementType::of(number).expect("a kind");
         let order: Vec<u32> = (0..20).collect();
-        let mut points = placed(&order, |[a, b, c]| [a + 0.3 * b * c, b, c + 0.2 * a * b]);
-        let mut known = HashMap::new();
-        let mut middles = Middles { points: &mut points, known: &mut known };
-        let cell = middles.simplices(hexahedron(), &order);
-        assert_eq!(cell, middles.simplices(hexahedron(), &order), "a copy in another group");
+        let middle = |[a, b]: &[usize; 2]| [0, 1, 2].map(|c| 0.5 * (CUBE[*a][c] + CUBE[*b][c]));
+        let bent = |[a, b, c]: [f64; 3]| [a + 0.3 * b * c, b, c + 0.2 * a * b];
+        let mut points: Vec<_> = CUBE.into_iter().chain(HEXAHEDRON.edges.iter().map(middle)).map(bent).collect();
+        let mut middles = Middles { points: &mut points, known: &mut HashMap::new() };
+        let cell = middles.simplices(kind(17), &order);
+        assert_eq!(cell, middles.simplices(kind(17), &order), "a copy in another group");
         assert_eq!(middles.points.len(), 27, "six faces and the cell");
         // The face 0 3 2 1 has the mid-edge nodes 9 13 11 8.
-        let facet = middles.simplices(ElementType::of(16).expect("a kind"), &[0, 3, 2, 1, 9, 13, 11, 8]);
+        let facet = middles.simplices(kind(16), &[0, 3, 2, 1, 9, 13, 11, 8]);
         let node = middles.known[&[0, 1, 2, 3]];
         assert_eq!(facet.iter().filter(|number| **number == node).count(), 2);
         let [x, y, z] = middles.points[node as usize];
         assert!((x - 0.5).abs() + (y - 0.5).abs() + (z - 0.05).abs() < 1e-15);
-        let full = middles.simplices(ElementType::of(10).expect("a kind"), &[2, 3, 7, 6, 13, 15, 19, 14, 99]);
+        let full = middles.simplices(kind(10), &[2, 3, 7, 6, 13, 15, 19, 14, 99]);
         assert!(!full.contains(&99), "the node that the hexahedron has made");
-        let full = middles.simplices(ElementType::of(10).expect("a kind"), &[30, 31, 32, 33, 34, 35, 36, 37, 38]);
-        assert_eq!(full.iter().filter(|number| **number == 38).count(), 2);
-    }
-
-    #[test]
-    fn a_quadratic_hexahedron_with_an_edge_drawn_into_a_point_is_a_prism() {
-        let order: Vec<u32> = (0..20).collect();
-        let mut points = placed(&order, |x| x);
-        let mut middles = Middles { points: &mut points, known: &mut HashMap::new() };
-        // The vertices 3 and 7 are 2 and 6 here. With them go the mid-edge nodes of 0 3, 2 3, 3 7, 4 7 and 6 7.
-        let hexahedron =
-            middles.simplices(hexahedron(), &[0, 1, 2, 2, 4, 5, 6, 6, 8, 9, 10, 11, 12, 2, 14, 14, 16, 17, 18, 6]);
-        let prism = middles
-            .simplices(ElementType::of(18).expect("a kind"), &[0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 12, 14, 16, 17, 18]);
-        let sorted = |simplices: &[u32]| {
+        // With an edge drawn into a point a hexahedron is a prism: 3 and 7 are 2 and 6, and with them go the mid-edge nodes of 0 3, 2 3, 3 7, 4 7, 6 7.
+        let sorted = |simplices: Vec<u32>| {
             let mut all: Vec<Vec<u32>> = simplices.chunks_exact(10).map(<[u32]>::to_vec).collect();
             all.iter_mut().for_each(|simplex| simplex.sort_unstable());
             all.sort_unstable();
             all
         };
-        assert_eq!(sorted(&hexahedron), sorted(&prism));
-        assert_eq!(prism.len(), 30);
+        let drawn = [0, 1, 2, 2, 4, 5, 6, 6, 8, 9, 10, 11, 12, 2, 14, 14, 16, 17, 18, 6];
+        let hexahedron = sorted(middles.simplices(kind(17), &drawn));
+        let prism = sorted(middles.simplices(kind(18), &[0, 1, 2, 4, 5, 6, 8, 9, 10, 11, 12, 14, 16, 17, 18]));
+        assert_eq!((hexahedron, prism.len()), (prism.clone(), 3));
     }
 }

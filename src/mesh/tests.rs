@@ -2,7 +2,8 @@
 
 mod mutations;
 
-use super::load::{load, made_from, meshed as from_script};
+use super::cache::Cache;
+use super::load::{Meshing, load};
 use super::{Group, Loaded, Mesh, MeshOrigin, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
@@ -48,9 +49,20 @@ fn located(path: PathBuf) -> Located<PathBuf> {
 }
 
 /// Return the mesh of a script with these numbers, kept in a cache.
-fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &[PathBuf]) -> Result<Loaded<D>> {
-    let limits = (&Guard::default(), &Interrupt::default());
-    from_script(&located(geo.to_owned()), (set, &[]), None, order, limits, cache)
+fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &Path) -> Result<Loaded<D>> {
+    meshed_with(geo, set, order, (None, &Guard::default()), cache)
+}
+
+/// Return the mesh of a script that follows sizes, with settings of Gmsh.
+fn meshed_with<const D: usize>(
+    geo: &Path,
+    set: &[(String, f64)],
+    order: Order,
+    (sizes, guard): (Option<&str>, &Guard),
+    cache: &Path,
+) -> Result<Loaded<D>> {
+    let (file, interrupt) = (&located(geo.to_owned()), &Interrupt::default());
+    Meshing { file, set, places: &[], sizes, order, guard, interrupt }.mesh(&Cache::at(cache.to_owned()))
 }
 
 /// Return the bytes of the mesh of a script in the form that these arguments request.
@@ -86,19 +98,19 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
         .sum()
 }
 
-/// Assert that every mid-edge point of a straight mesh lies between its two vertices.
-fn assert_mid_edges<const D: usize>(mesh: &Mesh<D>) {
-    const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]];
-    for group in mesh.groups.iter().filter(|group| group.dimension > 0) {
+/// Assert that groups have these measures, and that every mid-edge point of a straight mesh lies between its two vertices.
+fn assert_sizes<const D: usize>(mesh: &Mesh<D>, sizes: &[(&str, f64)]) {
+    for (name, expected) in sizes {
+        let size = extent(mesh, mesh.group(name).unwrap());
+        assert!((size - expected).abs() < 1e-9, "{name}: {size}");
+    }
+    for group in mesh.groups.iter().filter(|group| group.dimension > 0 && mesh.order == Order::P2) {
         for simplex in group.simplices() {
             let middles = &simplex[group.dimension + 1..];
             assert_eq!(middles.len(), [0, 1, 3, 6][group.dimension]);
-            for (middle, [a, b]) in middles.iter().zip(EDGES) {
-                for k in 0..D {
-                    let at = |point: u32| mesh.points[point as usize][k];
-                    let between = 0.5 * (at(simplex[a]) + at(simplex[b]));
-                    assert!((at(*middle) - between).abs() < 1e-9, "{} of `{}`", middle, group.name);
-                }
+            for (middle, [a, b]) in middles.iter().zip(simplex::EDGES) {
+                let [x, y, m] = [simplex[a], simplex[b], *middle].map(|point| mesh.points[point as usize]);
+                assert!((0..D).all(|k| (m[k] - 0.5 * (x[k] + y[k])).abs() < 1e-9), "{middle} of `{}`", group.name);
             }
         }
     }
@@ -114,70 +126,36 @@ fn squares_of_both_forms_and_orders() {
         // Text has 16 digits, so coordinates may differ in the last one.
         assert_eq!(text.groups, binary.groups);
         for mesh in [&text, &binary] {
-            let count = |name| mesh.group(name).unwrap().len();
-            assert_eq!(
-                [count("soft rock"), count("steel"), count("left"), count("outside"), count("corner")],
-                [8, 8, 2, 12, 1]
-            );
+            let counts =
+                ["soft rock", "steel", "left", "outside", "corner"].map(|name| mesh.group(name).unwrap().len());
+            assert_eq!(counts, [8, 8, 2, 12, 1]);
             assert_eq!(mesh.group_names(2).collect::<Vec<_>>(), ["soft_rock", "steel"]);
             assert_eq!(mesh.points.len(), if order == "1" { 15 } else { 45 });
-            let size = |name| extent(mesh, mesh.group(name).unwrap());
-            for (name, expected) in [("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)] {
-                assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
-            }
             // Each cell is positive, although one surface is drawn clockwise.
-            for group in mesh.groups.iter().filter(|group| group.dimension == 2) {
-                for cell in group.connectivity.chunks(group.stride) {
-                    let one = Group { connectivity: cell.to_vec(), ..group.clone() };
-                    assert!(extent(mesh, &one) > 0.0);
-                }
-            }
+            assert_sizes(mesh, &[("soft rock", 0.5), ("steel", 1.5), ("left", 1.0), ("outside", 4.0)]);
             let corner = mesh.group("corner").unwrap().connectivity[0];
             assert_eq!(mesh.points[corner as usize], [1.0, 0.0]);
         }
-        if order == "2" {
-            assert_mid_edges(&text);
-            let lower = text.lower_order();
-            assert_eq!((lower.points.len(), lower.order), (15, Order::P1));
-            assert!((extent(&lower, lower.group("steel").unwrap()) - 1.5).abs() < 1e-9);
-            assert_eq!(lower.group("left").unwrap().stride, 2);
-        }
+        let lower = text.lower_order();
+        assert_eq!((lower.points.len(), lower.order, lower.group("left").unwrap().stride), (15, Order::P1, 2));
+        assert_sizes(&lower, &[("steel", 1.5)]);
     }
 }
 
 #[test]
 fn cubes_of_both_forms_and_orders() {
-    for order in ["1", "2"] {
-        for form in [&[][..], &["-bin"]] {
-            let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form].concat())).unwrap();
-            let size = |name| extent(&mesh, mesh.group(name).unwrap());
-            for (name, expected) in [("soft", 1.5), ("hard", 4.5), ("bottom", 2.0)] {
-                assert!((size(name) - expected).abs() < 1e-9, "{name}: {}", size(name));
-            }
-            assert_eq!(mesh.group("pin").unwrap().len(), 1);
-            if order == "2" {
-                assert_eq!(mesh.group("soft").unwrap().stride, 10);
-                assert_mid_edges(&mesh);
-            }
-        }
-    }
-}
-
-#[test]
-fn inverted_cells_are_turned_and_order_two_with_them() {
-    for order in ["1", "2"] {
-        let script = format!("{SQUARE}\nMesh 2;\nReverseMesh Surface{{1}};");
-        let mesh: Mesh<2> = parse(&gmsh(&script, &["-2", "-order", order])).unwrap();
-        assert!((extent(&mesh, mesh.group("soft rock").unwrap()) - 0.5).abs() < 1e-9);
+    for (order, form) in [("1", &[][..]), ("1", &["-bin"]), ("2", &[]), ("2", &["-bin"])] {
+        let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form].concat())).unwrap();
+        assert_sizes(&mesh, &[("soft", 1.5), ("hard", 4.5), ("bottom", 2.0)]);
+        let strides = ["pin", "soft"].map(|name| mesh.group(name).unwrap().stride);
+        assert_eq!(strides, [1, if order == "1" { 4 } else { 10 }]);
         // The negative scale is a reflection through the origin.
-        let cube: Mesh<3> =
-            parse(&gmsh(CUBE, &["-3", "-order", order, "-setnumber", "Mesh.ScalingFactor", "-1"])).unwrap();
-        assert!(cube.points.iter().flatten().all(|coordinate| *coordinate <= 0.0));
-        assert!((extent(&cube, cube.group("soft").unwrap()) - 1.5).abs() < 1e-9);
-        if order == "2" {
-            assert_mid_edges(&mesh);
-            assert_mid_edges(&cube);
-        }
+        let scale = ["-setnumber", "Mesh.ScalingFactor", "-1"];
+        let mesh: Mesh<3> = parse(&gmsh(CUBE, &[&["-3", "-order", order], form, &scale].concat())).unwrap();
+        assert!(mesh.points.iter().flatten().all(|coordinate| *coordinate <= 0.0));
+        assert_sizes(&mesh, &[("soft", 1.5)]);
+        let script = format!("{SQUARE}\nMesh 2;\nReverseMesh Surface{{1}};");
+        assert_sizes::<2>(&parse(&gmsh(&script, &["-2", "-order", order])).unwrap(), &[("soft rock", 0.5)]);
     }
 }
 
@@ -190,6 +168,7 @@ fn bad_meshes_are_refused_by_name_and_line() {
     let square = |more: &str, arguments: &[&str]| gmsh(&format!("{SQUARE}{more}"), arguments);
     for (bytes, expected) in [
         (square("", &["-2", "-format", "msh40"]), "a.msh:2: this is version 4 of the mesh format"),
+        (square("", &["-2", "-format", "msh1"]), "a.msh:1: this is not a mesh file of Gmsh"),
         (square("", &["-2", "-order", "3"]), "elements of 4 nodes (Gmsh's type 26)"),
         (square("Physical Curve(77) = {3};", &["-2"]), "physical curve 77 has no name"),
         (square("Physical Curve(\"gone\") = {99};", &["-2"]), "the physical curve `gone` has no elements"),
@@ -198,8 +177,10 @@ fn bad_meshes_are_refused_by_name_and_line() {
         (gmsh("Point(1) = {0, 0, 0};\n", &["-2"]), "the mesh has no physical groups"),
         (gmsh("Point(1) = {0, 0, 0}; Physical Point(\"pin\") = {1};\n", &["-2"]), "no physical group holds surfaces"),
         (gmsh(CUBE, &["-3"]), "is made of volumes, but the scene has dimension = 2"),
-        (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2"]), "has z = "),
-        (gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2", "-bin"]), "in $Nodes, at byte "),
+        (
+            gmsh(&SQUARE.replace("{1, 1, 0}", "{1, 1, 1e-3}"), &["-2", "-bin"]),
+            "has z = 0.001, but the scene has dimension = 2 in $Elements",
+        ),
         (square("", &["-2", "-part", "2"]), "the mesh is partitioned"),
         (b"solid cube".to_vec(), "a.msh:1: this is not a mesh file of Gmsh"),
         (Vec::new(), "this is not a mesh file of Gmsh"),
@@ -227,11 +208,11 @@ fn small_mistakes_in_text_are_refused_at_their_line() {
         ("2 1 2 3 \n$EndE", "2 1 x 3\n$EndE", "a.msh:29: `x` should be a whole number"),
         ("\n1 0 0\n0 1 0\n", "\n1 0 0\n2 1e-13 0\n", "has zero area"),
         ("\n1 0 0\n0 1 0\n", "\n1 0 inf\n0 1 0\n", "a.msh:21: a coordinate is inf"),
-        ("\n1 0 0\n0 1 0\n", "\n1 0 0\n0 1 1e-9\n", "a.msh:22: a node of group `body` has z = 0.000000001"),
+        ("\n1 0 0\n0 1 0\n", "\n1 0 0\n0 1 1e-9\n", "a.msh:29: node 3 of group `body` has z = 0.000000001"),
         ("2 1 2 1\n", "2 7 2 1\n", "a.msh:28: elements of surface 7, which $Entities does not list"),
-        ("2 1 2 1\n", "2 1 2 987654321\n", "a.msh:28: the file is too short for a count of 987654321"),
-        ("2 2 1 2\n", "2 3 1 2\n", "a.msh:25: $Elements announces 3 elements and holds 2"),
-        ("1\n2\n3\n", "1\n2\n2\n", "a.msh:22: node tag 2 stands twice"),
+        ("2 1 2 1\n", "2 1 2 987654321\n", "a.msh:30: `$EndElements` should be a whole number"),
+        ("2 2 1 2\n", "2 3 1 2\n", "$Elements announces 3 elements and holds 2"),
+        ("1\n2\n3\n", "1\n2\n2\n", "node tag 2 stands twice"),
         ("1 3 1 3\n", "1 4 1 3\n", "$Nodes announces 4 nodes and holds 3"),
         ("$EndElements\n", "", "`$EndElements` should stand here"),
         ("$EndNodes\n", "$EndNodes\n$Nodes\n", "the section $Nodes stands twice"),
@@ -256,7 +237,7 @@ fn sections_of_no_use_are_skipped() {
 #[test]
 fn scripts_are_meshed_once_for_each_key() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("main.geo");
     let part = folder.path().join("part.geo");
     std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
@@ -287,14 +268,14 @@ fn scripts_are_meshed_once_for_each_key() {
     std::fs::write(&part, SQUARE).unwrap();
     assert_eq!(run(4.0, Order::P1).origin, MeshOrigin::Cache);
     // Only meshes are left: n = 4, n = 3, order 2, and the one of the changed file.
-    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 4);
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 4);
 }
 
 /// Gmsh omits the last command of a script whose last line is not ended.
 #[test]
 fn the_last_line_of_a_script_need_not_end() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("main.geo");
     std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
     let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
@@ -302,8 +283,7 @@ fn the_last_line_of_a_script_need_not_end() {
     for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
         std::fs::write(&geo, script).unwrap();
         for sizes in [None, Some(&sizes[..])].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
-            let guard = (&Guard::default(), &Interrupt::default());
-            let loaded = from_script::<2>(&located(geo.clone()), (&[], &[]), sizes, Order::P1, guard, &cache).unwrap();
+            let loaded = meshed_with::<2>(&geo, &[], Order::P1, (sizes, &Guard::default()), &cache).unwrap();
             assert!(loaded.mesh.group("outside").is_some(), "{script}");
         }
     }
@@ -312,7 +292,7 @@ fn the_last_line_of_a_script_need_not_end() {
 #[test]
 fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let refuse = |script: &str, set: &[(String, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
@@ -328,7 +308,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     // Lines and bytes of the mesh mean nothing to someone who wrote a script.
     let message = refuse(&format!("{SQUARE}Physical Curve(\"gone\") = {{99}};"), &[], Order::P1);
     assert!(message.contains("a.geo: ") && message.contains("`gone`") && !message.contains("byte"), "{message}");
-    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 0);
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 0);
 }
 
 #[test]
@@ -348,23 +328,10 @@ fn mesh_files_serve_lower_orders_but_not_higher_ones() {
     assert!(message.contains("cannot read") && message.contains("scene.toml"), "{message}");
 }
 
-/// A mesh that Gmsh converts depends on Gmsh, and one that is read directly does not.
-#[test]
-fn converted_meshes_are_made_by_gmsh() {
-    let folder = tempfile::tempdir().unwrap();
-    let made_from = |name: &str| {
-        let file = folder.path().join(name);
-        std::fs::write(&file, "$MeshFormat\n4.1 0 8\n").unwrap();
-        made_from(&MeshSource::Msh { file: located(file) }, 2, Order::P1).unwrap()
-    };
-    let [direct, converted] = ["a.msh", "a.unv"].map(made_from);
-    assert_ne!(direct, converted);
-}
-
 #[test]
 fn loads_at_the_same_time_do_not_meet() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("a.geo");
     std::fs::write(&geo, SQUARE).unwrap();
     let load = || meshed::<2>(&geo, &[], Order::P1, &cache).unwrap();
@@ -374,7 +341,7 @@ fn loads_at_the_same_time_do_not_meet() {
             assert_eq!(thread.join().unwrap().mesh.points.len(), 15);
         }
     });
-    assert_eq!(std::fs::read_dir(&cache[0]).unwrap().count(), 1);
+    assert_eq!(std::fs::read_dir(&cache).unwrap().count(), 1);
     assert_eq!(load().origin, MeshOrigin::Cache);
 }
 
@@ -383,15 +350,14 @@ fn loads_at_the_same_time_do_not_meet() {
 #[test]
 fn free_meshes_in_space_by_threads() {
     let folder = tempfile::tempdir().unwrap();
-    let cache = [folder.path().join("cache")];
+    let cache = folder.path().join("cache");
     let geo = folder.path().join("cube.geo");
     let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nMeshSize{:} = 0.2;\n\
                 Physical Volume(\"all\") = {1};\nPhysical Surface(\"bottom\") = {5};\n";
     std::fs::write(&geo, cube).unwrap();
     let run = |threads: Option<usize>| {
         let guard = Guard { threads, ..Guard::default() };
-        let limits = (&guard, &Interrupt::default());
-        let loaded = from_script::<3>(&located(geo.clone()), (&[], &[]), None, Order::P1, limits, &cache).unwrap();
+        let loaded = meshed_with::<3>(&geo, &[], Order::P1, (None, &guard), &cache).unwrap();
         (loaded.origin, loaded.mesh.points)
     };
     let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));

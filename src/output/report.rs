@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 pub struct Report {
     /// Version of the program.
     pub winkler: String,
-    /// Version of PETSc; `None` for a run that needed no PETSc object and did not load it.
-    pub petsc: Option<String>,
+    /// Version of PETSc.
+    pub petsc: String,
     /// BLAS library in use.
     pub blas: String,
     /// MPI ranks.
@@ -218,8 +218,6 @@ pub struct BodyReport {
     pub inner_facets: usize,
     /// Facets of the boundary, which does not intersect itself.
     pub boundary_facets: usize,
-    /// Parts that share no facet; more than one if the body is in pieces.
-    pub parts: usize,
     /// Degrees of freedom.
     pub dofs: usize,
     /// Inner solver in words; empty if nothing was solved.

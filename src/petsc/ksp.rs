@@ -1,16 +1,16 @@
-//! Linear solvers (KSP with a preconditioner PC): their options, solves, subspaces around the preconditioner, why a solve stopped, and how a solver recovers from a factorisation that failed.
+//! Linear solvers (KSP with a preconditioner PC): their options, solves, subspaces around the preconditioner, why a solve stopped, and how a
+//! solver recovers from a factorisation that failed.
 
-use super::library::{flag, is_set, petsc, text, text_from};
+use super::call::{flag, is_set, petsc, string, text, text_from};
 use super::mumps::EXTRA_SPACE;
 use super::subspace::{Started, Subspace, Wrapper};
 use super::vector::Vector;
-use super::{Int, Matrix, Scope, Session, ffi, is_of_family};
+use super::{Int, Matrix, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use std::cell::Cell;
 use std::ffi::CStr;
 use std::fmt;
 use std::ptr::null_mut;
-use std::rc::Rc;
 
 /// The outcome of a linear solve.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,12 +59,8 @@ pub struct Ksp {
     pub(super) ksp: ffi::KSP,
     /// PETSc's headers of right-hand side and solution, created with the operator.
     vectors: Option<[Vector; 2]>,
-    /// The number of updates of the matrix.
-    pub(super) updates: Rc<Cell<u64>>,
-    /// The number of updates of the matrix with which the preconditioner failed, if it did.
-    failed_at: Cell<Option<u64>>,
-    /// Whether a solve writes to its right-hand side.
-    writes_to_b: bool,
+    /// Whether the last set-up of the preconditioner failed.
+    has_failed: Cell<bool>,
     /// The subspaces around the preconditioner, the innermost first.
     wrappers: Vec<Wrapper>,
     prefix: String,
@@ -92,9 +88,7 @@ impl Ksp {
         let solver = Ksp {
             ksp,
             vectors: None,
-            updates: Rc::default(),
-            failed_at: Cell::new(None),
-            writes_to_b: false,
+            has_failed: Cell::new(false),
             wrappers: Vec::new(),
             prefix: prefix.to_owned(),
             scope,
@@ -142,9 +136,6 @@ impl Ksp {
             let new = || Vector::new(&self.session, self.scope, matrix.rows(), matrix.block_size());
             self.vectors = Some([new()?, new()?]);
         }
-        self.updates = matrix.updates();
-        // A failure with another matrix says nothing about this one.
-        self.failed_at.set(self.failed_at.get().map(|_| u64::MAX));
         Ok(())
     }
 
@@ -152,69 +143,27 @@ impl Ksp {
     /// wrong.
     ///
     /// # Errors
-    /// When PETSc refuses an option; for the options that change the matrix itself, `-ksp_diagonal_scale` and `-pc_factor_in_place`; for
-    /// `-ksp_max_it 0` and a `-ksp_rtol` that is not below 1; and for `preonly` over a nested solver that keeps a preconditioner.
+    /// When PETSc refuses an option.
     pub fn set_from_options(&mut self) -> Result<()> {
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
-            let own = match self.prefix.as_str() {
-                "" => String::new(),
-                prefix => format!("options of this solver begin with `-{prefix}`; "),
-            };
-            error.help(format!("{own}-help lists all options and types"))
+            error.help(format!(
+                "options of this solver begin with `-{}`; -help lists all options and types",
+                self.prefix
+            ))
         })?;
-        self.check_typed_options()?;
         if self.applies_only() {
             // SAFETY: the solver of this wrapper.
-            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, flag(false))) };
-        }
-        self.check_tolerances()
-    }
-
-    /// Refuse options that this program cannot honour, and note whether the right-hand side is written to.
-    fn check_typed_options(&mut self) -> Result<()> {
-        let typed = self.session.options().all()?;
-        let start = self.own_options();
-        let own = typed.iter().filter_map(|(name, value)| {
-            let bare = name.strip_prefix(&start)?;
-            is_of_family(bare).then_some((bare, value.as_deref()))
-        });
-        self.writes_to_b = own.clone().any(|(_, value)| value == Some("eisenstat"));
-        for (name, value) in own {
-            if matches!(value, Some("0" | "no" | "false" | "off")) {
-                continue;
-            }
-            let refused = |inside: &str, cause: &str| {
-                Error::new(Kind::Solver, format!("{start}{name} cannot be used {inside}")).because(cause)
-            };
-            if CHANGING.iter().any(|end| name.ends_with(end)) {
-                let cause = "it changes the values of the matrix, which belong to the program";
-                return Err(refused("here", cause).help("leave it out"));
-            }
-            if self.applies_only() && name.ends_with("_ksp_reuse_preconditioner") {
-                let cause = "the solution would be that of an older matrix";
-                return Err(refused(&format!("inside `{}`", self.ksp_type()), cause)
-                    .help(format!("take an iterative method, e.g. `{start}ksp_type cg`")));
-            }
+            unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, flag(false))) }?;
         }
         Ok(())
     }
 
-    /// Refuse tolerances with which the solver would do nothing.
-    fn check_tolerances(&self) -> Result<()> {
-        let start = self.own_options();
-        let Tolerances { rtol, limit, .. } = self.tolerances()?;
-        // with a limit of 0, conjugate gradients allocate no eigenvalues and do one iteration all the same
-        if limit < 1 {
-            return Err(Error::new(Kind::Solver, format!("{start}ksp_max_it is {limit}: the solver would do nothing"))
-                .help("give 1 or more; `-ksp_type preonly` applies the preconditioner once"));
-        }
-        // with 1, the zero guess would be accepted
-        if !(0.0..1.0).contains(&rtol) {
-            return Err(Error::new(Kind::Solver, format!("{start}ksp_rtol is {rtol}, which is no tolerance"))
-                .help("give a number from 0 on, below 1"));
-        }
-        Ok(())
+    /// Name the solver in what `-ksp_view` prints.
+    pub fn set_name(&self, name: &str) -> Result<()> {
+        let name = text(name)?;
+        // SAFETY: PETSc copies the text.
+        unsafe { petsc!(PetscObjectSetName(self.ksp.cast(), name.as_ptr())) }
     }
 
     /// Return whether the preconditioner is kept when the matrix changes.
@@ -272,9 +221,6 @@ impl Ksp {
         let Some([right, left]) = &self.vectors else {
             return Err(Error::new(Kind::Solver, "a linear solver was called before it had a matrix"));
         };
-        // the preconditioner `eisenstat` alone writes to the right-hand side, and restores it
-        let copy = self.writes_to_b.then(|| b.to_vec());
-        let b = copy.as_deref().unwrap_or(b);
         let mut guess = flag(false);
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPGetInitialGuessNonzero(self.ksp, &mut guess)) }?;
@@ -282,7 +228,7 @@ impl Ksp {
             x.fill(0.0);
         }
         self.recover()?;
-        // SAFETY: the solver reads `b` (a copy where it is written to) and writes to `x`.
+        // SAFETY: the solver reads `b` and writes to `x`.
         let solve = |b, x| unsafe { petsc!(KSPSolve(self.ksp, b, x)) };
         right
             .map(("b", b), left, ("x", x), solve)
@@ -295,10 +241,13 @@ impl Ksp {
             petsc!(KSPGetConvergedReason(self.ksp, &mut reason))?;
             petsc!(KSPGetResidualNorm(self.ksp, &mut residual))?;
         }
-        let reason = ConvergedReason::from_raw(reason, || {
-            self.failure().unwrap_or_else(|| "it is infinite or not a number where it was applied".to_owned())
-        });
-        Ok(Solved { iterations: iterations as usize, reason, residual })
+        // SAFETY: PETSc's text.
+        let mut text =
+            unsafe { text_from(|text| petsc!(KSPGetConvergedReasonString(self.ksp, text))) }.unwrap_or_default();
+        if let Some(failure) = self.failure().filter(|_| reason < 0) {
+            text = format!("{text}: {failure}");
+        }
+        Ok(Solved { iterations: iterations as usize, reason: ConvergedReason { number: reason, text }, residual })
     }
 
     /// Apply the preconditioner once, `z = M^-1 r`, and set it up before if that has not been done.
@@ -310,32 +259,26 @@ impl Ksp {
             return Err(Error::new(Kind::Solver, "a preconditioner was applied before it had a matrix"));
         };
         self.set_up()?;
-        let copy = self.writes_to_b.then(|| r.to_vec());
         let pc = self.outermost_pc()?;
         // SAFETY: as in `solve`.
-        right.map(("r", copy.as_deref().unwrap_or(r)), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
+        right.map(("r", r), left, ("z", z), |r, z| unsafe { petsc!(PCApply(pc, r, z)) })
     }
 
-    /// Set the relative tolerance.
+    /// Set the relative tolerance, and leave the other limits as they are.
     ///
     /// # Errors
     /// When it is not between 0 and 1.
     pub fn set_tolerance(&self, rtol: f64) -> Result<()> {
-        let Tolerances { atol, dtol, limit, .. } = self.tolerances()?;
-        // SAFETY: the solver of this wrapper; PETSc refuses values that are not numbers.
-        unsafe { petsc!(KSPSetTolerances(self.ksp, rtol, atol, dtol, limit)) }
+        // SAFETY: the solver of this wrapper; -2 is PETSC_DEFAULT, which keeps a value.
+        unsafe { petsc!(KSPSetTolerances(self.ksp, rtol, -2.0, -2.0, -2)) }
     }
 
     /// Return the relative tolerance in force.
     pub fn tolerance(&self) -> f64 {
-        self.tolerances().map_or(f64::NAN, |tolerances| tolerances.rtol)
-    }
-
-    fn tolerances(&self) -> Result<Tolerances> {
-        let mut set = Tolerances { rtol: 0.0, atol: 0.0, dtol: 0.0, limit: 0 };
-        // SAFETY: the solver of this wrapper.
-        unsafe { petsc!(KSPGetTolerances(self.ksp, &mut set.rtol, &mut set.atol, &mut set.dtol, &mut set.limit)) }?;
-        Ok(set)
+        let (mut rtol, none) = (f64::NAN, null_mut());
+        // SAFETY: the solver of this wrapper; PETSc writes to no null pointer. A failure leaves the tolerance unknown.
+        let _ = unsafe { petsc!(KSPGetTolerances(self.ksp, &mut rtol, none, none, null_mut())) };
+        rtol
     }
 
     /// Return the type of the solver, such as `cg`. It is empty until options were read or the solver was set up.
@@ -462,19 +405,6 @@ impl Ksp {
     }
 }
 
-/// The limits of the iteration.
-struct Tolerances {
-    rtol: f64,
-    atol: f64,
-    /// The growth of the residual that counts as divergence.
-    dtol: f64,
-    /// The largest number of iterations.
-    limit: Int,
-}
-
-/// The ends of options that change the matrix of the system itself.
-const CHANGING: [&str; 3] = ["ksp_diagonal_scale", "ksp_diagonal_scale_fix", "pc_factor_in_place"];
-
 impl Drop for Ksp {
     fn drop(&mut self) {
         // SAFETY: the one reference of this wrapper.
@@ -486,33 +416,18 @@ impl Ksp {
     /// Return why the set-up of the preconditioner failed, such as a zero pivot, or `None` if it did not.
     pub fn failure(&self) -> Option<String> {
         let pc = self.pc().ok()?;
-        let text = match self.failed_reason().ok()? {
-            ffi::PCFailedReason_PC_NOERROR => return None,
-            ffi::PCFailedReason_PC_FACTOR_STRUCT_ZEROPIVOT => "a zero pivot in the pattern of the factorisation",
-            ffi::PCFailedReason_PC_FACTOR_NUMERIC_ZEROPIVOT => "a zero pivot in the factorisation",
-            ffi::PCFailedReason_PC_FACTOR_OUTMEMORY => "not enough memory for the factorisation",
-            ffi::PCFailedReason_PC_FACTOR_OTHER => "the factorisation failed",
-            ffi::PCFailedReason_PC_SUBPC_ERROR => "a preconditioner inside it failed",
-            _ => "its set-up failed",
-        };
+        let reason = self.failed_reason().ok().filter(|reason| *reason != ffi::PCFailedReason_PC_NOERROR)?;
+        // SAFETY: PETSc's texts, one for each of its reasons.
+        let text = unsafe { string(*ffi::PCFailedReasons.offset(reason as isize)) };
         Some(match self.mumps_info(pc) {
-            Some((first, second)) => {
-                format!("{text}; MUMPS says INFOG(1)={first}, INFOG(2)={second}")
-            }
-            None => text.to_owned(),
+            Some((first, second)) => format!("{text} (MUMPS: INFOG(1)={first}, INFOG(2)={second})"),
+            None => text,
         })
     }
 
-    /// Reset a preconditioner that failed if the matrix has changed since. PETSc's interface to MUMPS never factors again after a failure.
+    /// Reset a preconditioner that failed: PETSc's interface to MUMPS never factors again after a failure.
     pub(super) fn recover(&self) -> Result<()> {
-        let Some(before) = self.failed_at.get() else {
-            return Ok(());
-        };
-        if self.updates.get() == before {
-            return Ok(());
-        }
-        self.failed_at.set(None);
-        self.reset()
+        if self.has_failed.replace(false) { self.reset() } else { Ok(()) }
     }
 
     /// Reset the preconditioner, and keep the matrix and everything else.
@@ -548,10 +463,9 @@ impl Ksp {
         }
     }
 
-    /// Note with which values of the matrix the preconditioner failed, if it did.
+    /// Note whether the preconditioner failed.
     pub(super) fn note_failure(&self) -> Result<()> {
-        let failed = self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR;
-        self.failed_at.set(failed.then(|| self.updates.get()));
+        self.has_failed.set(self.failed_reason()? != ffi::PCFailedReason_PC_NOERROR);
         Ok(())
     }
 
@@ -581,7 +495,7 @@ impl Ksp {
     }
 }
 
-/// The reason why a linear solver stopped; it is displayed as a sentence.
+/// The reason why a linear solver stopped, displayed in PETSc's words: `CONVERGED_RTOL`, `DIVERGED_ITS`, ...
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConvergedReason {
     /// PETSc's number of the reason, positive for convergence.
@@ -590,35 +504,6 @@ pub struct ConvergedReason {
 }
 
 impl ConvergedReason {
-    /// Translate PETSc's number. `failure` returns the reason of a failed preconditioner.
-    pub(super) fn from_raw(raw: ffi::KSPConvergedReason, failure: impl FnOnce() -> String) -> Self {
-        let text = match raw {
-            ffi::KSPConvergedReason_KSP_CONVERGED_RTOL => "the relative tolerance was reached",
-            ffi::KSPConvergedReason_KSP_CONVERGED_ATOL => "the absolute tolerance was reached",
-            // a direct solve ends with this reason, too
-            ffi::KSPConvergedReason_KSP_CONVERGED_ITS => "the asked number of iterations was done",
-            ffi::KSPConvergedReason_KSP_DIVERGED_ITS => "the iteration limit was reached (-ksp_max_it)",
-            ffi::KSPConvergedReason_KSP_DIVERGED_DTOL => {
-                "the residual grew beyond the divergence tolerance (-ksp_divtol)"
-            }
-            ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN | ffi::KSPConvergedReason_KSP_DIVERGED_BREAKDOWN_BICG => {
-                "the Krylov method broke down"
-            }
-            ffi::KSPConvergedReason_KSP_DIVERGED_NONSYMMETRIC => {
-                "the Krylov method needs a symmetric matrix and preconditioner"
-            }
-            ffi::KSPConvergedReason_KSP_DIVERGED_INDEFINITE_PC => "the preconditioner is not positive definite",
-            ffi::KSPConvergedReason_KSP_DIVERGED_INDEFINITE_MAT => "the matrix is not positive definite",
-            ffi::KSPConvergedReason_KSP_DIVERGED_NANORINF => "infinity or not a number came up",
-            ffi::KSPConvergedReason_KSP_DIVERGED_PC_FAILED => {
-                &format!("the preconditioner could not be made: {}", failure())
-            }
-            raw if raw > 0 => &format!("PETSc converged for its reason {raw}"),
-            raw => &format!("PETSc diverged for its reason {raw}"),
-        };
-        Self { number: raw, text: text.to_owned() }
-    }
-
     /// Return whether the solver converged. An iteration that has not ended did not.
     pub fn converged(&self) -> bool {
         self.number > 0

@@ -1,15 +1,13 @@
 //! Sparse matrices (MATAIJ), the rows that they are made of, and their index sets (IS) and submatrices.
 
-use super::library::{fit, flag, petsc};
+use super::call::{fit, flag, petsc};
 use super::vector::{Vector, check_length};
 use super::{Int, Scope, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{MPI_Comm, RSMPI_COMM_SELF};
-use std::cell::Cell;
 use std::ffi::c_void;
 use std::ops::Range;
 use std::ptr::{null, null_mut};
-use std::rc::Rc;
 
 /// A square sparse matrix in compressed rows (AIJ), of this process or distributed by rows over all processes.
 ///
@@ -39,8 +37,6 @@ pub struct Matrix {
     nonzeros: usize,
     block_size: usize,
     values: *mut f64,
-    /// The number of updates, which the solvers of this matrix read.
-    updates: Rc<Cell<u64>>,
     x: Vector,
     y: Vector,
     session: Session,
@@ -83,8 +79,7 @@ impl Matrix {
                 return Err(error);
             }
         };
-        let matrix =
-            Matrix { mat, scope, own, total, nonzeros, block_size, values, updates: Rc::default(), x, y, session };
+        let matrix = Matrix { mat, scope, own, total, nonzeros, block_size, values, x, y, session };
         // SAFETY: the matrix was just made over the rows, whose box nobody else has.
         unsafe {
             attach(mat, rows)?;
@@ -130,8 +125,8 @@ impl Matrix {
 
     /// Return the stored values, in the order of [`Rows`].
     pub fn values(&self) -> &[f64] {
-        // SAFETY: PETSc keeps the array while `self.mat` lives, and no call with `&self` writes to it: the solver refuses
-        // -ksp_diagonal_scale, which would.
+        // SAFETY: PETSc keeps the array while `self.mat` lives. Its solvers write to it with -ksp_diagonal_scale alone, and have restored it when
+        // their call returns.
         unsafe { std::slice::from_raw_parts(self.values, self.nonzeros) }
     }
 
@@ -161,7 +156,6 @@ impl Matrix {
                 petsc!(MatSeqAIJRestoreArray(part, &mut values))?;
             }
         }
-        self.updates.set(self.updates.get() + 1);
         Ok(result)
     }
 
@@ -244,11 +238,6 @@ impl Matrix {
         // SAFETY: as above.
         restore(unsafe { std::slice::from_raw_parts_mut(self.values, self.nonzeros) });
         product
-    }
-
-    /// Return the counter of updates, which goes on counting.
-    pub(super) fn updates(&self) -> Rc<Cell<u64>> {
-        self.updates.clone()
     }
 
     /// Return PETSc's handle.

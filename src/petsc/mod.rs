@@ -24,20 +24,16 @@
 #![warn(clippy::undocumented_unsafe_blocks)]
 
 mod blas;
+mod call;
 mod ffi;
-mod files;
-mod heap;
 mod ksp;
-mod library;
+mod launch;
 mod matrix;
 mod metis;
 mod mumps;
 mod options;
 mod patch;
 mod preconditioner;
-mod printed;
-#[cfg(test)]
-mod requirements;
 mod session;
 mod subspace;
 mod until;
@@ -45,17 +41,16 @@ mod vector;
 
 pub use blas::{cholesky, cholesky_solve};
 pub use ffi::Int;
-pub use heap::{Heap, keep_apart, keep_at_hand, leave};
 pub use ksp::{ConvergedReason, Ksp, Solved};
+pub use launch::launcher;
 pub use matrix::{Matrix, Rows};
-pub use metis::{Graph, has_metis, nested_dissection};
+pub use metis::{Graph, nested_dissection};
 pub use mumps::Schur;
-pub use options::{Entry, Options, begins_options, is_family, is_global, is_of_family};
-pub use printed::printed;
-pub use session::{CROWDED, Session, Stage, UNBOUND, launcher};
+pub use options::{Options, begins_options, is_family, is_global};
+pub use session::{Entry, Session, Stage};
 pub use subspace::Subspace;
 pub use until::{ConvergenceTest, KspIterate};
 pub use vector::Scope;
 
 /// Whether PETSc has hypre.
-pub const HAS_HYPRE: bool = option_env!("WINKLER_HAS_HYPRE").is_some();
+pub const HAS_HYPRE: bool = ffi::WINKLER_HAS_HYPRE == 1;

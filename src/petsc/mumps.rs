@@ -3,8 +3,8 @@
 //! Through PETSc, MUMPS would take a poor ordering and return the complement in part only.
 
 use super::Session;
-use super::ffi::{MumpsInt, mumps as c};
-use super::library::{self, fit};
+use super::call::{ensure_running, fit};
+use super::ffi::{DMUMPS_STRUC_C, MumpsInt, dmumps_c};
 use super::metis::{self, Graph};
 use crate::error::{Error, Kind, Result};
 use mpi::ffi::{RSMPI_COMM_SELF, RSMPI_Comm_c2f};
@@ -46,7 +46,7 @@ const RESERVED: [(usize, &str); 8] = [
 /// // the chain 0 - 1 - 2 of springs, held to the ground at 0 and 2, of which dof 2 is on the interface
 /// let session = Session::start(&[])?;
 /// let lower = [(0, 0, 2.0), (1, 0, -1.0), (1, 1, 2.0), (2, 1, -1.0), (2, 2, 2.0)];
-/// let mut schur = Schur::analyse(&session, "up", 1, 3, &lower, &[2])?;
+/// let mut schur = Schur::analyse(&session, &[], 1, 3, &lower, &[2])?;
 /// schur.factor()?;
 /// assert!((schur.take_complement()[0] - (2.0 - 2.0 / 3.0)).abs() < 1e-14);
 /// let condensed = schur.condense(&[3.0, 0.0, 1.0])?;
@@ -57,8 +57,7 @@ const RESERVED: [(usize, &str); 8] = [
 /// ```
 pub struct Schur {
     /// The struct of MUMPS, which keeps pointers into the arrays below.
-    mumps: Box<Padded>,
-    library: library::Mumps,
+    mumps: Box<DMUMPS_STRUC_C>,
     rows: Vec<MumpsInt>,
     columns: Vec<MumpsInt>,
     values: Vec<f64>,
@@ -70,30 +69,23 @@ pub struct Schur {
     _session: Session,
 }
 
-/// MUMPS' struct with space behind it: a library of another version than the header, which is found out later, may write more than the struct has.
-#[repr(C)]
-struct Padded {
-    head: c::DMUMPS_STRUC_C,
-    _space: [u8; 4096],
-}
-
 impl Schur {
     /// Analyse the elimination of all dofs but the `interface` ones, which may be none.
     ///
-    /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong to one node. Options
-    /// `-<body>_mat_mumps_icntl_<i>` and `_cntl_<i>` are honoured.
+    /// `lower` holds (row, column, value) of the lower triangle, row by row, each entry once. `block_size` dofs belong to one node. The `controls`
+    /// are options `mat_mumps_icntl_<i>` and `mat_mumps_cntl_<i>` with their values.
     ///
-    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1). Small plane bodies, and all without METIS, take MUMPS' own
-    /// approximate minimum degree (0).
+    /// The order of elimination is nested dissection by METIS (ICNTL(7) = 1). Small plane bodies take MUMPS' own approximate minimum degree
+    /// (0).
     ///
     /// MUMPS treats pivots below an absolute size (about 1e-20) as zeros, and does not scale a matrix with a Schur complement. It gets D K D
     /// with powers of two D, which round nothing. What counts as small then depends neither on units nor on other regions.
     ///
     /// # Errors
-    /// When MUMPS is not of the version of its header, an option cannot be used, or MUMPS refuses the pattern.
+    /// When a control cannot be used, or MUMPS refuses the pattern.
     pub fn analyse(
         session: &Session,
-        body: &str,
+        controls: &[(&str, &str)],
         block_size: usize,
         rows: usize,
         lower: &[(usize, usize, f64)],
@@ -105,11 +97,12 @@ impl Schur {
             return Err(Error::new(Kind::Solver, "not a lower triangle with interior rows"));
         }
         fit::<MumpsInt>("MUMPS", "dofs", rows + 1)?;
+        // MUMPS needs MPI
+        ensure_running()?;
         let scale = scales(rows, lower);
         let mut schur = Schur {
             // SAFETY: MUMPS' struct is plain C data; zeros are null pointers and sizes of nothing.
             mumps: Box::new(unsafe { std::mem::zeroed() }),
-            library: library::mumps()?,
             rows: lower.iter().map(|entry| one(entry.0)).collect(),
             columns: lower.iter().map(|entry| one(entry.1)).collect(),
             values: lower.iter().map(|&(i, j, value)| value * scale[i] * scale[j]).collect(),
@@ -120,10 +113,9 @@ impl Schur {
             _session: session.clone(),
         };
         schur.start()?;
-        let is_given = Self::is_large(block_size, rows) && metis::has_metis();
-        schur.mumps.head.icntl[6] = if is_given { GIVEN } else { MINIMUM_DEGREE };
-        schur.read_options(session, body)?;
-        let mumps = &mut schur.mumps.head;
+        schur.mumps.icntl[6] = if Self::is_large(block_size, rows) { GIVEN } else { MINIMUM_DEGREE };
+        controls.iter().try_for_each(|(name, value)| schur.control(name, value))?;
+        let mumps = &mut *schur.mumps;
         if mumps.icntl[6] == GIVEN {
             schur.positions = positions(block_size, rows, lower, interface)?;
             mumps.perm_in = schur.positions.as_mut_ptr();
@@ -147,12 +139,12 @@ impl Schur {
 
     /// Return the order of elimination that MUMPS took: INFOG(7), with the numbers of ICNTL(7).
     pub fn ordering(&self) -> MumpsInt {
-        self.mumps.head.infog[6]
+        self.mumps.infog[6]
     }
 
     /// Return the memory in megabytes that the factorisation will take, without S.
     pub fn expected_megabytes(&self) -> usize {
-        self.mumps.head.infog[15].max(0) as usize
+        self.mumps.infog[15].max(0) as usize
     }
 
     /// Eliminate the interior. The functions below need that.
@@ -160,13 +152,12 @@ impl Schur {
     /// # Errors
     /// When the interior is singular, or memory does not suffice.
     pub fn factor(&mut self) -> Result<()> {
-        let requested = self.mumps.head.icntl[13];
+        let requested = self.mumps.icntl[13];
         for percent in EXTRA_SPACE {
-            self.mumps.head.icntl[13] = requested.max(percent);
+            self.mumps.icntl[13] = requested.max(percent);
             match self.call(2) {
                 // the analysis underestimated the space
-                Err(_)
-                    if matches!(self.mumps.head.infog[0], -8 | -9) && percent < EXTRA_SPACE[EXTRA_SPACE.len() - 1] => {}
+                Err(_) if matches!(self.mumps.infog[0], -8 | -9) && percent < EXTRA_SPACE[EXTRA_SPACE.len() - 1] => {}
                 done => {
                     done?;
                     break;
@@ -174,7 +165,7 @@ impl Schur {
             }
         }
         // MUMPS has a copy of its own by now
-        let mumps = &mut self.mumps.head;
+        let mumps = &mut *self.mumps;
         (self.rows, self.columns, self.values) = Default::default();
         (mumps.irn, mumps.jcn, mumps.a) = (null_mut(), null_mut(), null_mut());
         self.complete();
@@ -236,7 +227,7 @@ impl Schur {
 
     /// Do one phase of the solution (ICNTL(26)): phase 1 condenses `b` into `reduced`, phase 2 expands `reduced` into `b`.
     fn solve(&mut self, phase: MumpsInt, b: &mut [f64], reduced: &mut [f64]) -> Result<()> {
-        let mumps = &mut self.mumps.head;
+        let mumps = &mut *self.mumps;
         if b.len() != mumps.n as usize || reduced.len() != self.interface.len() {
             return Err(Error::new(Kind::Solver, "a right-hand side of the wrong length for a Schur complement"));
         }
@@ -244,77 +235,55 @@ impl Schur {
         (mumps.redrhs, mumps.lredrhs) = (reduced.as_mut_ptr(), reduced.len() as MumpsInt);
         mumps.icntl[25] = if reduced.is_empty() { 0 } else { phase };
         let called = self.call(3);
-        (self.mumps.head.rhs, self.mumps.head.redrhs) = (null_mut(), null_mut());
+        (self.mumps.rhs, self.mumps.redrhs) = (null_mut(), null_mut());
         called
     }
 
     /// Start MUMPS on this process alone, without output, for a symmetric positive definite matrix.
     fn start(&mut self) -> Result<()> {
-        let mumps = &mut self.mumps.head;
+        let mumps = &mut *self.mumps;
         (mumps.sym, mumps.par) = (1, 1);
         // SAFETY: a constant of MPI, which runs as long as the session.
         mumps.comm_fortran = unsafe { RSMPI_Comm_c2f(RSMPI_COMM_SELF) };
         self.call(-1)?;
-        check_version(&self.mumps.head.version_number)?;
-        let icntl = &mut self.mumps.head.icntl;
+        let icntl = &mut self.mumps.icntl;
         icntl[..4].copy_from_slice(&[-1, -1, -1, 0]);
         icntl[18] = MumpsInt::from(!self.interface.is_empty());
         Ok(())
     }
 
-    /// Read the options of this body for MUMPS.
-    fn read_options(&mut self, session: &Session, body: &str) -> Result<()> {
-        let options = session.options();
-        for (name, value) in options.all()? {
-            let bare = name.strip_prefix(&format!("-{body}_mat_mumps_")).unwrap_or_default();
-            let number = |start: &str, last: usize| {
-                let number = bare.strip_prefix(start)?.parse::<usize>().ok()?;
-                (1..=last).contains(&number).then_some(number)
-            };
-            let value = value.unwrap_or_default();
-            let refuse = |cause: String| {
-                Error::new(Kind::Solver, format!("{name} {value} cannot be used with the condensed solver"))
-                    .because(cause)
-                    .help("leave it out, or choose -ksp_type and -pc_type for a solver of PETSc")
-            };
-            if let Some(number) = number("icntl_", 60) {
-                if let Some((_, what)) = RESERVED.iter().find(|reserved| reserved.0 == number) {
-                    return Err(refuse(format!("the program itself sets ICNTL({number}), the {what}")));
-                }
-                self.mumps.head.icntl[number - 1] =
-                    value.parse().map_err(|_| refuse("not a whole number".to_owned()))?;
-            } else if let Some(number) = number("cntl_", 15) {
-                self.mumps.head.cntl[number - 1] = value.parse().map_err(|_| refuse("not a number".to_owned()))?;
-            } else {
-                continue;
+    /// Set a control by the name of its option.
+    fn control(&mut self, name: &str, value: &str) -> Result<()> {
+        let refuse = |cause: String| {
+            Error::new(Kind::Solver, format!("-{name} {value} cannot be used with the condensed solver"))
+                .because(cause)
+                .help("leave it out, or choose -ksp_type and -pc_type for a solver of PETSc")
+        };
+        let number = |start: &str, last: usize| {
+            let number = name.strip_prefix(start)?.parse::<usize>().ok()?;
+            (1..=last).contains(&number).then_some(number)
+        };
+        if let Some(number) = number("mat_mumps_icntl_", 60) {
+            if let Some((_, what)) = RESERVED.iter().find(|reserved| reserved.0 == number) {
+                return Err(refuse(format!("the program itself sets ICNTL({number}), the {what}")));
             }
-            options.mark_used(&name)?;
+            self.mumps.icntl[number - 1] = value.parse().map_err(|_| refuse("not a whole number".to_owned()))?;
+        } else if let Some(number) = number("mat_mumps_cntl_", 15) {
+            self.mumps.cntl[number - 1] = value.parse().map_err(|_| refuse("not a number".to_owned()))?;
+        } else {
+            return Err(refuse("MUMPS has no such control".to_owned()));
         }
         Ok(())
     }
 
     /// Run a job of MUMPS.
     fn call(&mut self, job: MumpsInt) -> Result<()> {
-        self.mumps.head.job = job;
+        self.mumps.job = job;
         // SAFETY: every pointer in the struct is null or leads to an array of ours that has the length set beside it.
-        unsafe { (self.library)((&raw mut *self.mumps).cast()) };
-        let (first, second) = (self.mumps.head.infog[0], self.mumps.head.infog[1]);
+        unsafe { dmumps_c(&raw mut *self.mumps) };
+        let (first, second) = (self.mumps.infog[0], self.mumps.infog[1]);
         if first >= 0 { Ok(()) } else { Err(failure(job, first, second)) }
     }
-}
-
-/// Check that the version of MUMPS is that of its header, whose struct belongs to it.
-fn check_version(found: &[std::ffi::c_char]) -> Result<()> {
-    let found: String = found.iter().take_while(|letter| **letter != 0).map(|letter| *letter as u8 as char).collect();
-    let built = String::from_utf8_lossy(c::MUMPS_VERSION).trim_end_matches('\0').to_owned();
-    if found == built {
-        return Ok(());
-    }
-    Err(Error::new(
-        Kind::Solver,
-        format!("MUMPS is version {found:?}, but winkler was built with the header of {built:?}"),
-    )
-    .help("build winkler again, with MUMPS_DIR at the MUMPS of PETSc if its header is not found beside PETSc's"))
 }
 
 impl Drop for Schur {

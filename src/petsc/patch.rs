@@ -8,7 +8,7 @@
 //!
 //! r is the residual and z the result. The last product needs the columns P of A only; each process has its rows of these columns.
 
-use super::library::{flag, petsc};
+use super::call::{flag, petsc};
 use super::matrix::Indices;
 use super::subspace::Subspace;
 use super::vector::Vector;

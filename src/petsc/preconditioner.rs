@@ -1,6 +1,6 @@
 //! Multigrid of two levels (PCMG), whose interpolation the program makes.
 
-use super::library::{flag, petsc};
+use super::call::{flag, petsc};
 use super::matrix::check;
 use super::vector::DETERMINE;
 use super::{Int, Ksp, Matrix, Scope, ffi};
@@ -89,33 +89,6 @@ impl Ksp {
     /// Set up the smoother again with the current values of the `matrix`, where the preconditioner is otherwise kept.
     ///
     /// Chebyshev's method estimates its bounds anew. The matrix of the coarse level stays as it is.
-    ///
-    /// ```
-    /// use winkler::petsc::{Ksp, Matrix, Session};
-    /// let words = "-ksp_type cg -ksp_rtol 1e-10 -mg_levels_ksp_type chebyshev -mg_levels_pc_type jacobi -mg_coarse_pc_type cholesky";
-    /// let session = Session::start(&words.split(' ').map(String::from).collect::<Vec<_>>())?;
-    /// // sixty springs to the ground; then a stiff alternating motion of the last thirty, which the coarse level cannot represent
-    /// let (n, row) = (60, |spring: f64, i: usize| {
-    ///     let spring = move |j: usize| if i.min(j) < 30 { 0.0 } else { spring * [1.0, -1.0][(i + j) % 2] };
-    ///     (0..60).map(move |j| f64::from(u8::from(i == j)) + spring(j))
-    /// });
-    /// let columns = (0..n).flat_map(|_| 0..n as _).collect();
-    /// let values = (0..n).flat_map(|i| row(0.0, i)).collect();
-    /// let mut a = Matrix::from_csr(&session, 1, (0..=n).map(|i| (i * n) as _).collect(), columns, values)?;
-    /// a.set_spd()?;
-    /// let mut ksp = Ksp::new(&session, "")?;
-    /// ksp.set_operator(&a)?;
-    /// ksp.set_interpolation(&a, [&(0..=60).collect::<Vec<_>>(), &(0..60).map(|i| i / 2).collect::<Vec<_>>()], &[1.0; 60], 30)?;
-    /// ksp.set_from_options()?;
-    /// ksp.set_up()?;
-    /// ksp.set_reuse_preconditioner(true)?;
-    /// a.update(|values| (0..n).for_each(|i| (0..n).zip(row(1.0, i)).for_each(|(j, value)| values[n * i + j] = value)))?;
-    /// let (b, mut x) = ((0..n).map(|i| (i % 7) as f64).collect::<Vec<_>>(), vec![0.0; n]);
-    /// assert!(!ksp.solve(&b, &mut x)?.reason.converged());
-    /// ksp.renew_smoother(&a)?;
-    /// assert!(ksp.solve(&b, &mut x)?.reason.converged());
-    /// # Ok::<(), winkler::error::Error>(())
-    /// ```
     ///
     /// # Errors
     /// PETSc's, also when the preconditioner has no two levels.

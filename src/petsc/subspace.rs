@@ -1,6 +1,6 @@
 //! A preconditioner in Rust around one of PETSc (PCSHELL): an exact solve in a subspace before and after the preconditioner of a solver.
 
-use super::library::petsc;
+use super::call::petsc;
 use super::vector::{Vector, slice, slice_mut};
 use super::{Matrix, ffi};
 use crate::error::{Error, Result};

@@ -1,7 +1,7 @@
 //! A linear solve with a stopping test of the caller.
 
+use super::call::{flag, is_set, petsc};
 use super::ksp::Solved;
-use super::library::{flag, is_set, petsc};
 use super::subspace::ERROR;
 use super::vector::slice;
 use super::{Ksp, ffi};

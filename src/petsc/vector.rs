@@ -1,6 +1,6 @@
 //! Vectors: headers of PETSc, made once, over slices of Rust. The scope of an object is one process or all.
 
-use super::library::petsc;
+use super::call::petsc;
 use super::{Int, Session, ffi};
 use crate::error::{Error, Kind, Result};
 use mpi::collective::SystemOperation;

@@ -1,11 +1,9 @@
 //! Laws of layers p(c), pressure p over compression c: their forms and parameters.
 
-use crate::data::{Grid, Summits};
 use crate::error::{Error, Result};
 use crate::expression::{Expression, Field, KnownNames};
 use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, ValueKind};
 use serde_json::{Value as Json, json};
-use std::sync::Arc;
 
 /// The law of a Winkler layer.
 #[derive(Debug, Clone)]
@@ -19,8 +17,6 @@ pub enum LayerSpec {
     },
     /// A monotone cubic curve through points (c, p). Both columns increase from (0, 0), which is not among the points.
     Table(Vec<[f64; 2]>),
-    /// A law from the summits of a rough surface.
-    Asperities(AsperitySpec),
     /// The law of this name from a Rust program ([`Scene::law`](crate::scene::Scene::law)).
     Own(String),
     /// An expression p(c), which may use the coordinates, too.
@@ -52,35 +48,6 @@ impl LayerSpec {
     pub fn cubic(k1: impl Into<Field>, k3: impl Into<Field>) -> Self {
         Self::Form { form: &CUBIC, values: vec![k1.into(), k3.into()] }
     }
-}
-
-/// Summits of one radius at different heights, after Greenwood and Williamson.
-#[derive(Debug, Clone, PartialEq)]
-pub struct AsperitySpec {
-    /// Number of summits per area.
-    pub density: f64,
-    /// Radius of the summits (a length).
-    pub radius: f64,
-    /// E* of both bodies (a stress): 1/E* is the sum of (1 - nu^2)/E.
-    pub modulus: f64,
-    /// Depths of the summits below the highest one.
-    pub depths: Depths,
-    /// Name of the data with the surface, if the summits are measured.
-    pub data: Option<String>,
-}
-
-/// How the summits are distributed below the highest one (lengths).
-#[derive(Debug, Clone, PartialEq)]
-pub enum Depths {
-    /// A normal distribution of heights.
-    Normal {
-        /// Standard deviation of the heights.
-        deviation: f64,
-        /// Height of the highest summit above the mean. No summit lies above it.
-        highest: f64,
-    },
-    /// The depth of each summit of a measured surface, increasing from 0.
-    Measured(Arc<[f64]>),
 }
 
 /// The laws that have a form with a few parameters.
@@ -176,13 +143,12 @@ const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pr
 
 fn shape() -> TableShape {
     use ValueKind::{Number, Text};
-    let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure", "asperities"]).collect();
+    let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure"]).collect();
     FORMS
         .into_iter()
         .fold(TableShape::new("the layer"), with_form)
         .optional("table", Number.list().list(), POINTS)
         .optional("pressure", Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
-        .optional("asperities", asperities_shape(), "a law of summits: asperities = { modulus = E*, data = \"NAME\" }")
         .optional("up_to", Number, "compression beyond which the expression goes on linearly")
         .at_most_one(&laws)
 }
@@ -201,21 +167,6 @@ fn form_shape(form: &'static LawForm) -> TableShape {
     form.parameters.iter().fold(table, |table, known| table.required(known.key, Field, known.what))
 }
 
-fn asperities_shape() -> TableShape {
-    use ValueKind::{Number, Text};
-    TableShape::new("the layer of asperities")
-        .required("modulus", Number, "E* of both bodies: 1/E* is the sum of (1 - nu^2)/E")
-        .optional("data", Text, "data whose summits these are")
-        .optional("density", Number, "summits per area")
-        .optional("radius", Number, "their radius")
-        .optional("deviation", Number, "standard deviation of their heights")
-        .optional("highest", Number, "height of the highest above the mean; 4 deviations")
-        .not_both(&["data"], &["density", "radius", "deviation", "highest"])
-}
-
-/// Standard deviations from the mean to the highest summit by default; a share of 3e-5 of a normal distribution lies above.
-const HIGHEST: f64 = 4.0;
-
 impl Setting for LayerSpec {
     fn kind() -> ValueKind {
         shape().into()
@@ -229,9 +180,6 @@ impl Setting for LayerSpec {
         }
         if let Some(points) = keys.get("table") {
             return table(points);
-        }
-        if let Some(summits) = keys.get("asperities") {
-            return asperities(summits, context);
         }
         if let Some(law) = keys.get("pressure") {
             let scope = KnownNames { variables: &["c", "x", "y", "z"][..=context.dimension], data: &context.data };
@@ -253,27 +201,9 @@ impl Setting for LayerSpec {
             }
             Self::Table(points) => json!({ "table": points }),
             Self::Own(name) => json!({ "own": name }),
-            Self::Asperities(spec) => json!({ "asperities": spec.echo() }),
             Self::Pressure { law, up_to: None } => json!({ "pressure": law.text() }),
             Self::Pressure { law, up_to } => json!({ "pressure": law.text(), "up_to": up_to }),
         }
-    }
-}
-
-impl AsperitySpec {
-    fn echo(&self) -> Json {
-        let Self { density, radius, modulus, depths, data } = self;
-        let mut map = json!({ "density": density, "radius": radius, "modulus": modulus });
-        match depths {
-            Depths::Normal { deviation, highest } => {
-                (map["deviation"], map["highest"]) = (json!(deviation), json!(highest));
-            }
-            Depths::Measured(depths) => map["summits"] = json!(depths.len()),
-        }
-        if let Some(data) = data {
-            map["data"] = json!(data);
-        }
-        map
     }
 }
 
@@ -283,36 +213,6 @@ fn read_form(form: &'static LawForm, node: &Node, context: &Context) -> Result<L
     let value = |parameter: &Parameter| Field::read(keys.require(parameter.key)?, context);
     let values = form.parameters.iter().map(value).collect::<Result<_>>()?;
     Ok(LayerSpec::Form { form, values })
-}
-
-/// Return the summits that numbers describe, or those of data.
-fn asperities(node: &Node, context: &Context) -> Result<LayerSpec> {
-    let keys = Keys::open(node, &asperities_shape())?;
-    let missing = "give modulus = E* and data = \"NAME\", or modulus, density, radius and deviation of the summits";
-    let number = |key: &str| keys.require(key).map_err(|error| error.help(missing))?.number();
-    let modulus = number("modulus")?;
-    let Some(named) = keys.get("data") else {
-        let deviation = number("deviation")?;
-        let highest = keys.read("highest", Node::number)?.unwrap_or(HIGHEST * deviation);
-        let depths = Depths::Normal { deviation, highest };
-        let (density, radius) = (number("density")?, number("radius")?);
-        return Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: None }));
-    };
-    let name = named.string()?;
-    let Some(data) = context.data.get(name) else {
-        let otherwise = || format!("write [data.{name}] and below it file = \"surface.csv\"");
-        let error = named.refuse(format!("there are no data `{name}`"));
-        return Err(error.suggest(name, context.data.keys().map(String::as_str), otherwise));
-    };
-    data.load()?;
-    let Some(summits) = data.grid().and_then(Grid::summits) else {
-        return Err(named
-            .refuse(format!("data `{name}` have no summits"))
-            .help("summits are points of a regular grid that are higher than the eight around them"));
-    };
-    let Summits { density, radius, heights } = summits;
-    let depths = Depths::Measured(heights.iter().map(|height| heights[0] - height).collect());
-    Ok(LayerSpec::Asperities(AsperitySpec { density, radius, modulus, depths, data: Some(name.to_owned()) }))
 }
 
 /// Return the law through points (c, p).

@@ -22,18 +22,12 @@ keys! {
             ///
             /// The default is ten times what Gmsh takes for a million tetrahedra.
             pub seconds as "timeout": f64 = 1000.0,
-            /// gigabytes that Gmsh may take; what is free when it starts
-            pub gigabytes as "memory": Option<f64> = None,
-        }
-        initially {
-            /// Whether the user trusts the script, which may then start programs and write files.
-            pub trusted: bool = false,
         }
     }
 }
 
 impl Default for Guard {
-    /// Return the limits of a script that the user does not trust.
+    /// Return the settings of a scene that gives none.
     fn default() -> Self {
         Self::with_defaults()
     }
@@ -65,8 +59,8 @@ pub enum MeshSource {
 }
 
 impl MeshSource {
-    /// Return a Gmsh script with the numbers `set` in it. Its mesh is made once and kept in the cache. The script is refused if it can
-    /// start programs or write files.
+    /// Return a Gmsh script with the numbers `set` in it. Its mesh is made once and kept in the cache. A script is a program: it
+    /// can start others and write files.
     #[track_caller]
     pub fn script(file: impl AsRef<Path>, set: &[(&str, f64)]) -> Self {
         let file = file.as_ref();

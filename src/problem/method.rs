@@ -226,8 +226,6 @@ impl StopRule {
 pub struct SolverSpec {
     /// The preset; the program chooses if `None`.
     pub preset: Option<Preset>,
-    /// PETSc options of the scene, as words. Those of the command line win.
-    pub options: Vec<String>,
 }
 
 words! {

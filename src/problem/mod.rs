@@ -19,7 +19,7 @@ pub use body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
 pub use contact::{AutoContact, ContactSpec, Overlap};
 pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Plane, RegionSpec};
 pub use history::{History, LoadStep};
-pub use layer::{AsperitySpec, Depths, LawKind, LayerSpec};
+pub use layer::{LawKind, LayerSpec};
 pub use mesh::{GroupArrays, Guard, MeshArrays, MeshSource};
 pub use method::{Gamma, Linear, MethodName, MethodSpec, Preset, RobinRule, SolverSpec, Start, StopRule, Zone};
 pub use order::Order;

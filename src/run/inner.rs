@@ -60,7 +60,7 @@ impl<'a> SolverFactory<'a> {
         if session.size() > 1 {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
-        let typed = UserOptions::read(session)?;
+        let typed = UserOptions::read(session);
         Ok(Self {
             session,
             asked: scene.solver.preset,

@@ -18,7 +18,7 @@ use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, LinearStep};
 use crate::parallel::{Ranks, collectively, differences};
-use crate::petsc::{Session, keep_apart, keep_at_hand};
+use crate::petsc::Session;
 use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
@@ -46,10 +46,8 @@ pub fn build(
     build_after(session, scene.into(), None, interrupt, clock)
 }
 
-/// Build a scene with what the run of another scene before it has left. Collective.
-///
-/// The stiffness matrix of a body does not depend on method, layers, gaps and the values of loads and supports: then a condensed body is
-/// reused. Where only the method changes, the whole problem is reused.
+/// Build a scene with what the run of another scene before it has left, if only the method differs: the condensed bodies, and the whole
+/// problem if linear steps are solved alike. Collective.
 pub fn build_after(
     session: &Session,
     scene: Rc<Scene>,
@@ -58,7 +56,7 @@ pub fn build_after(
     clock: &mut Clock,
 ) -> Result<Built> {
     let mut kept = Vec::new();
-    if let Some(Done { built: mut last, .. }) = before {
+    if let Some(Done { built: mut last, .. }) = before.filter(|done| settings(&done.built.scene) == settings(&scene)) {
         if serves(&last, &scene) {
             let discrete = &mut last.discrete;
             discrete.model.exchange = Rc::new(Ranks::new(session));
@@ -67,11 +65,8 @@ pub fn build_after(
             discrete.assemblies = 0;
             return Ok(Built { scene, ..last });
         }
-        if settings(&last.scene, without_values) == settings(&scene, without_values) {
-            kept = last.into_condensed();
-        }
+        kept = last.into_condensed();
     }
-    collectively(session, options::refuse_log(session))?;
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::in_plane, kept, interrupt, clock),
         _ => build_in::<3>(session, scene, pieces::in_space, kept, interrupt, clock),
@@ -135,9 +130,6 @@ where
         let stage = session.stage("discretize");
         let mut bodies = verified.bodies.clone();
         scene.method.steps.apply(step, &mut bodies);
-        let names: Vec<String> = bodies.iter().map(|body| body.name.value.clone()).collect();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        collectively(session, options::set_of_scene(session, &names, &scene.solver.options))?;
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
@@ -152,7 +144,7 @@ where
         clock.estimate = inner.seconds;
         clock.phase("discretize");
         drop(stage);
-        let mut warnings = warnings::of_problem(session, &discrete, D);
+        let mut warnings = warnings::of_problem(session, &discrete);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
         let mut built = Built {
@@ -202,12 +194,11 @@ fn verified<const D: usize>(
     interrupt: &Interrupt,
 ) -> Result<(Verified<D>, Option<FileRead>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    interrupt.hold();
     let mut file = None;
     let read = || {
-        let Loaded { mesh, digest, unkept, notes, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        file = Some(FileRead { digest, warnings: notes.into_iter().chain(unkept).collect() });
         interrupt.release()?;
+        let Loaded { mesh, digest, notes: warnings, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        file = Some(FileRead { digest, warnings });
         Ok(mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);
@@ -237,7 +228,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         start = full;
     }
     let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-    let warnings = collectively(session, options::unread(session, &names, &built.options))?;
+    let warnings = collectively(session, options::unread(session, &names))?;
     if built.options.is_empty() && session.options().has("-help") {
         options::show_help(session)?;
     }
@@ -251,13 +242,10 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
 /// PETSc fails. A run that does not converge is not an error but a status of the outcome.
 pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
-    keep_at_hand();
-    let done = match ready.built.scene.method.steps.is_empty() {
+    let mut done = match ready.built.scene.method.steps.is_empty() {
         true => recorder::solve(ready, true, keep),
         false => steps::iterate(ready, keep, clock),
-    };
-    keep_apart();
-    let mut done = done?;
+    }?;
     warnings::note_ends(&mut done);
     clock.phase("iterate");
     Ok(done)
@@ -293,7 +281,8 @@ pub fn targets(scene: &Scene) -> String {
     rules.chain(balanced).collect::<Vec<_>>().join(" or ")
 }
 
-/// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.
+/// Return whether the problem of the run before serves a scene that differs in the method alone: all bodies are condensed, and linear steps
+/// are solved alike.
 fn serves(last: &Built, scene: &Scene) -> bool {
     let both = [&*last.scene, scene];
     // an estimate of the error needs the meshes, which are kept only for it
@@ -308,40 +297,13 @@ fn serves(last: &Built, scene: &Scene) -> bool {
         // tables of factors change the loads of bodies
         && both.iter().all(|scene| !scene.method.steps.is_table())
         && old_joint == new_joint
-        && settings(&last.scene, |_| ()) == settings(scene, |_| ())
 }
 
-/// Return the settings of a scene on which bodies can depend, changed by `edit`.
-fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
+/// Return the settings of a scene on which its discrete problem can depend.
+fn settings(scene: &Scene) -> Value {
     let mut settings = scene.settings();
     remove(&mut settings, "", &["title", "units", "method", "output"]);
-    edit(&mut settings);
     settings
-}
-
-/// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
-fn without_values(settings: &mut Value) {
-    items(settings.get_mut("contact")).for_each(|contact| remove(contact, "", &["gap", "layer", "reference"]));
-    for body in items(settings.get_mut("body")) {
-        remove(body, "", &["force", "path"]);
-        if let Some(Value::Array(loads)) = body.get_mut("load") {
-            // only rigid surfaces change the dofs: they join them
-            loads.retain(|load| load["rigid"] == true);
-        }
-        for key in ["load", "fix"] {
-            for item in items(body.get_mut(key)) {
-                remove(item, "", &["path"]);
-                for key in ["force", "moment", "x", "y", "z", "normal"] {
-                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
-                }
-            }
-        }
-    }
-}
-
-/// Return the items of a list in the settings.
-fn items(list: Option<&mut Value>) -> impl Iterator<Item = &mut Value> {
-    list.and_then(Value::as_array_mut).into_iter().flatten()
 }
 
 /// Refuse, on all ranks, scenes that differ between ranks, data and tables included. Files of the mesh are not compared, as only the

@@ -205,7 +205,6 @@ fn body_report(info: &BodyInfo, solver: &str) -> BodyReport {
         cells: info.cells,
         inner_facets: info.facets.inner,
         boundary_facets: info.facets.outer,
-        parts: info.facets.parts.count,
         dofs: info.dofs,
         solver: solver.to_owned(),
         rank: info.rank,
@@ -213,13 +212,13 @@ fn body_report(info: &BodyInfo, solver: &str) -> BodyReport {
     }
 }
 
-/// Return all PETSc options as they are typed, whatever their source. A failure of PETSc to list them is no reason to stop.
+/// Return the options of solvers as they were typed, whatever their source.
 fn petsc_options(session: &Session) -> Vec<String> {
     let option = |(name, value): (String, Option<String>)| match value {
         Some(value) => format!("{name} {value}"),
         None => name,
     };
-    session.options().all().unwrap_or_default().into_iter().map(option).collect()
+    session.options().typed().into_iter().map(option).collect()
 }
 
 /// Data that only the owners of the bodies have, gathered on every rank: counters over all bodies, and their inner solvers.

@@ -12,12 +12,12 @@ use crate::linalg::{self, diagonal};
 use crate::model::Mechanism;
 use crate::output::report::readable;
 use crate::output::{BalanceReport, sci};
-use crate::petsc::{Schur, Session, has_metis};
+use crate::petsc::Session;
 use crate::problem::LayerSpec;
 use std::f64::consts::PI;
 
 /// Return the warnings about a problem before it is solved.
-pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> Vec<String> {
+pub fn of_problem(session: &Session, discrete: &Discrete) -> Vec<String> {
     let mut warnings = Vec::new();
     if session.blas_name() == "reference BLAS" {
         warnings.push(
@@ -25,25 +25,6 @@ pub fn of_problem(session: &Session, discrete: &Discrete, dimension: usize) -> V
                 .to_owned(),
         );
     }
-    if let Some(kernels) = session.faster_blas_kernels() {
-        warnings.push(format!(
-            "{} does not use the vector instructions of this processor: factorisations take up to three times as long; set \
-             OPENBLAS_CORETYPE={kernels}",
-            session.blas_name()
-        ));
-    }
-    if discrete.bodies.iter().any(|body| Schur::is_large(dimension, body.dofs)) && !has_metis() {
-        warnings.push(
-            "METIS was not found: large bodies are factored in the order of minimum degree, with a fifth more memory or more; \
-             `apt-get install libmetis5`, or a PETSc with METIS"
-                .to_owned(),
-        );
-    }
-    warnings.extend(session.left_out().iter().map(|file| {
-        format!(
-            "{file} of this folder is not read, since PETSc options can run programs; -options_file {file} reads it"
-        )
-    }));
     if session.size() > discrete.bodies.len() && !discrete.model.is_distributed() {
         warnings.push(format!(
             "{} of {} ranks have no body to solve",

@@ -9,8 +9,8 @@ use crate::expression::Field;
 use crate::problem::body::{SPELLING, fault, is_in_name};
 use crate::problem::pattern::is_pattern;
 use crate::problem::{
-    AsperitySpec, AutoContact, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Gamma, LayerSpec, Load,
-    LoadKind, MeshSource, MethodName, MethodSpec, Plane, RobinRule, SpringKind, SpringSpec, Start, StopRule, Support,
+    AutoContact, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, LayerSpec, Load, LoadKind, MeshSource,
+    MethodName, MethodSpec, Plane, RobinRule, SpringKind, SpringSpec, Start, StopRule, Support,
 };
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -163,7 +163,6 @@ impl Scene {
 fn check_mesh(at: &CheckedKey, mesh: &MeshSource) -> CheckResult {
     let MeshSource::Geo { guard, .. } = mesh else { return Ok(()) };
     at.positive_in("timeout", "the timeout", guard.seconds)?;
-    guard.gigabytes.map_or(Ok(()), |memory| at.positive_in("memory", "the memory", memory))?;
     guard.size.map_or(Ok(()), |size| at.positive_in("size", "the size", size))
 }
 
@@ -278,7 +277,6 @@ fn check_layer(at: &CheckedKey, layer: &LayerSpec) -> CheckResult {
             Ok(())
         }
         LayerSpec::Table(points) => check_table(&at.below("table"), points),
-        LayerSpec::Asperities(spec) => check_asperities(&at.below("asperities"), spec),
         LayerSpec::Pressure { up_to: Some(end), .. } => at.positive_in("up_to", "the end of the law", *end),
         LayerSpec::Pressure { .. } | LayerSpec::Own(_) => Ok(()),
     }
@@ -299,16 +297,6 @@ fn check_table(at: &CheckedKey, points: &[[f64; 2]]) -> CheckResult {
         }
     }
     Ok(())
-}
-
-fn check_asperities(at: &CheckedKey, spec: &AsperitySpec) -> CheckResult {
-    at.positive_in("modulus", "the modulus", spec.modulus)?;
-    if let Depths::Normal { deviation, highest } = spec.depths {
-        at.positive_in("deviation", "the deviation", deviation)?;
-        at.positive_in("highest", "the highest summit", highest)?;
-    }
-    at.positive_in("density", "the density", spec.density)?;
-    at.positive_in("radius", "the radius", spec.radius)
 }
 
 fn check_method(at: &CheckedKey, method: &MethodSpec) -> CheckResult {

@@ -2,7 +2,7 @@
 //! the whole scene, of mesh, data and the inner solver are here.
 
 use super::Scene;
-use crate::data::{Data, DataSpec, Detrend, Fill, Interpolation, Library, NoData, Outside, has_header};
+use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
 use crate::error::{Error, Located, Place, Result};
 use crate::expression::names;
 use crate::mesh::is_shape;
@@ -10,7 +10,6 @@ use crate::problem::{Guard, MeshSource, Preset, SolverSpec, contact, name_of};
 use crate::setting::{
     Context, Entries, Keys, Node, Setting, TableEntry, TableShape, Value, ValueKind, choose, entries, file, word,
 };
-use crate::solver::options;
 use serde_json::{Map, Value as Json, json};
 use std::borrow::Cow;
 use std::path::Path;
@@ -18,7 +17,7 @@ use std::sync::Arc;
 
 /// Return the shape of a whole scene.
 pub(super) fn shape() -> TableShape {
-    use ValueKind::{Flag, Map, OneOf, Text};
+    use ValueKind::{Map, OneOf, Text};
     TableShape::new("the scene")
         .optional("title", Text, "title of plots and reports; the name of the file without one")
         .required("dimension", OneOf(&[2, 3]), "2 in the plane, 3 in space")
@@ -29,8 +28,6 @@ pub(super) fn shape() -> TableShape {
             "functions from files; each begins with a line [data.NAME]",
         )
         .optional("contact", contact::shape().list(), "a contact starts with the line [[contact]]")
-        // only `--trust-geo` sets it
-        .optional("trust_geo", Flag, "")
 }
 
 /// Decode the tree of a scene that was read from `path`. Its numbers are checked later ([`Scene::verify`]). Files of meshes and data
@@ -50,10 +47,6 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     };
     let (contacts, auto) = contact::read(keys.items("contact")?, context)?;
     let mut scene = Scene { contacts, auto, data, ..Scene::decode(&keys, context, path.to_owned(), title, dimension)? };
-    let trusted = is_trusted(tree, &keys)?;
-    if let MeshSource::Geo { guard, .. } = &mut scene.mesh {
-        guard.trusted = trusted;
-    }
     // meshes that are adapted need no more digits than they are worth, unless the scene says how many
     let has_stop = keys.get("method").is_some_and(|method| method.has_key("stop"));
     scene.method.stop.balanced |= scene.adapt.is_some() && !has_stop;
@@ -167,17 +160,6 @@ fn mesh_file(keys: &Keys, msh: &Node, context: &Context) -> Result<MeshSource> {
     }
 }
 
-/// Return whether the user trusts the mesh's script as a program. Only the command line can say so: a key whose place lies in the
-/// scene file is refused.
-fn is_trusted(tree: &Node, keys: &Keys) -> Result<bool> {
-    let Some(entry) = keys.entry("trust_geo") else { return Ok(false) };
-    if Arc::ptr_eq(&entry.key_place.source, &tree.place.source) {
-        return Err(Error::scene(&entry.key_place, "a scene cannot say that it is trusted")
-            .help("remove this, and give --trust-geo on the command line"));
-    }
-    entry.node.boolean()
-}
-
 struct NamedNumber {
     place: Place,
     name: String,
@@ -203,26 +185,17 @@ fn numbers(node: &Node) -> Result<Vec<NamedNumber>> {
 
 /// Return the shape of `[data.NAME]`; `name` is its name in messages.
 fn data_shape(name: impl Into<Cow<'static, str>>) -> TableShape {
-    use ValueKind::{Either, Flag, Number, Text};
+    use ValueKind::{Either, Number, Text};
     let one_or_two = || Either(vec![Number, Number.list()]);
-    let number_or_word = || Either(vec![Number, Text]);
-    let number_or_word_or_list = || Either(vec![Number, Text, number_or_word().list()]);
     TableShape::new(name)
-        .required("file", Text, "a table of numbers, .npy, or a grid .asc or .grd")
-        .optional("points", Flag, "whether each row is a place and its height; false")
+        .required("file", Text, "heights in rows: .npy, or a table of numbers")
         .optional("origin", one_or_two(), "place of the first height; 0")
-        .optional("spacing", one_or_two(), "distance of the heights along a row and from row to row")
+        .required("spacing", one_or_two(), "distance of the heights along a row and from row to row")
         .optional("unit", Number, "what a height of 1 in the file is; 1")
-        .optional("missing", number_or_word_or_list(), "what stands for a point without a height; NaN always does")
-        .optional("fill", word(&Fill::ALL), "what such points get; \"error\"")
         .optional("detrend", word(&Detrend::ALL), "what is subtracted from the heights; \"none\"")
         .optional("interpolate", word(&Interpolation::ALL), "what is between the heights; \"linear\"")
         .optional("outside", word(&Outside::ALL), "what is beyond them; \"error\"")
 }
-
-/// Advice for heights on a grid without a spacing.
-const SPACING: &str = "spacing = d or [d1, d2] is the distance of the heights along a row and from row to row; or points = true, if each row \
-                       is a place and its height";
 
 /// Return the data of a scene by name. Their files must exist; they are not read.
 fn library(node: Option<&Node>, folder: &Path) -> Result<Library> {
@@ -255,24 +228,13 @@ fn spec(entry: &TableEntry, folder: &Path) -> Result<DataSpec> {
     check_name(name, key_place)?;
     let keys = Keys::open(node, &data_shape(format!("[data.{name}]")))?;
     let path = file(folder, keys.require("file")?)?;
-    let points = keys.flag("points", false)?;
-    let spacing = match keys.get("spacing") {
-        None if points || has_header(&path.value) => [1.0; 2],
-        _ => {
-            let node = keys.require("spacing").map_err(|error| error.help(SPACING))?;
-            pair(node, |node| node.positive("the spacing"))?
-        }
-    };
     Ok(DataSpec {
         name: name.clone(),
         file: path.value,
         place: path.place,
-        points,
         origin: keys.read("origin", |node| pair(node, Node::number))?.unwrap_or_default(),
-        spacing,
+        spacing: pair(keys.require("spacing")?, |node| node.positive("the spacing"))?,
         unit: keys.read("unit", unit)?.unwrap_or(1.0),
-        missing: keys.read("missing", missing)?,
-        fill: keys.read("fill", |node| choose(node, "`fill`", &Fill::ALL))?.unwrap_or(Fill::Error),
         detrend: keys.read("detrend", |node| choose(node, "`detrend`", &Detrend::ALL))?.unwrap_or(Detrend::None),
         interpolation: keys
             .read("interpolate", |node| choose(node, "interpolation", &Interpolation::ALL))?
@@ -290,21 +252,12 @@ fn echo_of_data(data: &Library) -> Json {
 }
 
 fn of_spec(spec: &DataSpec) -> Json {
-    #[rustfmt::skip]
-    let DataSpec {
-        name: _, file, place: _, points, origin, spacing, unit, missing, fill, detrend, interpolation, outside,
-    } = spec;
-    let missing = missing.as_ref().map(|NoData { numbers, words }| {
-        numbers.iter().map(|number| json!(number)).chain(words.iter().map(|word| json!(word))).collect::<Json>()
-    });
+    let DataSpec { name: _, file, place: _, origin, spacing, unit, detrend, interpolation, outside } = spec;
     entries([
         ("file", json!(file.display().to_string())),
-        ("points", json!(points)),
         ("origin", json!(origin)),
         ("spacing", json!(spacing)),
         ("unit", json!(unit)),
-        ("missing", json!(missing)),
-        ("fill", json!(name_of(&Fill::ALL, fill))),
         ("detrend", json!(name_of(&Detrend::ALL, detrend))),
         ("interpolate", json!(name_of(&Interpolation::ALL, interpolation))),
         ("outside", json!(name_of(&Outside::ALL, outside))),
@@ -317,23 +270,6 @@ fn unit(node: &Node) -> Result<f64> {
         0.0 => Err(node.refuse("the unit is 0").label("all heights would be 0")),
         unit => Ok(unit),
     }
-}
-
-/// Return what stands for points without a height: a number, a word, or a list of these.
-fn missing(node: &Node) -> Result<NoData> {
-    let one = [node];
-    let items: Vec<&Node> = match &node.value {
-        Value::List(items) => items.iter().collect(),
-        _ => one.to_vec(),
-    };
-    let mut missing = NoData::default();
-    for item in items {
-        match &item.value {
-            Value::String(word) => missing.words.push(word.clone()),
-            _ => missing.numbers.push(item.number()?),
-        }
-    }
-    Ok(missing)
 }
 
 /// Return two numbers, each read by `number`; a single number stands for both.
@@ -354,33 +290,19 @@ impl Setting for SolverSpec {
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
         if let Value::String(_) = node.value {
-            return Ok(Self { preset: Some(Preset::read(node, context)?), options: Vec::new() });
+            return Ok(Self { preset: Some(Preset::read(node, context)?) });
         }
         let keys = Keys::open(node, &solver_shape())?;
-        let options = keys.read("options", petsc_options)?.unwrap_or_default();
-        Ok(Self { preset: keys.read("preset", |node| Preset::read(node, context))?, options })
+        Ok(Self { preset: keys.read("preset", |node| Preset::read(node, context))? })
     }
 
     fn echo(&self, dimension: usize) -> Json {
-        entries([("preset", self.preset.echo(dimension)), ("options", json!(self.options.join(" ")))]).into()
+        entries([("preset", self.preset.echo(dimension))]).into()
     }
 }
 
 fn solver_shape() -> TableShape {
-    TableShape::new("the solver").optional("preset", Preset::kind(), "the inner solver of all bodies").optional(
-        "options",
-        ValueKind::Text,
-        "PETSc options that choose solvers and set their parameters: \"-ksp_rtol 1e-10\"",
-    )
-}
-
-/// Return the words of PETSc options that choose solvers and set their parameters. Options that do anything else are refused.
-fn petsc_options(node: &Node) -> Result<Vec<String>> {
-    let words: Vec<String> = node.string()?.split_whitespace().map(str::to_owned).collect();
-    for (name, value) in options::pairs(&words).map_err(|error| error.at(&node.place))? {
-        options::check_of_scene(name, value).map_err(|error| error.at(&node.place_of_word(name)))?;
-    }
-    Ok(words)
+    TableShape::new("the solver").optional("preset", Preset::kind(), "the inner solver of all bodies")
 }
 
 /// Return the schema (draft 2020-12), made of the shapes by which scenes are decoded.

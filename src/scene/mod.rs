@@ -9,6 +9,7 @@
 
 mod check;
 mod decode;
+mod gone;
 mod spec;
 #[cfg(test)]
 mod tests;
@@ -41,7 +42,7 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     for text in overrides {
         apply(&mut tree, text)?;
     }
-    let scene = decode::scene(&tree, path)?;
+    let scene = decode::scene(&tree, path).map_err(gone::explain)?;
     scene.verify().map_err(|refusal| refusal.error.at(tree.place_of(&refusal.key)))?;
     Ok(scene)
 }
@@ -85,13 +86,8 @@ const SHORT: [(&str, &str); 3] =
     [("--method", "method.name"), ("--tolerance", "adapt.error"), ("--checkpoint", "output.checkpoint")];
 
 /// Options without a value, and the key that each sets to true.
-const FLAGS: [(&str, &str); 5] = [
-    ("--estimate", "estimate"),
-    ("--vtu", "output.vtu"),
-    ("--msh", "output.msh"),
-    ("--report", "output.report"),
-    ("--trust-geo", "trust_geo"),
-];
+const FLAGS: [(&str, &str); 4] =
+    [("--estimate", "estimate"), ("--vtu", "output.vtu"), ("--msh", "output.msh"), ("--report", "output.report")];
 
 /// Apply one override to the tree of a scene. It is `KEY=VALUE`, or an option with its value as typed (`--over KEY=VALUE`,
 /// `--tolerance 1e-3`, `--vtu`).

@@ -59,7 +59,7 @@ fn isotropic(body: &BodySpec) -> (f64, f64) {
 #[test]
 fn defaults_and_a_scene_in_space() {
     let text = "dimension = 3\nmesh = 'groove.msh'\n[[body]]\nname='a1'\nyoung=1\npoisson=0\norder=2\nforce=['z',0,1]\n\
-                fix=[{on='s',z=0.5}]\n[solver]\npreset='hypre'\noptions='-ksp_rtol 1e-10'\n[output]\ndir='out'\nvtu=true\n";
+                fix=[{on='s',z=0.5}]\n[solver]\npreset='hypre'\n[output]\ndir='out'\nvtu=true\n";
     let scene = load_text(text, &[]).unwrap();
     assert_eq!(scene.title, "scene");
     assert!(matches!(&scene.mesh, MeshSource::Msh { .. }));
@@ -74,8 +74,7 @@ fn defaults_and_a_scene_in_space() {
         scene.method.stop,
         StopRule { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
     );
-    let options = vec!["-ksp_rtol".to_owned(), "1e-10".to_owned()];
-    assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre), options });
+    assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre) });
     assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, ..OutputSpec::default() });
 }
 
@@ -96,7 +95,6 @@ fn overrides_replace_and_add() {
             "mesh.set.m = 2",
             "solver=mumps",
             "solver.preset=hypre",
-            "solver.options=-ksp_rtol 1e-10",
             "output.vtu=true",
             "title=Ein anderer Titel",
             "plane=stress",
@@ -121,7 +119,6 @@ fn overrides_replace_and_add() {
     let MeshSource::Geo { set, .. } = &scene.mesh else { panic!() };
     assert_eq!(set, &[("m".to_owned(), 2.0), ("n".to_owned(), 64.0)]);
     assert_eq!(scene.solver.preset, Some(Preset::Hypre));
-    assert_eq!(scene.solver.options, ["-ksp_rtol", "1e-10"]);
     assert_eq!((scene.title.as_str(), scene.plane), ("Ein anderer Titel", Plane::Stress));
     assert!(scene.output.vtu && scene.output.plots);
     assert_eq!(scene.method.gamma, Gamma::Stationary(0.2));
@@ -247,7 +244,6 @@ const CASES: &[Case] = &[
     ("psi = \"active\"", "psi = \"z > 0\"", "z", "unknown variable `z`", "x, y, k"),
     ("start = { normal = 1e-4 }", "start = \"none\"", "\"none\"", "unknown start `none`", "\"zero\""),
     ("[method]", "[solver]\npreset = \"mumpz\"\n[method]", "\"mumpz\"", "unknown solver `mumpz`", "`mumps`"),
-    ("[method]", "[solver]\noptions = \"ksp_rtol 1\"\n[method]", "\"ksp_rtol 1\"", "`ksp_rtol` is no PETSc option", "dash"),
     ("dimension = 2 ", "dimension = 2\nplane = \"strein\" ", "\"strein\"", "unknown plane `strein`", "`strain`"),
     ("dimension = 2 ", "dimension = 3\nplane = \"strain\" ", "plane", "`plane` in a problem in space", ""),
     // Bodies.
@@ -322,8 +318,8 @@ const CASES: &[Case] = &[
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
     ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
     ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` is 0", ""),
-    ("n = 32 }", "n = 32 }, memory = \"all\"", "\"all\"", "expected a number, found a string", ""),
-    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", memory = 1", "memory", "`memory` for a finished mesh", ""),
+    ("n = 32 }", "n = 32 }, memory = 8", "memory", "unknown key `memory`", "`timeout` alone"),
+    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", timeout = 1", "timeout", "`timeout` for a finished mesh", ""),
     ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
     ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
 ];
@@ -410,18 +406,4 @@ fn refusals_of_short_options_point_into_what_was_typed() {
         let shown = refused(GROOVE, &[text], text, [marked, message, ""]);
         assert!(shown.contains(&format!("1 | {}", text.trim_end())), "{shown}");
     }
-}
-
-/// A scene that came from somebody else cannot let its script run programs.
-#[test]
-fn only_the_command_line_trusts_a_script() {
-    use crate::problem::mesh::MeshSource;
-    let trusted = |text: &str, more: &[&str]| match load_text(text, more).expect("a scene").mesh {
-        MeshSource::Geo { guard, .. } => guard.trusted,
-        _ => false,
-    };
-    assert!(!trusted(GROOVE, &[]) && trusted(GROOVE, &["--trust-geo"]) && trusted(GROOVE, &["trust_geo=true"]));
-    let error = load_text(&format!("trust_geo = true\n{GROOVE}"), &[]).expect_err("a scene that trusts itself");
-    assert!(error.message().contains("cannot say that it is trusted"), "{error}");
-    assert_eq!(caret(&error), "trust_geo");
 }

@@ -152,13 +152,6 @@ impl Node {
         Error::scene(&self.place, message)
     }
 
-    /// Return the place of the first occurrence of `word` in this text. If escapes hide the word, return the place of the whole text.
-    pub fn place_of_word(&self, word: &str) -> Place {
-        let Place { source, span } = &self.place;
-        let found = source.text[span.clone()].find(word).map(|at| span.start + at);
-        Place { source: source.clone(), span: found.map_or(span.clone(), |at| at..at + word.len()) }
-    }
-
     /// Return the place of the value at a dotted path, or of the innermost value around it that is there.
     pub fn place_of(&self, path: &str) -> &Place {
         let mut node = self;

@@ -70,8 +70,8 @@ impl Uncondensed {
         let (load, name) = (interface.turn(&whole.load), chosen.prefix());
         let lower = interface.lower_triangle(&whole.stiffness);
         whole.stiffness = Csr::new(0);
-        let analyse = || Schur::analyse(&session, name, dimension, load.len(), &lower, &interface.dofs);
-        let mut schur = chosen.lend(&session, analyse)?;
+        let controls = chosen.controls_of_mumps(&session);
+        let mut schur = Schur::analyse(&session, &controls, dimension, load.len(), &lower, &interface.dofs)?;
         drop(lower);
         let (needed, available) = (schur.expected_megabytes(), available_memory() / 1_000_000);
         if needed > available {

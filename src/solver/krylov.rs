@@ -1,6 +1,6 @@
 //! Any KSP and PC of PETSc as inner solver.
 
-use super::options::Chosen;
+use super::options::{Chosen, Group};
 use super::{Change, InnerSolver};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
@@ -8,14 +8,17 @@ use crate::linalg::Csr;
 use crate::linalg::portable::log10;
 use crate::model::Solved;
 use crate::petsc::{ConvergenceTest, Ksp, Matrix, Rows, Session};
+use std::rc::Rc;
 
-/// G as a PETSc matrix with a KSP that takes its options from `-<body>_...`.
+/// G as a PETSc matrix with a KSP that takes its options from PETSc's table, where they stand while it lives.
 ///
 /// A multigrid preconditioner is kept while G changes, if the user has not decided this by `-ksp_reuse_preconditioner`. Dofs at which it is poor then are
 /// solved exactly around it. This local correction is called a patch.
 pub struct Krylov {
     session: Session,
     chosen: Chosen,
+    /// The options in PETSc's table.
+    _group: Rc<Group>,
     matrix: Matrix,
     ksp: Ksp,
     /// Whether G has changed since the last set-up.
@@ -71,13 +74,15 @@ impl Krylov {
         let mut matrix = Matrix::new(session, dimension, stiffness)?;
         let levels = if interpolation.is_some() { 2 } else { 1 };
         matrix.set_spd()?;
-        let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", chosen.prefix()))?;
+        let group = chosen.group(session)?;
+        let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", group.prefix))?;
+        ksp.set_name(chosen.prefix())?;
         ksp.set_operator(&matrix)?;
         if let Some(interpolation) = interpolation {
             let Prolongation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
-        chosen.lend(session, || ksp.set_from_options())?;
+        ksp.set_from_options()?;
         // the spectrum turns a residual in the natural norm into an error in the energy norm
         if ksp.ksp_type() == "cg" && chosen.get("ksp_norm_type") == Some("natural") {
             ksp.estimate_spectrum()?;
@@ -97,6 +102,7 @@ impl Krylov {
         Ok(Self {
             session,
             chosen,
+            _group: group,
             matrix,
             ksp,
             free,
@@ -117,7 +123,7 @@ impl Krylov {
     fn staged(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
         self.set_up()?;
         let stage = self.session.stage("linear solve");
-        let solved = self.with_options(|| solve(&self.ksp))?;
+        let solved = solve(&self.ksp)?;
         drop(stage);
         let direct = self.ksp.ksp_type() == "preonly";
         Ok(Solved {
@@ -159,7 +165,7 @@ impl Krylov {
         if !self.stale && self.patch(&poor_dofs(rows, soft, &self.prepared, springs))? {
             if self.ksp.pc_type() == "mg" {
                 // PETSc's smoothers use the new G, but their bounds of eigenvalues are those of their set-up
-                self.chosen.lend(&self.session, || self.ksp.renew_smoother(&self.matrix))?;
+                self.ksp.renew_smoother(&self.matrix)?;
             }
             return Ok(());
         }
@@ -177,12 +183,6 @@ impl Krylov {
             let pace = solved.iterations as f64 / -log10(self.reached);
             self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
         }
-    }
-
-    /// Do some work of the solver that may read options. The program's choices are read in the set-up, but a solve reads some of the user's options
-    /// (`-ksp_converged_reason`, and all of a solver nested in another).
-    fn with_options<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
-        if self.chosen.has_typed() { self.chosen.lend(&self.session, work) } else { work() }
     }
 }
 
@@ -222,7 +222,7 @@ impl InnerSolver for Krylov {
                 self.stale = false;
                 self.fresh = None;
             }
-            self.chosen.lend(&self.session, || self.ksp.set_up())?;
+            self.ksp.set_up()?;
         }
         Ok(())
     }
@@ -272,7 +272,7 @@ impl InnerSolver for Krylov {
             return self.solve(r, z);
         }
         self.set_up()?;
-        self.with_options(|| self.ksp.precondition(r, z))?;
+        self.ksp.precondition(r, z)?;
         Ok(Solved { iterations: 1, failure: self.ksp.failure() })
     }
 

@@ -69,25 +69,16 @@ fn meshes_of_other_formats_give_the_same_answer() {
         assert!(distance(&sorted(run), &sorted(&whole)) < size, "{label}");
         assert!(run.warnings().is_empty(), "{label}: {}", run.warnings());
     };
-    for (format, names) in
-        [("msh22", &NAMED), ("unv", &NAMED), ("bdf", &NUMBERED), ("mesh", &NUMBERED), ("msh1", &NUMBERED)]
-    {
+    for (format, names) in [("msh22", &NAMED), ("unv", &NAMED), ("bdf", &NUMBERED), ("mesh", &NUMBERED)] {
         let end = if format.starts_with("msh") { "msh" } else { format };
         let name = format!("a.{end}");
         let text = made(&patch(), &["-3", "-format", format], &name);
-        let names = if format == "msh1" {
-            &Names { bodies: ["volume_1", "volume_6"], surfaces: ["surface_2", "surface_3", "surface_7", "surface_8"] }
-        } else {
-            names
-        };
         let run = solved(&name, &text, &format!("\"{name}\""), names).converged();
         same(&run, format);
     }
-    // universal files of others have their groups in another dataset
-    let text = String::from_utf8(made(&patch(), &["-3", "-format", "unv"], "a.unv")).expect("text");
-    same(&solved("a.unv", text.replace("  2477", "  2467").as_bytes(), "\"a.unv\"", &NAMED).converged(), "2467");
     // in the cache now
-    let run = solved("b.unv", text.as_bytes(), "{ msh = \"b.unv\" }", &NAMED).converged();
+    let text = made(&patch(), &["-3", "-format", "unv"], "b.unv");
+    let run = solved("b.unv", &text, "{ msh = \"b.unv\" }", &NAMED).converged();
     same(&run, "a table");
 }
 
@@ -448,60 +439,12 @@ fn input_files_are_refused_with_their_line() {
     is_ten(run, &["the surface `lower` is `lower_surface` here"], "one name");
 }
 
-/// Grid points in local systems, in free, small and large fields.
+/// Gmsh ignores local systems of coordinates without a word.
 #[test]
-fn local_coordinates_of_bulk_data() {
-    let head = "SOL 101\nCEND\nBEGIN BULK\n";
-    let cells = "CHEXA,1,10,1,2,3,4,5,6\n+,7,8\nPSOLID,10,1\nENDDATA\n";
-    // the corners of a quarter of a ring, as in the test of input files
-    let corners = [[1.0, 0.0], [2.0, 0.0], [2.0, 90.0], [1.0, 90.0]];
-    let grids = |format: &dyn Fn(usize, [f64; 3]) -> String| -> String {
-        let points = (0..8).map(|at| (at + 1, [corners[at % 4][0], corners[at % 4][1], (at / 4) as f64]));
-        points.map(|(tag, x)| format(tag, x)).collect()
-    };
-    let small = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID    {tag:<8}7       {r:<8.1}{t:<8.1}{z:<8.1}\n");
-    let free = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID,{tag},7,{r:.1},{t:.1},{z:.1}\n");
-    let large = |tag: usize, [r, t, z]: [f64; 3]| {
-        format!("GRID*   {tag:<16}{:<16}{r:<16.1}{t:<16.1}*G\n*G      {z:<16.1}\n", 7)
-    };
-    let set = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID,{tag},,{r:.1},{t:.1},{z:.1}\n");
-    let system = "CORD2C,7,,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n";
-    let list = |text: &str| {
-        let scene = Scene::new("dimension = 3\nmesh = \"a.bdf\"\n[[body]]\nname = \"*\"\nyoung = 1\npoisson = 0.3\n");
-        fs::write(scene.path.with_file_name("a.bdf"), text).expect("a file");
-        winkler(&["mesh", scene.path.to_str().expect("a path"), "--json"])
-    };
-    let is = |text: &str, low: [f64; 3], high: [f64; 3]| {
-        let run = list(&(head.to_owned() + text + cells));
-        assert!(run.code == 0, "{text}\n{}", run.said());
-        let facts: serde_json::Value = serde_json::from_str(&run.stdout).expect("JSON");
-        let corner = |key: &str| {
-            facts["groups"][0][key].as_array().expect("a corner").iter().map(|x| x.as_f64().expect("a number"))
-        };
-        let far =
-            corner("low").chain(corner("high")).zip(low.into_iter().chain(high)).any(|(x, y)| (x - y).abs() > 1e-9);
-        assert!(!far, "{text}\n{}", run.said());
-    };
-    for grid in [&small as &dyn Fn(usize, [f64; 3]) -> String, &free, &large] {
-        is(&(system.to_owned() + &grids(grid)), [0.0; 3], [2.0, 2.0, 1.0]);
+fn local_coordinates_of_bulk_data_are_refused() {
+    let bulk = |card: &str| format!("SOL 101\nCEND\nBEGIN BULK\n{card}\nGRID,1,7,0.,0.,0.\nENDDATA\n");
+    for card in ["CORD2C,7,,0.,0.,0.,0.,0.,1.", "GRDSET,,7", "cord1r  7       1       2       3"] {
+        let run = solved("a.bdf", bulk(card).as_bytes(), "\"a.bdf\"", &NAMED);
+        assert!(run.code == 4 && run.stderr.contains("a.bdf:4: the deck has a local system"), "{}", run.said());
     }
-    is(&("GRDSET,,7\n".to_owned() + system + &grids(&set)), [0.0; 3], [2.0, 2.0, 1.0]);
-    // the axis of the ring is x, the angle begins at y, and the origin is a grid point
-    let points = "GRID,101,,1.,0.,0.\nGRID,102,,2.,0.,0.\nGRID,103,,1.,1.,0.\nCORD1C,7,101,102,103\n";
-    is(&(points.to_owned() + &grids(&free)), [1.0, 0.0, 0.0], [2.0, 2.0, 2.0]);
-    // the same by a system within another one, in which x is y, y is z and z is x
-    let nested = "CORD2R,5,,1.,0.,0.,2.,0.,0.\n,1.,1.,0.\nCORD2C,7,5,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n";
-    is(&(nested.to_owned() + &grids(&free)), [1.0, 0.0, 0.0], [2.0, 2.0, 2.0]);
-    // spherical: an eighth of a shell has the polar angle in the place of z
-    let ball = |tag: usize, [r, t, z]: [f64; 3]| format!("GRID,{tag},7,{r:.1},{:.1},{:.1}\n", 45.0 + t / 2.0, 90.0 * z);
-    is(&(system.replace("2C", "2S") + &grids(&ball)), [0.0, 0.0, 0.0], [2.0, 2.0, 2f64.sqrt()]);
-    let refused = |text: &str, words: &[&str]| {
-        let run = list(&(head.to_owned() + text + cells));
-        assert!(run.code == 4 && words.iter().all(|word| run.stderr.contains(word)), "{words:?}\n{}", run.said());
-    };
-    refused(&grids(&free), &["a.bdf:4", "system of coordinates 7 is not there"]);
-    refused(&("CORD3G,7,1,2,3\n".to_owned() + &grids(&free)), &["a.bdf:4", "CORD3G is not read"]);
-    refused(&("CORD1R,7,1,2,3\n".to_owned() + &grids(&free)), &["a.bdf:4", "depends on itself"]);
-    refused(&("CORD2R,7,,0.,0.,0.,0.,0.,1.\n,0.,0.,2.\n".to_owned() + &grids(&free)), &["a.bdf:4", "lie on a line"]);
-    refused(&("INCLUDE 'b.bdf'\n".to_owned() + &grids(&free)), &["a.bdf:4", "include others"]);
 }

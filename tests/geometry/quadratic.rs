@@ -42,26 +42,18 @@ impl Shape {
     /// The nodes of an element in a format. Each word has the corners in whose middle the node lies.
     fn nodes(self, format: &str) -> &'static str {
         match (format, self) {
-            ("unv", Line) => "0 01 1",
             (_, Line) => "0 1 01",
-            ("unv", Triangle) => "0 01 1 12 2 20",
             (_, Triangle) => "0 1 2 01 12 20",
             ("full", Quadrangle) => "0 1 2 3 01 12 23 30 0123",
-            ("unv", Quadrangle) => "0 01 1 12 2 23 3 30",
             (_, Quadrangle) => "0 1 2 3 01 12 23 30",
             ("inp", Hexahedron) => "0 1 2 3 4 5 6 7 01 12 23 30 45 56 67 74 04 15 26 37",
-            ("bdf", Hexahedron) => "0 1 2 3 4 5 6 7 01 12 23 30 04 15 26 37 45 56 67 74",
-            ("unv", Hexahedron) => "0 01 1 12 2 23 3 30 04 15 26 37 4 45 5 56 6 67 7 74",
             ("full", Hexahedron) => {
                 "0 1 2 3 4 5 6 7 01 03 04 12 15 23 26 37 45 47 56 67 0321 0154 0473 1265 2376 4567 01234567"
             }
             (_, Hexahedron) => "0 1 2 3 4 5 6 7 01 03 04 12 15 23 26 37 45 47 56 67",
             ("inp", Prism) => "0 1 2 3 4 5 01 12 20 34 45 53 03 14 25",
-            ("bdf", Prism) => "0 1 2 3 4 5 01 12 20 03 14 25 34 45 53",
-            ("unv", Prism) => "0 01 1 12 2 20 03 14 25 3 34 4 45 5 53",
             ("full", Prism) => "0 1 2 3 4 5 01 02 03 12 14 25 34 35 45 0143 0253 1254",
             (_, Prism) => "0 1 2 3 4 5 01 02 03 12 14 25 34 35 45",
-            ("bdf", Pyramid) => "0 1 2 3 4 01 12 23 30 04 14 24 34",
             ("full", Pyramid) => "0 1 2 3 4 01 03 04 12 14 23 24 34 0123",
             (_, Pyramid) => "0 1 2 3 4 01 03 04 12 14 23 24 34",
         }
@@ -72,8 +64,6 @@ impl Shape {
         let at = [Line, Triangle, Quadrangle, Hexahedron, Prism, Pyramid].iter().position(|shape| *shape == self);
         let kinds = match format {
             "inp" => ["", "", "CPE8R", "C3D20R", "C3D15", ""],
-            "bdf" => ["CBAR", "CTRIA6", "CQUAD8", "CHEXA", "CPENTA", "CPYRAM"],
-            "unv" => ["24", "92", "95", "116", "113", ""],
             "full" => ["8", "9", "10", "12", "13", "14"],
             _ => ["8", "9", "16", "17", "18", "19"],
         };
@@ -214,8 +204,6 @@ impl Two<'_> {
         };
         match format {
             "inp" => inp(&nodes, &groups, of),
-            "unv" => unv(&nodes, &groups, of),
-            "bdf" => bdf(&nodes, &groups, of),
             "msh2" => msh2(&nodes, &groups, of),
             _ => msh(format, &nodes, &groups, of),
         }
@@ -308,73 +296,9 @@ fn inp(nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell) -> Vec<usize>
     text
 }
 
-/// Universal file: groups of elements in dataset 2467.
-fn unv(nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell) -> Vec<usize>) -> String {
-    let mut text = String::from("    -1\n  2411\n");
-    for (number, [x, y, z]) in nodes {
-        let _ = writeln!(text, "{number:>10}{:>10}{:>10}{:>10}\n{x:>25.16e}{y:>25.16e}{z:>25.16e}", 1, 1, 11);
-    }
-    text += "    -1\n    -1\n  2412\n";
-    let (mut next, mut members) = (0_usize, String::new());
-    for (tag, group) in (1..).zip(groups) {
-        let (count, first) = (group.elements.len(), next);
-        let _ = writeln!(members, "{tag:>10}{0:>10}{0:>10}{0:>10}{0:>10}{0:>10}{0:>10}{count:>10}\n{1}", 0, group.name);
-        for (_, _, cell) in &group.elements {
-            next += 1;
-            let nodes = of(group, cell);
-            let kind = cell.shape.kind("unv");
-            let _ = writeln!(text, "{next:>10}{kind:>10}{:>10}{:>10}{:>10}{:>10}", 1, 1, 7, nodes.len());
-            if cell.shape == Line {
-                let _ = writeln!(text, "{0:>10}{0:>10}{0:>10}", 0);
-            }
-            for row in nodes.chunks(8) {
-                let _ = writeln!(text, "{}", row.iter().map(|node| format!("{node:>10}")).collect::<String>());
-            }
-            let _ = write!(members, "{:>10}{next:>10}{:>10}{:>10}", 8, 0, 0);
-            if (next - first).is_multiple_of(2) {
-                members.push('\n');
-            }
-        }
-        if !members.ends_with('\n') {
-            members.push('\n');
-        }
-    }
-    text + "    -1\n    -1\n  2467\n" + &members + "    -1\n"
-}
-
-/// Bulk data in free fields, continued as few programs do it, with a property for each group. Lines have two nodes.
-fn bdf(nodes: &Nodes, groups: &[Group], of: impl Fn(&Group, &Cell) -> Vec<usize>) -> String {
-    let mut text = String::from("CEND\nBEGIN BULK\n");
-    nodes.iter().for_each(|(number, x)| text += &format!("GRID,{number},,{}\n", words(x, ",")));
-    let mut next = 0;
-    for (tag, group) in (1..).zip(groups) {
-        for (_, _, cell) in &group.elements {
-            next += 1;
-            let mut fields = [&[next, tag][..], &of(group, cell)].concat();
-            if cell.shape == Line {
-                fields.truncate(4);
-            }
-            let rows: Vec<String> = fields.chunks(8).map(|row| words(row, ",")).collect();
-            let _ = writeln!(text, "{},{}", cell.shape.kind("bdf"), rows.join("\n,"));
-        }
-    }
-    text + "ENDDATA\n"
-}
-
-/// The name of a group in a format: `body` alone, or with a side.
-fn name(format: &str, dimension: usize, body: usize, side: Option<&str>) -> String {
-    let things = ["point", "curve", "surface", "volume"];
-    let sides = if dimension == 2 { vec!["a0", "a1", "b0", "b1"] } else { vec!["a0", "a1", "b0", "b1", "c0", "c1"] };
-    let first = 1 + body * (1 + sides.len());
-    match (format, side) {
-        ("bdf", None) => format!("{}_{first}", things[dimension]),
-        ("bdf", Some(side)) => {
-            let at = sides.iter().position(|known| *known == side).expect("a side");
-            format!("{}_{}", things[dimension - 1], first + 1 + at)
-        }
-        (_, None) => NAMES[body].to_owned(),
-        (_, Some(side)) => format!("{}_{side}", NAMES[body]),
-    }
+/// The name of a group: `body` alone, or with a side.
+fn name(body: usize, side: Option<&str>) -> String {
+    side.map_or(NAMES[body].to_owned(), |side| format!("{}_{side}", NAMES[body]))
 }
 
 /// Replaces `{lower}`, `{upper:c1}` and the like by the names of groups, and writes the mesh beside the scene.
@@ -382,11 +306,11 @@ fn written(two: &Two, format: &str, template: &str) -> Scene {
     let dimension = two.blocks[0].counts.len();
     let mut text = template.replace("{dimension}", &dimension.to_string());
     for (body, own) in NAMES.iter().enumerate() {
-        text = text.replace(&format!("{{{own}}}"), &name(format, dimension, body, None));
+        text = text.replace(&format!("{{{own}}}"), &name(body, None));
         for axis in ["a", "b", "c"].iter().take(dimension) {
             for end in 0..2 {
                 let side = format!("{axis}{end}");
-                text = text.replace(&format!("{{{own}:{side}}}"), &name(format, dimension, body, Some(&side)));
+                text = text.replace(&format!("{{{own}:{side}}}"), &name(body, Some(&side)));
             }
         }
     }
@@ -432,7 +356,7 @@ fn plane(body: usize, [a, b, _]: [f64; 3]) -> [f64; 3] {
 #[test]
 fn quadrangles_have_constant_pressure() {
     let two = Two { blocks: [Block::new(Quadrangle, &[2, 2]), Block::new(Quadrangle, &[3, 1])], place: &plane };
-    for format in ["msh", "full", "msh2", "inp", "unv", "bdf"] {
+    for format in ["msh", "full", "msh2", "inp"] {
         is_patch(&solve(patch(&two, format, 2), &[]).converged(), format, 1e-8);
     }
 }
@@ -440,7 +364,7 @@ fn quadrangles_have_constant_pressure() {
 #[test]
 fn hexahedra_and_prisms_have_constant_pressure() {
     let two = Two { blocks: [Block::new(Hexahedron, &[2, 2, 1]), Block::new(Prism, &[1, 2, 1])], place: &sheared };
-    for format in ["msh", "full", "msh2", "inp", "unv", "bdf"] {
+    for format in ["msh", "full", "msh2", "inp"] {
         is_patch(&solve(patch(&two, format, 2), &[]).converged(), format, 1e-8);
     }
     // Straight ones serve order 1.
@@ -452,7 +376,7 @@ fn hexahedra_and_prisms_have_constant_pressure() {
 #[test]
 fn pyramids_have_constant_pressure() {
     let two = Two { blocks: [Block::new(Pyramid, &[1, 2, 1]), Block::new(Hexahedron, &[2, 1, 1])], place: &sheared };
-    for format in ["msh", "full", "msh2", "bdf"] {
+    for format in ["msh", "full", "msh2"] {
         is_patch(&solve(patch(&two, format, 2), &[]).converged(), format, 1e-8);
     }
 }
@@ -508,7 +432,7 @@ fn rings_of_quadrangles_have_lames_pressure() {
     };
     let two =
         |n: i32| Two { blocks: [Block::new(Quadrangle, &[n, n]), Block::new(Quadrangle, &[n + 1, n])], place: &place };
-    let coarse = ["msh", "full", "inp", "unv", "bdf"].map(|format| error(rings(&two(3), format), format));
+    let coarse = ["msh", "full", "inp"].map(|format| error(rings(&two(3), format), format));
     let fine = error(rings(&two(6), "msh"), "fine");
     assert!(coarse.iter().all(|error| *error < 0.02) && fine < coarse[0] / 4.0, "{coarse:?} {fine}");
 }
@@ -525,10 +449,10 @@ fn rings_of_hexahedra_and_prisms_have_lames_pressure() {
         place: &place,
     };
     let mut all = Vec::new();
-    for format in ["msh", "inp", "unv", "bdf"] {
+    for format in ["msh", "inp"] {
         all.push(error(rings(&two([Hexahedron, Prism], 3), format), format));
     }
-    all.push(error(rings(&two([Pyramid, Hexahedron], 3), "bdf"), "pyramids"));
+    all.push(error(rings(&two([Pyramid, Hexahedron], 3), "msh"), "pyramids"));
     let fine = error(rings(&two([Hexahedron, Prism], 8), "msh"), "fine");
     assert!(all.iter().all(|error| *error < 0.03) && fine < all[0] / 2.0, "{all:?} {fine}");
 }

@@ -14,12 +14,6 @@ fn bilinear(value: impl Fn(f64, f64) -> f64) -> String {
     (0..4).map(|j| row(j) + "\n").collect()
 }
 
-/// Scattered points with the values of a function.
-fn points(value: impl Fn(f64, f64) -> f64) -> String {
-    let place = |k: usize| [-1.0 + 1.37 * (k % 7) as f64, -1.0 + 1.1 * (k / 7) as f64 + 0.1 * (k % 3) as f64];
-    (0..49).map(place).map(|[x, y]| format!("{x} {y} {:e}\n", value(x, y))).collect()
-}
-
 /// Two blocks whose gap, layer, modulus and load vary; `fields` are these, in this order.
 fn blocks(data: &str, fields: [&str; 4]) -> Scene {
     let [gap, layer, young, load] = fields;
@@ -36,15 +30,15 @@ fn blocks(data: &str, fields: [&str; 4]) -> Scene {
 fn measured() -> Scene {
     let grid =
         |name: &str| format!("[data.{name}]\nfile = \"{name}.csv\"\norigin = -1\nspacing = 3\noutside = \"clamp\"\n");
-    let scattered = "[data.E]\nfile = \"E.txt\"\npoints = true\nunit = 1e5\n";
-    let data = ["g", "b", "q"].map(grid).join("\n") + "\n" + scattered;
+    let modulus = "[data.E]\nfile = \"E.txt\"\norigin = -1\nspacing = 3\nunit = 1e5\n";
+    let data = ["g", "b", "q"].map(grid).join("\n") + "\n" + modulus;
     let scene = blocks(&data, ["1e-5*g(x, y)", "b(x, 2*y)", "E(x, y)", "q(x)"]);
     let folder = scene.path.parent().expect("a folder");
     for (name, text) in [
         ("g.csv", bilinear(|x, y| 1.0 + x + 0.5 * x * y)),
         ("b.csv", bilinear(|x, y| 2.5e-5 * (1.0 + 0.2 * x + 0.1 * y))),
         ("q.csv", "7,10,13,16\n".to_owned()),
-        ("E.txt", points(|x, y| 2.0 + 0.3 * x - 0.2 * y)),
+        ("E.txt", bilinear(|x, y| 2.0 + 0.3 * x - 0.2 * y)),
     ] {
         fs::write(folder.join(name), text).expect("a file");
     }
@@ -114,7 +108,7 @@ fn places_without_a_value_are_refused() {
             "contact.0.layer={pressure=\"1e5*c*q(30)\"}",
             ["pressure of the layer: data `q` have no value at (30)", "contact of `lower_top`", ""],
         ),
-        ("body.lower.young=E(x, 9 + y)", ["young: data `E` have no value at (", "for body `lower`", "\"clamp\""]),
+        ("body.lower.young=E(x, 99 + y)", ["young: data `E` have no value at (", "for body `lower`", "\"clamp\""]),
         ("body.upper.load.0.pressure=q(x - 9)", ["this load: data `q` have no value at (-", "for body `upper`", ""]),
         ("body.upper.force=[0, \"q(-3)\"]", ["the expression: data `q` have no value at (-3)", "", ""]),
         (
@@ -152,9 +146,11 @@ fn slips_in_data_are_pointed_at() {
         (&["contact.0.gap=q(x, y)"], "`q` takes 1 value, not 2"),
         (&["contact.0.gap=g"], "`g` needs its value in parentheses"),
         (&["contact.0.gap=gg(x, y)"], "did you mean `g`?"),
-        (&["data.g.points=true"], "g.csv has 4 numbers in a row"),
-        (&["data.E.interpolate=cubic"], "no cubic interpolation"),
-        (&["data.E.outside=periodic"], "no period"),
+        (&["data.g.points=true"], "scripts/library/heights.py"),
+        (&["data.g.missing=-9999"], "scripts/library/heights.py"),
+        (&["data.g.fill=linear"], "scripts/library/heights.py"),
+        (&["data.g.detrend=parabola"], "scripts/library/heights.py"),
+        (&["contact.0.layer={asperities={}}"], "scripts/library/asperities.py"),
     ] {
         let sets = sets.iter().flat_map(|set| ["--set", set]);
         let run = winkler(&["check", &path].into_iter().chain(sets).collect::<Vec<_>>());
@@ -170,9 +166,9 @@ fn checked(scene: &Scene, args: &[&str]) -> Value {
     serde_json::from_str(&run.stdout).expect("JSON")
 }
 
-/// A wave of five facets: straight lines between its nodes leave out 1 - 4 (1 - cos t)/t^2 + (2 + cos t)/3 of its variance, t = 2 pi/5.
+/// `check` tells the range of data and draws them where a folder is given.
 #[test]
-fn what_the_mesh_cannot_follow_is_known() {
+fn data_are_described_and_drawn() {
     let text = text_of("patch").replace("layer =", "gap = \"1e-6*wave(x)\"\nlayer =");
     let data = "[data.wave]\nfile = \"wave.csv\"\nspacing = 1.25e-3\noutside = \"periodic\"\ninterpolate = \"cubic\"\n";
     let scene = Scene::new(text.replace("[[contact]]", &format!("{data}\n[[contact]]")));
@@ -181,127 +177,13 @@ fn what_the_mesh_cannot_follow_is_known() {
     let found = checked(&scene, &["--set", "mesh.set={nl=20,nu=20}"]);
     let number =
         |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found:#}"));
-    let t = 2.0 * PI / 5.0;
-    let share = 1.0 - 4.0 * (1.0 - t.cos()) / (t * t) + (2.0 + t.cos()) / 3.0;
     let near = |ours: f64, exact: f64, within: f64| assert!((ours / exact - 1.0).abs() < within, "{ours} {exact}");
-    near(number("/pairs/0/surface/gap_followed/variance_left_out"), share, 1e-2);
-    near(number("/pairs/0/surface/gap_followed/rms_height"), 1e-6 * 0.5_f64.sqrt(), 1e-3);
-    near(number("/pairs/0/surface/gap_followed/side"), 0.05, 1e-9);
-    near(number("/data/wave/rms_slope"), 8.0 * PI * 0.5_f64.sqrt(), 1e-3);
-    // ten facets a wave: nowhere a tenth of the height
-    let fine = checked(&scene, &["--set", "mesh.set={nl=80,nu=80}"]);
-    assert_eq!(fine.pointer("/pairs/0/surface/gap_followed/area_left_out").and_then(Value::as_f64), Some(0.0));
-    // of five facets two are around the wave's zeros, where it is nearly straight
-    near(number("/pairs/0/surface/gap_followed/area_left_out"), 0.6, 1e-9);
+    near(number("/data/wave/range/1"), 1.0, 1e-12);
     // nothing is drawn that nobody asked for
     let folder = scene.path.parent().expect("a folder").join("pictures");
     let run = winkler(&["check", &scene.path.display().to_string(), "-o", &folder.display().to_string()]);
-    assert!(run.stdout.contains("data wave: ") && run.stdout.contains("rms slope"), "{}", run.said());
+    assert!(run.stdout.contains("data wave: ") && run.stdout.contains("heights -1.000e+00"), "{}", run.said());
     let drawn: Vec<_> = fs::read_dir(&folder).expect("pictures").flatten().map(|file| file.file_name()).collect();
     assert_eq!(drawn, ["data-wave.svg"]);
     assert!(fs::read_to_string(folder.join("data-wave.svg")).expect("a picture").contains("</svg>"));
-}
-
-/// A layer of summits of one height is Hertz' law; those of data are counted by the program.
-#[test]
-fn layers_of_asperities() {
-    // 2 x 2 periods with one summit in each: cos x + cos y of amplitude 1e-3
-    let period = 0.1;
-    let (n, k) = (40, 2.0 * PI / period);
-    let wave = |i: usize| 1e-3 * (2.0 * PI * i as f64 / n as f64).cos();
-    let rows: String = (0..2 * n)
-        .map(|j| (0..2 * n).map(|i| (wave(i) + wave(j)).to_string()).collect::<Vec<_>>().join(" ") + "\n")
-        .collect();
-    let text = text_of("patch").replace(
-        "[[contact]]",
-        "[data.rough]\nfile = \"rough.txt\"\nspacing = 2.5e-3\noutside = \"periodic\"\n[[contact]]",
-    );
-    let scene = Scene::new(text);
-    fs::write(scene.path.parent().expect("a folder").join("rough.txt"), rows).expect("a file");
-    let set = ["--set", "contact.0.layer={asperities={data=\"rough\",modulus=1e5}}", "--set", "method={}"];
-    let table = solve(&scene, &set).converged().contact();
-    // curvature by differences
-    let half = PI / n as f64;
-    let radius = 1.0 / (1e-3 * (k * half.sin() / half).powi(2));
-    let stiffness = 4.0 / 3.0 * 1e5 * radius.sqrt() / (period * period);
-    for q in 0..table.rows() {
-        let exact = (table["pressure"][q] / stiffness).powf(2.0 / 3.0);
-        assert!((table["pressure"][q] / 10.0 - 1.0).abs() < 1e-6, "{}", table["pressure"][q]);
-        assert!((table["compression"][q] / exact - 1.0).abs() < 1e-4, "{} {exact}", table["compression"][q]);
-    }
-    // the same summits as numbers with hardly any spread, and what `check` says of them
-    let numbers = format!(
-        "contact.0.layer={{asperities={{density={},radius={radius},deviation=1e-7,modulus=1e5}}}}",
-        1.0 / (period * period)
-    );
-    let other = solve(&scene, &["--set", &numbers, "--set", "method={}"]).converged().contact();
-    let shift = other["compression"][0] - table["compression"][0];
-    assert!((shift / 4e-7 - 1.0).abs() < 0.05, "the highest is 4 deviations above the mean: {shift}");
-    let law = &checked(&scene, &set)["pairs"][0]["surface"]["law"];
-    assert_eq!(law.as_array().map(Vec::len), Some(8), "{law}");
-    for (layer, words) in [
-        ("{modulus=1e5}", "has no `deviation`"),
-        ("{data=\"rough\"}", "has no `modulus`"),
-        ("{data=\"ruogh\",modulus=1}", "did you mean `rough`?"),
-        ("{data=\"rough\",modulus=1,radius=2}", "has both `data` and `radius`"),
-        ("{data=\"rough\",modulus=-1}", "the modulus is -1"),
-        ("{density=1,radius=1,deviation=0,modulus=1}", "the deviation is 0"),
-        ("{density=1,radius=1,deviation=1,modulus=1,highest=-1}", "the highest summit is -1"),
-        ("{density=1,radius=1,deviation=1,modulus=1,hihgest=1}", "did you mean `highest`?"),
-        ("{density=\"x\",radius=1,deviation=1,modulus=1}", "expected a number"),
-        ("7", "expected a table"),
-    ] {
-        let run = solve(&scene, &["--set", &format!("contact.0.layer={{asperities={layer}}}")]);
-        assert_eq!(run.code, 3, "{}", run.said());
-        assert!(run.stderr.contains(words), "{words}: {}", run.said());
-    }
-    let flat = solve(&scene, &["--set", set[1], "--set", "data.rough.points=true"]);
-    assert!(flat.stderr.contains("80 numbers in a row"), "{}", flat.said());
-}
-
-/// A border of -9999 is refused with what to write; named and filled it changes nothing inside, and a tilt is subtracted.
-#[test]
-fn measurements_have_gaps_and_tilt() {
-    let text = text_of("patch-2d").replace("layer =", "gap = \"1e-3*g(x, y)\"\nlayer =");
-    let data = "[data.g]\nfile = \"g.asc\"\norigin = -1\noutside = \"clamp\"\ndetrend = \"plane\"\n";
-    let scene = Scene::new(text.replace("[[contact]]", &format!("{data}\n[[contact]]")));
-    let file = scene.path.parent().expect("a folder").join("g.asc");
-    // waves on a slope; the first row of the file is the uppermost one
-    let wave = |i: usize, j: usize| (1.7 * i as f64).sin() + (2.3 * j as f64).cos();
-    let height = |i: usize, j: usize, gap: &str| match i.min(j).min(9 - i).min(9 - j) {
-        0 => gap.to_owned(),
-        _ => format!("{:e}", wave(i, j) + 0.25 * i as f64 - 3.0 * j as f64),
-    };
-    let rows = |gap: &str| {
-        (0..10).rev().map(|j| (0..10).map(|i| height(i, j, gap)).collect::<Vec<_>>().join(" ") + "\n").collect()
-    };
-    let header =
-        |nodata: &str| format!("ncols 10\nnrows 10\nxllcenter 0\nyllcenter 0\ncellsize 0.3\nNODATA_value {nodata}\n");
-    let write = |nodata: &str, gap: &str| {
-        let rows: String = rows(gap);
-        fs::write(&file, header(nodata) + &rows).expect("a file");
-    };
-    let refused = |sets: &[&str], words: &str| {
-        let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
-        let run = winkler(&[&["check", &scene.path.display().to_string()], &sets[..]].concat());
-        assert!(run.code == 3 && run.stderr.contains(words), "{}", run.said());
-    };
-    write("-1", "-9999");
-    refused(&[], "has -9999 at 36 of 100 points, the first in line 16, column 0 (from 0)");
-    refused(&[], "write missing = -9999 and fill =");
-    refused(&["data.g.missing=-9999"], "has no height at 36 of 100 points");
-    refused(&["data.g.missing=-9999", "data.g.fill=best"], "it is one of error, nearest, linear");
-    refused(&["data.g.missing=[[1]]"], "expected");
-    let filled = ["--set", "data.g.fill=linear"];
-    let named = checked(&scene, &[&filled[..], &["--set", "data.g.missing=-9999"]].concat());
-    write("-9999", "-9999");
-    let by_header = checked(&scene, &filled);
-    assert_eq!(named["data"]["g"], by_header["data"]["g"]);
-    assert_eq!(named["data"]["g"]["missing"], 36);
-    // what is left of a slope of 10 are the waves
-    let slope = named["data"]["g"]["rms_slope"].as_f64().expect("a number");
-    assert!((2.0..8.0).contains(&slope), "{slope}");
-    let run = winkler(&[&["check", &scene.path.display().to_string()], &filled[..]].concat());
-    assert!(run.stdout.contains("36 points without a height are filled (linear)"), "{}", run.said());
-    assert!(run.stdout.contains("subtracted: a plane with slopes"), "{}", run.said());
 }

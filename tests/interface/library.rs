@@ -156,8 +156,6 @@ fn refuses(session: &Session) {
         true,
     );
     refused(&|s| s.contacts[0].gap = (|_| f64::NAN).into(), "the gap is NaN at", false);
-    // a scene that a program builds may do no more than one that is read
-    refused(&|s| s.solver.options = ["-ksp_view", ":here"].map(str::to_owned).to_vec(), "ksp_view", false);
     refused(&|s| s.bodies[0] = BodySpec::new("lower", |x: [f64; 3]| 0.5 - x[1], 0.0), "young is -0.1666", true);
     refused(
         &|s| s.bodies[0] = BodySpec::new("lower", 1.0, 0.5).fix("base", [Some(0.0); 2]),

@@ -2,8 +2,8 @@
 
 use std::rc::Rc;
 use winkler::api::{
-    AxesSpec, BodySpec, Constants, ContactSpec, Depths, ElasticitySpec, Error, Field, LawKind, LayerSpec, LoadKind,
-    MeshArrays, MeshSource, Plane, Result, Scene, SpringKind, Start,
+    AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Error, Field, LawKind, LayerSpec, LoadKind, MeshArrays,
+    MeshSource, Plane, Result, Scene, SpringKind, Start,
 };
 use winkler::internals::expression::{Expression, KnownNames};
 use winkler::internals::fem::cross;
@@ -205,17 +205,6 @@ impl Change {
                 }
             }
             LayerSpec::Table(points) => points.iter_mut().for_each(|[c, p]| (*c, *p) = (l * *c, s * *p)),
-            LayerSpec::Asperities(spec) => {
-                spec.density /= l * l;
-                spec.radius *= l;
-                spec.modulus *= s;
-                spec.depths = match &spec.depths {
-                    Depths::Normal { deviation, highest } => {
-                        Depths::Normal { deviation: l * deviation, highest: l * highest }
-                    }
-                    Depths::Measured(depths) => Depths::Measured(depths.iter().map(|depth| l * depth).collect()),
-                };
-            }
             LayerSpec::Own(name) => {
                 return Err(Error::new(winkler::api::Kind::Scene, format!("the law `{name}` has no text")));
             }

@@ -62,11 +62,7 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
                 let (b, mut x) = ([1.0, 1.0], [0.0; 2]);
                 let solved = ksp.solve(&b, &mut x)?;
                 println!("REASON {}", solved.reason);
-                assert!(
-                    solved.reason.to_string().starts_with("the preconditioner could not be made: "),
-                    "{}",
-                    solved.reason
-                );
+                assert!(solved.reason.to_string().starts_with("DIVERGED_PC_FAILED: "), "{}", solved.reason);
                 // Repaired, it works again.
                 matrix.update(|values| values.copy_from_slice(&[2.0, -1.0, -1.0, 2.0]))?;
                 assert!(ksp.solve(&b, &mut x)?.reason.converged());
@@ -78,7 +74,7 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
             return;
         }
         let out = expect_success(output);
-        assert!(out.contains("zero pivot"), "{out}");
+        assert!(out.contains("NUMERIC_ZEROPIVOT"), "{out}");
         assert_eq!(out.contains("INFOG(1)=-10"), test == "mumps", "{out}");
     }
 }
@@ -86,8 +82,7 @@ fn a_failed_factorisation_is_a_reason_and_not_the_end() {
 #[test]
 fn preonly_never_solves_with_an_old_factor() {
     expect_success(alone("parallel::petsc::preonly_never_solves_with_an_old_factor", 0, &[], || {
-        let line = "-ksp_type preonly -pc_type cholesky -ksp_reuse_preconditioner -in_ksp_type preonly -in_pc_type bjacobi \
-                    -in_sub_ksp_reuse_preconditioner -cg_ksp_type cg -cg_pc_type cholesky -cg_ksp_rtol 1e-12";
+        let line = "-ksp_type preonly -pc_type cholesky -ksp_reuse_preconditioner -cg_ksp_type cg -cg_pc_type cholesky -cg_ksp_rtol 1e-12";
         let session = Session::start(&words(line))?;
         let mut matrix = chain(&session, 50)?;
         let direct = solver(&session, "", &matrix)?;
@@ -103,28 +98,17 @@ fn preonly_never_solves_with_an_old_factor() {
         let solved = lagged.solve(&b, &mut x)?;
         assert!(solved.iterations > 1 && residual(&matrix, &b, &x)? < 1e-8, "{solved:?}");
         assert!(direct.set_reuse_preconditioner(true).is_err());
-        assert!(solver(&session, "in_", &matrix).is_err_and(|error| error.message().contains("-in_sub_ksp")));
         Ok(())
     }));
 }
 
 #[test]
-fn options_that_change_the_matrix_are_refused() {
-    expect_success(alone("parallel::petsc::options_that_change_the_matrix_are_refused", 0, &[], || {
-        let line = "-a_ksp_diagonal_scale -b_pc_type lu -b_pc_factor_in_place -c_pc_type eisenstat -c_ksp_type cg \
-                    -c_ksp_initial_guess_nonzero -d_pc_type nosuch";
-        let session = Session::start(&words(line))?;
-        let matrix = chain(&session, 9)?;
-        for (prefix, word) in [("a_", "diagonal_scale"), ("b_", "in_place"), ("d_", "KSPSetFromOptions")] {
-            let error = solver(&session, prefix, &matrix).err().expect(prefix);
-            assert!(error.message().contains(word), "{error}");
-        }
-        let error = solver(&session, "d_", &matrix).err().expect("no such type");
+fn a_type_that_does_not_exist_is_refused_in_petscs_words() {
+    expect_success(alone("parallel::petsc::a_type_that_does_not_exist_is_refused_in_petscs_words", 0, &[], || {
+        let session = Session::start(&words("-d_pc_type nosuch"))?;
+        let error = solver(&session, "d_", &chain(&session, 9)?).err().expect("no such type");
+        assert!(error.message().contains("KSPSetFromOptions"), "{error}");
         assert!(error.to_string().contains("requested PC type nosuch"), "{error}");
-        let (b, mut x) = ([1.0; 9], [f64::NAN; 9]);
-        assert!(solver(&session, "c_", &matrix)?.solve(&b, &mut x)?.reason.converged());
-        assert_eq!(b, [1.0; 9]);
-        assert!(residual(&matrix, &b, &x)? < 1e-4);
         Ok(())
     }));
 }
@@ -157,14 +141,12 @@ fn options_come_from_line_file_and_environment() {
     expect_success(alone("parallel::petsc::options_come_from_line_file_and_environment", 0, &environment, || {
         let file = std::env::var("WINKLER_FILE").unwrap_or_default();
         let session = Session::start(&words(&format!("-ksp_type cg -options_file {file} -shift -1e-3")))?;
-        let (options, upper) = (session.options(), UserOptions::read(&session)?.of("upper"));
+        let upper = UserOptions::read(&session).of("upper");
         for (name, value) in [("ksp_type", "cg"), ("pc_type", "sor"), ("ksp_rtol", "1e-3"), ("ksp_max_it", "7")] {
             assert_eq!(upper.typed(name), Some(value));
         }
-        assert_eq!(options.get("-shift").as_deref(), Some("-1e-3"));
-        let error = unread(&session, &["upper"], &[upper]).expect_err("PETSc has no -shift");
-        assert!(error.message().ends_with("no option -shift"), "{error}");
-        assert_eq!(options.left()?, []);
+        let error = unread(&session, &["upper"]).expect_err("PETSc has no -shift");
+        assert!(error.message().ends_with("the option -shift"), "{error}");
         Ok(())
     }));
 }
@@ -188,12 +170,14 @@ fn an_option_read_on_one_rank_is_read() {
         let bodies = ["upper", "lower"];
         // Each rank has one body, and tells PETSc only what concerns that.
         let body = bodies[session.rank()];
-        let mut chosen = UserOptions::read(&session)?.of(body);
+        let mut chosen = UserOptions::read(&session).of(body);
         chosen.set_default("pc_type", "jacobi");
         let matrix = chain(&session, 9)?;
-        chosen.lend(&session, || solver(&session, &format!("{body}_"), &matrix)?.set_up())?;
-        let error = unread(&session, &bodies, &[chosen.clone()]).expect_err("a typing mistake");
-        assert!(error.message().ends_with("no option -upper_ksp_rtoll"), "{error}");
+        let group = chosen.group(&session)?;
+        let ksp = solver(&session, &format!("{}_", group.prefix), &matrix)?;
+        ksp.set_up()?;
+        let error = unread(&session, &bodies).expect_err("a typing mistake");
+        assert!(error.message().ends_with("the option -upper_ksp_rtoll"), "{error}");
         assert_eq!(error.advice(), Some("did you mean -upper_ksp_rtol?"));
         session.options().clear("-upper_ksp_rtoll")?;
         // both count as read now
@@ -201,9 +185,11 @@ fn an_option_read_on_one_rank_is_read() {
             session.options().clear(name)?;
             session.options().set(name, Some("2"))?;
         }
-        let warnings = unread(&session, &bodies, &[chosen])?;
+        let warnings = unread(&session, &bodies)?;
         assert!(warnings.len() == 2 && warnings.iter().all(|text| text.contains("was not used")), "{warnings:?}");
         assert!(warnings[0].contains("-newton_ksp_rtol") && warnings[1].contains("-pc_sor_its"), "{warnings:?}");
+        // a group leaves the table with its last solver
+        drop((ksp, group));
         assert_eq!(session.options().left()?, []);
         Ok(())
     }));
@@ -232,7 +218,7 @@ fn a_panic_on_one_rank_ends_the_others() {
 fn several_ranks_start_petsc_together() {
     let inside = || {
         let session = Session::start(&[])?;
-        assert!(session.size() == 2 && session.petsc_version().is_some());
+        assert!(session.size() == 2);
         Ok(())
     };
     expect_success(alone("parallel::petsc::several_ranks_start_petsc_together", 2, &[], inside));

@@ -62,11 +62,13 @@ fn any_power_law_takes_few_steps() {
 /// Bodies with multigrid: the Newton matrix has one multigrid for all, and bodies have none of their own.
 #[test]
 fn multigrid_over_all_bodies() {
-    let run = |solver: &str| {
+    let typed = |solver: &str, options: &[&str]| {
         let solver = format!("solver={solver}");
         let sets = ["mesh.set.n=6", "body.0.order=1", "body.1.order=1", "method={}", &solver];
-        solve(case("hertz-sphere"), &sets.iter().flat_map(|set| ["--set", set]).collect::<Vec<_>>()).converged()
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        solve(case("hertz-sphere"), &sets.chain(options.iter().copied()).collect::<Vec<_>>()).converged()
     };
+    let run = |solver: &str| typed(solver, &[]);
     let (multigrid, condensed) = (run("hypre"), run("condensed"));
     assert_eq!((multigrid.text("method"), condensed.text("method")), ("newton", "newton"));
     assert!(distance(&multigrid.contact()["pressure"], &condensed.contact()["pressure"]) < 1e-7);
@@ -76,7 +78,7 @@ fn multigrid_over_all_bodies() {
     assert!((1..=steps).contains(&multigrid.count("factorizations")), "{}", multigrid.count("factorizations"));
     assert_eq!([multigrid.count("body_solves"), multigrid.count("sweeps")], [0, 0]);
     // what is typed for one body reaches it: then bodies have multigrid of their own
-    let sweeps = run("{preset=\"hypre\",options=\"-lower_ksp_rtol 1e-8\"}");
+    let sweeps = typed("hypre", &["-lower_ksp_rtol", "1e-8"]);
     assert_eq!(sweeps.text("method"), "newton-robin");
     assert!(sweeps.count("inner_iterations") > multigrid.count("inner_iterations"));
     assert_eq!(sweeps.count("body_solves"), 2 * sweeps.count("sweeps"));

@@ -71,7 +71,7 @@ impl BenchPlan {
         if let Some(order) = request.orders.iter().find(|order| !matches!(order, 1 | 2)) {
             return Err(usage(format!("there are no elements of order {order}")).help("--order 1,2"));
         }
-        let overrides = request.all_overrides();
+        let overrides = request.overrides.clone();
         let scenes =
             request.scenes.iter().map(|path| crate::scene::load(path, &overrides)).collect::<Result<Vec<_>>>()?;
         let keys = over.iter().map(|axis| axis.name.as_str());
@@ -121,7 +121,7 @@ impl BenchPlan {
         }
         let texts = |choices: &[&AxisValue]| choices.iter().map(|choice| choice.text.clone()).collect::<Vec<_>>();
         let overrides = |choices: &[&AxisValue]| choices.iter().flat_map(|choice| choice.overrides.clone()).collect();
-        let mesh_overrides: Vec<String> = [request.all_overrides(), overrides(values), overrides(&[order])].concat();
+        let mesh_overrides: Vec<String> = [request.overrides.clone(), overrides(values), overrides(&[order])].concat();
         Some(BenchCase {
             scene: self.scenes[index].path.clone(),
             key: [vec![self.names[index].clone()], texts(values), texts(&[solver, method, order, ranks])].concat(),
@@ -292,23 +292,12 @@ pub struct BenchArgs {
     /// Replace a key of the scene in all runs; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
-    /// Run the meshes' .geo scripts even if they can start programs or write files
-    #[arg(long)]
-    pub trust_geo: bool,
     /// Print errors, warnings and the folder of the results only
     #[arg(short, long)]
     pub quiet: bool,
     /// PETSc options for every run.
     #[arg(skip)]
     pub petsc: Vec<String>,
-}
-
-impl BenchArgs {
-    /// Return the overrides of the scenes for every run.
-    pub(super) fn all_overrides(&self) -> Vec<String> {
-        let trust = self.trust_geo.then(|| "trust_geo=true".to_owned());
-        self.overrides.iter().cloned().chain(trust).collect()
-    }
 }
 
 /// Return a refusal of the command line.

@@ -136,7 +136,7 @@ fn settings(request: &BenchArgs, reference: &References) -> String {
     format!(
         "winkler {}\n--set {:?}\nPETSc {:?} {:?}\n--repeat {}\n--timeout {}\n--against {:?} {}\n",
         env!("CARGO_PKG_VERSION"),
-        request.all_overrides(),
+        request.overrides.clone(),
         request.petsc,
         std::env::var_os("PETSC_OPTIONS").unwrap_or_default(),
         request.repeat,

@@ -2,7 +2,7 @@
 
 use super::expression::{Breach, ExpressionLaw, increases};
 use super::forms;
-use super::table::{Table, asperities};
+use super::table::Table;
 use super::{LayerLaw, PerPoint};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::diagonal;
@@ -19,7 +19,6 @@ use std::rc::Rc;
 pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match spec {
         LayerSpec::Form { form, values } => forms::make(form, values, position),
-        LayerSpec::Asperities(spec) => Ok(Rc::new(asperities(spec))),
         LayerSpec::Own(name) => own(laws, name, position, extent(position)),
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {

@@ -30,7 +30,7 @@ struct Strip<const D: usize> {
 
 impl<const D: usize> Strip<D> {
     fn of(space: &Space<D>) -> Self {
-        let places: Vec<(usize, usize)> = space.lone_facets().collect();
+        let places = space.lone_facets();
         let all = space.facets_of(places.iter().copied());
         let straight = |i: &usize| element::is_straight(&all.coordinates(*i, space), D);
         // Quadratic facets represent the boundary of the mesh. If one is curved, the straight ones are exact, too.

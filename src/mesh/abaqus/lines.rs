@@ -1,8 +1,8 @@
 //! The lines of an input file and of the files that it includes, and their words.
 
+use super::frame::{Coordinates, real};
 use crate::error::{Error, Result};
 use crate::file::{read, with_unix_lines};
-use crate::mesh::frame::{Coordinates, real};
 use std::path::{Path, PathBuf};
 
 /// Files that may stand in each other by `*INCLUDE`. More are taken for a file that includes itself.

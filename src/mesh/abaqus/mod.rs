@@ -1,14 +1,15 @@
-//! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 4.1: nodes, elements, and named sets.
+//! Input files of Abaqus and CalculiX (`.inp`) in Gmsh's format 2.2: nodes, elements, and named sets.
 //!
 //! Element sets become groups of cells. Sets of shells, membranes and trusses become the groups of facets or edges of cells
 //! that these lie on. Surfaces are groups of facets, and node sets groups of points. Instances of parts are placed. Names are
 //! written in lower case. Characters that no name can have become `_`. Other keywords are skipped.
 
+mod frame;
 mod lines;
 mod model;
 mod read;
 
-use super::old::{self, Contents};
+use super::msh2::Contents;
 use super::simplex;
 use crate::error::{Error, Result};
 use lines::LineReader;
@@ -19,7 +20,7 @@ use std::path::Path;
 
 /// A converted file.
 pub struct Converted {
-    /// The bytes of the mesh in Gmsh's format 4.1.
+    /// The bytes of the mesh in Gmsh's format 2.2.
     pub mesh: Vec<u8>,
     /// What the user should know of it, in sentences without a full stop.
     pub notes: Vec<String>,
@@ -45,7 +46,7 @@ pub fn convert(path: &Path, bytes: &[u8], dimension: usize) -> Result<Converted>
         return Err(Error::mesh(path, None, message).help(help));
     }
     Ok(Converted {
-        mesh: contents(&reader.model, &groups.list).written(),
+        mesh: contents(&reader.model, &groups.list).written().into_bytes(),
         notes: notes(path, &reader, &groups.left_out),
     })
 }
@@ -56,10 +57,9 @@ fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
     let mut contents =
         Contents { nodes: model.nodes.iter().map(|(tag, node)| (*tag, node.x)).collect(), ..Contents::default() };
     for (tag, ElementGroup { dimension, name, elements, points }) in (1..).zip(groups) {
-        contents.names.push(format!("{dimension} {tag} \"{name}\""));
-        let mut add = |number: u64, kind: i32, nodes: &[u64]| {
-            contents.elements.push(old::Element { number, kind, entity: 0, groups: vec![tag], nodes: nodes.to_vec() });
-        };
+        contents.groups.push((*dimension, name.clone()));
+        let mut add =
+            |number: u64, kind: i32, nodes: &[u64]| contents.elements.push((number, kind, tag, nodes.to_vec()));
         for (number, (kind, nodes)) in elements {
             add(*number, simplex::ElementType::number(kind.shape, kind.nodes()), nodes);
         }
@@ -70,43 +70,26 @@ fn contents(model: &AbaqusModel, groups: &[ElementGroup]) -> Contents {
 
 /// Return what was left out, or is not as the user may think.
 fn notes(path: &Path, reader: &Reader, left_out: &LeftOut) -> Vec<String> {
-    let mut notes = Vec::new();
-    let file = path.display();
-    let types: Vec<String> = left_out.elements.iter().map(|(name, count)| format!("{count} {name}")).collect();
-    if !types.is_empty() {
-        notes.push(format!("{file}: elements that are no solids are left out: {}", types.join(", ")));
-    }
-    if left_out.faces > 0 {
-        notes.push(format!("{file}: surfaces lose {} faces of elements that are left out", left_out.faces));
-    }
-    if left_out.nodes > 0 {
-        notes.push(format!("{file}: node sets lose {} nodes that belong to no solid", left_out.nodes));
-    }
-    if let [first, ..] = &reader.twice[..] {
-        let [old, new] = first.lines.map(|at| reader.lines.show(at));
-        notes.push(format!(
-            "{file}: {} nodes stand twice with different coordinates, and the later ones count, as in CalculiX: node {} in {old} \
-             and {new}",
-            reader.twice.len(),
-            first.tag
-        ));
-    }
-    if reader.longer > 0 {
-        notes.push(format!(
-            "{file}: {} elements have more nodes than their type, and the first ones count, as in CalculiX",
-            reader.longer
-        ));
-    }
-    if !left_out.renamed.is_empty() {
-        notes.push(format!("{file}: names of element sets are taken: {}", left_out.renamed.join(", ")));
-    }
-    if reader.transforms > 0 {
-        notes.push(format!(
-            "{file}: {} *TRANSFORM are skipped: supports and loads of the scene are along x, y and z",
-            reader.transforms
-        ));
-    }
-    notes
+    let Reader { twice, longer, transforms, lines, .. } = reader;
+    let LeftOut { elements, faces, nodes, renamed } = left_out;
+    let types: Vec<String> = elements.iter().map(|(name, count)| format!("{count} {name}")).collect();
+    let first = twice.first().map_or(String::new(), |first| {
+        let [old, new] = first.lines.map(|at| lines.show(at));
+        format!("node {} in {old} and {new}", first.tag)
+    });
+    let (types, renamed, double) = (types.join(", "), renamed.join(", "), twice.len());
+    [
+        (!types.is_empty(), format!("elements that are no solids are left out: {types}")),
+        (*faces > 0, format!("surfaces lose {faces} faces of elements that are left out")),
+        (*nodes > 0, format!("node sets lose {nodes} nodes that belong to no solid")),
+        (double > 0, format!("{double} nodes stand twice with different coordinates, and the later ones count, as in CalculiX: {first}")),
+        (*longer > 0, format!("{longer} elements have more nodes than their type, and the first ones count, as in CalculiX")),
+        (!renamed.is_empty(), format!("names of element sets are taken: {renamed}")),
+        (*transforms > 0, format!("{transforms} *TRANSFORM are skipped: supports and loads of the scene are along x, y and z")),
+    ]
+    .into_iter()
+    .filter_map(|(is_so, note)| is_so.then(|| format!("{}: {note}", path.display())))
+    .collect()
 }
 
 struct ElementGroup {

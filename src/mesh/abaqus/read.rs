@@ -1,5 +1,6 @@
 //! From the lines of a file to its contents.
 
+use super::frame::{Coordinates, LocalAxes};
 use super::lines::{
     InputLine, Keyword, LineReader, SourceLine, TextResult, coordinates, count, generated, reals, spelled,
 };
@@ -7,7 +8,6 @@ use super::model::{
     AbaqusElement, AbaqusModel, AbaqusNode, AbaqusSurface, AbaqusType, ElementFace, Label, Role, Set, members, normal,
 };
 use crate::error::Result;
-use crate::mesh::frame::{Coordinates, LocalAxes};
 use nalgebra::{Point3, Rotation3, Unit};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -443,9 +443,8 @@ impl Reader {
         points.extend(numbers.chunks_exact(3).map(|point| [point[0], point[1], point[2]]));
         let frame = match points[..] {
             [origin] => Some(LocalAxes::at(origin)),
-            // The third axis stays where it is.
-            [[x, y, z], first] => LocalAxes::by_third_axis([x, y, z], [x, y, z + 1.0], first),
-            [origin, first, second] => LocalAxes::by_first_axis(origin, first, second),
+            [origin, first] => LocalAxes::about_third(origin, first),
+            [origin, first, second] => LocalAxes::by_plane(origin, first, second),
             _ => return Err("*SYSTEM has three points at most".into()),
         };
         self.scope.frame = frame.ok_or("the points of *SYSTEM lie on a line")?;

@@ -101,24 +101,6 @@ fn cells_that_overlap() {
     folded[1] = [1.2, 1.4];
     let turned = [0, 1, 3, 1, 3, 4, 1, 4, 2, 2, 5, 4];
     refused(&mesh(folded, &turned), &["same side of the facet that they share"]);
-    // The triangles form a spiral that goes around twice and a bit less. Each fits the next one.
-    let angle = |k: u32| f64::from(k) * 0.9;
-    let around: Vec<[f64; 2]> = (0..9).map(|k| [angle(k).cos(), angle(k).sin()]).collect();
-    let spiral: Vec<u32> = (0..8).flat_map(|k| [9, k, k + 1]).collect();
-    refused(&mesh([&around[..], &[[0.0; 2]]].concat(), &spiral), &["crosses itself"]);
-    // One part lies within another one.
-    let inner = [[0.6, 0.6], [0.7, 0.6], [0.6, 0.7]];
-    let twice = mesh([&points[..], &inner].concat(), &[&cells[..], &[6, 7, 8]].concat());
-    refused(&twice, &["2 cells lie over each other", "(0.6"]);
-    refused(&quadratic(&twice), &["2 cells lie over each other"]);
-    let (mut points, mut cells) = cube([0.0; 3], 0);
-    points.extend([[0.5, 0.3, 0.2], [0.6, 0.3, 0.2], [0.5, 0.4, 0.2], [0.5, 0.3, 0.3]]);
-    cells.extend([8, 9, 10, 11]);
-    refused(&mesh(points.clone(), &cells), &["2 cells lie over each other"]);
-    // The inner part now reaches out of the outer one.
-    points[9] = [3.0, 0.35, 0.22];
-    refused(&mesh(points.clone(), &cells), &["crosses itself"]);
-    refused(&quadratic(&mesh(points, &cells)), &["crosses itself"]);
 }
 
 /// A hole is not a mistake, and neither is a part in a hole.
@@ -193,49 +175,6 @@ fn mid_edge_nodes() {
     let bottom = folded.groups[0].connectivity[3];
     folded.points[bottom as usize] = [0.5, 0.6];
     refused(&folded, &["a curved cell is folded"]);
-}
-
-/// The gap between the arcs is smaller than the distance of their chords.
-#[test]
-fn chords_that_meet_are_looked_at_closely() {
-    // Two quarters of thin rings are one body in two parts, with nodes at different angles.
-    let ring = |radius: [f64; 2], turn: f64, first: u32, n: u32| {
-        let at = |i: u32| {
-            let angle = turn + f64::from(i / 2) * 0.4;
-            let r = radius[i as usize % 2];
-            [r * angle.cos(), r * angle.sin()]
-        };
-        let points: Vec<[f64; 2]> = (0..2 * n + 2).map(at).collect();
-        let cells = (0..n).flat_map(|k| {
-            let i = first + 2 * k;
-            [i, i + 1, i + 3, i, i + 3, i + 2]
-        });
-        (points, cells.collect::<Vec<u32>>())
-    };
-    let (mut points, mut cells) = ring([0.9, 1.0], 0.0, 0, 3);
-    let (more, others) = ring([1.002, 1.1], 0.1, 8, 3);
-    points.extend(more);
-    cells.extend(others);
-    let straight = mesh(points, &cells);
-    refused(&straight, &["crosses itself"]);
-    let mut curved = quadratic(&straight);
-    for group in curved.groups.iter() {
-        for cell in group.simplices() {
-            for (k, [i, j]) in [[0, 1], [1, 2], [0, 2]].into_iter().enumerate() {
-                let radius = |node: u32| curved.points[node as usize][0].hypot(curved.points[node as usize][1]);
-                let (a, b, middle) =
-                    (straight.points[cell[i] as usize], straight.points[cell[j] as usize], cell[3 + k]);
-                let r = 0.5 * (a[0].hypot(a[1]) + b[0].hypot(b[1]));
-                let scale = r / radius(middle);
-                // Places are read from the straight mesh and written to the curved one.
-                let x = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
-                let scale = if (radius(middle) - x[0].hypot(x[1])).abs() < 1e-12 { scale } else { 1.0 };
-                curved.points[middle as usize] =
-                    [curved.points[middle as usize][0] * scale, curved.points[middle as usize][1] * scale];
-            }
-        }
-    }
-    assert_eq!(check(&curved, &[]).unwrap().parts.count, 2);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Local systems of coordinates and numbers in files of other programs.
+//! Local systems of coordinates, and numbers as Fortran writes them.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,8 +9,6 @@ pub enum Coordinates {
     Rectangular,
     /// Radius, angle from x to y, z.
     Cylindrical,
-    /// Radius, angle from the z axis, angle from x to y, as in Nastran.
-    Spherical,
 }
 
 impl Coordinates {
@@ -19,7 +17,6 @@ impl Coordinates {
         match self {
             Coordinates::Rectangular => [a, b, c],
             Coordinates::Cylindrical => [a * cos(b), a * sin(b), c],
-            Coordinates::Spherical => [a * sin(b) * cos(c), a * sin(b) * sin(c), a * cos(b)],
         }
     }
 }
@@ -63,20 +60,19 @@ impl LocalAxes {
         Self { origin: origin.into(), ..Self::default() }
     }
 
-    /// Return the axes with the third one from the origin to `axis`, and `plane` in the half plane of the first one. None if
-    /// the points lie on a line.
-    pub fn by_third_axis(origin: [f64; 3], axis: [f64; 3], plane: [f64; 3]) -> Option<Self> {
-        let [z, x] = [axis, plane].map(|point| Vector3::from(point) - Vector3::from(origin));
-        let (z, y) = (unit(z)?, unit(z.cross(&x))?);
-        Some(Self { origin: origin.into(), axes: Matrix3::from_columns(&[y.cross(&z), y, z]) })
+    /// Return the axes with the first one from the origin to `first`, and `plane` in the half plane of the second one. None if the points lie on a
+    /// line.
+    pub fn by_plane(origin: [f64; 3], first: [f64; 3], plane: [f64; 3]) -> Option<Self> {
+        let origin = Vector3::from(origin);
+        let x = unit(Vector3::from(first) - origin)?;
+        let z = unit(x.cross(&(Vector3::from(plane) - origin)))?;
+        Some(Self { origin, axes: Matrix3::from_columns(&[x, z.cross(&x), z]) })
     }
 
-    /// Return the axes with the first one from the origin to `axis`, and `plane` in the half plane of the second one. None if
-    /// the points lie on a line.
-    pub fn by_first_axis(origin: [f64; 3], axis: [f64; 3], plane: [f64; 3]) -> Option<Self> {
-        let [x, y] = [axis, plane].map(|point| Vector3::from(point) - Vector3::from(origin));
-        let (x, z) = (unit(x)?, unit(x.cross(&y))?);
-        Some(Self { origin: origin.into(), axes: Matrix3::from_columns(&[x, z.cross(&x), z]) })
+    /// Return the axes with the global third one, and `first` in the half plane of the first one. None if `first` is straight above the origin.
+    pub fn about_third(origin: [f64; 3], first: [f64; 3]) -> Option<Self> {
+        let level = [first[0], first[1], origin[2]];
+        Self::by_plane(origin, level, [origin[0] - level[1] + origin[1], origin[1] + level[0] - origin[0], origin[2]])
     }
 
     /// Return the global coordinates of a point with these rectangular local ones.
@@ -106,15 +102,13 @@ mod tests {
     #[test]
     fn local_coordinates_become_global_ones() {
         assert_eq!(Coordinates::Cylindrical.rectangular([2.0, 90.0, 5.0]), [0.0, 2.0, 5.0]);
-        assert_eq!(Coordinates::Spherical.rectangular([2.0, 90.0, 180.0]), [-2.0, 0.0, 0.0]);
-        assert_eq!(Coordinates::Spherical.rectangular([2.0, 0.0, 45.0]), [0.0, 0.0, 2.0]);
         assert!((Coordinates::Cylindrical.rectangular([2.0, 30.0, 5.0])[1] - 1.0).abs() < 1e-15);
-        // The third axis is x, and the first one y, so that the second one is z.
-        let frame = LocalAxes::by_third_axis([1.0, 1.0, 1.0], [3.0, 1.0, 1.0], [0.0, 2.0, 1.0]).unwrap();
+        // The first axis is y, and the second one z.
+        let frame = LocalAxes::by_plane([1.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 0.0, 5.0]).unwrap();
         assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
-        let frame = LocalAxes::by_first_axis([1.0, 1.0, 1.0], [1.0, 3.0, 1.0], [1.0, 0.0, 5.0]).unwrap();
-        assert_eq!(frame.place([10.0, 20.0, 30.0]), [31.0, 11.0, 21.0]);
-        assert_eq!(LocalAxes::by_third_axis([0.0; 3], [1.0; 3], [2.0; 3]), None);
+        let frame = LocalAxes::about_third([1.0, 1.0, 1.0], [1.0, 3.0, 4.0]).unwrap();
+        assert_eq!(frame.place([10.0, 20.0, 30.0]), [-19.0, 11.0, 31.0]);
+        assert_eq!(LocalAxes::by_plane([0.0; 3], [1.0; 3], [2.0; 3]), None);
     }
 
     #[test]
