@@ -63,14 +63,6 @@ impl<const D: usize> Mirrors<D> {
         mean
     }
 
-    /// Return the unit normals of the planes of symmetry at a node which its surface, with this normal, meets at right angles, the axis of a body
-    /// of revolution among them.
-    pub fn across(&self, space: &Space<D>, node: u32, normal: [f64; D]) -> Vec<[f64; D]> {
-        let axis = space.on_axis(node).then(|| std::array::from_fn(|c| if c == 0 { 1.0 } else { 0.0 }));
-        let planes = self.planes.get(&node).into_iter().flatten().copied().chain(axis);
-        planes.filter(|plane| dot(&normal, plane).abs() <= HELD).collect()
-    }
-
     /// Return whether a surface goes on as its mirror image beyond an edge with these `(node, normal)` at its ends.
     pub fn continue_beyond(&self, edge: &[(u32, [f64; D])]) -> bool {
         let is_in = |plane: &[f64; D]| {

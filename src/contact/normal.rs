@@ -1,13 +1,12 @@
 //! One normal at each point of a pair, made of the normals of both sides at places that face each other.
 //!
-//! Let n_a and -n_b be unit vectors from side a to side b, and let K_a and K_b be the curvatures of the surfaces, as matrices. The direction is
+//! Let n_a and -n_b be unit vectors from side a to side b, and let kappa_a and kappa_b be the curvatures of the surfaces. The direction is
 //!
 //! ```text
-//! n = unit(-n_b + W (n_a + n_b)),      (|K_a| + |K_b|) W = |K_b|
+//! n = unit(kappa_b n_a - kappa_a n_b)
 //! ```
 //!
-//! so that along each direction the less curved surface counts: kappa_b n_a - kappa_a n_b in the plane and for balls. Two flats, and surfaces of
-//! equal curvature, give the plain mean (docs/theory.md, "The normals").
+//! so that the less curved surface counts; two flats, and surfaces of equal curvature, give the plain mean (docs/theory.md, "The normals").
 
 use super::basis::PressureBasis;
 use super::pieces::Intersection;
@@ -15,7 +14,6 @@ use super::side::{ROUNDING, Side};
 use crate::fem::{element, length, unit};
 use crate::linalg::dot;
 use crate::problem::order::Order;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// The surface of side b that faces a node of side a: integrals of functions around the node.
 #[derive(Clone, Copy)]
@@ -24,7 +22,7 @@ struct Facing<const D: usize> {
     /// Area of the facets around the node, over which the curvature is the plain mean: one that extrapolates could be negative.
     area: f64,
     normal: [f64; D],
-    curvature: [[f64; D]; D],
+    curvature: f64,
 }
 
 impl<const D: usize> Side<'_, D> {
@@ -40,8 +38,9 @@ impl<const D: usize> Side<'_, D> {
             if !faces || length(tilt) <= ROUNDING {
                 continue;
             }
-            let part = weighted([own.curvature, curvature], tilt);
-            let sum = std::array::from_fn(|c| part[c] - normal[c]);
+            let sum = own.curvature + curvature;
+            let weight = if sum > 0.0 { curvature / sum } else { 0.5 };
+            let sum = std::array::from_fn(|c| weight * own.normal[c] - (1.0 - weight) * normal[c]);
             own.direction = unit(self.mirrors.mean(self.space, own.node, sum, -1.0));
             own.tilt = length(tilt);
             changed = true;
@@ -50,26 +49,9 @@ impl<const D: usize> Side<'_, D> {
     }
 }
 
-/// Curvature, as a share of that of both surfaces, below which a direction is flat: rounding of the square root of a matrix.
-const FLAT: f64 = 1e-9;
-
-/// Return W d for the curvatures of side a and side b, which is d/2 along directions in which both are flat.
-fn weighted<const D: usize>(curvatures: [[[f64; D]; D]; 2], d: [f64; D]) -> [f64; D] {
-    let [size_a, size_b] = curvatures.map(|curvature| {
-        let eigen = SymmetricEigen::new(DMatrix::from_fn(D, D, |i, j| curvature[i][j]));
-        let sizes = DMatrix::from_diagonal(&eigen.eigenvalues.abs());
-        &eigen.eigenvectors * sizes * eigen.eigenvectors.transpose()
-    });
-    let whole = size_a.trace() + size_b.trace();
-    let slight = DMatrix::identity(D, D) * if whole > 0.0 { FLAT * whole } else { 1.0 };
-    let right = (&size_b + &slight) * DVector::from_column_slice(&d);
-    let solved = (size_a + size_b + 2.0 * slight).lu().solve(&right);
-    solved.map_or(d.map(|d| 0.5 * d), |part| std::array::from_fn(|c| part[c]))
-}
-
 /// Return the mean normal and curvature of side b before each node of side a, `None` where nothing faces a node.
 fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) -> Vec<Option<Facing<D>>> {
-    let none = Facing { weight: 0.0, area: 0.0, normal: [0.0; D], curvature: [[0.0; D]; D] };
+    let none = Facing { weight: 0.0, area: 0.0, normal: [0.0; D], curvature: 0.0 };
     let mut sums = vec![none; a.nodes.len()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let on = a.on_facet(chunk[0].facet_a);
@@ -85,18 +67,14 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
                 let (mu, sum) = (point.weight * value, &mut sums[at as usize]);
                 sum.weight += mu;
                 sum.area += point.weight;
-                (0..D).for_each(|i| (0..D).for_each(|j| sum.curvature[i][j] += point.weight * curvature[i][j]));
+                sum.curvature += point.weight * curvature;
                 (0..D).for_each(|c| sum.normal[c] += mu * normal[c]);
             }
         }
     }
     let mean = |sum: Facing<D>| {
         let is_faced = sum.weight > 0.0 && length(sum.normal) > 0.0;
-        is_faced.then(|| Facing {
-            normal: unit(sum.normal),
-            curvature: sum.curvature.map(|row| row.map(|k| k / sum.area)),
-            ..sum
-        })
+        is_faced.then(|| Facing { normal: unit(sum.normal), curvature: sum.curvature / sum.area, ..sum })
     };
     let mut means: Vec<Option<Facing<D>>> = sums.into_iter().map(mean).collect();
     spread(a, &mut means);
@@ -119,11 +97,10 @@ fn spread<const D: usize>(a: &Side<D>, facing: &mut [Option<Facing<D>>]) {
 }
 
 /// Return the unit normal and the curvature of a side at barycentric coordinates of a facet.
-fn surface_at<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> ([f64; D], [[f64; D]; D]) {
+fn surface_at<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> ([f64; D], f64) {
     let mut normal = [0.0; D];
     for (node, phi) in side.facet_nodes(facet).zip(element::values(side.facets.order, at)) {
         (0..D).for_each(|c| normal[c] += phi * node.normal[c]);
     }
-    let entry = |i: usize, j: usize| side.facet_nodes(facet).zip(at).map(|(node, l)| l * node.curvature[i][j]).sum();
-    (unit(normal), std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))))
+    (unit(normal), side.facet_nodes(facet).zip(at).map(|(node, l)| l * node.curvature).sum())
 }

@@ -41,9 +41,8 @@ pub struct FaceNode<const D: usize> {
     pub direction: [f64; D],
     /// Length of the sum of the own normal and that of the other side before it, zero if they are opposite.
     pub tilt: f64,
-    /// Curvature (1/length): the symmetric matrix K with K dx nearest to dn for two nodes of the facets around, which are apart by dx and
-    /// whose normals differ by dn.
-    pub curvature: [[f64; D]; D],
+    /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
+    pub curvature: f64,
 }
 
 impl<'a, const D: usize> Side<'a, D> {
@@ -67,7 +66,7 @@ impl<'a, const D: usize> Side<'a, D> {
                     (0..D).for_each(|c| normal[c] += area[c]);
                 }
                 let normal = unit(mirrors.mean(space, node, normal, least));
-                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: [[0.0; D]; D] });
+                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0 });
             }
         }
         let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
@@ -101,35 +100,23 @@ impl<'a, const D: usize> Side<'a, D> {
         }
     }
 
-    /// Compute the curvature of the surface at each node, by least squares with a weight of one for each direction.
+    /// Compute the curvature of the surface at each node.
     fn bend(&mut self) {
         let flat = self.tilt().max(ROUNDING);
-        // sums of dn dx' and dx dx' over |dx|^2; K n = 0 adds n n' to the second
-        let normal = |at: &FaceNode<D>| [[[0.0; D]; D], outer(at.normal, at.normal)];
-        let mut sums: Vec<[[[f64; D]; D]; 2]> = self.nodes.iter().map(normal).collect();
         for i in 0..self.facets.count() {
-            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i));
-            for (k, l) in (0..on.len()).flat_map(|k| (0..k).map(move |l| (k, l))) {
-                let along = minus(x[k], x[l]);
-                let square = dot(&along, &along);
-                let turn = minus(self.nodes[on[k] as usize].normal, self.nodes[on[l] as usize].normal);
-                let turn = if length(turn) > flat { turn } else { [0.0; D] };
-                for at in [on[k], on[l]] {
-                    let sum = &mut sums[at as usize];
-                    add(&mut sum[0], outer(turn, along.map(|x| x / square)));
-                    add(&mut sum[1], outer(along, along.map(|x| x / square)));
+            let (x, on) = (self.facets.coordinates(i, self.space), self.on_facet(i).to_vec());
+            let mut curvature: f64 = 0.0;
+            for k in 0..on.len() {
+                for l in 0..k {
+                    let [p, q] = [on[k], on[l]].map(|corner| self.nodes[corner as usize].normal);
+                    let turn = length(minus(p, q));
+                    curvature = curvature.max(if turn > flat { turn / length(minus(x[k], x[l])) } else { 0.0 });
                 }
             }
-        }
-        for (at, [mut turns, mut places]) in self.nodes.iter_mut().zip(sums) {
-            for plane in self.mirrors.across(self.space, at.node, at.normal) {
-                for sum in [&mut turns, &mut places] {
-                    add(sum, reflected(*sum, plane));
-                }
+            for corner in on {
+                let largest = &mut self.nodes[corner as usize].curvature;
+                *largest = largest.max(curvature);
             }
-            let Some((inverse, _)) = element::invert(&places) else { continue };
-            let of = |i: usize, j: usize| (0..D).map(|c| turns[i][c] * inverse[c][j]).sum::<f64>();
-            at.curvature = std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (of(i, j) + of(j, i))));
         }
     }
 
@@ -230,27 +217,6 @@ fn areas_around<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> BTreeMa
         }
     }
     around
-}
-
-/// Return the matrix a b'.
-fn outer<const D: usize>(a: [f64; D], b: [f64; D]) -> [[f64; D]; D] {
-    a.map(|a| b.map(|b| a * b))
-}
-
-/// Add a matrix to `sum`.
-fn add<const D: usize>(sum: &mut [[f64; D]; D], matrix: [[f64; D]; D]) {
-    sum.as_flattened_mut().iter_mut().zip(matrix.as_flattened()).for_each(|(sum, value)| *sum += value);
-}
-
-/// Return R A R for the reflection R in a plane with this unit normal.
-fn reflected<const D: usize>(a: [[f64; D]; D], normal: [f64; D]) -> [[f64; D]; D] {
-    let reflect = |x: [f64; D]| -> [f64; D] {
-        let part = 2.0 * dot(&x, &normal);
-        std::array::from_fn(|c| x[c] - part * normal[c])
-    };
-    let rows = a.map(reflect);
-    let columns: [[f64; D]; D] = std::array::from_fn(|j| reflect(std::array::from_fn(|i| rows[i][j])));
-    std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
 }
 
 /// Divide the facets around a node into faces, within which neighbours turn by an angle with the cosine `least` or more.

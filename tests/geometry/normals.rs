@@ -295,28 +295,3 @@ load = [{{ on = \"outer_out\", pressure = \"40 + 12*(x^2 - z^2)/(x^2 + y^2 + z^2
         assert!(ours.0 == theirs.0 && (ours.1 / theirs.1 - 1.0).abs() < 1e-6, "{ours:?} {theirs:?}");
     }
 }
-
-/// Two halves of equal cylinders that cross at right angles.
-const CROSS: &str = "SetFactory(\"OpenCASCADE\"); e = 1e-6; R = 10;
-Cylinder(1) = {-2,0,R, 4,0,0, R}; Box(2) = {-2,-2,0, 4,4,1.5}; BooleanIntersection(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
-Cylinder(4) = {0,-2,-R, 0,4,0, R}; Box(5) = {-2,-2,-1.5, 4,4,1.5}; BooleanIntersection(6) = { Volume{4}; Delete; }{ Volume{5}; Delete; };
-Physical Volume(\"a\") = {3}; Physical Volume(\"b\") = {6}; s() = Boundary{ Volume{3}; }; t() = Boundary{ Volume{6}; };
-Physical Surface(\"skin_a\") = {s()}; Physical Surface(\"skin_b\") = {t()};
-Physical Surface(\"roof\") = Surface In BoundingBox{-3,-3,1.5-e,3,3,1.5+e}; Physical Surface(\"floor\") = Surface In BoundingBox{-3,-3,-1.5-e,3,3,-1.5+e};
-Field[1] = MathEval; Field[1].F = \"0.2 + 0.4*Sqrt(x*x+y*y+z*z)\"; Background Field = 1;
-Mesh.MeshSizeExtendFromBoundary = 0; Mesh.MeshSizeFromPoints = 0;
-";
-
-/// A cylinder slides along itself on one that crosses it, whose curvature is as large but across: a spring alone resists it. With one curvature for all
-/// directions, the contact would carry half of this load.
-#[test]
-fn a_cylinder_slides_along_itself_on_one_that_crosses_it() {
-    let text = "dimension = 3\nmesh = { geo = \"part.geo\" }
-[[body]]\nname = \"a\"\nyoung = 1e3\npoisson = 0.3\nfix = [{ on = \"roof\", z = -0.05, y = 0 }]
-spring = [{ on = \"roof\", stiffness = [1e-1, 0, 0] }]\nload = [{ on = \"roof\", force = [0.2, 0, 0] }]
-[[body]]\nname = \"b\"\nyoung = 1e3\npoisson = 0.3\nfix = [{ on = \"floor\", x = 0, y = 0, z = 0 }]
-[[contact]]\nbetween = [\"skin_a\", \"skin_b\"]\nlayer = { linear = { stiffness = 1e5 } }\n";
-    let run = solve_here(scene(CROSS, text.to_owned()), &[]).converged();
-    let force = [0, 2].map(|c| run.number(&format!("pairs/0/force/1/{c}")).abs());
-    assert!(force[1] > 10.0 && force[0] < 0.04, "{force:?}");
-}
