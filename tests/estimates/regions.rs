@@ -96,7 +96,8 @@ Macro Quad
   EndFor
   Curve Loop(b)={b+1,b+2,b+3,b+4}; Plane Surface(b)={b}; Transfinite Curve{b+1,b+3}=n+1; Transfinite Curve{b+2,b+4}=n/2+1; Transfinite Surface{b};
 Return
-b=10; y=-1; Call Quad; b=20; y=0; Call Quad;
+b=10; y=-1; Call Quad;
+b=20; y=0; Call Quad;
 Physical Surface(\"lower\")={10}; Physical Surface(\"upper\")={20}; Physical Curve(\"floor\")={11}; Physical Curve(\"top\")={23};
 Physical Curve(\"low\")={13}; Physical Curve(\"up\")={21}; Physical Curve(\"low_ends\")={12,14}; Physical Curve(\"up_ends\")={22,24};
 ";

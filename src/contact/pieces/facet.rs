@@ -1,13 +1,16 @@
 //! A facet as a parametrised curve or surface: where a line meets it, which of its normals passes through a point, and what its normals
 //! may meet at all.
 
-use super::Lost;
 use crate::contact::side::Side;
 use crate::fem::{area_vector, element, length, minus, unit};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTreeObject, SelectionFunction};
+
+/// The failure of a search for a point on a facet: it did not converge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Lost;
 
 /// Largest number of Newton steps for a point on a facet. The start is within a facet's size of the point, and from there each step
 /// doubles the number of correct digits: six steps are enough for a double, and twice as many make up for a bad start.
@@ -227,6 +230,10 @@ impl<const D: usize> SelectionFunction<GeomWithData<Rectangle<[f64; D]>, usize>>
     fn should_unpack_leaf(&self, leaf: &GeomWithData<Rectangle<[f64; D]>, usize>) -> bool {
         self.should_unpack_parent(&leaf.geom().envelope())
     }
+}
+
+pub(super) fn plus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
+    std::array::from_fn(|c| a[c] + b[c])
 }
 
 struct Ball<const D: usize> {

@@ -15,7 +15,7 @@ pub use space::in_space;
 use super::side::Side;
 use crate::fem::{length, minus};
 use crate::linalg::{around, dot};
-use facet::{Facet, Rays};
+use facet::{Facet, Rays, plus};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 use std::collections::BTreeSet;
@@ -56,17 +56,9 @@ impl<const D: usize> Intersection<D> {
 /// A function that finds the common pieces of two surfaces.
 pub type Cut<const D: usize> = fn(&Side<D>, &Side<D>, &Reach) -> Intersection<D>;
 
-/// The failure of a search for a point on a facet: it did not converge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Lost;
-
 /// Share from which a facet counts as fully paired: by quadrature, the length of a curve differs a little between a facet and
 /// its pieces.
 pub(super) const WHOLE: f64 = 1.0 - 1e-3;
-
-fn plus<const D: usize>(a: [f64; D], b: [f64; D]) -> [f64; D] {
-    std::array::from_fn(|c| a[c] + b[c])
-}
 
 /// The limits of distance and inclination within which two facets face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]

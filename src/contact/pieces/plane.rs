@@ -1,7 +1,7 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::facet::{Facet, Rays, SNAP};
-use super::{BoxTree, IntegrationPoint, Intersection, Lost, Reach, Refused, plus};
+use super::facet::{Facet, Lost, Rays, SNAP, plus};
+use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused};
 use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;

@@ -7,8 +7,8 @@
 //! curved facet of b is split into four at the middle of its edges. All facets of b are split further where corners of some
 //! have no image.
 
-use super::facet::{Facet, Rays, SNAP};
-use super::{BoxTree, IntegrationPoint, Intersection, Lost, Reach, Refused, WHOLE, plus};
+use super::facet::{Facet, Lost, Rays, SNAP, plus};
+use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused, WHOLE};
 use crate::contact::side::Side;
 use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::dot;
