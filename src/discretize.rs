@@ -3,8 +3,11 @@
 mod approach;
 mod assembler;
 mod auto;
+mod body;
 mod carrier;
+mod chords;
 mod distribute;
+mod groups;
 mod local;
 mod mechanism;
 pub mod meshes;
@@ -18,12 +21,12 @@ mod surface;
 mod unassembled;
 mod verify;
 
+pub use approach::mean_normal;
 pub use assembler::{Assembled, Factory, Outline};
+pub use groups::point;
 pub use local::BodyInfo;
 pub use pairs::ContactInfo;
-pub use patterns::point;
 pub use post::{ForceBalance, Unbalanced};
-pub use surface::{Resolution, resolution};
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};
@@ -35,7 +38,7 @@ use crate::problem::contact::Carrier;
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
 use assembler::Assembler;
-use local::LocalBody;
+use body::BodyMesh;
 use meshes::{Kept, Meshes};
 use prepare::{ReplicatedProblem, Whole, prepare};
 use std::rc::Rc;
@@ -92,7 +95,7 @@ where
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, imposed, mut pairs, contacts, mechanisms, fine, plan } = shared;
     let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
@@ -101,14 +104,13 @@ where
             pair.law = law::make(&contact.spec.layer, &scene.laws, &pair.position)?;
         }
     }
-    let imposed: Vec<Vec<f64>> = shared.iter().map(|body| body.imposed.clone()).collect();
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
     let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
-    let (mut slots, mut infos) = (Vec::new(), Vec::new());
-    for ((spec, shared), local) in bodies.iter().zip(shared).zip(locals) {
-        let (slot, info) = assembler.make(spec, shared, local)?;
-        slots.push(slot);
-        infos.push(info);
+    let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
+    for (body, local) in locals.into_iter().enumerate() {
+        if let Some(local) = local {
+            assembler.make(&bodies[body], local, &mut slots[body], &mut infos[body])?;
+        }
     }
     let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
@@ -119,7 +121,7 @@ where
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
-fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Vec<Option<LocalBody<D>>>>
+fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Vec<Option<BodyMesh<D>>>>
 where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
@@ -129,7 +131,7 @@ where
         prepared => prepared,
     };
     let part = |rank| prepared.as_ref().map_or_else(Vec::new, |whole| whole.on(rank));
-    let mut locals: Vec<Option<LocalBody<D>>> = scatter(&**exchange, part)?;
+    let mut locals: Vec<Option<BodyMesh<D>>> = scatter(&**exchange, part)?;
     for share in locals.iter_mut().flatten().filter_map(|local| local.share.as_mut()) {
         share.distribution.exchange = exchange.clone();
     }

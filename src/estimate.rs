@@ -43,8 +43,6 @@ pub struct Estimate {
     pub ends: Vec<f64>,
     /// Why the error of the pressures of each pair is a guess, if it is one.
     pub guesses: Vec<Option<Guess>>,
-    /// Relative change of the pressures of each pair if the other side gave the normals.
-    pub sides: Vec<f64>,
     /// Relative error of the normal displacements of all contact surfaces, prescribed ones included, measured likewise.
     pub displacement: f64,
 }
@@ -94,7 +92,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = LocalErrors::of_bodies(meshes, &recovered, &work_on_missed(meshes, model, layer, &recovered));
+    let mut local = LocalErrors::of_bodies(&recovered, &work_on_missed(meshes, model, layer, &recovered));
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, pair);
     }
@@ -104,7 +102,7 @@ pub fn estimate(
     local.cells.iter_mut().zip(&local.strips).for_each(|(cells, strips)| axpy(1.0, strips, cells));
     let held = HoldingSprings::of(model, layer);
     held.balance(meshes, model, &mut local.loads);
-    let LocalErrors { cells, mut loads, layers, sides, mean_error, .. } = local;
+    let LocalErrors { cells, mut loads, layers, mean_error, .. } = local;
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
@@ -134,7 +132,6 @@ pub fn estimate(
         cells,
         bodies,
         layers,
-        sides,
     })
 }
 
@@ -207,23 +204,20 @@ struct LocalErrors {
     loads: Vec<Vec<f64>>,
     /// Squared energy error of each layer.
     layers: Vec<f64>,
-    /// Relative change of the pressures of each pair if side b gave the normals.
-    sides: Vec<f64>,
     /// Difference of the compression at each contact point, n, from its mean around the point, which the discrete problem takes in its place.
     mean_error: Vec<f64>,
 }
 
 impl LocalErrors {
     /// Return the errors of the bodies, without those of the layers. `work_on_missed` has an entry for each body.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
+    fn of_bodies(recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, strips, loads) = (none(), none(), none());
-        let mut local = Self { cells, strips, loads, layers: Vec::new(), sides: Vec::new(), mean_error: Vec::new() };
+        let mut local = Self { cells, strips, loads, layers: Vec::new(), mean_error: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
-                let Errors { cells, strips, mut load } = recovered.errors(work_on_missed[body]);
-                load.iter_mut().zip(meshes.unloaded(body)).for_each(|(load, missed)| *load += missed);
+                let Errors { cells, strips, load } = recovered.errors(work_on_missed[body]);
                 (local.cells[body], local.strips[body], local.loads[body]) = (cells, strips, load);
             }
         }
@@ -242,18 +236,13 @@ impl LocalErrors {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
         let soft = pressure::softness(model, index);
         let mut compression = vec![0.0; points.each.len()];
-        let mut change = compression.clone();
         for side in 0..2 {
             if let Some(recovered) = &recovered[pair.bodies[side]] {
                 let normal = recovered.normal_displacement(index, side);
                 compression.iter_mut().zip(normal).for_each(|(sum, u)| *sum += u);
-                let tilted = recovered.tilted_displacement(index, side);
-                axpy([-1.0, 1.0][side], &tilted, &mut change);
             }
         }
         model.exchange.sum(&mut compression);
-        model.exchange.sum(&mut change);
-        self.sides.push(pressure::change_by_normals(pair, points, soft, layer, range.clone(), &change));
         let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);

@@ -21,9 +21,7 @@ pub mod expression {
 
 pub mod fem {
     //! Finite elements.
-    pub use crate::fem::{
-        EDGES, Elasticity, Facets, Frame, Space, Subdivision, assemble, cross, displacement, pad, surface,
-    };
+    pub use crate::fem::{EDGES, Elasticity, Facets, Frame, Space, assemble, cross, displacement, pad, surface};
 }
 
 pub mod mesh {

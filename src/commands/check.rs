@@ -1,9 +1,8 @@
 //! `winkler check`: build the problem of a scene and print what it has, without solving it.
 
 use super::{SceneArgs, clock_with_phases, load};
-use crate::contact::{ContactPair, Left};
-use crate::data::Data;
-use crate::discretize::{BodyInfo, Resolution, resolution};
+use crate::contact::ContactPair;
+use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::linalg::range;
@@ -13,7 +12,6 @@ use crate::run::results::{self, CouplingEstimate};
 use crate::run::{self, Built, in_words, report};
 use serde_json::{Value, json};
 use std::rc::Rc;
-use std::sync::Arc;
 
 /// The command line of `winkler check`.
 #[derive(clap::Args)]
@@ -80,16 +78,11 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "length": pair.weight.iter().sum::<f64>(),
         "gap": [low, high],
         "facets_uncovered": pair.uncovered(),
-        "facets_steep": pair.left(Left::Steep),
-        "facets_far": pair.left(Left::Far),
         "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
         "facets_averaged": pair.averaged(),
         "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
         "theta": coupling.theta,
         "expected_sweeps": sweeps.map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
-        "gap_followed": gap_resolution(built, i).map(|Resolution { height, variance, area, side }| {
-            json!({ "rms_height": height, "variance_left_out": variance, "area_left_out": area, "side": side })
-        }),
     })
 }
 
@@ -157,7 +150,7 @@ fn all_bodies(built: &Built) -> Vec<String> {
     lines
 }
 
-/// Return two lines for each pair, and one on a measured gap.
+/// Return two lines for each pair.
 fn each_pair(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
@@ -182,16 +175,6 @@ fn each_pair(built: &Built) -> Vec<String> {
                 expected(&coupling)
             ),
         });
-        lines.extend(gap_resolution(built, i).map(|Resolution { height, variance, area, side }| {
-            format!(
-                "    the gap has an rms height of {}; facets with sides of {} leave out {:.1} % of its variance, and more than a tenth of \
-                 the rms height on {:.1} % of the surface",
-                sci(height, 3),
-                sci(side, 3),
-                100.0 * variance,
-                100.0 * area
-            )
-        }));
     }
     lines
 }
@@ -247,15 +230,4 @@ fn all_pairs(built: &Built) -> Vec<String> {
         ));
     }
     lines
-}
-
-/// Return how well the mesh follows the gap of a pair; none for a gap without data.
-fn gap_resolution(built: &Built, pair: usize) -> Option<Resolution> {
-    let info = &built.discrete.contacts[pair];
-    let spacing = |data: &Arc<Data>| {
-        let axes = data.grid().map_or(&[][..], |grid| &grid.axes);
-        axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.spacing).fold(f64::INFINITY, f64::min)
-    };
-    let detail = info.spec.gap.data().map(spacing).reduce(f64::min)?;
-    Some(resolution(&info.surface, &info.spec.gap, detail))
 }

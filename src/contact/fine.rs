@@ -4,8 +4,9 @@
 //! points are also projected to side b, and facets at rims of the contact are marked.
 
 use super::basis::{Carriers, PressureBasis};
-use super::pair::{ContactPair, Coverage, Left};
-use super::pieces::{IntegrationPoint, Intersection, WHOLE};
+use super::pair::{ContactPair, Coverage};
+use super::pieces::{IntegrationPoint, Intersection};
+use super::review::height;
 use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
 use crate::fem::{Facets, element, length, minus, unit};
@@ -21,7 +22,7 @@ pub struct FinePoint {
     /// Length (area) of the point.
     pub weight: f64,
     /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
-    /// less by the heights of both curved surfaces above their straight facets (`rise`).
+    /// less by the heights of both curved surfaces above their straight facets (`review::height`).
     pub gap: f64,
     /// Facet of side a under the point. Points on one facet follow each other.
     pub facet: usize,
@@ -62,8 +63,6 @@ pub struct Fine<const D: usize> {
     pub points: FinePoints,
     /// Unit normal from side a to side b at each point.
     pub normal: Vec<[f64; D]>,
-    /// Sum of the outer unit normals of both sides at each point, zero where they are opposite.
-    pub tilt: Vec<[f64; D]>,
     /// Location of the points on each side.
     pub sides: [FineSide<D>; 2],
     /// Location of the contact points on side b.
@@ -84,7 +83,7 @@ pub struct FineSide<const D: usize> {
 
 impl<const D: usize> Fine<D> {
     /// Collect the integration points of `pair`, which was made of these sides and common pieces. `jumps` has the nodes of both sides where the
-    /// material of their body jumps.
+    /// material of their body jumps, or the law of the layer.
     ///
     /// `gap(x)` is the gap that the scene adds to the distance of the meshes. If the surfaces are `touching`, the difference
     /// between that distance at a contact point and its mean around it counts as zero, as does the height of surfaces above their facets.
@@ -108,7 +107,7 @@ impl<const D: usize> Fine<D> {
         let rounding = a.rounding_along_normals();
         let rise_of_both = |point: &IntegrationPoint<D>| match touching {
             true => 0.0,
-            false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
+            false => height(a, point.facet_a, &point.at_a) + height(b, point.facet_b, &point.at_b),
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
@@ -121,12 +120,8 @@ impl<const D: usize> Fine<D> {
             size: size_under(a, point),
             at_rim: at_rim[point.facet_a],
             at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
-            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].left == Left::Nothing,
+            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].is_whole(),
             nearest: 0,
-        };
-        let tilt = |point: &IntegrationPoint<D>| {
-            let (n_a, n_b) = (normal_a(point), vector_at(b, point.facet_b, &point.at_b, |at| at.normal));
-            std::array::from_fn(|c| n_a[c] + n_b[c])
         };
         let mut points = FinePoints {
             order: a.facets.order,
@@ -138,7 +133,6 @@ impl<const D: usize> Fine<D> {
         Self {
             points,
             normal: shared.iter().map(direction).collect(),
-            tilt: shared.iter().map(tilt).collect(),
             near: Projections::new(a, b, common, pair, (!touching).then_some(gap)),
             sides: [side(a, |p| p.facet_a, |p| p.at_a), side(b, |p| p.facet_b, |p| p.at_b)],
         }
@@ -287,27 +281,7 @@ fn project<const D: usize>(b: &Side<D>, facet: usize, from: [f64; D], normal: [f
 
 /// Return the distance along a normal from a point to the surface at the barycentric coordinates `at` of a facet.
 fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
-    dot(&normal, &minus(b.facets.point(facet, b.space, at), from)) - rise(b, facet, at)
-}
-
-/// Return the height of the surface of a side above a facet at barycentric coordinates.
-///
-/// A quadratic facet is the surface itself. Over a straight facet the surface is taken to rise by
-/// l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a curve between two normals is a parabola. Here l_i is the
-/// barycentric coordinate, n_i the normal and x_i the place of corner i.
-fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
-    if side.facets.order != Order::P1 {
-        return 0.0;
-    }
-    let x = side.facets.coordinates(facet, side.space);
-    let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
-    let mut rise = 0.0;
-    for i in 0..D {
-        for j in i + 1..D {
-            rise += 0.5 * at[i] * at[j] * dot(&minus(normals[j], normals[i]), &minus(x[j], x[i]));
-        }
-    }
-    rise
+    dot(&normal, &minus(b.facets.point(facet, b.space, at), from)) - height(b, facet, at)
 }
 
 /// Return, for each facet of side a, whether it lies at a rim, where the pressure may be singular, since one of the surfaces ends there.
@@ -319,6 +293,7 @@ fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
 /// of b: the covered part of that facet may be a sliver.
 ///
 /// The pressure may be singular where an interface of two materials ends in the contact, too, on the softer one as at a corner of the stiffer one.
+/// It jumps with the law of a layer, and no polynomial on a facet follows that.
 fn facets_at_rim<const D: usize>(
     a: &Side<D>,
     b: &Side<D>,
@@ -334,7 +309,7 @@ fn facets_at_rim<const D: usize>(
         at_interface[point.facet_a] |=
             at_jump(0, a.facets.facet(point.facet_a)) || at_jump(1, b.facets.facet(point.facet_b));
     }
-    let ends_on = |i: usize| cover[i].share < WHOLE;
+    let ends_on = |i: usize| !cover[i].is_whole();
     let beside = |i: usize| a.facets.edges(i).into_iter().flat_map(|edge| &edges_a[&edge]).filter(move |&&k| k != i);
     let ends_beside = |i: usize| beside(i).any(|&k| ends_on(k) && (above_rim_of_b[i] || above_rim_of_b[k]));
     let at_rim = |i: usize| {

@@ -1,8 +1,8 @@
 //! The arrays of a contact pair, which are all that the solution methods know of two surfaces, and how much of them is paired.
 
 use super::basis::{Carriers, PressureBasis};
-use super::law::{LayerLaw, LinearLaw};
-use super::pieces::{Intersection, Refused, WHOLE};
+use super::law::{LawMaker, LayerLaw, LinearLaw};
+use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
@@ -101,7 +101,7 @@ impl LostPieces {
     /// Return the losses of the facets of side a with this coverage, `None` if nothing was lost.
     fn of<const D: usize>(a: &Side<D>, coverage: &[Coverage]) -> Option<Self> {
         let uncovered = |&(i, facet): &(usize, &Coverage)| (1.0 - facet.share) * length(a.area(i));
-        let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.left == Left::Lost);
+        let lost = || coverage.iter().enumerate().filter(|(_, facet)| facet.lost > 0);
         let (worst, _) = lost().max_by(|p, q| uncovered(p).total_cmp(&uncovered(q)))?;
         let whole = a.mean_measure() * coverage.len() as f64;
         let middle = element::interpolate(&a.facets.coordinates(worst, a.space)[..D], &[1.0 / D as f64; D]);
@@ -123,9 +123,6 @@ pub enum Fault {
     /// The scene's law is invalid at a point.
     Law(Error),
 }
-
-/// A function from the contact points of a pair to its law.
-pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 
 /// Integrate over common pieces. Return the integrals of each node (on a face) that carries a point, and the coverage of each facet of side a.
 ///
@@ -372,14 +369,9 @@ impl ContactPair {
         self.cover.iter().filter(|facet| facet.carriers.is_none()).count()
     }
 
-    /// Return the number of facets of side a that are not fully paired for this reason.
-    pub fn left(&self, reason: Left) -> usize {
-        self.cover.iter().filter(|facet| facet.left == reason).count()
-    }
-
     /// Return the number of partially covered facets of side a that take the hat functions of their vertices.
     pub fn averaged(&self) -> usize {
-        let averaged = |facet: &&Coverage| facet.carriers == Some(Carriers::Vertices) && facet.left != Left::Nothing;
+        let averaged = |facet: &&Coverage| facet.carriers == Some(Carriers::Vertices) && !facet.is_whole();
         self.cover.iter().filter(averaged).count()
     }
 
@@ -394,27 +386,10 @@ impl ContactPair {
 pub struct Coverage {
     /// Share of its length (area) that is paired.
     pub share: f64,
-    /// Why it is not fully paired.
-    pub left: Left,
-    /// Number of pieces, and of points of pieces, that the search has lost.
+    /// Number of pieces, and of points of pieces, that the search has lost, if it is not fully paired.
     pub lost: usize,
     /// Which of its nodes carry points; `None` where it has no partner.
     pub carriers: Option<Carriers>,
-}
-
-/// The reason why a facet is not fully paired. If several reasons hold, `Lost` comes before `Steep`, and `Steep` before `Far`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Left {
-    /// It is fully paired.
-    Nothing,
-    /// What lies before it is inclined by too large an angle.
-    Steep,
-    /// What lies before it is too far away.
-    Far,
-    /// Nothing lies before it.
-    Bare,
-    /// The search for points on what lies before it has failed.
-    Lost,
 }
 
 impl Coverage {
@@ -424,12 +399,15 @@ impl Coverage {
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = element::rule(D, if a.facets.order == Order::P2 { 5 } else { 2 });
         let of_facet = |i: usize| {
-            let share = covered[i] / facet_measure(a, i, &rule);
-            let left = Left::of(share, &common.refused[i]);
-            let lost = if left == Left::Lost { common.refused[i].lost } else { 0 };
-            Self { share, left, lost, carriers: carriers[i] }
+            let found = Self { share: covered[i] / facet_measure(a, i, &rule), lost: 0, carriers: carriers[i] };
+            Self { lost: if found.is_whole() { 0 } else { common.refused[i].lost }, ..found }
         };
         (0..covered.len()).map(of_facet).collect()
+    }
+
+    /// Return whether the facet is fully paired.
+    pub fn is_whole(&self) -> bool {
+        self.share > WHOLE
     }
 }
 
@@ -441,21 +419,4 @@ fn facet_measure<const D: usize>(a: &Side<D>, i: usize, rule: &Rule) -> f64 {
         length(area_vector(a.facets.order, &x, l)) * a.space.circle(&at)
     };
     rule.iter().map(|(l, weight)| weight * density(l)).sum()
-}
-
-impl Left {
-    /// Return the reason for a facet with this paired share, from what was refused before it.
-    fn of(share: f64, refused: &Refused) -> Self {
-        if share > WHOLE {
-            Self::Nothing
-        } else if refused.lost > 0 {
-            Self::Lost
-        } else if refused.steep {
-            Self::Steep
-        } else if !refused.far.is_empty() {
-            Self::Far
-        } else {
-            Self::Bare
-        }
-    }
 }

@@ -1,4 +1,4 @@
-//! What a user should know of a pair: how far straight facets leave curved surfaces, and points where the pair ends because its surfaces are
+//! What a user should know of a pair: how far straight facets leave curved surfaces, and where the pair ends because its surfaces are
 //! farther apart than its largest distance.
 
 use super::pair::ContactPair;
@@ -40,6 +40,11 @@ impl Chords {
     }
 }
 
+/// Return the height of the surface of a side above a facet at barycentric coordinates. A curve between two normals is a parabola.
+pub fn height<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
+    rises(side, facet).iter().zip(products(at)).map(|(rise, l)| rise * l).sum()
+}
+
 /// Return the rise of a curved surface over each edge of a facet, in the order of [`products`]: the factor of l_i l_j in the height of the
 /// surface above the facet. It is zero on a facet that is curved itself.
 ///
@@ -66,38 +71,15 @@ fn edges<const D: usize>() -> impl Iterator<Item = (usize, usize)> {
     element::EDGES[..D * (D - 1) / 2].iter().copied()
 }
 
-/// A contact point on a facet, or beside one, that has no partner or only a part of one, because what lies before it is too far away.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct UncoveredPoint {
-    /// Index of the contact point.
-    pub point: usize,
-    /// Compression of the layer from which the contact probably goes on where the pair has ended.
-    pub compression: f64,
-}
-
-/// Approach of the surfaces, as a share of the largest distance of the pair, from which a contact at the end of the pair goes on beyond it.
-///
-/// On a curved surface the distance at an end is nearly the largest one. It grows with the square of the place r, and the end is within a facet
-/// of size h from the largest distance: its share is (r/(r + h))^2 or more, which is a half if r is 2.4 facets. So every contact of three facets
-/// that reaches the end counts. At a step of the surface the distance at the end is less, and the surfaces have to approach by all of the step,
-/// which is more than the largest distance, until what lies beyond touches. Spheres whose contact ends where they are 0.02 apart are
-/// found with largest distances from 0.004 to 0.016, on elements of both orders (`tests/geometry/ends.rs`).
-const NEARLY: f64 = 0.5;
-
-impl UncoveredPoint {
-    /// Return the ends of a pair whose facets may be apart by `distance`. `far` are the nodes of facets of side a that were found to be too far
-    /// away before the pair was made. `drawn` gives the distance of the meshes at a contact point; with `None` the surfaces touch at any distance.
-    pub fn all<const D: usize>(
-        a: &Side<D>,
-        common: &Intersection<D>,
-        pair: &ContactPair,
-        far: &BTreeSet<u32>,
-        distance: f64,
-        drawn: Option<&dyn Fn(usize) -> f64>,
-    ) -> Vec<Self> {
-        let ends: BTreeSet<u32> = common.far().flat_map(|(i, _)| a.facets.facet(i).iter().copied()).collect();
-        let is_end = |point: &usize| [&ends, far].iter().any(|nodes| nodes.contains(&pair.nodes[*point]));
-        let compression = |point: usize| drawn.map_or(0.0, |drawn| (NEARLY * distance - drawn(point)).max(0.0));
-        (0..pair.len()).filter(is_end).map(|point| Self { point, compression: compression(point) }).collect()
-    }
+/// Return the contact points beside which the pair ends because what lies before side a is too far away. `far` are the nodes of facets of side a
+/// that were found to be too far away before the pair was made.
+pub fn ends<const D: usize>(
+    a: &Side<D>,
+    common: &Intersection<D>,
+    pair: &ContactPair,
+    far: &BTreeSet<u32>,
+) -> Vec<usize> {
+    let own: BTreeSet<u32> = common.far().flat_map(|(i, _)| a.facets.facet(i).iter().copied()).collect();
+    let is_end = |point: &usize| [&own, far].iter().any(|nodes| nodes.contains(&pair.nodes[*point]));
+    (0..pair.len()).filter(is_end).collect()
 }

@@ -1,6 +1,8 @@
 //! One contact surface of a body: its facets, its nodes with their normals and curvatures, its smooth faces, and the order of nodes along it.
 
+use super::law::LawMaker;
 use super::mirror::Mirrors;
+use crate::error::Result;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
 use crate::linalg::{DisjointSets, bounds, dot};
 use crate::mesh::datum;
@@ -143,6 +145,27 @@ impl<'a, const D: usize> Side<'a, D> {
         joined.classes().1
     }
 
+    /// Return the nodes of facets within which a law of the layer jumps.
+    ///
+    /// # Errors
+    /// A law that is invalid at a point.
+    pub fn layer_jumps(&self, law: &LawMaker) -> Result<HashSet<u32>> {
+        let place = |at: u32| self.space.in_scene(self.space.nodes[self.nodes[at as usize].node as usize]);
+        let all = law(&(0..self.nodes.len() as u32).map(place).collect::<Vec<_>>())?;
+        let c = SLIGHT * self.mean_measure().powf(1.0 / (D - 1) as f64);
+        let mut found = HashSet::new();
+        for on in self.corners.chunks_exact(self.facets.stride) {
+            for (k, &p) in on[..D].iter().enumerate() {
+                for &q in on[..k].iter().filter(|q| all.pressure(p as usize, c) != all.pressure(**q as usize, c)) {
+                    if has_jump([place(p), place(q)], |x| Ok(law(&[x])?.pressure(0, c)))? {
+                        found.extend([p, q].map(|at| self.nodes[at as usize].node));
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+
     /// Return the mean length (area) of a facet.
     pub fn mean_measure(&self) -> f64 {
         let total: f64 = (0..self.facets.count()).map(|i| length(self.area(i))).sum();
@@ -207,6 +230,25 @@ fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(
     let mut faces = vec![Vec::new(); count];
     around.iter().zip(face).for_each(|(&facet, face)| faces[face as usize].push(facet));
     faces
+}
+
+/// Compression at which laws at two places are compared, as a share of the size of a facet: layers are thinner than facets.
+const SLIGHT: f64 = 1e-3;
+
+/// Number of halvings of a line after which the difference of a smooth function at its ends is a thousandth of what it was.
+const HALVINGS: usize = 10;
+
+/// Return whether most of the difference of a function at the ends of a line is a jump: whether it stays in one half, again and again.
+fn has_jump(mut ends: [[f64; 3]; 2], value: impl Fn([f64; 3]) -> Result<f64>) -> Result<bool> {
+    let mut values = [value(ends[0])?, value(ends[1])?];
+    let whole = (values[1] - values[0]).abs();
+    for _ in 0..HALVINGS {
+        let middle = std::array::from_fn(|c| 0.5 * (ends[0][c] + ends[1][c]));
+        let half = value(middle)?;
+        let replaced = usize::from((half - values[0]).abs() > (values[1] - half).abs());
+        (ends[replaced], values[replaced]) = (middle, half);
+    }
+    Ok((values[1] - values[0]).abs() > 0.5 * whole)
 }
 
 /// Rounding of the cosine of the angle between two facets. A facet of a millionth of its mesh has normals to 2e-10, the rounding of

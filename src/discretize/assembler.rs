@@ -1,17 +1,15 @@
 //! The step from what one rank has of a body to its matrix and its solver, which a factory makes.
 
-use super::distribute::Share;
-use super::local::{BodyInfo, LocalBody, SharedBody};
+use super::body::BodyMesh;
+use super::local::BodyInfo;
 use super::meshes::FemBody;
 use super::part::{SceneBody, elasticity_of};
 use super::post::{OnPart, Post};
-use super::supports::Constraints;
-use super::unassembled::{Supported, Unconstrained};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::{self, AtDofs};
-use crate::fem::{ElasticBody, NodalForces, NodeGraph, Prolongation, RigidMotion, Space, Split};
-use crate::linalg::{Csr, dot};
+use crate::fem::{ElasticBody, NodeGraph, Prolongation, Split};
+use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::model::{BodySlot, Distribution, FreeMotion, Loads, Local};
 use crate::problem::order::Order;
@@ -35,99 +33,93 @@ pub struct Assembler<'a, const D: usize, F> {
     pub shapes: Vec<FemBody<D>>,
 }
 
-/// What only the ranks with a part of a body have of it, until [`Discrete::share`](super::Discrete::share).
-#[derive(Default)]
-struct Made {
-    local: Local,
-    imposed: Vec<f64>,
-    scale: f64,
-    row_stiffness: Vec<f64>,
-}
-
 impl<const D: usize, F: Factory> Assembler<'_, D, F> {
-    /// Assemble a body and give it a solver, from what all ranks have of it and what this rank has, if anything. The facts for reports
-    /// receive the evaluation of displacements.
+    /// Assemble a body and give it a solver, from what this rank has of it. `slot` receives the body, and `info` the evaluation of its
+    /// displacements.
     ///
     /// # Errors
     /// The scene contradicts its mesh in a way that shows when K is assembled, or the factory fails.
     pub fn make(
         &mut self,
         spec: &BodySpec,
-        shared: SharedBody<D>,
-        local: Option<LocalBody<D>>,
-    ) -> Result<(BodySlot, BodyInfo)> {
-        let SharedBody { mut info, segments, unconstrained, modulus, depth, .. } = shared;
-        let Unconstrained { left, motions, sprung, unsupported, .. } = unconstrained;
-        let mut made = Made::default();
-        if let Some(local) = local {
-            let elasticity = Rc::new(elasticity_of(spec, local.regions, D, self.plane)?);
-            let LocalBody { space, held, springs, facts, share, load, .. } = local;
-            let part = SceneBody { spec, space, held, springs, elasticity: elasticity.clone(), facts };
-            let (space, held) = match local.is_owned {
-                false => (Rc::new(part.space), Rc::new(part.held)),
-                true => {
-                    let is_own =
-                        |node| share.as_ref().is_none_or(|s| s.is_own::<D>(part.held.frame.node(node) as usize));
-                    let own = (0..part.space.nodes.len() as u32).map(is_own).collect();
-                    let (loads, free) = loads(&part, &load, local.supported, left, local.works);
-                    let kept = self.factory.kept(&info.name).filter(|_| share.is_none());
-                    made = match reload(kept, &loads)? {
-                        Some(before) => {
-                            self.avoided += 1;
-                            before
-                        }
-                        None => {
-                            self.assemblies += usize::from(info.rank == self.rank);
-                            self.assemble(&part, local.rows, local.graph, share, free, loads)?
-                        }
-                    };
-                    if info.rank != self.rank {
-                        made.scale = 0.0;
-                    }
-                    evaluate(&mut info, part, local.nodal_rows, &load, own)?
-                }
-            };
-            let (unloaded, motions) = (local.unloaded, unsupported);
-            self.shapes.push(FemBody { space, split: OnceCell::new(), held, elasticity, unloaded, motions });
+        mut mesh: BodyMesh<D>,
+        slot: &mut BodySlot,
+        info: &mut BodyInfo,
+    ) -> Result<()> {
+        let elasticity = elasticity_of(spec, std::mem::take(&mut mesh.regions), D, self.plane)?;
+        let mut part = SceneBody { spec, elasticity: Rc::new(elasticity), mesh };
+        let own = part.mesh.own_nodes();
+        if part.mesh.is_owned {
+            self.give_solver(&mut part, slot, info.rank)?;
         }
-        let Made { local, imposed, scale, row_stiffness } = made;
-        let name = info.name.clone();
-        let slot = BodySlot { name, local, imposed, segments, motions, sprung, scale, modulus, depth, row_stiffness };
-        Ok((slot, info))
+        let SceneBody { elasticity, mesh, .. } = part;
+        let mesh = Rc::new(mesh);
+        if mesh.is_owned {
+            let split = Split::new(&mesh.space, &elasticity);
+            let load = mesh.load.all(mesh.space.nodes.len());
+            let (name, exact) = (info.name.clone(), spec.exact.clone());
+            let (mesh, elasticity) = (mesh.clone(), elasticity.clone());
+            let post =
+                OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len(), load, nodes: info.nodes };
+            post.check_exact()?;
+            info.points = post.points();
+            info.post = Some(Box::new(post) as Box<dyn Post>);
+        }
+        self.shapes.push(FemBody { mesh, split: OnceCell::new(), elasticity });
+        Ok(())
     }
 
-    /// Assemble the matrix of a body on its rows, or on those of this rank, and make its solver.
-    fn assemble(
-        &mut self,
-        part: &SceneBody<D>,
-        rows: Csr,
-        graph: Option<NodeGraph>,
-        share: Option<Share>,
-        left: Vec<FreeMotion>,
-        loads: Loads,
-    ) -> Result<Made> {
-        let name = &part.spec.name.value;
-        let mut graph = graph.unwrap_or_else(|| NodeGraph::with_rows(&part.space, &rows, &part.held.frame));
+    /// Give a body its solver: that of an earlier scene with other loads, or a new one. On ranks other than the `owner` the scale stays zero until
+    /// [`Discrete::share`](super::Discrete::share).
+    fn give_solver(&mut self, part: &mut SceneBody<D>, slot: &mut BodySlot, owner: usize) -> Result<()> {
+        let mesh = &part.mesh;
+        let loads = Loads {
+            force: mesh.load_vector(),
+            prescribed: mesh.prescribed.clone(),
+            imposed: mesh.imposed.as_ref().map_or_else(Vec::new, |motion| mesh.dofs_of(motion)),
+            work: slot.motions.iter().map(|motion| motion.work).collect(),
+        };
+        slot.imposed = loads.imposed.clone();
+        let kept = self.factory.kept(&slot.name).filter(|_| mesh.share.is_none());
+        if let Some(before) = reload(kept, &loads)? {
+            self.avoided += 1;
+            (slot.local, slot.scale, slot.row_stiffness) = (before.local, before.scale, before.row_stiffness);
+        } else {
+            self.assemblies += usize::from(owner == self.rank);
+            self.assemble(part, loads, slot)?;
+        }
+        slot.scale = if owner == self.rank { slot.scale } else { 0.0 };
+        Ok(())
+    }
+
+    /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact rows.
+    fn assemble(&mut self, part: &mut SceneBody<D>, loads: Loads, slot: &mut BodySlot) -> Result<()> {
+        let Loads { force, prescribed, imposed, work } = loads;
+        let free = part.mesh.left.iter().zip(work);
+        let left = free.map(|(motion, work)| FreeMotion::new(part.mesh.dofs_of(motion), &prescribed, work)).collect();
+        part.mesh.graph();
+        let (share, rows) = (part.mesh.share.take(), std::mem::take(&mut part.mesh.rows));
+        let mut graph = part.mesh.graph.take().unwrap_or_else(|| unreachable!("the graph was requested"));
         if let Some(share) = &share {
             graph = graph.of(|node| share.is_own::<D>(node));
         }
-        let Loads { force, prescribed, imposed, .. } = loads;
         let mut body = part.assemble(self.mesh, &graph, force, prescribed, &imposed)?;
         drop(graph);
-        let scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
-        let row_stiffness = rows.quadratic_diagonal(&body.stiffness);
+        slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
+        slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
         if let Some(share) = &share {
             body = share.own::<D>(body);
         }
-        let interpolation = self.factory.wants_interpolation(name).then(|| match &share {
-            Some(share) => share.interpolation::<D>(|coarse| part.interpolation(coarse)),
-            None => part.interpolation(&part.coarse_nodes()),
+        let mesh = &part.mesh;
+        let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &share {
+            Some(share) => share.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
+            None => mesh.interpolation(&mesh.coarse_nodes()),
         });
         // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
         // displacements and rotations of its section as a plane body.
-        let smooth = || rigid::modes(&part.facts.extent).iter().map(|motion| part.dofs_of(motion)).collect();
-        let local = self.factory.make(Assembled {
-            name: name.clone(),
+        let smooth = || rigid::modes(&mesh.extent).iter().map(|motion| mesh.dofs_of(motion)).collect();
+        slot.local = self.factory.make(Assembled {
+            name: slot.name.clone(),
             dimension: D,
             body,
             distribution: share.map(|share| share.distribution),
@@ -136,74 +128,18 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             left,
             interpolation,
         })?;
-        Ok(Made { local, imposed, scale, row_stiffness })
+        Ok(())
     }
 }
 
-/// Return the loads of a body on the dofs of this rank, and the motions that supports leave. If this rank has only some of the
-/// loads, `works` holds the work of all loads on these motions.
-fn loads<const D: usize>(
-    part: &SceneBody<D>,
-    load: &NodalForces<D>,
-    Supported { imposed, prescribed }: Supported<D>,
-    left: Vec<RigidMotion<D>>,
-    works: Option<Vec<f64>>,
-) -> (Loads, Vec<FreeMotion>) {
-    let force = part.load_vector(load);
-    let free = left.iter().enumerate().map(|(k, motion)| {
-        let work = |u: &[f64]| works.as_ref().map_or_else(|| dot(u, &force), |works| works[k]);
-        FreeMotion::new(part.dofs_of(motion), &prescribed, work)
-    });
-    let free: Vec<FreeMotion> = free.collect();
-    let work = free.iter().map(|motion| motion.work).collect();
-    let imposed = imposed.map_or_else(Vec::new, |motion| part.dofs_of(&motion));
-    (Loads { work, force, prescribed, imposed }, free)
-}
-
-/// Give `info` the evaluation of displacements and forces of a body at the nodes that this rank has. `own` marks the nodes that
-/// belong to this rank. Return the space and the supports of the body.
-fn evaluate<const D: usize>(
-    info: &mut BodyInfo,
-    part: SceneBody<D>,
-    rows: Csr,
-    load: &NodalForces<D>,
-    own: Vec<bool>,
-) -> Result<(Rc<Space<D>>, Rc<Constraints<D>>)> {
-    let rigid = part.rigid_forces().collect();
-    let (space, held) = (Rc::new(part.space), Rc::new(part.held));
-    let post = OnPart {
-        name: info.name.clone(),
-        exact: part.spec.exact.clone(),
-        outer: part.facts.outer,
-        rows,
-        springs: part.springs,
-        supports: part.spec.fix.len(),
-        load: load.all(space.nodes.len()),
-        rigid,
-        extent: part.facts.extent,
-        nodes: info.nodes,
-        held: held.clone(),
-        split: Split::new(&space, &part.elasticity),
-        elasticity: part.elasticity,
-        space: space.clone(),
-        own,
-    };
-    post.check_exact()?;
-    let shown = post.split.space.part(post.owned()).1;
-    info.points = shown.into_iter().map(|node| part.facts.points[post.split.origin(node) as usize]).collect();
-    info.post = Some(Box::new(post) as Box<dyn Post>);
-    Ok((space, held))
-}
-
 /// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
-fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<Made>> {
-    let Some(BodySlot { mut local, scale, row_stiffness, .. }) = kept else { return Ok(None) };
-    let serves = match local.as_mut() {
+fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<BodySlot>> {
+    let Some(mut slot) = kept else { return Ok(None) };
+    let serves = match slot.local.as_mut() {
         Some(body) => body.reload(loads)?,
         None => false,
     };
-    let made = Made { local, imposed: loads.imposed.clone(), scale, row_stiffness };
-    Ok(serves.then_some(made))
+    Ok(serves.then_some(slot))
 }
 
 /// What the first rank has of a body before it is assembled.

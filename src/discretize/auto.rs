@@ -1,13 +1,12 @@
 //! Pairs that rules of the scene find: boundary facets of different bodies that face each other within a distance.
 
 use super::part::SceneBody;
-use super::patterns::{pattern, tie};
+use super::patterns::pattern;
 use crate::contact::Side;
 use crate::contact::pieces::{BoxTree, Cut, Reach};
-use crate::error::{Error, Place, Result, few};
+use crate::error::{Error, Located, Place, Result, few};
 use crate::fem::{Facets, unit};
 use crate::problem::contact::AutoContact;
-use crate::problem::pattern::Rank;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashSet};
 
@@ -33,13 +32,13 @@ pub struct SurfacePair<'a, const D: usize> {
 }
 
 /// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
-/// one first. The narrowest rule for two bodies decides alone whether they are a pair.
+/// one first. The last rule for two bodies decides alone whether they are a pair.
 ///
 /// All facets that could have a partner are collected first, so that the nodal normals are those of smooth surfaces. Then only
 /// the facets with a common piece are kept.
 ///
 /// # Errors
-/// A pattern matches no body, or two rules match a pair equally well.
+/// A pattern matches no body.
 pub fn find<'a, const D: usize>(
     rules: &[AutoContact],
     cut: Cut<D>,
@@ -50,20 +49,12 @@ pub fn find<'a, const D: usize>(
         return Ok(Vec::new());
     }
     let whole: Vec<Side<D>> =
-        parts.iter().map(|part| part.side(&part.spec.name.value, part.space.boundary(), 180.0)).collect();
+        parts.iter().map(|part| part.side(&part.spec.name.value, part.mesh.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
-        let found = meeting(rules, cut, &whole, &possible);
-        if found.sides[0].facets.count() == 0 {
-            continue;
-        }
-        if let Some(other) = possible.other {
-            let [a, b] = possible.bodies.map(|body| &parts[body].spec.name.value);
-            let [(own, _), (other, place)] = [possible.rule, other].map(|number| title(&rules[number]));
-            return Err(tie(&format!("{a} - {b}"), [&own, &other], place));
-        }
-        all.push(found);
+        all.push(meeting(rules, cut, &whole, &possible));
     }
+    all.retain(|found| found.sides[0].facets.count() > 0);
     Ok(all)
 }
 
@@ -73,10 +64,8 @@ struct Possible<const D: usize> {
     bodies: [usize; 2],
     /// Facets of each body that could have a partner.
     near: [Facets<D>; 2],
-    /// Index of the narrowest rule for the bodies.
+    /// Index of the last rule for the bodies.
     rule: usize,
-    /// Index of another rule that is as narrow.
-    other: Option<usize>,
 }
 
 fn possible<const D: usize>(
@@ -95,12 +84,12 @@ fn possible<const D: usize>(
         others.retain(|&b| b > a && !named.contains(&[a, b]));
         others.sort_unstable();
         for b in others {
-            let Some((rule, other)) = narrowest(&matches, a, b) else { continue };
+            let Some(rule) = matches.iter().rposition(|rule| rule.are_for(a, b)) else { continue };
             let spec = &rules[rule].contact;
             let reach = Reach::between(&whole[a], &whole[b], spec.angle, spec.distance);
             let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
             if near.iter().all(|facets| facets.count() > 0) {
-                all.push(Possible { bodies: [a, b], near, rule, other });
+                all.push(Possible { bodies: [a, b], near, rule });
             }
         }
     }
@@ -146,42 +135,33 @@ pub fn all_find_some(rules: &[AutoContact], found: impl Iterator<Item = ContactE
     let message = format!("no facets of {bodies} face each other within {}", distance(&rules[rule]));
     let help = match rules.len() {
         1 => "a larger distance may find some",
-        _ => "a larger distance may find some, unless narrower rules or contacts with names have all these pairs",
+        _ => "a larger distance may find some, unless later rules or contacts with names have all these pairs",
     };
     Err(Error::scene(place, message).help(help))
 }
 
-/// The bodies to which a rule applies, as the first and as the second of a pair, with the rank that says how narrow the rule is.
-struct Matches {
-    of: Option<[Vec<bool>; 2]>,
-    rank: Rank,
-}
+/// The bodies to which a rule applies, as the first and as the second of a pair; `None` if it applies to all.
+struct Matches(Option<[Vec<bool>; 2]>);
 
 impl Matches {
     fn new<const D: usize>(rule: &AutoContact, parts: &[SceneBody<D>]) -> Result<Self> {
-        let Some(of) = &rule.of else { return Ok(Self { of: None, rank: Rank::default() }) };
-        let patterns = [pattern(&of[0])?, pattern(&of[1])?];
+        let Some(of) = &rule.of else { return Ok(Self(None)) };
         let names = || parts.iter().map(|part| part.spec.name.value.as_str());
-        let matching = patterns.each_ref().map(|pattern| names().map(|name| pattern.matches(name)).collect::<Vec<_>>());
-        if let Some((nothing, _)) = of.iter().zip(&matching).find(|(_, matching)| !matching.contains(&true)) {
+        let matching = |name: &Located<String>| {
+            let pattern = pattern(name)?;
+            let found: Vec<bool> = names().map(|body| pattern.matches(body)).collect();
+            if found.contains(&true) {
+                return Ok(found);
+            }
             let help = format!("the bodies of the scene: {}", few(names()).join(", "));
-            return Err(Error::scene(&nothing.place, format!("no body matches `{}`", nothing.value)).help(help));
-        }
-        let [a, b] = patterns.map(|pattern| pattern.rank());
-        Ok(Self { of: Some(matching), rank: std::array::from_fn(|i| a[i] + b[i]) })
+            Err(Error::scene(&name.place, format!("no body matches `{}`", name.value)).help(help))
+        };
+        Ok(Self(Some([matching(&of[0])?, matching(&of[1])?])))
     }
 
     fn are_for(&self, a: usize, b: usize) -> bool {
-        self.of.as_ref().is_none_or(|[first, second]| (first[a] && second[b]) || (first[b] && second[a]))
+        self.0.as_ref().is_none_or(|[first, second]| (first[a] && second[b]) || (first[b] && second[a]))
     }
-}
-
-/// Return the narrowest rule for two bodies, and another one that is as narrow, if any.
-fn narrowest(rules: &[Matches], a: usize, b: usize) -> Option<(usize, Option<usize>)> {
-    let own = || (0..rules.len()).filter(|&rule| rules[rule].are_for(a, b));
-    let rank = own().map(|rule| rules[rule].rank).max()?;
-    let mut best = own().filter(|&rule| rules[rule].rank == rank);
-    Some((best.next()?, best.next()))
 }
 
 /// Return the name of a rule in an error, and its place in the scene.

@@ -26,7 +26,7 @@ struct Candidate {
 
 impl Candidate {
     fn of<const D: usize>(part: &SceneBody<D>, facets: &Facets<D>) -> Self {
-        let (space, centre) = (&part.space, [1.0 / D as f64; D]);
+        let (space, centre) = (&part.mesh.space, [1.0 / D as f64; D]);
         let (mut area, mut stiffness) = (0.0, 0.0);
         for (i, cell) in part.cells_at(facets).into_iter().enumerate() {
             let x = facets.coordinates(i, space);

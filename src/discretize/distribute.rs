@@ -1,7 +1,7 @@
 //! The partition of the nodes of bodies over the ranks. Each node of the bodies in one matrix has one owner, and a number in that
 //! matrix. The coupling of the nodes determines the work and the memory of each.
 
-use super::part::SceneBody;
+use super::body::BodyMesh;
 use super::unassembled::Unassembled;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
@@ -25,6 +25,8 @@ pub struct Partition {
     nodes: Numbers,
     /// Numbers of the nodes of each body from which displacements are interpolated, if an interpolation is requested.
     coarse: Numbers,
+    /// [`BodyMesh::products`] of each body.
+    products: Vec<DMatrix<f64>>,
 }
 
 /// Numbers of nodes of the bodies in one matrix. They run rank by rank, within a rank body by body, and within a body in the
@@ -84,22 +86,23 @@ impl Partition {
         ranks: usize,
         wants_coarse: &dyn Fn(usize) -> bool,
     ) -> Self {
-        let nodes_of = |body: usize| &bodies[body].part.space.nodes;
+        let nodes_of = |body: usize| &bodies[body].part.mesh.space.nodes;
         let places: Vec<[f64; D]> = set.iter().flat_map(|&body| nodes_of(body).iter().copied()).collect();
         let mut all = bisect(&places, &couplings(bodies, &set, pairs), ranks).into_iter();
         let of_body = |&body: &usize| all.by_ref().take(nodes_of(body).len()).collect();
         let mut owner: Vec<Vec<u32>> = set.iter().map(of_body).collect();
         for (owner, &body) in owner.iter_mut().zip(&set) {
-            for (&master, levers) in &bodies[body].part.held.frame.levers {
-                owner[levers.pole as usize] = owner[master as usize];
+            for [pole, master] in bodies[body].part.mesh.held.frame.poles() {
+                owner[pole as usize] = owner[master as usize];
             }
         }
         let coarse_nodes =
-            |&body: &usize| if wants_coarse(body) { bodies[body].part.coarse_nodes() } else { Vec::new() };
+            |&body: &usize| if wants_coarse(body) { bodies[body].part.mesh.coarse_nodes() } else { Vec::new() };
         let coarse: Vec<Vec<u32>> = set.iter().map(coarse_nodes).collect();
         let nodes = Numbers::new(&owner, ranks, |_, _| true);
         let coarse = Numbers::new(&owner, ranks, |body, node| coarse[body].binary_search(&node).is_ok());
-        Self { bodies: set, ranks, owner, nodes, coarse }
+        let products = set.iter().map(|&body| bodies[body].part.mesh.products()).collect();
+        Self { bodies: set, ranks, owner, nodes, coarse, products }
     }
 
     /// Return the rank that owns a node. `number` is the index of the body among those of the matrix.
@@ -120,8 +123,8 @@ impl Partition {
     /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
     /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
     /// their master.
-    pub fn cells<const D: usize>(&self, number: usize, part: &SceneBody<D>, rank: usize) -> Vec<usize> {
-        let SceneBody { space, held, .. } = part;
+    pub fn cells<const D: usize>(&self, number: usize, body: &BodyMesh<D>, rank: usize) -> Vec<usize> {
+        let BodyMesh { space, held, .. } = body;
         let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
         let cells = || space.cells.chunks_exact(space.stride);
         let mut is_near = vec![false; space.nodes.len()];
@@ -134,14 +137,8 @@ impl Partition {
 
     /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its cells and of
     /// contact rows, and those that move tied nodes.
-    pub fn nodes<const D: usize>(
-        &self,
-        number: usize,
-        body: &Unassembled<D>,
-        cells: &[usize],
-        rank: usize,
-    ) -> Vec<u32> {
-        let SceneBody { space, held, .. } = &body.part;
+    pub fn nodes<const D: usize>(&self, number: usize, body: &BodyMesh<D>, cells: &[usize], rank: usize) -> Vec<u32> {
+        let BodyMesh { space, held, .. } = body;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
         let of_cells = space.corners(cells).into_iter();
         let of_rows = [&body.rows, &body.nodal_rows].into_iter().flat_map(|rows| &rows.col);
@@ -150,14 +147,7 @@ impl Partition {
     }
 
     /// Return the distribution of the dofs of a body for a rank that has these `nodes`. `rows` are the contact rows of the body.
-    pub fn share<const D: usize>(
-        &self,
-        number: usize,
-        nodes: Vec<u32>,
-        rows: &Csr,
-        products: DMatrix<f64>,
-        rank: usize,
-    ) -> Share {
+    pub fn share<const D: usize>(&self, number: usize, nodes: Vec<u32>, rows: &Csr, rank: usize) -> Share {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
@@ -183,7 +173,7 @@ impl Partition {
             own,
             places,
             near: others,
-            products,
+            products: self.products[number].clone(),
             total,
             rows: rows.of_columns(total, column),
             leads: self.leader(number) == rank,
@@ -193,12 +183,10 @@ impl Partition {
         let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
         Share {
             distribution,
-            coarse: CoarseNodes {
-                nodes: of_coarse,
-                number: coarse,
-                all: self.coarse.sum(0..self.ranks),
-                own: self.coarse.counts[rank][number],
-            },
+            coarse_nodes: of_coarse,
+            coarse_number: coarse,
+            coarse_count: self.coarse.sum(0..self.ranks),
+            own_coarse: self.coarse.counts[rank][number],
             number: nodes.iter().map(|&node| numbers[node as usize]).collect(),
             nodes,
         }
@@ -206,7 +194,7 @@ impl Partition {
 }
 
 /// What one rank has of the dofs of a distributed body.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Share {
     /// Dofs of this rank.
     pub distribution: Distribution,
@@ -214,35 +202,27 @@ pub struct Share {
     pub nodes: Vec<u32>,
     /// Number of each of these nodes in the matrix with the rows of the body.
     number: Vec<u32>,
-    /// Coarse nodes; empty if no interpolation is requested.
-    coarse: CoarseNodes,
-}
-
-/// The coarse nodes of a body on one rank.
-#[derive(Serialize, Deserialize)]
-struct CoarseNodes {
-    /// Local indices of the coarse nodes among the nodes of this rank.
-    nodes: Vec<u32>,
+    /// Local indices of the coarse nodes among the nodes of this rank; empty if no interpolation is requested.
+    coarse_nodes: Vec<u32>,
     /// Numbers of these nodes among the coarse nodes of the bodies in one matrix.
-    number: Vec<u32>,
+    coarse_number: Vec<u32>,
     /// Number of coarse nodes of these bodies on all ranks.
-    all: usize,
+    coarse_count: usize,
     /// Number of coarse nodes of this body that this rank owns.
-    own: usize,
+    own_coarse: usize,
 }
 
 impl Share {
     /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
     /// bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
-        let CoarseNodes { nodes, number, all, own } = &self.coarse;
-        let whole = whole(nodes);
-        let mut rows = Csr::new(D * all);
+        let whole = whole(&self.coarse_nodes);
+        let mut rows = Csr::new(D * self.coarse_count);
         for &dof in &self.distribution.places {
-            let number = |j: usize| D * number[j / D] as usize + j % D;
+            let number = |j: usize| D * self.coarse_number[j / D] as usize + j % D;
             rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
         }
-        Prolongation { rows, own: D * own }
+        Prolongation { rows, own: D * self.own_coarse }
     }
 
     /// Return whether this rank owns a node, given by its local index.
@@ -287,7 +267,7 @@ fn couplings<const D: usize>(bodies: &[Unassembled<D>], set: &[usize], pairs: &[
     let (mut first, mut all) = (HashMap::new(), Vec::new());
     for &body in set {
         first.insert(body, all.len());
-        all.extend(bodies[body].graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
+        all.extend(bodies[body].part.mesh.graph().ptr.windows(2).map(|ends| ends[1] - ends[0]));
     }
     for pair in pairs.iter().filter(|pair| pair.bodies.iter().all(|body| first.contains_key(body))) {
         let nodes = |side: usize, q: usize| pair.rows[side].row(q).map(|(dof, _)| (dof / D) as u32);

@@ -1,18 +1,14 @@
-//! What all ranks have of a body that is ready for assembly, and what one rank has.
+//! What all ranks have of a body: the arrays of the model, and the facts that reports need.
 
-use super::distribute::{Partition, Share};
-use super::part::BodyFacts;
 use super::post::Post;
-use super::supports::{Constraints, axis_vector};
-use super::unassembled::{NO_WORK, Supported, Unassembled, Unconstrained};
+use super::supports::axis_vector;
+use super::unassembled::{NO_WORK, Unassembled};
 use crate::contact::{self, ContactPair};
-use crate::exchange::Plain;
-use crate::fem::{self, NodalBlock, NodalForces, NodeGraph, Space, place};
-use crate::linalg::{Csr, dot};
+use crate::fem;
+use crate::linalg::dot;
 use crate::mesh::BodyCheck;
-use crate::model::Segment;
+use crate::model::{BodySlot, Local};
 use crate::problem::Plane;
-use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Facts of a body besides its matrices.
@@ -69,164 +65,57 @@ impl BodyInfo {
     }
 }
 
-/// What all ranks have of a body.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct SharedBody<const D: usize> {
-    /// Facts for reports.
-    pub info: BodyInfo,
-    /// Contact rows, pair by pair.
-    pub segments: Vec<Segment>,
-    /// Rigid motions that supports and springs leave.
-    pub unconstrained: Unconstrained<D>,
-    /// Modulus along the normals of the contact surfaces.
-    pub modulus: f64,
-    /// Depth of the body behind its contact surfaces.
-    pub depth: f64,
-    /// Trace on the contact rows of the rigid motion that supports impose.
-    pub imposed: Vec<f64>,
-}
-
-/// What one rank has of a body: all of it, or the part on the nodes that this rank needs, with local numbers.
-#[derive(Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
-pub struct LocalBody<const D: usize> {
-    /// Nodes and cells.
-    pub space: Space<D>,
-    /// Index of the elastic constants of each cell; empty if the body has no regions.
-    pub regions: Vec<usize>,
-    /// Supports and rigid surfaces.
-    pub held: Constraints<D>,
-    pub springs: Vec<Vec<NodalBlock<D>>>,
-    /// Facts of the whole body, and the points of the mesh that these nodes come from.
-    pub facts: BodyFacts,
-    /// Contact rows with dofs as columns.
-    pub rows: Csr,
-    /// Contact rows with displacements of nodes as columns.
-    pub nodal_rows: Csr,
-    /// Nodal forces of the loads at owned nodes, and at nodes tied to these.
-    pub load: NodalForces<D>,
-    /// Displacements that the supports prescribe.
-    pub supported: Supported<D>,
-    /// Work of all loads on each rigid motion that supports and springs leave; `None` if this rank has all loads.
-    pub works: Option<Vec<f64>>,
-    /// Dofs of this rank, if the body is distributed.
-    pub share: Option<Share>,
-    /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
-    pub is_owned: bool,
-    /// See [`Unassembled::unloaded`].
-    pub unloaded: Vec<f64>,
-    /// Coupling of nodes by K, if it was computed on this rank.
-    #[serde(skip)]
-    pub graph: Option<NodeGraph>,
-}
-
-impl<const D: usize> LocalBody<D> {
-    /// Take the whole body.
-    pub fn whole(body: Unassembled<D>, is_owned: bool) -> Self {
-        let Unassembled { part, rows, nodal_rows, nodal_load, supported, unloaded, graph, .. } = body;
-        let cells = if part.spec.regions.is_empty() { 0 } else { part.space.cell_count() };
-        Self {
-            regions: (0..cells).map(|cell| part.elasticity.region(cell)).collect(),
-            space: part.space,
-            held: part.held,
-            springs: part.springs,
-            facts: part.facts,
-            rows,
-            nodal_rows,
-            load: nodal_load,
-            supported,
-            works: None,
-            share: None,
-            is_owned,
-            unloaded,
-            graph: graph.into_inner(),
-        }
-    }
-
-    /// Restrict a body to the nodes that a rank needs, or keep all nodes if `wants_all`. `number` is the index of the body in its
-    /// matrix.
-    pub fn restrict(body: &Unassembled<D>, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
-        let Unassembled { part, supported, .. } = body;
-        let cells = match wants_all {
-            true => (0..part.space.cell_count()).collect(),
-            false => partition.cells(number, part, rank),
-        };
-        let nodes = partition.nodes(number, body, &cells, rank);
-        let here = |node: u32| place(&nodes, node);
-        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
-        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
-        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
-        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
-            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
-        };
-        let springs = part.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
-        let regions = cells.iter().filter(|_| !part.spec.regions.is_empty()).map(|&cell| part.elasticity.region(cell));
-        let is_assembled = |node: u32| partition.owner(number, part.held.frame.node(node)) == rank;
-        let on_dofs = body.on_dofs.as_ref();
-        let products = on_dofs.map_or_else(|| DMatrix::zeros(0, 0), |on| on.products.clone());
-        Self {
-            space: part.space.on(&part.space.corners(&cells), &nodes),
-            regions: regions.collect(),
-            held: part.held.on(&nodes),
-            springs: springs.collect(),
-            facts: part.facts.on(&nodes),
-            rows: rows_here(&body.rows),
-            nodal_rows: rows_here(&body.nodal_rows),
-            load: body.nodal_load.only(is_assembled).on(&nodes),
-            supported: Supported {
-                imposed: supported.imposed.clone(),
-                prescribed: supported.prescribed.iter().filter_map(prescribed_here).collect(),
-            },
-            works: on_dofs.map(|on| on.works.clone()),
-            is_owned: true,
-            unloaded: body.unloaded.clone(),
-            graph: None,
-            share: Some(partition.share::<D>(number, nodes, &body.rows, products, rank)),
-        }
-    }
-}
-
 impl<const D: usize> Unassembled<'_, D> {
-    /// Return what all ranks have of the body. `checked` is the result of the check of its mesh.
-    pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> SharedBody<D> {
+    /// Return what all ranks have of the body: the arrays of the model and the facts for reports. `checked` is the result of the check of its
+    /// mesh.
+    pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> (BodySlot, BodyInfo) {
         let of_body = || self.segments.iter().map(|segment| &pairs[segment.pair]);
         let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
-        let modulus = dot(&self.part.facts.moduli, &along_axes(of_body()));
-        let depth = self.part.facts.volume / surface;
-        let imposed = self.supported.imposed.as_ref();
-        SharedBody {
-            info: self.info(checked, plane, modulus, depth),
+        let (volume, moduli) = self.part.volume_and_moduli();
+        let (modulus, depth) = (dot(&moduli, &along_axes(of_body())), volume / surface);
+        let slot = BodySlot {
+            name: self.part.spec.name.value.clone(),
+            local: Local::default(),
+            imposed: Vec::new(),
             segments: self.segments.clone(),
-            unconstrained: self.unconstrained.clone(),
+            motions: self.motions.clone(),
+            sprung: self.sprung.clone(),
+            scale: 0.0,
             modulus,
             depth,
-            imposed: imposed.map_or_else(|| vec![0.0; self.rows.rows()], |motion| self.trace(motion)),
-        }
+            row_stiffness: Vec::new(),
+        };
+        (slot, self.info(checked, plane, modulus, depth))
+    }
+
+    /// Return the trace on the contact rows of the rigid motion that supports impose.
+    pub fn imposed_trace(&self) -> Vec<f64> {
+        let mesh = &self.part.mesh;
+        mesh.imposed.as_ref().map_or_else(|| vec![0.0; mesh.rows.rows()], |motion| self.trace(motion))
     }
 
     fn info(&self, checked: &BodyCheck, plane: Plane, modulus: f64, depth: f64) -> BodyInfo {
-        let Self { part, unconstrained, .. } = self;
+        let (part, unresisted) = (&self.part, self.unresisted());
         let spec = part.spec;
-        let is_held = unconstrained.motions.len() == unconstrained.unresisted.len() && depth.is_finite();
+        let is_held = self.motions.len() == unresisted.len() && depth.is_finite();
         // Loads that balance, as a pressure in a closed ring does, leave rounding, which counts as zero.
-        let mut load = self.nodal_load.sum();
+        let mut load = part.mesh.load.sum();
         for (c, sum) in load.iter_mut().enumerate().take(D) {
-            let [work, largest] = self.nodal_load.works(|_| axis_vector(c));
+            let [work, largest] = part.mesh.load.works(|_| axis_vector(c));
             *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
         }
-        part.rigid_forces().for_each(|(_, force)| contact::add(&mut load, fem::pad(force)));
+        part.mesh.rigid_forces().for_each(|(_, force)| contact::add(&mut load, fem::pad(force)));
         BodyInfo {
             name: spec.name.value.clone(),
-            datum: fem::pad(part.space.datum),
-            nodes: part.space.nodes.len(),
+            datum: fem::pad(part.mesh.space.datum),
+            nodes: part.mesh.space.nodes.len(),
             points: Vec::new(),
-            cells: part.facts.cells,
+            cells: part.mesh.space.cell_count(),
             facets: BodyCheck { points: Vec::new(), ..checked.clone() },
-            dofs: part.space.dofs(),
-            supported: part.held.supported(),
-            left_by_supports: unconstrained.left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: unconstrained.unresisted.iter().map(|(name, _)| name.clone()).collect(),
+            dofs: part.mesh.space.dofs(),
+            supported: part.mesh.held.supported(),
+            left_by_supports: part.mesh.left.iter().map(|motion| motion.name.clone()).collect(),
+            left_by_all: unresisted,
             warning: part.locking(plane),
             stiffness: if is_held { modulus / depth } else { 0.0 },
             load,
@@ -234,7 +123,7 @@ impl<const D: usize> Unassembled<'_, D> {
             ranks: self.ranks.clone(),
             supports: spec.fix.iter().map(|support| support.on.value.clone()).collect(),
             springs: spec.spring.iter().map(|spring| spring.on.value.clone()).collect(),
-            rigid: part.held.rigid.iter().map(|(load, _)| spec.load[*load].on.value.clone()).collect(),
+            rigid: part.mesh.held.rigid.iter().map(|surface| spec.load[surface.load].on.value.clone()).collect(),
             post: None,
         }
     }

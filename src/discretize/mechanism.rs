@@ -17,14 +17,13 @@ use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::{Mechanism, Motions};
 use nalgebra::{DMatrix, DVector};
 
-/// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for. A traction
-/// on an arc with chords of 9 degrees lacks as much, and forces in equilibrium that people write have three digits or more.
+/// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
 const LACKING: f64 = 1e-3;
 
-/// Find the motions that nothing resists. Fix those on which no load works.
-pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair]) -> Vec<Mechanism> {
+/// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
+pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
-    let mut search = MechanismSearch { bodies, pairs, tilt, found: Vec::new() };
+    let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
     for group in search.groups() {
         search.settle(search.as_one(&group));
     }
@@ -51,17 +50,19 @@ struct MechanismSearch<'p, 's, const D: usize> {
     pairs: &'p [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
+    /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
+    lack: f64,
     found: Vec<Mechanism>,
 }
 
 impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions that supports and springs leave to a body at present.
     fn left(&self, body: usize) -> &[RigidMotion<D>] {
-        &self.bodies[body].unconstrained.left
+        &self.bodies[body].part.mesh.left
     }
 
     fn extent(&self, body: usize) -> &PointExtent {
-        &self.bodies[body].part.facts.extent
+        &self.bodies[body].part.mesh.extent
     }
 
     /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies.
@@ -78,7 +79,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the rigid motions of some bodies as one.
     fn common(&self, bodies: &[usize]) -> Vec<RigidMotion<D>> {
         let extent = bodies.iter().fold(PointExtent::default(), |all, &body| all.join(self.extent(body)));
-        rigid::of(&extent, bodies.iter().any(|&body| self.bodies[body].part.space.axisymmetric))
+        rigid::of(&extent, bodies.iter().any(|&body| self.bodies[body].part.mesh.space.axisymmetric))
     }
 
     /// Return the displacements of the corners of the box around a body.
@@ -129,7 +130,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             pair.weight.iter().map(|weight| weight / all).collect::<Vec<_>>()
         };
         let weight: Vec<f64> = self.pairs.iter().flat_map(share).collect();
-        let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.unconstrained.motions[..]));
+        let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..]));
         Motions::new(motions, &points).springs(&weight).kernel(TOLERANCE.max(self.tilt * self.tilt))
     }
 
@@ -162,7 +163,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let works: Vec<Vec<f64>> =
             named.iter().map(|set| set.iter().map(|(_, moving)| self.work(moving).abs()).collect()).collect();
         let worst = works.iter().flatten().copied().fold(0.0, f64::max);
-        if worst <= LACKING {
+        if worst <= self.lack {
             self.balance(named.iter().flatten().map(|(_, moving)| moving).collect());
         }
         let mut pins = Vec::new();
@@ -170,7 +171,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let most = works.iter().copied().fold(0.0, f64::max);
             let mechanism =
                 |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, ..Default::default() };
-            if worst > LACKING {
+            if worst > self.lack {
                 // The motion on which loads work most is the reason, and the others of its bodies are not of interest.
                 let reason = works.iter().position(|work| *work == worst);
                 self.found.extend(reason.map(|i| Mechanism {
@@ -246,9 +247,9 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         for (number, body) in self.bodies.iter().enumerate() {
             let motions: Vec<(usize, &RigidMotion<D>)> =
                 all.iter().enumerate().filter_map(|(j, moving)| Some((j, moving.of(number)?))).collect();
-            for (node, force) in body.nodal_load.iter().filter(|_| !motions.is_empty()) {
+            for (node, force) in body.part.mesh.load.iter().filter(|_| !motions.is_empty()) {
                 let size = dot(&force, &force).sqrt();
-                let at = motions.iter().map(|(j, motion)| (*j, motion.at(&body.part.space.nodes[node as usize])));
+                let at = motions.iter().map(|(j, motion)| (*j, motion.at(&body.part.mesh.space.nodes[node as usize])));
                 let at: Vec<(usize, [f64; D])> = at.collect();
                 for (j, u) in &at {
                     at.iter().for_each(|(k, v)| products[(*j, *k)] += size * dot(u, v));
@@ -277,7 +278,8 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let mut amounts = moving.amounts;
         for pin in pins.iter() {
             let there = self.moving(amounts.clone());
-            let value = there.of(pin.body).map_or(0.0, |motion| self.bodies[pin.body].part.dof_of(motion, pin.dof));
+            let value =
+                there.of(pin.body).map_or(0.0, |motion| self.bodies[pin.body].part.mesh.dof_of(motion, pin.dof));
             amounts -= value * &pin.amounts;
         }
         let moving = self.moving(amounts);
@@ -313,7 +315,7 @@ impl<const D: usize> Moving<D> {
     fn works(&self, bodies: &[Unassembled<D>]) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (&body, motion) in self.bodies.iter().zip(&self.motions) {
-            let works = bodies[body].load.works(|node| bodies[body].part.at_dofs(motion, node));
+            let works = bodies[body].load.works(|node| bodies[body].part.mesh.at_dofs(motion, node));
             (0..2).for_each(|k| sums[k] += works[k]);
         }
         sums

@@ -1,8 +1,8 @@
 //! The meshes without their space dimension, as an estimate of the error uses them.
 
-use super::supports::Constraints;
+use super::body::BodyMesh;
 use crate::contact::{Fine, FinePoints};
-use crate::fem::{Elasticity, Errors, Recovery, RigidMotion, Space, Split, element};
+use crate::fem::{Elasticity, Errors, Recovery, Split, element};
 use crate::linalg::{Csr, axpy, dot};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -17,9 +17,6 @@ pub trait Meshes {
 
     /// Recover smoother fields from the displacements `u` of all nodes of a body.
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a>;
-
-    /// Return the nodal forces of a body that the quadrature of its loads misses. The slice is empty if there are none.
-    fn unloaded(&self, body: usize) -> &[f64];
 
     /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these amounts.
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
@@ -66,9 +63,6 @@ pub trait RecoveredFields {
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
     fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
-    /// Return the displacement at the integration points of a side of a pair, times [`Fine::tilt`].
-    fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
-
     /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is replaced by the
     /// value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its nodal displacements.
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64>;
@@ -79,18 +73,12 @@ pub trait RecoveredFields {
 
 /// A body's space, elasticity and supports.
 pub struct FemBody<const D: usize> {
-    /// Space of the body.
-    pub space: Rc<Space<D>>,
+    /// Nodes and cells, supports, and the rigid motions that these leave.
+    pub mesh: Rc<BodyMesh<D>>,
     /// The same space, cut apart where the material jumps, once it has been requested.
     pub split: OnceCell<Split<D>>,
     /// Elasticity of the body.
     pub elasticity: Rc<Elasticity>,
-    /// Supports of the body, which define its dofs.
-    pub held: Rc<Constraints<D>>,
-    /// See [`Meshes::unloaded`].
-    pub unloaded: Vec<f64>,
-    /// Rigid motions that the supports leave, in the order of [`Motions::with_springs`](crate::model::Motions::with_springs).
-    pub motions: Vec<RigidMotion<D>>,
 }
 
 /// The implementation of [`Meshes`] in `D` dimensions.
@@ -103,28 +91,24 @@ pub struct Kept<const D: usize> {
 
 impl<const D: usize> Meshes for Kept<D> {
     fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64> {
-        self.shapes[body].held.frame.displacements(state)
+        self.shapes[body].mesh.held.frame.displacements(state)
     }
 
     fn forces(&self, body: usize, load: &mut [f64]) {
-        self.shapes[body].held.frame.forces(load);
+        self.shapes[body].mesh.held.frame.forces(load);
     }
 
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a> {
         let shape = &self.shapes[body];
-        let split = shape.split.get_or_init(|| Split::new(&shape.space, &shape.elasticity));
+        let split = shape.split.get_or_init(|| Split::new(&shape.mesh.space, &shape.elasticity));
         let recovery = Recovery::new(&split.space, &shape.elasticity, split.values(u));
         Box::new(OnBody { kept: self, shape, split, u, recovery })
     }
 
-    fn unloaded(&self, body: usize) -> &[f64] {
-        &self.shapes[body].unloaded
-    }
-
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
-        let FemBody { space, motions, .. } = &self.shapes[body];
+        let BodyMesh { space, unsupported, .. } = &*self.shapes[body].mesh;
         let mut moved = vec![0.0; space.dofs()];
-        for (motion, amount) in motions.iter().zip(amounts) {
+        for (motion, amount) in unsupported.iter().zip(amounts) {
             axpy(*amount, &motion.nodal(space.nodes.iter().copied()), &mut moved);
         }
         moved
@@ -144,7 +128,7 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn cells(&self, body: usize) -> BodyCells {
-        let space = &self.shapes[body].space;
+        let space = &self.shapes[body].mesh.space;
         // This is the measure of the regular simplex with edges of length one.
         let regular = if D == 2 { 3f64.sqrt() / 4.0 } else { 2f64.sqrt() / 12.0 };
         let size = |index| (space.cell_measure(index) / regular).powf(1.0 / D as f64);
@@ -161,7 +145,7 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn degree(&self, body: usize) -> usize {
-        self.shapes[body].space.order as usize + 1
+        self.shapes[body].mesh.space.order as usize + 1
     }
 }
 
@@ -180,7 +164,7 @@ impl<const D: usize> OnBody<'_, D> {
     /// Return the displacement at a point of a facet, including the interpolation error.
     fn displacement(&self, at: &FacetPoint<D>) -> [f64; D] {
         let mut u = self.missed(at);
-        for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.space.order, at.l)) {
+        for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.mesh.space.order, at.l)) {
             (0..D).for_each(|c| u[c] += phi * self.u[D * node as usize + c]);
         }
         u
@@ -231,13 +215,6 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
         values
     }
 
-    fn tilted_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
-        let tilt = &self.kept.fine[pair].tilt;
-        let mut values = vec![0.0; tilt.len()];
-        self.visit(pair, side, |g, _, at| values[g] = dot(&tilt[g], &self.displacement(&at)));
-        values
-    }
-
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
         let Fine { near, sides, .. } = &self.kept.fine[pair];
         let (mut mean, split) = (vec![0.0; near.at.len()], self.split.facets(&sides[1].facets));
@@ -253,7 +230,7 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
 
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]) {
         self.visit(pair, side, |g, normal, at| {
-            for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.space.order, at.l)) {
+            for (&node, phi) in at.nodes.iter().zip(element::values(self.shape.mesh.space.order, at.l)) {
                 (0..D).for_each(|c| r[D * node as usize + c] += force[g] * phi * normal[c]);
             }
         });

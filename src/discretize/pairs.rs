@@ -3,12 +3,12 @@
 
 use super::auto::{self, ContactEntry, SurfacePair};
 use super::carrier;
+use super::groups::{Owners, find_group, point};
 use super::part::SceneBody;
-use super::patterns::{Owners, find_group, point};
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
-use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, ROUNDING, Side, UncoveredPoint};
+use crate::contact::pieces::{Cut, Reach};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
@@ -16,7 +16,7 @@ use crate::mesh::{Group, Mesh};
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashSet};
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
@@ -31,18 +31,20 @@ pub struct Contact<const D: usize> {
 /// What all ranks have of the origin of a pair; see [`ContactInfo`].
 #[derive(Serialize, Deserialize)]
 pub struct ContactFacts {
-    origin: PairOrigin,
+    entry: ContactEntry,
+    /// Names of the two surfaces, which are those of the bodies if the pair was found.
+    names: [String; 2],
     swapped: bool,
     chords: Option<Chords>,
-    ends: Vec<UncoveredPoint>,
+    ends: Vec<usize>,
     surface: ContactSurface,
 }
 
 impl ContactFacts {
     /// Return the facts of the pair, including its description in the scene.
     pub fn info(self, scene: &Scene) -> ContactInfo {
-        let Self { origin, swapped, chords, ends, surface } = self;
-        ContactInfo { spec: origin.spec(scene), swapped, chords, ends, surface }
+        let Self { entry, names, swapped, chords, ends, surface } = self;
+        ContactInfo { spec: entry.spec(scene, names), swapped, chords, ends, surface }
     }
 }
 
@@ -53,7 +55,7 @@ pub struct ContactInfo {
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
-    pub ends: Vec<UncoveredPoint>,
+    pub ends: Vec<usize>,
     /// Whether side a, which carries the points, is the second of `spec.between`.
     pub swapped: bool,
     /// Mesh of side a, for output.
@@ -68,22 +70,14 @@ impl ContactInfo {
     }
 }
 
-/// The entry of the scene that a pair comes from.
-#[derive(Serialize, Deserialize)]
-struct PairOrigin {
-    entry: ContactEntry,
-    /// Names of the two surfaces, which are those of the bodies if the pair was found.
-    names: [String; 2],
-}
-
-impl PairOrigin {
-    /// Return the scene's description of the pair. `between` has the names of the pair.
-    fn spec(&self, scene: &Scene) -> ContactSpec {
-        let mut spec = match self.entry {
+impl ContactEntry {
+    /// Return the scene's description of a pair of this table. `between` has the names of the pair.
+    fn spec(self, scene: &Scene, names: [String; 2]) -> ContactSpec {
+        let mut spec = match self {
             ContactEntry::Named(number) => scene.contacts[number].clone(),
             ContactEntry::Found(rule) => scene.auto[rule].contact.clone(),
         };
-        spec.between.iter_mut().zip(&self.names).for_each(|(name, own)| name.value.clone_from(own));
+        spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value = own);
         spec
     }
 }
@@ -102,7 +96,7 @@ pub fn all<const D: usize>(
 ) -> Result<Vec<Contact<D>>> {
     let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
     let owners =
-        Owners::new(points.flat_map(|(part, body)| part.space.mesh_points().map(move |p| (p, body))).collect());
+        Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
     let named = scene.contacts.iter().enumerate();
     let mut found = named.map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
@@ -112,7 +106,7 @@ pub fn all<const D: usize>(
     for pair in found {
         contacts.extend(Opposite::new(scene, parts, pair).assemble(&scene.laws, parts, cut, fine)?);
     }
-    auto::all_find_some(&scene.auto, contacts.iter().map(|contact| contact.facts.origin.entry))?;
+    auto::all_find_some(&scene.auto, contacts.iter().map(|contact| contact.facts.entry))?;
     Ok(contacts)
 }
 
@@ -143,7 +137,7 @@ fn named<'a, const D: usize>(
 
 /// Two surfaces that are to be a pair.
 struct Opposite<'a, const D: usize> {
-    origin: PairOrigin,
+    entry: ContactEntry,
     spec: ContactSpec,
     bodies: [usize; 2],
     a: Side<'a, D>,
@@ -159,15 +153,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
     /// Choose the side that carries the points.
     fn new(scene: &Scene, parts: &[SceneBody<D>], pair: SurfacePair<'a, D>) -> Self {
         let SurfacePair { entry, bodies, sides: [first, second], far: [far_first, far_second] } = pair;
-        let origin = PairOrigin { entry, names: [first.name.to_owned(), second.name.to_owned()] };
-        let spec = origin.spec(scene);
+        let spec = entry.spec(scene, [first.name, second.name].map(str::to_owned));
         let swapped = carrier::is_second(parts, bodies, [&first.facets, &second.facets], spec.table, &scene.carriers);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
         };
         let reach = Reach::between(&a, &b, spec.angle, spec.distance);
-        Self { origin, spec, bodies: [body_a, body_b], a, b, swapped, far, reach }
+        Self { entry, spec, bodies: [body_a, body_b], a, b, swapped, far, reach }
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair that was found have no common
@@ -186,14 +179,15 @@ impl<'a, const D: usize> Opposite<'a, D> {
         if self.spec.touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
-        let Self { origin, spec, bodies, a, b, swapped, far, .. } = self;
+        let Self { entry, spec, bodies, a, b, swapped, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
-            Err(Fault::NoPartner) if matches!(origin.entry, ContactEntry::Found(_)) => return Ok(None),
-            assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut, &spec)))?,
+            Err(Fault::NoPartner) if matches!(entry, ContactEntry::Found(_)) => return Ok(None),
+            assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
         };
-        pair.surfaces = spec.between.each_ref().map(|name| name.value.clone());
+        let names = spec.between.each_ref().map(|name| name.value.clone());
+        pair.surfaces = names.clone();
         if swapped {
             pair.surfaces.swap(0, 1);
         }
@@ -210,13 +204,17 @@ impl<'a, const D: usize> Opposite<'a, D> {
         }
         let surface = ContactSurface::new(&a, &pair);
         let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
-        let fine = fine.then(|| Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&jumps(0, &a), &jumps(1, &b)]));
+        let fine = match fine {
+            true => {
+                let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
+                at_a.extend(a.layer_jumps(&law)?);
+                Some(Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&at_a, &at_b]))
+            }
+            false => None,
+        };
         let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
-        let drawn = |q: usize| pair.gap[q] - gap(pair.position[q]);
-        let drawn: Option<&dyn Fn(usize) -> f64> = if spec.touching { None } else { Some(&drawn) };
-        let ends =
-            spec.distance.map_or(Vec::new(), |distance| UncoveredPoint::all(&a, &common, &pair, &far, distance, drawn));
-        Ok(Some(Contact { pair, fine, facts: ContactFacts { origin, swapped, chords, ends, surface } }))
+        let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
+        Ok(Some(Contact { pair, fine, facts: ContactFacts { entry, names, swapped, chords, ends, surface } }))
     }
 }
 
@@ -226,15 +224,16 @@ fn of_pair(spec: &ContactSpec) -> String {
     format!("it is for the contact of `{a}` and `{b}`")
 }
 
-/// Return the error of a pair. `why` says why its surfaces do not face each other, and what to do.
-fn refuse(spec: &ContactSpec, fault: Fault, why: impl Fn() -> [String; 2]) -> Error {
+/// Return the error of a pair. `why` says where its surfaces are nearest to each other.
+fn refuse(spec: &ContactSpec, fault: Fault, why: impl Fn() -> String) -> Error {
     match fault {
         Fault::Law(error) => error.because(of_pair(spec)),
         Fault::NoPartner => {
             let [a, b] = spec.between.each_ref().map(|name| &name.value);
-            let [reason, help] = why();
             let message = format!("`{a}` and `{b}` do not face each other anywhere");
-            Error::scene(&spec.between[0].place, message).because(reason).help(help)
+            Error::scene(&spec.between[0].place, message)
+                .because(why())
+                .help("name the sides of the bodies that look at each other (`winkler mesh` has their places), move a body, or give a larger `distance` or `angle`")
         }
         Fault::Gap(x) => {
             spec.gap.eval_finite("the gap", x).err().map(|error| error.because(of_pair(spec))).unwrap_or_else(|| {
@@ -258,7 +257,7 @@ fn bounded<const D: usize>(
     let touching: BTreeSet<usize> = group.connectivity.iter().flat_map(|&point| owners.of(point)).collect();
     let mut found: Vec<(usize, Facets<D>)> = touching
         .into_iter()
-        .map(|body| (body, parts[body].space.facets(group)))
+        .map(|body| (body, parts[body].mesh.space.facets(group)))
         .filter(|(_, facets)| facets.count() > 0)
         .collect();
     let all = group.connectivity.len() / group.stride;
@@ -281,81 +280,20 @@ fn bounded<const D: usize>(
     }
 }
 
-/// Largest angle, in degrees, between the normals of facets that can have common pieces at all.
-const RIGHT: f64 = 90.0;
-
-/// Return why two surfaces do not face each other within the limits of their contact, and what to do.
-pub fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>, spec: &ContactSpec) -> [String; 2] {
-    let ContactSpec { angle, distance, .. } = *spec;
-    let [names_a, names_b] = [a.name, b.name];
-    let anywhere = |angle: f64| cut(a, b, &Reach::anywhere(a, b, angle));
-    if let Some(Nearest { gap, at }) = Nearest::of(a, &anywhere(angle)) {
-        return match distance.filter(|_| gap > 0.0) {
-            Some(distance) => [
-                format!("the gap is {gap:.6} where they are nearest, at {at}, and `distance` = {distance} ends before"),
-                "give a larger distance, or none: surfaces with names are found at any distance".to_owned(),
-            ],
-            None if gap > 0.0 => [format!("the gap is {gap:.6} where they are nearest, at {at}"), String::new()],
-            None => [
-                format!(
-                    "at {at} `{names_b}` lies {:.6} behind `{names_a}`, deeper than an overlap can be: the surfaces look away from each other",
-                    -gap
-                ),
-                "name the sides of the bodies that look at each other, or move a body".to_owned(),
-            ],
-        };
-    }
-    if Nearest::of(a, &anywhere(RIGHT)).is_some() {
-        return [
-            format!("where they lie before each other their normals stand at more than {angle} degrees (key `angle`)"),
-            "give a larger angle, up to 90 degrees, or name other surfaces".to_owned(),
-        ];
-    }
-    if closest(a, b) <= ROUNDING {
-        return [
-            "their outer normals nowhere point at each other".to_owned(),
-            "name the sides of the bodies that look at each other; `winkler mesh` has their places".to_owned(),
-        ];
-    }
-    [
-        "no facet of one lies before a facet of the other along its normal".to_owned(),
-        "move a body, or name surfaces that lie opposite each other; `winkler mesh` has their places".to_owned(),
-    ]
-}
-
-/// Where two surfaces are nearest to each other.
-struct Nearest {
-    /// Signed distance, negative where one is behind the other.
-    gap: f64,
-    /// The point as a text.
-    at: String,
-}
-
-impl Nearest {
-    /// Return the nearest of common points, those in front first; `None` if there are none.
-    fn of<const D: usize>(a: &Side<D>, common: &Intersection<D>) -> Option<Self> {
-        let key = |gap: f64| (gap < 0.0, gap.abs());
-        let less = |p: f64, q: f64| {
-            let ((behind, p), (other, q)) = (key(p), key(q));
-            behind.cmp(&other).then(p.total_cmp(&q))
-        };
-        let nearest = common.points.iter().min_by(|p, q| less(p.gap, q.gap))?;
-        let at = a.facets.point(nearest.facet_a, a.space, &nearest.at_a);
-        Some(Self { gap: nearest.gap, at: point(a.space.in_scene(at)) })
-    }
-}
-
-/// Return the largest cosine of the angle between the normal of a facet of one side and minus that of a facet of the other.
-///
-/// One normal stands for all that differ from it by less than a twentieth in each component, since large curved surfaces have too many
-/// to compare each two. On plane facets it is exact.
-fn closest<const D: usize>(a: &Side<D>, b: &Side<D>) -> f64 {
-    let normals = |side: &Side<D>| -> Vec<[f64; D]> {
-        let all = (0..side.facets.count()).map(|i| unit(side.area(i)));
-        let rounded = all.map(|normal| (normal.map(|n| (20.0 * n).round() as i64), normal));
-        rounded.collect::<BTreeMap<_, _>>().into_values().collect()
+/// Return where two surfaces are nearest to each other along their normals, with the gap and the angle there.
+fn why<const D: usize>(a: &Side<D>, b: &Side<D>, cut: Cut<D>) -> String {
+    let common = cut(a, b, &Reach::anywhere(a, b, 90.0));
+    // those in front come before those behind
+    let key = |gap: f64| (gap < 0.0, gap.abs());
+    let less = |(behind, p): (bool, f64), (other, q): (bool, f64)| behind.cmp(&other).then(p.total_cmp(&q));
+    let Some(nearest) = common.points.iter().min_by(|p, q| less(key(p.gap), key(q.gap))) else {
+        return "no facet of one lies before a facet of the other along its normal".to_owned();
     };
-    let (ours, others) = (normals(a), normals(b));
-    let facing = |n: &[f64; D]| others.iter().map(|m| -dot(n, m)).fold(-1.0, f64::max);
-    ours.iter().map(facing).fold(-1.0, f64::max)
+    let cosine = -dot(&unit(a.area(nearest.facet_a)), &unit(b.area(nearest.facet_b)));
+    let at = point(a.space.in_scene(a.facets.point(nearest.facet_a, a.space, &nearest.at_a)));
+    let angle = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    format!(
+        "where they are nearest, at {at}, the gap is {:.6} and their normals stand at {angle:.0} degrees",
+        nearest.gap
+    )
 }

@@ -1,138 +1,63 @@
 //! The bodies of the scene on its mesh: space, elasticity, supports, loads, stiffness. Errors name body and place.
 
-use super::approach::{LoadForces, Outer};
-use super::patterns::{FieldValues, find_group, load_dimensions, not_on_body, of_body, point, without_area};
+use super::body::BodyMesh;
+use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
 use crate::error::{Error, Result, shown};
-use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
-use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{
-    ElasticBody, Elasticity, Facets, NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space,
-    Subdivision, assemble, rigid, support, surface,
+    ElasticBody, Elasticity, Facets, NodalForces, NodeGraph, PointExtent, Space, assemble, support, surface,
 };
-use crate::linalg::{Total, axpy, countable, dot};
+use crate::linalg::{Csr, Total, countable};
 use crate::mesh::{self, Group, Mesh};
 use crate::problem::body::{Load, LoadKind};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 use crate::scene::Scene;
-use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// Poisson's ratio above which linear elements lock.
 const LOCKING: f64 = 0.49;
 
-/// A body of the scene with its space, supports and springs.
+/// A body of the scene on its mesh.
 #[derive(Clone)]
 pub struct SceneBody<'a, const D: usize> {
     /// Description in the scene.
     pub spec: &'a BodySpec,
-    /// Finite element space.
-    pub space: Space<D>,
-    /// Constraints from supports and rigid surfaces.
-    pub held: Constraints<D>,
-    /// Springs to the ground: the stiffness blocks between nodes for each spring of the scene.
-    pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Elasticity of the cells.
     pub elasticity: Rc<Elasticity>,
-    /// Facts of the whole body.
-    pub facts: BodyFacts,
+    /// Nodes, and all that is tied to them.
+    pub mesh: BodyMesh<D>,
 }
 
 impl<'a, const D: usize> SceneBody<'a, D> {
-    /// Return the displacements of all dofs in a rigid motion.
-    pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
-        self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
-    }
-
-    /// Return the rigid motions of the free body.
-    pub fn free(&self) -> Vec<RigidMotion<D>> {
-        rigid::of(&self.facts.extent, self.space.axisymmetric)
-    }
-
-    /// Return the displacements of the dofs of a node in a rigid motion.
-    pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
-        self.held.frame.at(node, |node| self.at(motion, node))
-    }
-
-    /// Return the displacement of a dof in a rigid motion.
-    pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
-        self.held.frame.dof(dof, |node| self.at(motion, node))
-    }
-
     /// Return a contact surface of the body, with edges where facets turn by more than `edge` degrees.
     pub fn side<'s>(&'s self, name: &'s str, facets: Facets<D>, edge: f64) -> Side<'s, D> {
-        Side::new(name, &self.space, facets, &self.held.prescribed, &self.held.frame, edge)
+        Side::new(name, &self.mesh.space, facets, &self.mesh.held.prescribed, &self.mesh.held.frame, edge)
     }
 
     /// Return a cell with the elasticity at each of these facets: the one that the facet bounds, if the elasticity differs between cells.
     pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
-        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.space.cells_at(facets) }
+        if self.elasticity.is_constant() { vec![0; facets.count()] } else { self.mesh.space.cells_at(facets) }
     }
 
-    /// Return the products of rigid motions over all dofs without the `prescribed` ones, and the work of the load vector on each
-    /// motion.
-    pub fn products(
-        &self,
-        motions: &[RigidMotion<D>],
-        prescribed: &[(usize, f64)],
-        load: &[f64],
-    ) -> (DMatrix<f64>, Vec<f64>) {
-        let (count, mut held) = (motions.len(), prescribed.iter().map(|entry| entry.0).peekable());
-        let (mut products, mut work) = (DMatrix::zeros(count, count), vec![0.0; count]);
-        for node in 0..self.space.nodes.len() {
-            let mut at: Vec<[f64; D]> = motions.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
-            while let Some(dof) = held.next_if(|dof| dof / D <= node) {
-                at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
-            }
-            for (i, u) in at.iter().enumerate() {
-                at.iter().enumerate().for_each(|(j, v)| products[(i, j)] += dot(u, v));
-                work[i] += dot(u, &load[D * node..][..D]);
-            }
+    /// Return the area (volume) of the body, in a body of revolution the volume of the rings, and the means of the moduli along x, y, z
+    /// ([`Elasticity::moduli`]). A cell whose constants make no material at its middle contributes zero; assembly refuses it.
+    pub fn volume_and_moduli(&self) -> (f64, [f64; 3]) {
+        let (space, elasticity) = (&self.mesh.space, &self.elasticity);
+        let cells = || 0..space.cell_count();
+        let volume = cells().map(|cell| space.share(cell)).collect::<Total>().value();
+        if self.spec.regions.is_empty() && elasticity.is_constant() {
+            return (volume, elasticity.moduli(0, [0.0; 3]).unwrap_or_default());
         }
-        (products, work)
-    }
-
-    /// Return the displacement of a node in a rigid motion.
-    fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
-        motion.at(&self.space.nodes[node as usize])
-    }
-
-    /// Return the prescribed (dof, value), sorted by dof.
-    pub fn prescribed_sorted(&self) -> Vec<(usize, f64)> {
-        let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
-        all.sort_unstable_by_key(|entry| entry.0);
-        all
-    }
-
-    /// Return the weights of those combinations of `count` motions that neither supports nor springs resist. `u(k, node)` is the
-    /// displacement of motion k at a node.
-    pub fn left(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let left = self.left_by_supports(count, u);
-        let springs = self.springs.concat();
-        if springs.is_empty() { left } else { rigid::left_by_springs(left, &rigid::of_springs(count, u, &springs)) }
-    }
-
-    fn left_by_supports(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let value = |k: usize, dof: usize| self.held.frame.dof(dof, |node| u(k, node));
-        rigid::left_by_supports(count, value, &self.prescribed_sorted())
-    }
-
-    /// Return the rigid motions that supports leave, with the stiffness of the springs in terms of them. The result is `None`
-    /// without springs.
-    pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
-        let springs = self.springs.concat();
-        if springs.is_empty() {
-            return None;
+        let mut sum = [0.0; 3];
+        for cell in cells() {
+            let moduli = elasticity.moduli(cell, space.in_scene(space.centroid(cell))).unwrap_or_default();
+            crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
         }
-        let left = self.left_by_supports(free.len(), &|k, node| free[k].at(&self.space.nodes[node as usize]));
-        let left: Vec<_> = left.iter().map(|weights| rigid::combine(free, weights)).collect();
-        let at = |k: usize, node: u32| left[k].at(&self.space.nodes[node as usize]);
-        let stiffness = rigid::of_springs(left.len(), at, &springs);
-        Some((left, stiffness))
+        (volume, sum.map(|sum| sum / volume))
     }
 
     /// Return the nodal forces of the loads without those on rigid surfaces. Supports are not taken into account.
@@ -140,70 +65,40 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// # Errors
     /// A load is not finite somewhere, or a surface is not on the body or has no area.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let load =
-            body_force(self.spec, &self.space, Subdivision::Whole)?.and(self.on_surfaces(mesh, Subdivision::Whole)?);
+        let mut load = body_force(self.spec, &self.mesh.space)?;
+        for spec in &self.spec.load {
+            load = load.and(self.on_surface(spec, spec.factor, mesh)?);
+        }
         if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) }
     }
 
-    /// Return the nodal forces of all loads that the quadrature misses. The result is empty if all loads are constant.
-    ///
-    /// # Errors
-    /// See [`SceneBody::load`].
-    pub fn unloaded(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
-        let is_constant = |load: &Load| match &load.kind {
-            LoadKind::Pressure(pressure) => pressure.is_constant(),
-            LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
-            LoadKind::Force { .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => true,
-        };
-        let force = self.spec.force.iter().flatten();
-        if self.spec.load.iter().all(is_constant) && force.into_iter().all(Field::is_constant) {
-            return Ok(Vec::new());
-        }
-        let all = |parts: Subdivision| {
-            let load = body_force(self.spec, &self.space, parts)?.and(self.on_surfaces(mesh, parts)?);
-            Ok(load.all(self.space.nodes.len()))
-        };
-        let (mut missed, load) = (all(Subdivision::Halves)?, all(Subdivision::Whole)?);
-        axpy(-1.0, &load, &mut missed);
-        Ok(missed)
-    }
-
-    /// Return the nodal forces of all loads on surfaces that are not rigid.
-    fn on_surfaces(&self, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
-        let mut load = NodalForces::default();
-        for spec in &self.spec.load {
-            load = load.and(self.on_surface(spec, spec.factor, mesh, parts)?);
-        }
-        Ok(load)
-    }
-
     /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
-    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, parts: Subdivision) -> Result<NodalForces<D>> {
+    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
-        let group = find_group(mesh, &spec.on, load_dimensions::<D>(&spec.kind), "load")?;
+        let group = spec.group(mesh)?;
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
             return self.at_nodes(spec, group, total.map(|total| factor * total));
         }
-        let facets = self.space.facets(group);
+        let facets = self.mesh.space.facets(group);
         if facets.count() == 0 {
             return Err(not_on_body(&spec.on, &name.value));
         }
-        let area = surface::measure(&self.space, &facets);
+        let area = surface::measure(&self.mesh.space, &facets);
         if area == 0.0 {
             return Err(without_area(&spec.on, self.spec));
         }
         if let LoadKind::Moment(moment) = spec.kind {
-            let load = moment_load(&self.space, &facets, parts, moment.map(|component| factor * component));
+            let load = moment_load(&self.mesh.space, &facets, moment.map(|component| factor * component));
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
         let values = FieldValues::of("this load", &name.value);
-        let load = surface::surface_load(&self.space, &facets, parts, &|x, n| match &spec.kind {
+        let load = surface::surface_load(&self.mesh.space, &facets, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
-                let pressure = factor * values.at(field, self.space.in_scene(x));
+                let pressure = factor * values.at(field, self.mesh.space.in_scene(x));
                 n.map(|n| -pressure * n)
             }
             LoadKind::Traction(fields) => {
-                let x = self.space.in_scene(x);
+                let x = self.mesh.space.in_scene(x);
                 std::array::from_fn(|c| factor * values.at(&fields[c], x))
             }
             LoadKind::Force { rigid: true, .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => [0.0; D],
@@ -219,7 +114,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 
     /// Return a total force as equal forces at the nodes of a group of points.
     fn at_nodes(&self, spec: &Load, group: &Group, total: [f64; 3]) -> Result<NodalForces<D>> {
-        let nodes = self.space.nodes_on(group);
+        let nodes = self.mesh.space.nodes_on(group);
         if nodes.is_empty() {
             return Err(not_on_body(&spec.on, &self.spec.name.value));
         }
@@ -227,51 +122,18 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         Ok(nodes.into_iter().map(|node| (node, each)).collect())
     }
 
-    /// Return the nodal forces of a load of the scene at its full value. A force on a rigid surface is spread over its area.
+    /// Return the nodal forces of a load of the scene without its factor. A force on a rigid surface is spread over its area.
     ///
     /// # Errors
     /// See [`SceneBody::load`].
-    fn load_forces(&self, load: &Load, mesh: &Mesh<D>) -> Result<LoadForces> {
-        let spread = match &load.kind {
+    pub fn full_load(&self, load: &Load, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
+        match load.kind {
             LoadKind::Force { total, rigid: true } | LoadKind::Turning { force: total, .. } => {
-                LoadKind::Force { total: *total, rigid: false }
+                let kind = LoadKind::Force { total, rigid: false };
+                self.on_surface(&Load { kind, ..load.clone() }, 1.0, mesh)
             }
-            _ => return Ok(LoadForces::new(self.on_surface(load, 1.0, mesh, Subdivision::Whole)?.iter())),
-        };
-        let load = Load { kind: spread, ..load.clone() };
-        Ok(LoadForces::new(self.on_surface(&load, 1.0, mesh, Subdivision::Whole)?.iter()))
-    }
-
-    /// Return the forces on rigid surfaces, at few nodes of each.
-    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
-        self.held.rigid.iter().flat_map(|(index, nodes)| {
-            let Load { kind, factor, .. } = &self.spec.load[*index];
-            let in_space = |force: &[f64; 3]| std::array::from_fn(|c| factor * force[c]);
-            let master = nodes.first().copied();
-            match (master, kind) {
-                (Some(master), LoadKind::Force { total, .. }) => vec![(master, in_space(total))],
-                (Some(master), LoadKind::Turning { force, moment }) => {
-                    let moment = moment.map(|component| factor * component);
-                    self.held.frame.levers[&master].forces(master, in_space(force), moment)
-                }
-                _ => Vec::new(),
-            }
-        })
-    }
-
-    /// Return the nodal forces of [`SceneBody::load`] and those on rigid surfaces as forces at dofs.
-    pub fn load_on_dofs(&self, load: &NodalForces<D>) -> NodalForces<D> {
-        load.iter().chain(self.rigid_forces()).flat_map(|(node, force)| self.held.frame.force(node, force)).collect()
-    }
-
-    /// Return the load vector f at all dofs, from the nodal forces at all nodes.
-    pub fn load_vector(&self, load: &NodalForces<D>) -> Vec<f64> {
-        let mut load = load.all(self.space.nodes.len());
-        for (node, total) in self.rigid_forces() {
-            (0..D).for_each(|c| load[D * node as usize + c] += total[c]);
+            _ => self.on_surface(load, 1.0, mesh),
         }
-        self.held.frame.forces(&mut load);
-        load
     }
 
     /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane stress. There the
@@ -280,7 +142,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         if self.spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
             return None;
         }
-        let places = || self.space.nodes.iter().map(|&x| self.space.in_scene(x));
+        let places = || self.mesh.space.nodes.iter().map(|&x| self.mesh.space.in_scene(x));
         let largest = |spec: &ElasticitySpec| match &spec.constants {
             Constants::Isotropic { poisson, .. } => places().map(|x| poisson.eval(x)).fold(0.0, f64::max),
             _ => 0.0,
@@ -290,64 +152,6 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         (poisson > LOCKING).then(|| {
             format!("body {name}: Poisson's ratio is {poisson}: linear elements are far too stiff there; set order = 2")
         })
-    }
-
-    /// Check a body in several unconnected parts. Supports and springs must leave it no more rigid motions than a connected body
-    /// would have. The reason is that contact and loads treat its rigid motions as those of one body.
-    ///
-    /// # Errors
-    /// Supports and springs leave more. The error names the place of a free part.
-    fn check_held(&self, parts: &mesh::Components, mesh: &Mesh<D>) -> Result<()> {
-        if parts.count == 1 {
-            return Ok(());
-        }
-        let space = &self.space;
-        let part_of = |node: u32| parts.of_node[node as usize] as usize;
-        let mut extents = vec![PointExtent::default(); parts.count];
-        let mut first: Vec<Option<[f64; D]>> = vec![None; parts.count];
-        for (node, x) in (0..).zip(&space.nodes) {
-            extents[part_of(node)].add(*x);
-            first[part_of(node)].get_or_insert(*x);
-        }
-        let motions: Vec<Vec<RigidMotion<D>>> =
-            extents.iter().map(|extent| rigid::of(extent, space.axisymmetric)).collect();
-        // In each of these motions one part moves and the others stay at rest.
-        let each: Vec<(usize, &RigidMotion<D>)> = motions
-            .iter()
-            .enumerate()
-            .flat_map(|(number, own)| own.iter().map(move |motion| (number, motion)))
-            .collect();
-        let left = |moving: &[(usize, &RigidMotion<D>)]| {
-            let at = |k: usize, node: u32| match moving[k].0 == part_of(node) {
-                true => moving[k].1.at(&space.nodes[node as usize]),
-                false => [0.0; D],
-            };
-            self.left(moving.len(), &at).len()
-        };
-        let free = self.free();
-        let whole = self.left(free.len(), &|k, node| free[k].at(&space.nodes[node as usize])).len();
-        if left(&each) <= whole {
-            return Ok(());
-        }
-        // Contact may resist a part to which supports leave some motions. The part with the most free motions is reported.
-        let alone = |number: usize| left(&each.iter().filter(|moving| moving.0 == number).copied().collect::<Vec<_>>());
-        let most = (0..parts.count).min_by_key(|&number| std::cmp::Reverse(alone(number))).unwrap_or(0);
-        let at = first[most].map_or([0.0; 3], |x| space.in_scene(x));
-        let (name, count) = (&self.spec.name.value, parts.count);
-        let message =
-            format!("body `{name}` is in {count} parts that share no facet, and the one at {} is not held", point(at));
-        Err(Error::mesh(&mesh.path, None, message)
-            .help("make a body of each part (`split = true` in its table), support each of them, or let them share facets (in the script: `Coherence;`)"))
-    }
-
-    /// Return the nodes of linear displacements, sorted.
-    pub fn coarse_nodes(&self) -> Vec<u32> {
-        coarse_nodes(&self.space, &self.held.frame)
-    }
-
-    /// Return the interpolation of the dofs from those at these nodes.
-    pub fn interpolation(&self, coarse: &[u32]) -> Prolongation {
-        from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
     }
 
     /// Assemble K on its graph, with f and the supports. `imposed` is the rigid motion that was subtracted from `prescribed`, if
@@ -362,23 +166,21 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
-        let mut stiffness = assemble::stiffness(&self.space, graph, &self.held.frame, &self.elasticity).map_err(
-            |defect| match defect {
+        let mut stiffness = assemble::stiffness(&self.mesh.space, graph, &self.mesh.held.frame, &self.elasticity)
+            .map_err(|defect| match defect {
                 assemble::Defect::Inverted(cell) => {
-                    let corner = self.space.in_scene(self.space.cell_nodes(cell)[0]);
+                    let corner = self.mesh.space.in_scene(self.mesh.space.cell_nodes(cell)[0]);
                     let message = format!("body `{}`: the curved cell at {} is folded", name.value, point(corner));
                     Error::mesh(&mesh.path, None, message).help("refine the mesh there, or use order = 1")
                 }
                 assemble::Defect::Elasticity(number, x, flaw) => refusal(self.spec, number, Some(x), &flaw),
-            },
-        )?;
+            })?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
             return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
         }
-        let frame = &self.held.frame;
-        self.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
-        frame.turn_matrix(&mut stiffness);
+        let frame = &self.mesh.held.frame;
+        self.mesh.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
         Ok(support(stiffness, load, prescribed, imposed))
@@ -389,14 +191,14 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 ///
 /// # Errors
 /// The force is not finite somewhere, or beyond the range of numbers.
-fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Subdivision) -> Result<NodalForces<D>> {
+fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = FieldValues::of("this body force", &name.value);
     let density = |x: [f64; D]| {
         let x = space.in_scene(x);
         std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x))
     };
-    let load = assemble::body_force(space, parts, &density);
+    let load = assemble::body_force(space, &density);
     values.refused()?;
     if !load.is_finite() {
         return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
@@ -409,34 +211,6 @@ fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, parts: Subdivis
 fn too_large(spec: &BodySpec) -> Error {
     Error::scene(&spec.name.place, format!("body `{}`: its loads together are too large", spec.name.value))
         .label("their forces are beyond the range of numbers")
-}
-
-/// Facts of a whole body, and the points of the mesh that its nodes come from.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub struct BodyFacts {
-    /// Point of the mesh of each node.
-    pub points: Vec<u32>,
-    /// Number of nodes of the body and their extent.
-    pub extent: PointExtent,
-    /// Number of cells.
-    pub cells: usize,
-    /// Area (volume) of the body; in a body of revolution the volume of the rings.
-    pub volume: f64,
-    /// Means over the body of the moduli along x, y, z ([`Elasticity::moduli`]).
-    pub moduli: [f64; 3],
-    /// Nodes at which the body is loaded or constrained.
-    pub outer: Outer,
-}
-
-impl BodyFacts {
-    /// Restrict the facts to the nodes in the sorted slice `nodes`, which are renumbered by their positions there.
-    pub fn on(&self, nodes: &[u32]) -> Self {
-        Self {
-            points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
-            outer: self.outer.on(nodes),
-            ..*self
-        }
-    }
 }
 
 /// Return the bodies with their spaces, elasticity, supports and springs.
@@ -453,16 +227,36 @@ pub fn parts<'a, const D: usize>(
     for (index, spec) in bodies.iter().enumerate() {
         let space = space(spec, mesh, scene.plane)?;
         let checked = &checked[index];
+        refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
-        let facts = facts(spec, &space, &elasticity, checked.points.clone());
+        let (points, extent) = (checked.points.clone(), PointExtent::of(space.nodes.iter().copied()));
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;
-        let mut part = SceneBody { spec, space, held, springs, elasticity: Rc::new(elasticity), facts };
-        let loaded = spec.load.iter().map(|load| part.load_forces(load, mesh)).collect::<Result<_>>()?;
-        part.facts.outer = Outer::new(spec, &part.space, mesh, loaded)?;
-        part.check_held(&checked.parts, mesh)?;
-        parts.push(part);
+        let cells = if spec.regions.is_empty() { 0 } else { space.cell_count() };
+        let regions = (0..cells).map(|cell| elasticity.region(cell)).collect();
+        let none = || Csr::new(space.dofs());
+        let (rows, nodal_rows, approach) = (none(), none(), none());
+        let mesh = BodyMesh {
+            space: Rc::new(space),
+            regions,
+            held,
+            springs,
+            points,
+            extent,
+            rows,
+            nodal_rows,
+            approach,
+            load: NodalForces::default(),
+            left: Vec::new(),
+            unsupported: Vec::new(),
+            imposed: None,
+            prescribed: Vec::new(),
+            share: None,
+            is_owned: true,
+            graph: OnceCell::new(),
+        };
+        parts.push(SceneBody { spec, elasticity: Rc::new(elasticity), mesh });
     }
     Ok(parts)
 }
@@ -484,16 +278,21 @@ fn space<const D: usize>(spec: &BodySpec, mesh: &Mesh<D>, plane: Plane) -> Resul
     Err(Error::mesh(&mesh.path, None, message).help(help))
 }
 
-/// Return the facts of a body whose nodes are these `points` of the mesh.
-fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elasticity, points: Vec<u32>) -> BodyFacts {
-    let cells = space.cell_count();
-    let volume = (0..cells).map(|cell| space.share(cell)).collect::<Total>().value();
-    let moduli = match spec.regions.is_empty() && elasticity.is_constant() {
-        true => elasticity.moduli(0, [0.0; 3]).unwrap_or_default(),
-        false => moduli(space, elasticity, 0..cells).map(|sum| sum / volume),
-    };
-    let extent = PointExtent::of(space.nodes.iter().copied());
-    BodyFacts { points, extent, cells, volume, moduli, outer: Outer::default() }
+/// Check that all cells of a body are connected by facets.
+///
+/// # Errors
+/// They are not. The error names the place of the second part.
+fn refuse_parts<const D: usize>(
+    spec: &BodySpec,
+    space: &Space<D>,
+    parts: &mesh::Components,
+    mesh: &Mesh<D>,
+) -> Result<()> {
+    let Some(other) = parts.of_node.iter().position(|&part| part == 1) else { return Ok(()) };
+    let (name, at) = (&spec.name.value, point(space.in_scene(space.nodes[other])));
+    let message = format!("body `{name}` is in {} parts that share no facet, one of them at {at}", parts.count);
+    Err(Error::mesh(&mesh.path, None, message)
+        .help("make a body of each part (`split = true` in its table), or let them share facets (in the script: `Coherence;`)"))
 }
 
 /// Return the elasticity of the cells of a body.
@@ -503,7 +302,7 @@ fn facts<const D: usize>(spec: &BodySpec, space: &Space<D>, elasticity: &Elastic
 fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>, plane: Plane) -> Result<Elasticity> {
     let mut of_cell = vec![0; if spec.regions.is_empty() { 0 } else { space.cell_count() }];
     for (number, region) in spec.regions.iter().enumerate() {
-        let cells = space.cells_in(find_group(mesh, &region.on, &[D], "region")?);
+        let cells = space.cells_in(region.group(mesh)?);
         if cells.is_empty() {
             return Err(not_on_body(&region.on, &spec.name.value));
         }
@@ -568,15 +367,4 @@ fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> 
             .label("strains of the meridian cause shear stresses along the circles")
             .help("in axisymmetric scenes one axis of the material runs along the circles: turn axes 1 and 2 alone"),
     }
-}
-
-/// Return the moduli against pressure along x, y, z, integrated over some cells. A cell whose constants make no material at its
-/// middle contributes zero; assembly refuses it.
-fn moduli<const D: usize>(space: &Space<D>, elasticity: &Elasticity, cells: impl Iterator<Item = usize>) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for cell in cells {
-        let moduli = elasticity.moduli(cell, space.in_scene(space.centroid(cell))).unwrap_or_default();
-        crate::contact::add(&mut sum, moduli.map(|modulus| space.share(cell) * modulus));
-    }
-    sum
 }

@@ -1,9 +1,8 @@
 //! Evaluation of the displacements of a body: fields for output, forces and their balance, unbalanced forces and the energy in
 //! them, errors against a known solution. Each rank evaluates its part.
 
-use super::approach::Outer;
-use super::patterns::point;
-use super::supports::Constraints;
+use super::body::BodyMesh;
+use super::groups::point;
 use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
@@ -51,9 +50,8 @@ pub trait Post {
     /// Return the contribution of owned nodes to B v, one entry per contact row, for a field v with one entry per dof.
     fn trace(&self, field: &[f64]) -> Vec<f64>;
 
-    /// Return the contribution of the owned nodes to the mean displacement (x, y, z) of the outer part of the body. The outer
-    /// part is where the body is loaded along `direction`, else where it is constrained along it, else the whole body.
-    fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3];
+    /// Return the contribution of owned nodes to the displacement of the body towards each of its contact surfaces.
+    fn approach(&self, v: &[f64]) -> Vec<f64>;
 
     /// Return the norms of the error against the known displacements of the scene, and the norms of these displacements. They are
     /// the L2 norm, the H1 seminorm and the energy norm ([`displacement::norms_of_error`]) on the cells that this rank writes. The result is
@@ -70,29 +68,18 @@ pub struct OnPart<const D: usize> {
     pub name: String,
     /// Known displacements, if the scene has them.
     pub exact: Option<Vec<Expression>>,
-    /// Where the body is loaded or constrained.
-    pub outer: Outer,
-    /// Cells and nodes.
-    pub space: Rc<Space<D>>,
-    /// The same, cut apart where the material jumps.
+    /// Cells, nodes, supports, springs, and rows with displacements of nodes as columns.
+    pub mesh: Rc<BodyMesh<D>>,
+    /// The space, cut apart where the material jumps.
     pub split: Split<D>,
     /// Whether this rank owns each node.
     pub own: Vec<bool>,
     /// Elasticity of the cells.
     pub elasticity: Rc<Elasticity>,
-    /// Supports and rigid surfaces.
-    pub held: Rc<Constraints<D>>,
-    pub springs: Vec<Vec<NodalBlock<D>>>,
     /// Number of supports in the scene.
     pub supports: usize,
-    /// Nodal forces of the loads.
+    /// Nodal forces of the loads without those on rigid surfaces.
     pub load: Vec<f64>,
-    /// Forces on rigid surfaces, at few nodes of each, all of which have one owner.
-    pub rigid: Vec<(u32, [f64; D])>,
-    /// Contact rows with displacements of nodes as columns.
-    pub rows: Csr,
-    /// Extent of the whole body.
-    pub extent: PointExtent,
     /// Number of nodes of the whole body.
     pub nodes: usize,
 }
@@ -103,7 +90,7 @@ impl<const D: usize> OnPart<D> {
     /// # Errors
     /// One is not.
     pub fn check_exact(&self) -> Result<()> {
-        let places = || self.space.nodes.iter().map(|&x| self.space.in_scene(x));
+        let places = || self.mesh.space.nodes.iter().map(|&x| self.mesh.space.in_scene(x));
         for (component, x) in self.exact.iter().flatten().flat_map(|u| places().map(move |x| (u, x))) {
             let value = component.eval(&x[..D]);
             if !value.is_finite() {
@@ -115,24 +102,30 @@ impl<const D: usize> OnPart<D> {
         Ok(())
     }
 
+    /// Return the point of the mesh for each node of the cells that this rank writes.
+    pub fn points(&self) -> Vec<u32> {
+        let shown = self.split.space.part(self.owned()).1;
+        shown.into_iter().map(|node| self.mesh.points[self.split.origin(node) as usize]).collect()
+    }
+
     /// Return the indices of the cells that this rank writes and measures. Each cell of the body belongs to the rank that owns
     /// its first node.
     pub fn owned(&self) -> impl Iterator<Item = usize> {
         let is_own = |cell: &[u32]| cell.iter().min().is_some_and(|&first| self.own[first as usize]);
-        let cells = self.space.cells.chunks_exact(self.space.stride).enumerate();
+        let cells = self.mesh.space.cells.chunks_exact(self.mesh.space.stride).enumerate();
         cells.filter(move |(_, cell)| is_own(cell)).map(|(number, _)| number)
     }
 
     /// Return the displacements of the nodes of the part.
     fn nodal(&self, v: &[f64]) -> Vec<f64> {
-        self.held.frame.displacements(v)
+        self.mesh.held.frame.displacements(v)
     }
 
     /// Return the reactions at the owned nodes of supports and rigid surfaces, in increasing order of the nodes.
     fn reactions(&self, u: &[f64], known: &[f64]) -> Vec<(u32, [f64; D])> {
-        let Self { space, own, .. } = self;
+        let (space, own) = (&self.mesh.space, &self.own);
         let mut held = vec![false; own.len()];
-        let nodes = self.held.nodes().filter(|&node| own[node as usize]);
+        let nodes = self.mesh.held.nodes().filter(|&node| own[node as usize]);
         nodes.for_each(|node| held[node as usize] = true);
         let touched = |cell: &[u32]| cell.iter().any(|&node| held[node as usize]);
         let cells = space.cells.chunks_exact(space.stride).enumerate().filter(|(_, cell)| touched(cell));
@@ -148,13 +141,20 @@ impl<const D: usize> OnPart<D> {
         (0..nodes.len()).filter(|&place| held[nodes[place] as usize]).map(at).collect()
     }
 
+    /// Return the contribution of owned nodes to the products of rows, whose columns are displacements of nodes, with a field.
+    fn products_with(&self, rows: &Csr, field: &[f64]) -> Vec<f64> {
+        let nodal = self.nodal(field);
+        let own = |row: usize| rows.row(row).filter(|(dof, _)| self.own[dof / D]);
+        (0..rows.rows()).map(|row| own(row).map(|(dof, b)| b * nodal[dof]).sum()).collect()
+    }
+
     fn own_dofs(&self) -> impl Iterator<Item = usize> {
         (0..self.load.len()).filter(|dof| self.own[dof / D])
     }
 
     /// Set the entries at dofs that supports prescribe to zero.
     fn clear(&self, field: &mut [f64]) {
-        self.held.prescribed.keys().for_each(|&dof| field[dof] = 0.0);
+        self.mesh.held.prescribed.keys().for_each(|&dof| field[dof] = 0.0);
     }
 }
 
@@ -177,7 +177,7 @@ impl<const D: usize> Post for OnPart<D> {
         BodyField {
             name: self.name.clone(),
             points: owned.nodes.iter().map(|&x| owned.in_scene(x)).collect(),
-            cell: CellKind::simplex(D, self.space.order.degree()),
+            cell: CellKind::simplex(D, self.mesh.space.order.degree()),
             connectivity: owned.cells,
             displacement: shown.iter().map(displacement).collect(),
             von_mises,
@@ -188,24 +188,24 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn strain(&self, bent: &[f64]) -> Strained {
-        displacement::largest_strain(&self.space, self.owned(), &self.nodal(bent))
+        displacement::largest_strain(&self.mesh.space, self.owned(), &self.nodal(bent))
     }
 
     fn rotation(&self, v: &[f64]) -> [f64; 3] {
-        displacement::rotation(&self.space, self.owned(), &self.nodal(v))
+        displacement::rotation(&self.mesh.space, self.owned(), &self.nodal(v))
     }
 
     /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
     fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance {
         let u = self.nodal(v);
         let mut contact = vec![0.0; u.len()];
-        self.rows.add_transpose(-1.0, force, &mut contact);
-        let space = &*self.space;
+        self.mesh.nodal_rows.add_transpose(-1.0, force, &mut contact);
+        let space = &self.mesh.space;
         let mut sum = Resultants { size: [0.0; 2], part: self };
         let parts = vec![sum.of(&self.load), sum.of(&contact)];
         let mut known: Vec<f64> = self.load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
         let mut springs = Vec::new();
-        for blocks in &self.springs {
+        for blocks in &self.mesh.springs {
             let mut pull = vec![0.0; u.len()];
             for NodalBlock { nodes: [a, b], block } in blocks {
                 for (i, row) in block.iter().enumerate() {
@@ -217,13 +217,13 @@ impl<const D: usize> Post for OnPart<D> {
             crate::linalg::axpy(1.0, &pull, &mut known);
         }
         let mut supports = vec![Resultant::default(); self.supports];
-        let mut rigid = vec![Resultant::default(); self.held.rigid.len()];
+        let mut rigid = vec![Resultant::default(); self.mesh.held.rigid.len()];
         for (node, reaction) in self.reactions(&u, &known) {
             sum.grow(node, reaction);
-            match self.held.rigid.iter().position(|(_, nodes)| nodes.binary_search(&node).is_ok()) {
+            match self.mesh.held.rigid.iter().position(|surface| surface.nodes.binary_search(&node).is_ok()) {
                 Some(surface) => rigid[surface].add(space, node, reaction),
                 None => {
-                    for (support, part) in self.held.split(node, reaction) {
+                    for (support, part) in self.mesh.held.split(node, reaction) {
                         supports[support].add(space, node, part);
                     }
                 }
@@ -234,21 +234,21 @@ impl<const D: usize> Post for OnPart<D> {
 
     fn unbalanced(&self, bent: &[f64], force: &[f64], springs: &[f64]) -> Unbalanced {
         let u = self.nodal(bent);
-        let space = &*self.space;
+        let space = &self.mesh.space;
         let Internal { force: inner, rounding, mut diagonal, bulk } =
             displacement::internal_forces(space, &self.elasticity, 0..space.cell_count(), &u);
         let mut sum = Sum { force: self.load.clone(), size: rounding };
         let mut resisting = vec![0.0; bulk.len()];
         for (row, (force, spring)) in force.iter().zip(springs).enumerate() {
-            let whole: f64 = self.rows.row(row).map(|(_, b)| b.abs()).sum();
-            for (dof, b) in self.rows.row(row) {
+            let whole: f64 = self.mesh.nodal_rows.row(row).map(|(_, b)| b.abs()).sum();
+            for (dof, b) in self.mesh.nodal_rows.row(row) {
                 sum.add(dof, -b * force, D);
                 resisting[dof / D] += spring * b.abs() * whole;
             }
         }
         let mut strain = self.own_dofs().map(|dof| u[dof] * inner[dof]).sum::<f64>();
         inner.iter().enumerate().for_each(|(dof, inner)| sum.force[dof] -= inner);
-        for block in self.springs.iter().flatten() {
+        for block in self.mesh.springs.iter().flatten() {
             let [a, b] = block.nodes.map(|node| D * node as usize);
             for (i, row) in block.block.iter().enumerate() {
                 let pull = dot(row, &u[b..b + D]);
@@ -257,14 +257,14 @@ impl<const D: usize> Post for OnPart<D> {
                 diagonal[a / D] += if a == b { row[i].abs() } else { 0.0 };
             }
         }
-        for (node, total) in &self.rigid {
-            (0..D).for_each(|c| sum.add(D * *node as usize + c, total[c], D));
+        for (node, total) in self.mesh.rigid_forces() {
+            (0..D).for_each(|c| sum.add(D * node as usize + c, total[c], D));
         }
         for per_node in [&mut sum.size, &mut diagonal, &mut resisting] {
-            self.held.frame.sum(per_node);
+            self.mesh.held.frame.sum(per_node);
         }
         let Sum { mut force, size } = sum;
-        self.held.frame.forces(&mut force);
+        self.mesh.held.frame.forces(&mut force);
         self.clear(&mut force);
         for (dof, force) in force.iter_mut().enumerate() {
             let counts = if self.own[dof / D] { (force.abs() - size[dof / D]).max(0.0) } else { 0.0 };
@@ -284,15 +284,15 @@ impl<const D: usize> Post for OnPart<D> {
 
     fn on_hats(&self, unbalanced: &Unbalanced) -> Vec<f64> {
         let mut sums = Vec::new();
-        let force = self.held.frame.displacements(&unbalanced.force);
+        let force = self.mesh.held.frame.displacements(&unbalanced.force);
         let nodes = (0..unbalanced.bulk.len()).filter(|&node| self.own[node]);
-        let nodes: Vec<usize> = nodes.filter(|node| !self.held.frame.master.contains_key(&(*node as u32))).collect();
-        for grid in grids::<D>(&self.extent, self.nodes) {
+        let nodes: Vec<usize> = nodes.filter(|node| self.mesh.held.frame.node(*node as u32) == *node as u32).collect();
+        for grid in grids::<D>(&self.mesh.extent, self.nodes) {
             let begin = sums.len();
             sums.resize(begin + (D + 2) * grid.len(), 0.0);
             for &node in &nodes {
                 let (force, bulk) = (&force[D * node..][..D], unbalanced.bulk[node] / grid.step.powi(2));
-                for (hat, value) in grid.hats(&self.space.nodes[node]) {
+                for (hat, value) in grid.hats(&self.mesh.space.nodes[node]) {
                     let sums = &mut sums[begin + (D + 2) * hat..][..D + 2];
                     (0..D).for_each(|c| sums[c] += value * force[c]);
                     sums[D] += value * bulk;
@@ -304,10 +304,10 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn smooth(&self, sums: &[f64], with_springs: bool) -> Vec<f64> {
-        let space = &*self.space;
+        let space = &self.mesh.space;
         let mut field = vec![0.0; self.load.len()];
         let mut rest = sums;
-        for grid in grids::<D>(&self.extent, self.nodes) {
+        for grid in grids::<D>(&self.mesh.extent, self.nodes) {
             let of_grid;
             (of_grid, rest) = rest.split_at((D + 2) * grid.len());
             let moved: Vec<[f64; D]> = of_grid
@@ -321,16 +321,16 @@ impl<const D: usize> Post for OnPart<D> {
                 grid.hats(x).for_each(|(hat, value)| (0..D).for_each(|c| u[c] += value * moved[hat][c]));
             }
         }
-        let mut field = self.held.frame.dofs(&field);
+        let mut field = self.mesh.held.frame.dofs(&field);
         self.clear(&mut field);
         field
     }
 
     fn products(&self, fields: &[Vec<f64>]) -> Vec<f64> {
-        let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.held.frame.displacements(field)).collect();
+        let nodal: Vec<Vec<f64>> = fields.iter().map(|field| self.mesh.held.frame.displacements(field)).collect();
         let n = fields.len();
-        let mut products = displacement::energy_products(&self.space, &self.elasticity, self.owned(), &nodal);
-        for block in self.springs.iter().flatten().filter(|block| self.own[block.nodes[0] as usize]) {
+        let mut products = displacement::energy_products(&self.mesh.space, &self.elasticity, self.owned(), &nodal);
+        for block in self.mesh.springs.iter().flatten().filter(|block| self.own[block.nodes[0] as usize]) {
             let [a, b] = block.nodes.map(|node| D * node as usize);
             for (i, row) in block.block.iter().enumerate() {
                 for (place, product) in products.iter_mut().enumerate() {
@@ -342,25 +342,23 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn trace(&self, field: &[f64]) -> Vec<f64> {
-        let nodal = self.held.frame.displacements(field);
-        let own = |row: usize| self.rows.row(row).filter(|(dof, _)| self.own[dof / D]);
-        (0..self.rows.rows()).map(|row| own(row).map(|(dof, b)| b * nodal[dof]).sum()).collect()
+        self.products_with(&self.mesh.nodal_rows, field)
     }
 
-    fn outer(&self, v: &[f64], direction: [f64; 3]) -> [f64; 3] {
-        self.outer.mean::<D>(&self.nodal(v), &self.own, direction)
+    fn approach(&self, v: &[f64]) -> Vec<f64> {
+        self.products_with(&self.mesh.approach, v)
     }
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {
         let exact = self.exact.as_ref()?;
         let at = |x: [f64; D]| {
-            let x = &self.space.in_scene(x)[..D];
+            let x = &self.mesh.space.in_scene(x)[..D];
             displacement::Exact {
                 value: std::array::from_fn(|i| exact[i].eval(x)),
                 gradient: std::array::from_fn(|i| std::array::from_fn(|j| exact[i].eval_by(j, x).1)),
             }
         };
-        let norms = displacement::norms_of_error(&self.space, self.owned(), &self.elasticity, &self.nodal(v), &at);
+        let norms = displacement::norms_of_error(&self.mesh.space, self.owned(), &self.elasticity, &self.nodal(v), &at);
         Some(norms.map(|norms| [norms.l2, norms.h1, norms.energy]))
     }
 }
@@ -400,7 +398,7 @@ impl<const D: usize> Resultants<'_, D> {
         let mut resultant = Resultant::default();
         for (node, force) in forces.chunks_exact(D).enumerate().filter(|(node, _)| self.part.own[*node]) {
             let force: [f64; D] = std::array::from_fn(|c| force[c]);
-            resultant.add(&self.part.space, node as u32, force);
+            resultant.add(&self.part.mesh.space, node as u32, force);
             self.grow(node as u32, force);
         }
         resultant
@@ -408,9 +406,9 @@ impl<const D: usize> Resultants<'_, D> {
 
     fn grow(&mut self, node: u32, force: [f64; D]) {
         let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let size = length(self.part.space.net_force(force));
+        let size = length(self.part.mesh.space.net_force(force));
         self.size[0] += size;
-        self.size[1] += size * length(pad(self.part.space.nodes[node as usize]));
+        self.size[1] += size * length(pad(self.part.mesh.space.nodes[node as usize]));
     }
 }
 

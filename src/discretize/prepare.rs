@@ -3,19 +3,20 @@
 //! The factory requests facts about each body, chooses solvers, and decides which bodies share a matrix.
 
 use super::assembler::{Factory, Outline};
+use super::body::BodyMesh;
 use super::distribute::Partition;
-use super::local::{LocalBody, SharedBody};
-use super::mechanism;
+use super::local::BodyInfo;
 use super::pairs::{self, ContactFacts};
 use super::part::parts;
 use super::unassembled::Unassembled;
 use super::verify::Verified;
+use super::{chords, mechanism};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
-use crate::model::Mechanism;
+use crate::model::{BodySlot, Mechanism};
 use crate::problem::BodySpec;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -24,8 +25,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, P: Plain")]
 pub struct ReplicatedProblem<const D: usize, P> {
-    /// Bodies in the order of the scene.
-    pub bodies: Vec<SharedBody<D>>,
+    /// Bodies in the order of the scene: arrays of the model, and facts for reports.
+    pub bodies: Vec<(BodySlot, BodyInfo)>,
+    /// Trace of each body of the rigid motion that its supports impose.
+    pub imposed: Vec<Vec<f64>>,
     /// Arrays on which the method works.
     pub pairs: Vec<ContactPair>,
     /// Origin of each pair.
@@ -48,17 +51,17 @@ pub struct Whole<'a, const D: usize> {
 
 impl<const D: usize> Whole<'_, D> {
     /// Return everything, for the only rank.
-    pub fn into_locals(self) -> Vec<Option<LocalBody<D>>> {
-        self.bodies.into_iter().map(|body| Some(LocalBody::whole(body, true))).collect()
+    pub fn into_locals(self) -> Vec<Option<BodyMesh<D>>> {
+        self.bodies.into_iter().map(|body| Some(body.part.mesh)).collect()
     }
 
     /// Return what a rank receives of each body.
-    pub fn on(&self, rank: usize) -> Vec<Option<LocalBody<D>>> {
+    pub fn on(&self, rank: usize) -> Vec<Option<BodyMesh<D>>> {
         let of_body = |(index, body): (usize, &Unassembled<D>)| {
             let is_owned = body.owner == rank;
             match place_of(&self.partitions, index) {
-                Some((partition, number)) => Some(LocalBody::restrict(body, partition, number, rank, self.keep)),
-                None => (is_owned || self.keep).then(|| LocalBody::whole(body.clone(), is_owned)),
+                Some((partition, number)) => Some(body.part.mesh.restrict(partition, number, rank, self.keep)),
+                None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.part.mesh.clone() }),
             }
         };
         self.bodies.iter().enumerate().map(of_body).collect()
@@ -91,22 +94,20 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         contacts.push(found.facts);
         fine.extend(found.fine);
     }
+    let lack = chords::lack(&parts, mesh)?;
     let mut bodies = Unassembled::all(parts, &pairs, mesh)?;
-    let mechanisms = mechanism::fix(&mut bodies, &pairs);
+    let mechanisms = mechanism::fix(&mut bodies, &pairs, lack);
     bodies.iter_mut().for_each(Unassembled::support);
     let plan = plan(&bodies, factory)?;
     let partitions = partitions(&bodies, &pairs, factory, ranks);
     for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
         let body = &mut bodies[index];
         (body.owner, body.ranks) = (owner, ranks);
-        body.on_dofs = place_of(&partitions, index).map(|_| body.on_dofs());
-        if keep {
-            body.unloaded = body.part.unloaded(mesh)?;
-        }
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, fine, plan };
+    let imposed = bodies.iter().map(Unassembled::imposed_trace).collect();
+    let shared = ReplicatedProblem { bodies: shared, imposed, pairs, contacts, mechanisms, fine, plan };
     Ok((shared, Whole { bodies, partitions, keep }))
 }
 
@@ -116,17 +117,17 @@ pub fn prepare<'a, const D: usize, F: Factory>(
 /// See [`Factory::plan`].
 fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) -> Result<F::SolverPlan> {
     // Facts of a body are computed when they are requested.
-    let graphs: Vec<_> = bodies.iter().map(|body| move || body.graph()).collect();
+    let graphs: Vec<_> = bodies.iter().map(|body| move || body.part.mesh.graph()).collect();
     let at: Vec<_> =
-        bodies.iter().map(|body| move |k: usize, dof: usize| body.part.dof_of(&body.free[k], dof)).collect();
+        bodies.iter().map(|body| move |k: usize, dof: usize| body.part.mesh.dof_of(&body.free[k], dof)).collect();
     let outline = |index: usize| {
-        let Unassembled { part, rows, supported, free, .. } = &bodies[index];
+        let Unassembled { part, free, .. } = &bodies[index];
         Outline {
             name: &part.spec.name.value,
             dimension: D,
-            order: part.space.order,
-            rows,
-            prescribed: &supported.prescribed,
+            order: part.mesh.space.order,
+            rows: &part.mesh.rows,
+            prescribed: &part.mesh.prescribed,
             motions: AtDofs { count: free.len(), at: &at[index] },
             graph: &graphs[index],
         }
@@ -153,7 +154,7 @@ fn owners<const D: usize>(
     partitions: &[Partition],
     ranks: usize,
 ) -> Vec<(usize, Vec<usize>)> {
-    let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.space.dofs() };
+    let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.mesh.space.dofs() };
     let owners = crate::parallel::owners(&(0..bodies.len()).map(dofs).collect::<Vec<_>>(), ranks);
     let of_body = |(body, owner): (usize, usize)| match place_of(partitions, body) {
         Some((partition, number)) => (partition.leader(number), partition.ranks(number)),

@@ -1,16 +1,14 @@
 //! What holds a body: supports and rigid surfaces as conditions on its nodes, and springs to the ground. Moments on surfaces are here, too,
 //! since rigid surfaces turn about the same centre.
 
-use super::patterns::{FieldValues, earlier, find_group, not_on_body, of_body, point, without_area};
+use super::groups::{FieldValues, Line, earlier, not_on_body, of_body, point, without_area};
 use crate::error::{Error, Located, Place, Result, shown};
 use crate::exchange::Plain;
 use crate::expression::Field;
-use crate::fem::{
-    Facets, Frame, Levers, NodalBlock, NodalForces, Space, Subdivision, cross, length, minus, place, surface,
-};
+use crate::fem::{Facets, Frame, NodalBlock, NodalForces, Space, cross, length, minus, place, surface};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec};
+use crate::problem::body::{BodySpec, LoadKind, SpringKind, SpringSpec};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -37,8 +35,20 @@ pub struct Constraints<const D: usize> {
     pub prescribed: HashMap<usize, f64>,
     /// Independent constrained directions at each node. Those of tied nodes are at their master.
     directions: BTreeMap<u32, Vec<Direction<D>>>,
-    /// Tied nodes of each rigid load, with the index of the load.
-    pub rigid: Vec<(usize, Vec<u32>)>,
+    /// The rigid surfaces.
+    pub rigid: Vec<RigidSurface<D>>,
+}
+
+/// A surface whose nodes move as one under a load.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
+pub struct RigidSurface<const D: usize> {
+    /// Index of the load in the scene.
+    pub load: usize,
+    /// Its nodes, sorted. The first one is the master, whose dofs move all of them.
+    pub nodes: Vec<u32>,
+    /// Nodal forces that do the work of the load on the dofs of the surface.
+    pub forces: Vec<(u32, [f64; D])>,
 }
 
 /// Sine below which two directions are the same.
@@ -55,8 +65,7 @@ impl<const D: usize> Constraints<D> {
         held.tie(spec, space, mesh)?;
         let mut conditions = held.symmetry(space);
         for (support, fix) in spec.fix.iter().enumerate() {
-            let dimensions: Vec<usize> = if fix.normal.is_some() { vec![D - 1] } else { (0..=D).rev().collect() };
-            let group = find_group(mesh, &fix.on, &dimensions, "support")?;
+            let group = fix.group(mesh)?;
             let nodes = space.nodes_on(group);
             if nodes.is_empty() {
                 return Err(not_on_body(&fix.on, &spec.name.value));
@@ -91,7 +100,11 @@ impl<const D: usize> Constraints<D> {
         let here = |node: u32| place(nodes, node);
         let prescribed = |(dof, value): (&usize, &f64)| Some((D * here((dof / D) as u32)? as usize + dof % D, *value));
         let directions = self.directions.iter().filter_map(|(node, at)| Some((here(*node)?, at.clone())));
-        let rigid = self.rigid.iter().map(|(load, tied)| (*load, tied.iter().filter_map(|&node| here(node)).collect()));
+        let rigid = self.rigid.iter().map(|surface| RigidSurface {
+            load: surface.load,
+            nodes: surface.nodes.iter().filter_map(|&node| here(node)).collect(),
+            forces: surface.forces.iter().filter_map(|&(node, force)| Some((here(node)?, force))).collect(),
+        });
         Self {
             frame: self.frame.on(nodes),
             prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
@@ -105,7 +118,7 @@ impl<const D: usize> Constraints<D> {
     fn symmetry(&self, space: &Space<D>) -> BTreeMap<u32, Vec<Condition<D>>> {
         let radial = Condition { direction: axis_vector(0), value: 0.0, support: None };
         let on_axis = (0..space.nodes.len() as u32).filter(|&node| space.on_axis(node));
-        let masters = self.rigid.iter().flat_map(|(_, nodes)| nodes.first().copied());
+        let masters = self.rigid.iter().map(|surface| surface.nodes[0]);
         let held = on_axis.chain(masters).filter(|_| space.axisymmetric);
         held.map(|node| (self.frame.node(node), vec![radial])).collect()
     }
@@ -114,11 +127,12 @@ impl<const D: usize> Constraints<D> {
     fn tie(&mut self, spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>) -> Result<()> {
         let mut taken: BTreeMap<u32, usize> = BTreeMap::new();
         for (index, load) in spec.load.iter().enumerate() {
-            let turns = matches!(load.kind, LoadKind::Turning { .. });
-            if !turns && !matches!(load.kind, LoadKind::Force { rigid: true, .. }) {
-                continue;
-            }
-            let group = find_group(mesh, &load.on, &[D - 1], "load")?;
+            let (total, moment) = match load.kind {
+                LoadKind::Force { total, rigid: true } => (total, None),
+                LoadKind::Turning { force, moment } => (force, Some(moment)),
+                _ => continue,
+            };
+            let group = load.group(mesh)?;
             let nodes = space.nodes_on(group);
             let Some(&master) = nodes.first() else {
                 return Err(not_on_body(&load.on, &spec.name.value));
@@ -134,38 +148,42 @@ impl<const D: usize> Constraints<D> {
                         .because(earlier(other))
                         .help("join the two surfaces in one physical group, with one force"));
                 }
-                if node != master {
-                    self.frame.master.insert(node, master);
-                    self.prescribed.extend((0..D).map(|c| (D * node as usize + c, 0.0)));
+            }
+            self.frame.tie(&nodes);
+            self.prescribed
+                .extend(nodes[1..].iter().flat_map(|&node| (0..D).map(move |c| (D * node as usize + c, 0.0))));
+            let force = total.map(|component| load.factor * component);
+            let mut forces = Vec::new();
+            if let Some(moment) = moment {
+                let facets = space.facets(group);
+                if surface::measure(space, &facets) == 0.0 {
+                    return Err(without_area(&load.on, spec));
                 }
+                forces.extend(self.turn(&nodes, centre(space, &facets), force, moment.map(|m| load.factor * m), space));
             }
-            if turns {
-                self.turn(load, &nodes, &space.facets(group), spec, space)?;
-            }
-            self.rigid.push((index, nodes));
+            forces.push((master, std::array::from_fn(|c| force[c])));
+            self.rigid.push(RigidSurface { load: index, nodes, forces });
         }
         Ok(())
     }
 
-    /// Let a rigid surface with these `nodes` turn.
+    /// Let a rigid surface with these `nodes` turn. Return nodal forces that do the work of the `moment` and of the force, which acts at the
+    /// `centre`, on the rotation.
     fn turn(
         &mut self,
-        load: &Load,
         nodes: &[u32],
-        facets: &Facets<D>,
-        spec: &BodySpec,
+        centre: [f64; 3],
+        force: [f64; 3],
+        moment: [f64; 3],
         space: &Space<D>,
-    ) -> Result<()> {
-        if surface::measure(space, facets) == 0.0 {
-            return Err(without_area(&load.on, spec));
+    ) -> Vec<(u32, [f64; D])> {
+        let x = |node: u32| space.nodes[node as usize];
+        let pole = self.frame.let_turn(nodes, x);
+        for c in 0..if D == 2 { 1 } else { D } {
+            self.prescribed.remove(&(D * pole as usize + c));
         }
-        let centre = centre(space, facets, Subdivision::Whole);
-        let levers = Levers::new(nodes, |node| space.nodes[node as usize], std::array::from_fn(|c| centre[c]));
-        for component in 0..if D == 2 { 1 } else { D } {
-            self.prescribed.remove(&(D * levers.pole as usize + component));
-        }
-        self.frame.levers.insert(nodes[0], levers);
-        Ok(())
+        let about_master = cross(minus(centre, pad(x(nodes[0]))), force);
+        self.frame.couple([nodes[0], pole], std::array::from_fn(|c| moment[c] + about_master[c]), x)
     }
 
     /// Turn the conditions at a node into prescribed dofs. If the conditions are inclined, the node gets axes of its own.
@@ -208,7 +226,8 @@ impl<const D: usize> Constraints<D> {
                     axes.push(rest.map(|r| r / size));
                 }
             }
-            self.frame.axes.insert(node, std::array::from_fn(|i| axes[i]));
+            let surface = self.rigid.iter().find(|surface| surface.nodes[0] == node);
+            self.frame.turn(node, std::array::from_fn(|i| axes[i]), surface.map_or(&[], |surface| &surface.nodes[1..]));
         }
         for (i, (axis, value)) in basis.iter().enumerate() {
             let component = if turned { i } else { (0..D).find(|&c| axis[c] == 1.0).unwrap_or(i) };
@@ -222,10 +241,9 @@ impl<const D: usize> Constraints<D> {
     /// # Errors
     /// It holds one.
     fn refuse_on_turning(&self, nodes: &[u32], on: &Located<String>, spec: &BodySpec) -> Result<()> {
-        let turns = |node: u32| self.frame.levers.contains_key(&self.frame.node(node));
-        let Some(node) = nodes.iter().copied().find(|&node| turns(node)) else { return Ok(()) };
-        let surface = self.rigid.iter().find(|(_, nodes)| nodes.binary_search(&node).is_ok());
-        let Some((load, _)) = surface else { return Ok(()) };
+        let turns = |surface: &&RigidSurface<D>| matches!(spec.load[surface.load].kind, LoadKind::Turning { .. });
+        let holds = |surface: &&RigidSurface<D>| nodes.iter().any(|node| surface.nodes.binary_search(node).is_ok());
+        let Some(RigidSurface { load, .. }) = self.rigid.iter().filter(turns).find(holds) else { return Ok(()) };
         let surface = &spec.load[*load].on;
         let message = format!(
             "body `{}`: the support on `{}` holds nodes of the rigid surface `{}`, which turns",
@@ -241,11 +259,11 @@ impl<const D: usize> Constraints<D> {
     /// # Errors
     /// A rigid force pushes against a support.
     fn refuse_pushed_supports(&self, spec: &BodySpec) -> Result<()> {
-        for (index, nodes) in &self.rigid {
-            let load = &spec.load[*index];
+        for RigidSurface { load, nodes, .. } in &self.rigid {
+            let load = &spec.load[*load];
             let LoadKind::Force { total, .. } = &load.kind else { continue };
             let force: [f64; D] = std::array::from_fn(|c| total[c]);
-            for (direction, support) in nodes.first().and_then(|node| self.directions.get(node)).into_iter().flatten() {
+            for (direction, support) in self.directions.get(&nodes[0]).into_iter().flatten() {
                 let Some(support) = support else { continue };
                 if dot(&force, direction).abs() > 1e-12 * dot(&force, &force).sqrt() {
                     let on = &spec.fix[*support].on;
@@ -277,13 +295,14 @@ impl<const D: usize> Constraints<D> {
 
     /// Return the nodes at which supports act, and the tied nodes.
     pub fn nodes(&self) -> impl Iterator<Item = u32> + '_ {
-        let tied = self.rigid.iter().flat_map(|(_, nodes)| nodes.iter().copied());
+        let tied = self.rigid.iter().flat_map(|surface| surface.nodes.iter().copied());
         self.directions.keys().copied().chain(tied)
     }
 
     /// Return the number of prescribed dofs without those of tied nodes.
     pub fn supported(&self) -> usize {
-        self.prescribed.keys().filter(|&dof| !self.frame.master.contains_key(&((dof / D) as u32))).count()
+        let is_tied = |node: u32| self.frame.node(node) != node;
+        self.prescribed.keys().filter(|&dof| !is_tied((dof / D) as u32)).count()
     }
 }
 
@@ -344,7 +363,7 @@ pub fn spring_blocks<const D: usize>(
     space: &Space<D>,
     mesh: &Mesh<D>,
 ) -> Result<Vec<NodalBlock<D>>> {
-    let group = find_group(mesh, &spring.on, &[D - 1, 0], "spring")?;
+    let group = spring.group(mesh)?;
     let values = FieldValues::of("the stiffness of this spring", &spec.name.value);
     let value = |field: &Field, x: [f64; D]| {
         let x = space.in_scene(x);
@@ -385,9 +404,8 @@ pub fn spring_blocks<const D: usize>(
 }
 
 /// Return the centre of a surface: the mean place over its area.
-pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Subdivision) -> [f64; 3] {
-    let sum =
-        |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| density(x)).sum();
+pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> [f64; 3] {
+    let sum = |density: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, &|x, _| density(x)).sum();
     let area = sum(&|_| axis_vector(0))[0];
     sum(&|x| x).map(|sum| sum / area)
 }
@@ -398,14 +416,9 @@ pub fn centre<const D: usize>(space: &Space<D>, facets: &Facets<D>, parts: Subdi
 /// The traction is theta x r with r = x - c, where c is the centre of the surface: stresses of a beam in bending. Its moment is
 /// J theta with J = int |r|^2 I - r r^T over the surface. All integrals are those of the quadrature of loads, so that the nodal forces
 /// have the moment to rounding on curved facets, too.
-pub fn moment_load<const D: usize>(
-    space: &Space<D>,
-    facets: &Facets<D>,
-    parts: Subdivision,
-    moment: [f64; 3],
-) -> NodalForces<D> {
-    let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, parts, &|x, _| traction(x));
-    let centre = centre(space, facets, parts);
+pub fn moment_load<const D: usize>(space: &Space<D>, facets: &Facets<D>, moment: [f64; 3]) -> NodalForces<D> {
+    let of = |traction: &dyn Fn([f64; D]) -> [f64; D]| surface::surface_load(space, facets, &|x, _| traction(x));
+    let centre = centre(space, facets);
     let from_centre = |x: [f64; D]| {
         let x = pad(x);
         std::array::from_fn(|c| x[c] - centre[c])

@@ -1,17 +1,15 @@
 //! A body before its matrix is assembled, on the first rank: its contact rows, its loads, the rigid motions that supports leave, and that by
 //! which they move it.
 
+use super::approach;
 use super::part::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
-use crate::exchange::Plain;
-use crate::fem::{NodalForces, NodeGraph, RigidMotion, rigid};
+use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
-use std::cell::OnceCell;
 use std::collections::HashSet;
 
 /// Share of the largest possible work below which the work of the loads is rounding.
@@ -24,65 +22,18 @@ pub struct Unassembled<'a, const D: usize> {
     pub part: SceneBody<'a, D>,
     /// Contact rows of the body, pair by pair.
     pub segments: Vec<Segment>,
-    /// These rows with dofs as columns.
-    pub rows: Csr,
-    /// The same rows with displacements of nodes as columns.
-    pub nodal_rows: Csr,
     /// Rigid motions of the free body.
     pub free: Vec<RigidMotion<D>>,
-    /// Nodal forces of the loads, without those on rigid surfaces.
-    pub nodal_load: NodalForces<D>,
     /// Forces of all loads at dofs.
     pub load: NodalForces<D>,
-    /// Rigid motions that supports and springs leave at present.
-    pub unconstrained: Unconstrained<D>,
-    /// Displacements that the supports prescribe.
-    pub supported: Supported<D>,
-    /// Coupling of nodes by K, once it was requested.
-    pub graph: OnceCell<NodeGraph>,
+    /// The motions that supports and springs leave at present, as traces on the contact rows and works of the loads.
+    pub motions: Vec<Motion>,
+    /// The motions that supports alone leave, with the stiffness of the springs, if springs resist some of them.
+    pub sprung: Option<Sprung>,
     /// Rank that owns the body or, if it is distributed, most of it.
     pub owner: usize,
     /// Ranks that own nodes of the body.
     pub ranks: Vec<usize>,
-    /// Nodal forces that the quadrature of the loads misses, if an estimate of the error needs them.
-    pub unloaded: Vec<f64>,
-    /// The unconstrained motions on all dofs, if the dofs are distributed.
-    pub on_dofs: Option<OnDofs>,
-}
-
-/// The rigid motions that supports and springs leave to a body.
-#[derive(Clone, Default, Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct Unconstrained<const D: usize> {
-    /// Combinations of the motions of the free body.
-    pub left: Vec<RigidMotion<D>>,
-    /// The same motions as traces on the contact rows and works of the loads.
-    pub motions: Vec<Motion>,
-    /// Motions that supports alone leave, if springs resist some of them.
-    pub sprung: Option<Sprung>,
-    /// Combinations of the motions of the free body that supports alone leave.
-    pub unsupported: Vec<RigidMotion<D>>,
-    /// Combinations of `left` that no contact row resists: name and weights.
-    pub unresisted: Vec<(String, DVector<f64>)>,
-}
-
-/// The displacements that supports prescribe.
-#[derive(Clone, Default, Serialize, Deserialize)]
-#[serde(bound = "[f64; D]: Plain")]
-pub struct Supported<const D: usize> {
-    /// Rigid motion by which the supports move the body as one.
-    pub imposed: Option<RigidMotion<D>>,
-    /// Prescribed (dof, value) relative to this motion, sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
-}
-
-/// The rigid motions that supports and springs leave a body, on all of its dofs.
-#[derive(Clone)]
-pub struct OnDofs {
-    /// Products of the motions over all dofs without the prescribed ones.
-    pub products: DMatrix<f64>,
-    /// Work of all loads on each motion.
-    pub works: Vec<f64>,
 }
 
 /// A dof that can be fixed against a motion.
@@ -105,43 +56,36 @@ impl<'a, const D: usize> Unassembled<'a, D> {
         parts.into_iter().zip(segments).map(|(part, segments)| Self::new(part, segments, pairs, mesh)).collect()
     }
 
-    fn new(part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
-        let all = |rows: fn(&ContactPair) -> &[Csr; 2]| {
-            let mut all = Csr::new(part.space.dofs());
+    fn new(mut part: SceneBody<'a, D>, segments: Vec<Segment>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Self> {
+        let rows = |of: fn(&ContactPair) -> &[Csr; 2]| {
+            let mut all = Csr::new(part.mesh.space.dofs());
             for &Segment { pair, side } in &segments {
-                (0..pairs[pair].len()).for_each(|q| all.push_row(rows(&pairs[pair])[side].row(q)));
+                (0..pairs[pair].len()).for_each(|q| all.push_row(of(&pairs[pair])[side].row(q)));
             }
             all
         };
-        let nodal_load = part.load(mesh)?;
-        let mut body = Self {
-            rows: all(|pair| &pair.rows),
-            nodal_rows: all(|pair| &pair.nodal),
-            free: part.free(),
-            load: part.load_on_dofs(&nodal_load),
-            nodal_load,
-            part,
-            segments,
-            unconstrained: Unconstrained::default(),
-            supported: Supported::default(),
-            graph: OnceCell::new(),
-            owner: 0,
-            ranks: Vec::new(),
-            unloaded: Vec::new(),
-            on_dofs: None,
-        };
+        (part.mesh.rows, part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
+        part.mesh.approach = approach::rows(&part, &segments, pairs, mesh)?;
+        part.mesh.load = part.load(mesh)?;
+        let (free, load) = (part.mesh.free(), part.mesh.load_on_dofs());
+        let mut body =
+            Self { part, segments, free, load, motions: Vec::new(), sprung: None, owner: 0, ranks: Vec::new() };
         body.find_motions();
         Ok(body)
     }
 
-    /// Return the coupling of the nodes by K, which is computed when it is first requested.
-    pub fn graph(&self) -> &NodeGraph {
-        let SceneBody { space, held, .. } = &self.part;
-        self.graph.get_or_init(|| NodeGraph::with_rows(space, &self.rows, &held.frame))
+    /// Return the names of the motions that neither supports nor springs nor any contact row of the body resist.
+    pub fn unresisted(&self) -> Vec<String> {
+        let motions = &self.motions;
+        let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
+        let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
+        let names = || motions.iter().map(|motion| motion.name.as_str());
+        let named = |weights: DVector<f64>| joint::combined(names(), weights.iter().copied());
+        Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
     }
 
     /// Return the traces of motions on the contact rows, with the work of the loads on each.
-    pub fn motions(&self, all: &[RigidMotion<D>]) -> Vec<Motion> {
+    fn with_works(&self, all: &[RigidMotion<D>]) -> Vec<Motion> {
         let of = |(motion, work): (&RigidMotion<D>, f64)| Motion {
             name: motion.name.clone(),
             trace: self.trace(motion),
@@ -152,13 +96,13 @@ impl<'a, const D: usize> Unassembled<'a, D> {
 
     /// Return the trace of a motion on the contact rows.
     pub fn trace(&self, motion: &RigidMotion<D>) -> Vec<f64> {
-        let row = |q: usize| self.rows.row(q).map(|(dof, b)| b * self.part.dof_of(motion, dof)).sum();
-        (0..self.rows.rows()).map(row).collect()
+        let row = |q: usize| self.part.mesh.rows.row(q).map(|(dof, b)| b * self.part.mesh.dof_of(motion, dof)).sum();
+        (0..self.part.mesh.rows.rows()).map(row).collect()
     }
 
     /// Return the work of the loads on motions. It is exactly zero where it is rounding.
     fn works(&self, all: &[RigidMotion<D>]) -> Vec<f64> {
-        let of = |motion: &RigidMotion<D>| self.load.works(|node| self.part.at_dofs(motion, node));
+        let of = |motion: &RigidMotion<D>| self.load.works(|node| self.part.mesh.at_dofs(motion, node));
         let work = |[work, largest]: [f64; 2]| if work.abs() <= NO_WORK * largest { 0.0 } else { work };
         all.iter().map(of).map(work).collect()
     }
@@ -166,67 +110,50 @@ impl<'a, const D: usize> Unassembled<'a, D> {
     /// Change each nodal force f by -|f| u, where u is the vector at the position of its node.
     pub fn change_loads(&mut self, u: impl Fn(&[f64; D]) -> [f64; D]) {
         let change = |(node, force): (u32, [f64; D])| {
-            let (size, u) = (dot(&force, &force).sqrt(), u(&self.part.space.nodes[node as usize]));
+            let (size, u) = (dot(&force, &force).sqrt(), u(&self.part.mesh.space.nodes[node as usize]));
             (node, std::array::from_fn(|c| force[c] - size * u[c]))
         };
-        self.nodal_load = self.nodal_load.iter().map(change).collect();
-        self.load = self.part.load_on_dofs(&self.nodal_load);
+        self.part.mesh.load = self.part.mesh.load.iter().map(change).collect();
+        self.load = self.part.mesh.load_on_dofs();
     }
 
     /// Find the motions that supports and springs leave to the body at present.
     pub fn find_motions(&mut self) {
-        let at = |k: usize, node: u32| self.free[k].at(&self.part.space.nodes[node as usize]);
-        let left = self.part.left(self.free.len(), &at);
+        let at = |k: usize, node: u32| self.free[k].at(&self.part.mesh.space.nodes[node as usize]);
+        let left = self.part.mesh.unconstrained(self.free.len(), &at);
         let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
-        let motions = self.motions(&left);
-        let unresisted = unresisted(&motions);
-        let sprung = self.part.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
-        let unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
-        let sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.motions(&all), stiffness });
-        self.unconstrained = Unconstrained { left, motions, sprung, unsupported, unresisted };
+        let sprung = self.part.mesh.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
+        self.part.mesh.unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
+        self.sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.with_works(&all), stiffness });
+        (self.motions, self.part.mesh.left) = (self.with_works(&left), left);
     }
 
     /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the
     /// contact rows so that these do not change. The result is `None` if that displacement is small.
     pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<FixableDof> {
-        let in_rows: HashSet<usize> = self.rows.col.iter().map(|&dof| dof as usize).collect();
-        let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.held.prescribed.contains_key(dof);
-        let all = (0..self.part.space.dofs()).filter(is_free);
-        let sizes = all.map(|dof| FixableDof { dof, size: self.part.dof_of(motion, dof) });
+        let in_rows: HashSet<usize> = self.part.mesh.rows.col.iter().map(|&dof| dof as usize).collect();
+        let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.mesh.held.prescribed.contains_key(dof);
+        let all = (0..self.part.mesh.space.dofs()).filter(is_free);
+        let sizes = all.map(|dof| FixableDof { dof, size: self.part.mesh.dof_of(motion, dof) });
         sizes.max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())).filter(|found| found.size.abs() > 1e-3)
     }
 
     /// Fix a dof. The motions of the body are not found anew.
     pub fn fix(&mut self, found: &FixableDof) {
-        self.part.held.prescribed.insert(found.dof, 0.0);
+        self.part.mesh.held.prescribed.insert(found.dof, 0.0);
     }
 
     /// Find the displacements that the supports prescribe.
     pub fn support(&mut self) {
-        let prescribed = self.part.prescribed_sorted();
-        let value = |k: usize, dof: usize| self.part.dof_of(&self.free[k], dof);
-        let imposed = imposed_motion(self.free.len(), &value, &prescribed).filter(|_| self.part.springs.is_empty());
-        self.supported = match imposed {
-            None => Supported { imposed: None, prescribed },
-            Some((weights, rest)) => Supported { imposed: Some(rigid::sum(&self.free, &weights)), prescribed: rest },
+        let prescribed = self.part.mesh.prescribed_sorted();
+        let value = |k: usize, dof: usize| self.part.mesh.dof_of(&self.free[k], dof);
+        let imposed =
+            imposed_motion(self.free.len(), &value, &prescribed).filter(|_| self.part.mesh.springs.is_empty());
+        (self.part.mesh.imposed, self.part.mesh.prescribed) = match imposed {
+            None => (None, prescribed),
+            Some((weights, rest)) => (Some(rigid::sum(&self.free, &weights)), rest),
         };
     }
-
-    /// Return the unconstrained motions on all dofs.
-    pub fn on_dofs(&self) -> OnDofs {
-        let load = self.part.load_vector(&self.nodal_load);
-        let (products, works) = self.part.products(&self.unconstrained.left, &self.supported.prescribed, &load);
-        OnDofs { products, works }
-    }
-}
-
-/// Return the combinations of motions that no contact row resists: name and weights.
-fn unresisted(motions: &[Motion]) -> Vec<(String, DVector<f64>)> {
-    let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
-    let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
-    let names = || motions.iter().map(|motion| motion.name.as_str());
-    let named = |weights: DVector<f64>| (joint::combined(names(), weights.iter().copied()), weights);
-    Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
 }
 
 /// Share of the largest prescribed displacement up to which supports agree with a rigid motion.

@@ -1,13 +1,14 @@
 //! Checks of the mesh against the scene before anything is assembled. Surfaces that a scene names by sets of nodes, as meshes of other
 //! programs have them, become groups of facets first.
 
-use super::patterns::{self, Lying, earlier};
+use super::groups::earlier;
+use super::patterns::{self, Lying};
 use crate::error::{Error, Located, Result, few};
 use crate::exchange::{Exchange, broadcast};
 use crate::fem::PointExtent;
 use crate::mesh::{Asked, BodyCheck, Duty, EDGES, Groups, LENGTHS, Mesh};
-use crate::problem::body::{BodySpec, LoadKind, SpringKind, plain, plain_pattern};
-use crate::problem::pattern::{BODY, Pattern};
+use crate::problem::body::{BodySpec, LoadKind, SpringKind, plain};
+use crate::problem::pattern::{BODY, Pattern, is_pattern};
 use crate::problem::{Order, Plane};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -179,7 +180,7 @@ pub fn to_surfaces<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<
     for place in 0..mesh.groups.len() {
         let group = &mesh.groups[place];
         let own: Vec<Use> =
-            uses.iter().copied().filter(|(on, _)| group.dimension == 0 && names(on, mesh, &group.name)).collect();
+            uses.iter().copied().filter(|(on, _)| group.dimension == 0 && names(on, mesh, place)).collect();
         if !own.iter().any(|(_, need)| matches!(need, Need::Facets | Need::Either)) {
             continue;
         }
@@ -221,12 +222,13 @@ fn refuse_points(own: &[Use], lost: usize) -> Result<()> {
     }
 }
 
-/// Return whether a line names a group, itself or by a pattern. The plain form of the name counts if no group has the name itself.
-fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, group: &str) -> bool {
-    let any = on.value.replace(BODY, "*");
-    let form = plain_pattern(&any);
-    let is = |form: &str, name: &str| Pattern::new(form).is_ok_and(|pattern| pattern.matches(name));
-    is(&any, group) || is(&form, &plain(group)) && !mesh.groups.iter().any(|other| is(&any, &other.name))
+/// Return whether a line names the group with this index, itself or by a pattern, which may match the plain form of its name.
+fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, place: usize) -> bool {
+    let (any, group) = (on.value.replace(BODY, "*"), &mesh.groups[place].name);
+    match is_pattern(&any) {
+        true => Pattern::new(&any).is_ok_and(|pattern| pattern.matches(group) || pattern.matches(&plain(group))),
+        false => mesh.groups.place(&any) == Some(place),
+    }
 }
 
 fn of_body(body: &BodySpec) -> Vec<Use<'_>> {

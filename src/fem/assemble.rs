@@ -4,13 +4,14 @@
 //! of entries follow from the graph by arithmetic, so that assembly adds each value directly to its entry.
 
 use super::elasticity::{Elasticity, Flaw, Material};
-use super::element::{self, Rule, Subdivision};
-use super::frame::{Frame, Movers, Rotation, place};
+use super::element::{self, Rule};
+use super::frame::{Frame, place};
 use super::space::{CellPoint, Space};
 use super::{length, pad};
 use crate::exchange::Plain;
 use crate::linalg::{Csr, Total, dot};
 use crate::problem::order::Order;
+use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
 /// The symmetric graph of coupled nodes of a body, as compressed rows with diagonal.
@@ -34,18 +35,18 @@ impl NodeGraph {
     }
 
     /// Build the graph of a space's cells plus `extra` sets of nodes that are coupled among themselves. These are the nodes of
-    /// each contact row, the pattern of B'B. The nodes that `frame` ties are represented by their master, and on surfaces that turn
-    /// also by the pole. Their own rows have the diagonal alone.
+    /// each contact row, the pattern of B'B. The nodes that `frame` ties are represented by those that move them. Their own rows have the
+    /// diagonal alone.
     pub fn new<const D: usize>(space: &Space<D>, extra: &[Vec<u32>], frame: &Frame<D>) -> Self {
         let n = space.nodes.len();
-        let merged: Vec<u32> = match frame.master.is_empty() {
+        let merged: Vec<u32> = match frame.is_empty() {
             true => Vec::new(),
             false => space.cells.iter().map(|&node| frame.node(node)).collect(),
         };
         let cells = if merged.is_empty() { &space.cells } else { &merged };
-        let tied = frame.master.keys().map(|&node| vec![node]);
-        let turned: Vec<Vec<u32>> = turned_cells(space, frame).chain(tied).collect();
-        let others: Vec<&[u32]> = extra.iter().chain(&turned).map(Vec::as_slice).collect();
+        let constrained: Vec<Vec<u32>> =
+            constrained_cells(space, frame).chain(frame.tied().map(|node| vec![node])).collect();
+        let others: Vec<&[u32]> = extra.iter().chain(&constrained).map(Vec::as_slice).collect();
         let sets = || cells.chunks_exact(space.stride).chain(others.iter().copied());
         let (start, sets_of_nodes) = sets_by_node(n, sets);
         let cell_count = space.cell_count();
@@ -113,29 +114,26 @@ impl NodeGraph {
         Csr { columns: D * n, ptr, values: vec![0.0; col.len()], col }
     }
 
-    /// Add a block of nodal stiffness to a matrix on this graph, in the rows and columns of the nodes that move two nodes.
-    fn add_moved<const D: usize>(
-        &self,
-        [rows, columns]: [&Movers<D>; 2],
-        entry: impl Fn(usize, usize) -> f64,
-        matrix: &mut Csr,
-    ) {
-        self.add_block::<D>([rows.node, columns.node], &entry, matrix);
-        let right = |rotation: &Rotation<D>, i, j| (0..D).map(|k| entry(i, k) * rotation.matrix[(k, j)]).sum::<f64>();
-        if let Some(column) = &columns.rotation {
-            self.add_block::<D>([rows.node, column.pole], |i, j| right(column, i, j), matrix);
+    /// Add a block k of nodal stiffness between two nodes to a matrix on this graph, as C'k C in the rows and columns of the dofs that move them.
+    /// Rows that the graph lacks are left out.
+    fn add_moved<const D: usize>(&self, [a, b]: [&Node<D>; 2], k: SMatrix<f64, D, D>, matrix: &mut Csr) {
+        let no_columns = |i: u32, k: SMatrix<f64, D, D>, matrix: &mut Csr| {
+            if !self.has(i) {
+                return;
+            }
+            if b.row.is_empty() {
+                self.add_block([i, b.node], k, matrix);
+            }
+            b.row.iter().for_each(|(j, c)| self.add_block([i, *j], k * c, matrix));
+        };
+        if a.row.is_empty() {
+            no_columns(a.node, k, matrix);
         }
-        let Some(row) = &rows.rotation else { return };
-        let left = |k: usize, i: usize| row.matrix[(k, i)];
-        self.add_block::<D>([row.pole, columns.node], |i, j| (0..D).map(|k| left(k, i) * entry(k, j)).sum(), matrix);
-        if let Some(column) = &columns.rotation {
-            let both = |i, j| (0..D).map(|k| left(k, i) * right(column, k, j)).sum();
-            self.add_block::<D>([row.pole, column.pole], both, matrix);
-        }
+        a.row.iter().for_each(|(i, c)| no_columns(*i, c.tr_mul(&k), matrix));
     }
 
     /// Add a block to a matrix on this graph, in the rows of node `i` and the columns of node `j`.
-    fn add_block<const D: usize>(&self, [i, j]: [u32; 2], entry: impl Fn(usize, usize) -> f64, matrix: &mut Csr) {
+    fn add_block<const D: usize>(&self, [i, j]: [u32; 2], block: SMatrix<f64, D, D>, matrix: &mut Csr) {
         let (from, to) = (self.ptr[i as usize] as usize, self.ptr[i as usize + 1] as usize);
         let Ok(place) = self.col[from..to].binary_search(&j) else {
             unreachable!("the graph holds every pair of nodes of a cell")
@@ -143,28 +141,35 @@ impl NodeGraph {
         let (start, row_length) = (D * D * from + D * place, D * (to - from));
         for i in 0..D {
             for j in 0..D {
-                matrix.values[start + i * row_length + j] += entry(i, j);
+                matrix.values[start + i * row_length + j] += block[(i, j)];
             }
         }
     }
 }
 
-/// Return, for each cell with nodes on surfaces that turn, the nodes that move its nodes.
-fn turned_cells<'a, const D: usize>(
+/// A node with the dofs that move it.
+struct Node<'a, const D: usize> {
+    node: u32,
+    /// Its row of u = T v; empty if it has its own dofs.
+    row: &'a [(u32, SMatrix<f64, D, D>)],
+}
+
+impl<'a, const D: usize> Node<'a, D> {
+    fn new(node: u32, frame: &'a Frame<D>) -> Self {
+        Self { node, row: frame.row(node) }
+    }
+}
+
+/// Return, for each cell with nodes that the dofs of several nodes move, the nodes of these dofs.
+fn constrained_cells<'a, const D: usize>(
     space: &'a Space<D>,
     frame: &'a Frame<D>,
 ) -> impl Iterator<Item = Vec<u32>> + use<'a, D> {
-    let cells = space.cells.chunks_exact(space.stride).filter(|_| !frame.levers.is_empty());
-    cells.filter_map(|cell| {
-        let poles = cell.iter().filter_map(|&node| Some(frame.movers(node).rotation?.pole));
-        let mut nodes: Vec<u32> = poles.collect();
-        if nodes.is_empty() {
-            return None;
-        }
-        nodes.extend(cell.iter().map(|&node| frame.node(node)));
-        nodes.sort_unstable();
-        nodes.dedup();
-        Some(nodes)
+    let cells = space.cells.chunks_exact(space.stride).filter(|_| !frame.is_empty());
+    let cells = cells.filter(|cell| cell.iter().any(|&node| frame.row(node).len() > 1));
+    cells.map(|cell| {
+        let others = cell.iter().flat_map(|&node| frame.row(node).iter().map(|entry| entry.0));
+        Space::<D>::among(cell.iter().map(|&node| frame.node(node)).chain(others))
     })
 }
 
@@ -199,10 +204,8 @@ pub struct NodalBlock<const D: usize> {
 /// Add springs to a stiffness matrix on a graph.
 pub fn add_blocks<const D: usize>(graph: &NodeGraph, frame: &Frame<D>, blocks: &[NodalBlock<D>], matrix: &mut Csr) {
     for NodalBlock { nodes, block } in blocks {
-        let [rows, columns] = nodes.map(|node| frame.movers(node));
-        if graph.has(rows.node) {
-            graph.add_moved([&rows, &columns], |i, j| block[i][j], matrix);
-        }
+        let [a, b] = nodes.map(|node| Node::new(node, frame));
+        graph.add_moved([&a, &b], SMatrix::from_fn(|i, j| block[i][j]), matrix);
     }
 }
 
@@ -264,8 +267,7 @@ pub fn visit<const D: usize>(
     Ok(())
 }
 
-/// Assemble the stiffness matrix of a space on a graph, which may have the rows of some nodes only. `frame` ties nodes; its axes are
-/// not applied. The rows of the pole of a surface that turns are on the graph if those of the master are.
+/// Assemble the stiffness matrix of a space in the dofs of `frame` on a graph, which may have the rows of some nodes only.
 ///
 /// Where the elasticity varies within a cell, and in bodies of revolution, it is evaluated at the points of a rule of degree 2
 /// (P1) or 5 (P2). All of these points lie off the axis.
@@ -283,8 +285,8 @@ pub fn stiffness<const D: usize>(
     // Only the blocks with row <= column are set.
     let mut blocks = vec![[[0.0; D]; D]; stride * stride];
     for index in 0..space.cell_count() {
-        let movers: Vec<Movers<D>> = space.cell(index).iter().map(|&node| frame.movers(node)).collect();
-        if !movers.iter().any(|movers| graph.has(movers.node)) {
+        let nodes: Vec<Node<D>> = space.cell(index).iter().map(|&node| Node::new(node, frame)).collect();
+        if !nodes.iter().any(|moved| graph.has(frame.node(moved.node))) {
             continue;
         }
         blocks.fill([[0.0; D]; D]);
@@ -293,22 +295,20 @@ pub fn stiffness<const D: usize>(
             let hoops: Vec<f64> = point.phi[..stride].iter().filter(|_| space.axisymmetric).map(hoop).collect();
             material.accumulate(&point.gradient[..stride], &hoops, point.weight, &mut blocks);
         })?;
-        scatter(graph, &movers, &blocks, &mut matrix);
+        scatter(graph, &nodes, &blocks, &mut matrix);
     }
     Ok(matrix)
 }
 
-/// Add the symmetric stiffness matrix of a cell to a matrix. `movers` are the nodes that move each node of the cell.
-fn scatter<const D: usize>(graph: &NodeGraph, movers: &[Movers<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
-    let stride = movers.len();
-    for (a, of_a) in movers.iter().enumerate() {
-        for (b, of_b) in movers.iter().enumerate().skip(a) {
-            let block = &blocks[a * stride + b];
-            if graph.has(of_a.node) {
-                graph.add_moved([of_a, of_b], |i, j| block[i][j], matrix);
-            }
-            if a != b && graph.has(of_b.node) {
-                graph.add_moved([of_b, of_a], |i, j| block[j][i], matrix);
+/// Add the symmetric stiffness matrix of a cell to a matrix.
+fn scatter<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
+    let stride = nodes.len();
+    for (a, of_a) in nodes.iter().enumerate() {
+        for (b, of_b) in nodes.iter().enumerate().skip(a) {
+            let block = SMatrix::from_fn(|i, j| blocks[a * stride + b][i][j]);
+            graph.add_moved([of_a, of_b], block, matrix);
+            if a != b {
+                graph.add_moved([of_b, of_a], block.transpose(), matrix);
             }
         }
     }
@@ -404,18 +404,11 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
 }
 
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
-pub fn body_force<const D: usize>(
-    space: &Space<D>,
-    parts: Subdivision,
-    density: &dyn Fn([f64; D]) -> [f64; D],
-) -> NodalForces<D> {
+pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D]) -> NodalForces<D> {
     let (space, nodes) = space.part(0..space.cell_count());
     let mut load = vec![0.0; space.dofs()];
     let low = space.order == Order::P1 && !space.axisymmetric;
-    let mut rule = element::rule(D + 1, if low { 2 } else { 5 });
-    if parts == Subdivision::Halves {
-        rule = rule.on_parts();
-    }
+    let rule = element::rule(D + 1, if low { 2 } else { 5 });
     for index in 0..space.cell_count() {
         for point in space.points(index, &rule).flatten() {
             let force = density(point.at);

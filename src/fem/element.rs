@@ -110,7 +110,7 @@ pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Opt
 }
 
 /// Return the inverse and the determinant of a matrix; `None` if it is singular or the determinant overflows.
-fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)> {
+pub fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)> {
     let mut inverse = [[0.0; D]; D];
     let det;
     if D == 2 {
@@ -172,41 +172,6 @@ impl Rule {
     pub fn iter(&self) -> impl Iterator<Item = (&[f64], f64)> {
         self.points.iter().map(Vec::as_slice).zip(self.weights.iter().copied())
     }
-
-    /// Return the same rule on each of the equal parts, half as wide, into which a simplex of two to four vertices is divided.
-    pub fn on_parts(&self) -> Self {
-        let n = self.points[0].len();
-        // There is a part at each vertex. In a triangle one more remains, and in a tetrahedron an octahedron, which is divided into
-        // four parts around a diagonal.
-        let mut parts: Vec<Vec<(usize, usize)>> = (0..n).map(|i| (0..n).map(|j| (i, j)).collect()).collect();
-        match n {
-            3 => parts.push(vec![(0, 1), (1, 2), (2, 0)]),
-            4 => {
-                let rings = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1)];
-                parts.extend(rings.windows(2).map(|ring| vec![(0, 2), (1, 3), ring[0], ring[1]]));
-            }
-            _ => {}
-        }
-        let share = 1.0 / parts.len() as f64;
-        let mut rule = Self::default();
-        for part in parts {
-            let part: Vec<[f64; 4]> = part.into_iter().map(middle).collect();
-            for (l, weight) in self.iter() {
-                let point = |k: usize| (0..n).map(|vertex| l[vertex] * part[vertex][k]).sum();
-                rule.add(&(0..n).map(point).collect::<Vec<f64>>(), share * weight);
-            }
-        }
-        rule
-    }
-}
-
-/// The fineness of the integration of loads.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Subdivision {
-    /// One rule on each element.
-    Whole,
-    /// The same rule on each part of an element. The difference of both results is nearly the whole error of the first.
-    Halves,
 }
 
 /// Return Gauss-Legendre points and weights on \[0, 1\], exact to degree `2 count - 1`, for a `count` from 1 to 5.
@@ -368,13 +333,8 @@ mod tests {
     }
 
     /// The mean of a monomial in barycentric coordinates over a simplex is n! prod(a_i!) / (n + sum a)!.
-    fn check(vertices: usize, degree: usize) {
-        check_rule(vertices, degree, &rule(vertices, degree));
-        check_rule(vertices, degree, &rule(vertices, degree).on_parts());
-    }
-
-    fn check_rule(n: usize, degree: usize, rule: &Rule) {
-        let mut powers = vec![0usize; n];
+    fn check(n: usize, degree: usize) {
+        let (rule, mut powers) = (rule(n, degree), vec![0usize; n]);
         loop {
             if powers.iter().sum::<usize>() <= degree {
                 let exact = factorial(n - 1) * powers.iter().map(|&a| factorial(a)).product::<f64>()
@@ -395,22 +355,5 @@ mod tests {
             (2..=4).for_each(|vertices| check(vertices, degree));
         }
         check(2, 9);
-    }
-
-    /// On parts half as wide, the error of a rule of degree 2 or 3 for a polynomial of degree 4 is a sixteenth.
-    #[test]
-    fn parts_cover_the_simplex() {
-        let error = |rule: Rule| -> f64 {
-            let n = rule.points[0].len();
-            let exact = 24.0 * factorial(n - 1) / factorial(n + 3);
-            let sum: f64 = rule.iter().map(|(x, w)| w * x[0].powi(4)).sum();
-            sum - exact
-        };
-        let ratio = error(rule(2, 2)) / error(rule(2, 2).on_parts());
-        assert!((ratio - 16.0).abs() < 1e-9, "{ratio}");
-        for vertices in [3, 4] {
-            let (whole, parts) = (error(rule(vertices, 2)), error(rule(vertices, 2).on_parts()));
-            assert!(parts.abs() < 0.25 * whole.abs(), "{whole} {parts}");
-        }
     }
 }

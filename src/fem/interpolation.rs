@@ -56,9 +56,7 @@ pub fn from_vertices<const D: usize>(
                 (Ok(place), _) => vec![(D * place + c, 1.0)],
                 (Err(_), Some(ends)) if !is_prescribed(D * node + c) => {
                     // v_c = axis_c . (u_a + u_b)/2, where u_a and u_b are the displacements of the ends.
-                    let unit = std::array::from_fn(|k| f64::from(u8::from(k == c)));
-                    let axis = frame.axes.get(&(node as u32)).map_or(unit, |axes| axes[c]);
-                    mean_of_ends(frame, ends, axis, &is_prescribed, coarse)
+                    mean_of_ends(frame, ends, frame.direction(node as u32, c), &is_prescribed, coarse)
                 }
                 _ => Vec::new(),
             });
@@ -130,7 +128,8 @@ mod tests {
         let turned = [[0.6, 0.8, 0.0], [-0.8, 0.6, 0.0], [0.0, 0.0, 1.0]];
         let middle =
             (0..125).find(|node| coarse.binary_search(node).is_err()).expect("a node in the middle of an edge");
-        let frame = Frame { axes: [(coarse[3], turned), (middle, turned)].into(), ..Frame::default() };
+        let mut frame = Frame::default();
+        [coarse[3], middle].into_iter().for_each(|node| frame.turn(node, turned, &[]));
         let (all, few) = both(&space, &frame, |x| [1.0 + x[0] - 2.0 * x[1], 3.0 * x[2], x[0] + x[1] - 0.5]);
         let Prolongation { rows, own } = from_vertices(&space, &frame, |_| false, &coarse);
         assert_eq!((rows.rows(), own), (375, 81));
@@ -147,7 +146,8 @@ mod tests {
         let master =
             (0..27).find(|node| vertices.binary_search(node).is_err()).expect("a node in the middle of an edge");
         let tied = [vertices[0], vertices[1]];
-        let frame = Frame { master: tied.map(|node| (node, master)).into(), ..Frame::default() };
+        let mut frame = Frame::default();
+        frame.tie(&[master, tied[0], tied[1]]);
         let coarse = coarse_nodes(&space, &frame);
         assert_eq!(coarse.len(), 9);
         let is_tied = |dof: usize| tied.contains(&(dof as u32 / 3));

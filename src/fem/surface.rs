@@ -1,7 +1,7 @@
 //! Integrals over surfaces: loads, foundations and areas.
 
 use super::assemble::{NodalBlock, NodalForces};
-use super::element::{self, Subdivision};
+use super::element;
 use super::facets::{Facets, area_vector};
 use super::frame::place;
 use super::length;
@@ -12,12 +12,11 @@ use crate::problem::order::Order;
 pub fn surface_load<const D: usize>(
     space: &Space<D>,
     facets: &Facets<D>,
-    parts: Subdivision,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
 ) -> NodalForces<D> {
     let surface_nodes = facets.distinct_nodes();
     let mut load = vec![0.0; D * surface_nodes.len()];
-    visit(space, facets, parts, |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, |FacetPoint { nodes, phi, weight, x, normal }| {
         let force = traction(x, normal);
         for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&surface_nodes, node)?))) {
             for c in 0..D {
@@ -42,16 +41,8 @@ struct FacetPoint<'a, const D: usize> {
 }
 
 /// Visit the integration points of a surface.
-fn visit<const D: usize>(
-    space: &Space<D>,
-    facets: &Facets<D>,
-    parts: Subdivision,
-    mut each: impl FnMut(FacetPoint<D>),
-) {
-    let mut rule = element::rule(D, if space.order == Order::P1 { 3 } else { 5 });
-    if parts == Subdivision::Halves {
-        rule = rule.on_parts();
-    }
+fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, mut each: impl FnMut(FacetPoint<D>)) {
+    let rule = element::rule(D, if space.order == Order::P1 { 3 } else { 5 });
     for index in 0..facets.count() {
         let x = facets.coordinates(index, space);
         for (l, weight) in rule.iter() {
@@ -74,7 +65,7 @@ pub fn foundation<const D: usize>(
     stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
 ) -> Vec<NodalBlock<D>> {
     let mut blocks = Vec::new();
-    visit(space, facets, Subdivision::Whole, |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, |FacetPoint { nodes, phi, weight, x, normal }| {
         let density = stiffness(x, normal);
         for (a, &first) in nodes.iter().enumerate() {
             for (b, &second) in nodes.iter().enumerate() {
@@ -89,6 +80,6 @@ pub fn foundation<const D: usize>(
 /// Return the length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
 pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let mut sum = 0.0;
-    visit(space, facets, Subdivision::Whole, |point| sum += point.weight);
+    visit(space, facets, |point| sum += point.weight);
     sum
 }

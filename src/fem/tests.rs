@@ -1,27 +1,28 @@
 //! Tests of rigid surfaces that turn: dofs, matrices and forces together.
 
 use super::space::sample::block;
-use super::{Elasticity, Frame, Levers, NodeGraph, PointExtent, RigidMotion, Space, assemble, rigid};
-use crate::linalg::dot;
+use super::{Elasticity, Frame, NodeGraph, PointExtent, RigidMotion, Space, assemble, rigid};
+use crate::linalg::{cross, dot, minus, pad};
 use crate::problem::{BodySpec, Order, Plane};
 
-/// Return a space, and the frame in which its nodes at the end of the first axis turn about the `centre`.
-fn turning<const D: usize>(order: Order, centre: [f64; D]) -> (Space<D>, Frame<D>) {
+/// Return a space, and the frame in which its nodes at the end of the first axis turn.
+fn turning<const D: usize>(order: Order) -> (Space<D>, Frame<D>) {
     let space = block::<D>(2, order);
     let places = space.nodes.clone();
     let at_end = |node: &u32| (places[*node as usize][0] - 0.2 * places[*node as usize][1] - 1.0).abs() < 0.05;
     let nodes: Vec<u32> = (0..places.len() as u32).filter(at_end).collect();
-    let levers = Levers::new(&nodes, |node| places[node as usize], centre);
-    let master = nodes[1..].iter().map(|&node| (node, nodes[0])).collect();
-    (space, Frame { master, levers: [(nodes[0], levers)].into(), ..Frame::default() })
+    let mut frame = Frame::default();
+    frame.tie(&nodes);
+    frame.let_turn(&nodes, |node| places[node as usize]);
+    (space, frame)
 }
 
 /// Return dofs of all kinds: those of tied nodes are zero, except for the rotation.
 fn some<const D: usize>(space: &Space<D>, frame: &Frame<D>, phase: f64) -> Vec<f64> {
-    let pole = frame.levers.values().next().map(|levers| levers.pole).expect("levers");
+    let [pole, _] = frame.poles().next().expect("a pole");
     let is_free = |dof: usize| match (dof / D) as u32 {
         node if node == pole => D == 3 || dof.is_multiple_of(D),
-        node => !frame.master.contains_key(&node),
+        node => frame.node(node) == node,
     };
     (0..space.dofs()).map(|dof| if is_free(dof) { (dof as f64 * 0.7 + phase).sin() } else { 0.0 }).collect()
 }
@@ -32,7 +33,7 @@ fn near(a: f64, b: f64) {
 
 /// The matrix in the dofs is that of the displacements: v'(T'KT)w = (Tv)'K(Tw).
 fn same_form<const D: usize>(order: Order) {
-    let (space, frame) = turning::<D>(order, [0.3; D]);
+    let (space, frame) = turning::<D>(order);
     let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
     let elasticity = Elasticity::new(&[&spec], Vec::new(), D, Plane::Strain).expect("a material");
     let form = |frame: &Frame<D>, v: &[f64], w: &[f64]| {
@@ -59,12 +60,15 @@ fn matrices_displacements_and_forces_belong_together() {
 /// A force at the centre and a moment about it do the work of both on a rigid motion about the centre, as forces at nodes and at dofs.
 fn work<const D: usize>(moment: [f64; 3]) {
     let centre = std::array::from_fn(|c| 0.4 + 0.1 * c as f64);
-    let (space, frame) = turning::<D>(Order::P2, centre);
-    let (&master, levers) = frame.levers.iter().next().expect("levers");
-    let force = std::array::from_fn(|c| 2.0 - c as f64);
+    let (space, frame) = turning::<D>(Order::P2);
+    let [pole, master] = frame.poles().next().expect("a pole");
+    let x = |node: u32| space.nodes[node as usize];
+    let force: [f64; D] = std::array::from_fn(|c| 2.0 - c as f64);
+    let about_master = cross(pad(minus(centre, x(master))), pad(force));
+    let all: [f64; 3] = std::array::from_fn(|c| moment[c] + about_master[c]);
     let mut at_nodes = vec![0.0; space.dofs()];
     let mut at_dofs = at_nodes.clone();
-    for (node, force) in levers.forces(master, force, moment) {
+    for (node, force) in frame.couple([master, pole], all, x).into_iter().chain([(master, force)]) {
         (0..D).for_each(|c| at_nodes[D * node as usize + c] += force[c]);
         for (node, force) in frame.force(node, force) {
             (0..D).for_each(|c| at_dofs[D * node as usize + c] += force[c]);
@@ -74,13 +78,8 @@ fn work<const D: usize>(moment: [f64; 3]) {
     for motion in &motions {
         let u = motion.nodal(space.nodes.iter().copied());
         let v = frame.dofs(&u);
-        assert!(
-            frame
-                .master
-                .keys()
-                .filter(|node| **node != levers.pole)
-                .all(|&node| { (0..D).all(|c| v[D * node as usize + c].abs() < 1e-14) })
-        );
+        let mut tied = frame.tied().filter(|node| *node != pole);
+        assert!(tied.all(|node| (0..D).all(|c| v[D * node as usize + c].abs() < 1e-14)));
         // The curl of the displacement is twice the rotation.
         let turned = |c: usize| {
             let [i, j] = [(c + 1) % 3, (c + 2) % 3];

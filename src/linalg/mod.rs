@@ -15,9 +15,7 @@ mod factor;
 /// The C library has several versions of each function and chooses one for the processor. Every rank evaluates the laws of all contact points. On
 /// processors of two kinds, ranks would decide differently near a tolerance, and wait for each other for ever.
 pub mod portable {
-    pub use libm::{
-        acos, asin, atan, atan2, cbrt, cos, cosh, exp, expm1, hypot, log, log1p, log2, log10, pow, sin, sinh, tan, tanh,
-    };
+    pub use libm::{acos, asin, atan, atan2, cos, cosh, exp, hypot, log, log2, log10, pow, sin, sinh, tan, tanh};
 }
 
 /// Return the least and the largest coordinates of points: the corners of their bounding box. Without points the least ones are infinite.

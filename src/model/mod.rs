@@ -74,13 +74,16 @@ pub struct Sprung {
 }
 
 /// A body in the model. Every rank has the arrays; only the ranks where the body lives have the body itself.
+#[derive(Serialize, Deserialize)]
 pub struct BodySlot {
     /// Name in the scene.
     pub name: String,
     /// The body, on the rank that owns it, or on every rank that may own a part of it.
+    #[serde(skip)]
     pub local: Local,
     /// The rigid motion by which supports move the body, one entry a dof of the owned and ghost nodes of this rank; empty for none. It is not
     /// part of states.
+    #[serde(skip)]
     pub imposed: Vec<f64>,
     /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,

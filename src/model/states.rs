@@ -17,10 +17,10 @@ pub struct FreeMotion {
 }
 
 impl FreeMotion {
-    /// Make the motion from the displacements of dofs, which are set to zero at prescribed ones. `work` gives the work of the loads.
-    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], work: impl Fn(&[f64]) -> f64) -> Self {
+    /// Make the motion from the displacements of dofs, which are set to zero at prescribed ones, and the work of the loads.
+    pub fn new(mut displacement: Vec<f64>, prescribed: &[(usize, f64)], work: f64) -> Self {
         prescribed.iter().for_each(|entry| displacement[entry.0] = 0.0);
-        Self { work: work(&displacement), displacement }
+        Self { work, displacement }
     }
 }
 
@@ -232,7 +232,7 @@ impl States {
 ///
 /// A state is (v, a): v has the dofs that this rank owns, and the rigid motion a is the same on all ranks. Every rank has a part of a
 /// force, also of the force on the rigid motion, so that work is a sum over ranks.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone, Serialize, Deserialize)]
 pub struct Distribution {
     /// Number of dofs of the body.
     pub dofs: usize,

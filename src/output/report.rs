@@ -218,8 +218,6 @@ pub struct BodyReport {
     pub inner_facets: usize,
     /// Facets of the boundary, which does not intersect itself.
     pub boundary_facets: usize,
-    /// Parts that share no facet; more than one if the body is in pieces.
-    pub parts: usize,
     /// Degrees of freedom.
     pub dofs: usize,
     /// Inner solver in words; empty if nothing was solved.
@@ -299,10 +297,6 @@ pub struct PairReport {
     pub theta: [f64; 2],
     /// Facets of the carrier without a partner.
     pub facets_uncovered: usize,
-    /// Facets of the carrier that are excluded, wholly or in part, since they are too steep to the other side.
-    pub facets_steep: usize,
-    /// Facets of the carrier that are excluded, wholly or in part, since they are too far from the other side.
-    pub facets_far: usize,
     /// Pieces of the carrier without common points because the search failed. A warning names their position.
     pub pieces_lost: usize,
     /// Partially covered facets of the carrier, which use plain means.

@@ -74,7 +74,7 @@ impl ContactSpec {
 }
 
 /// A rule that finds pairs: contact of all bodies that lie near each other. A [`ContactSpec`] that names surfaces of two bodies, and a
-/// narrower rule, take precedence.
+/// later rule, take precedence.
 #[derive(Debug, Clone)]
 pub struct AutoContact {
     /// Names or patterns of bodies. A body that matches the first and one that matches the second form a pair. All bodies if `None`.

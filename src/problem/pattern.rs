@@ -34,10 +34,6 @@ pub(crate) fn pattern(node: &Node, _: &Context) -> Checked<Located<String>> {
     }
 }
 
-/// How narrow a pattern is; narrower ones compare greater. The entries are: 1 for a plain name and 0 for a pattern, then the numbers of
-/// characters that stand for themselves, of `[ ]`, and of `?`.
-pub type Rank = [usize; 4];
-
 impl<'a> Pattern<'a> {
     /// Read a name or a pattern.
     pub fn new(text: &'a str) -> Result<Self, &'static str> {
@@ -49,25 +45,6 @@ impl<'a> Pattern<'a> {
     pub fn matches(&self, name: &str) -> bool {
         self.text == name || self.glob.as_ref().is_some_and(|glob| glob.matches(name))
     }
-
-    /// Return how narrow the pattern is.
-    pub fn rank(&self) -> Rank {
-        if self.glob.is_none() {
-            return [1, self.text.len(), 0, 0];
-        }
-        let ([mut literals, mut classes, mut singles], mut rest) = ([0; 3], self.text);
-        while let Some(first) = rest.chars().next() {
-            let class_end = if first == '[' { rest.find(']') } else { None };
-            match (first, class_end) {
-                (_, Some(_)) => classes += 1,
-                ('*', _) => {}
-                ('?', _) => singles += 1,
-                _ => literals += 1,
-            }
-            rest = &rest[class_end.map_or(first.len_utf8(), |end| end + 1)..];
-        }
-        [0, literals, classes, singles]
-    }
 }
 
 #[cfg(test)]
@@ -75,15 +52,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patterns_match_and_rank() {
+    fn patterns_match() {
         let pattern = |text| Pattern::new(text).unwrap();
         assert!(pattern("brick_*").matches("brick_17") && !pattern("brick_*").matches("block_17"));
         assert!(pattern("b[0-9]").matches("b7") && pattern("b?").matches("bx") && !pattern("b?").matches("b17"));
         assert!(pattern("a[b").matches("a[b") && pattern("a[b").glob.is_none(), "an open bracket is a plain character");
         assert!(pattern("a[1]").matches("a[1]") && pattern("a[1]").matches("a1"), "groups may be called so");
-        let narrower = ["*", "b*", "b?*", "b[0-9]*", "br*", "brick_*", "*_brick_1", "b1"];
-        let ranks = narrower.map(|text| pattern(text).rank());
-        assert!(ranks.is_sorted() && ranks.windows(2).all(|two| two[0] < two[1]), "{ranks:?}");
         assert!(Pattern::new("a**b").is_err());
     }
 }

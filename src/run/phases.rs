@@ -47,10 +47,8 @@ pub fn build(
     build_after(session, scene.into(), None, interrupt, clock)
 }
 
-/// Build a scene with what the run of another scene before it has left. Collective.
-///
-/// The stiffness matrix of a body does not depend on method, layers, gaps and the values of loads and supports: then a condensed body is
-/// reused. Where only the method changes, the whole problem is reused.
+/// Build a scene with what the run of another scene before it has left, if only the method differs: the condensed bodies, and the whole
+/// problem if linear steps are solved alike. Collective.
 pub fn build_after(
     session: &Session,
     scene: Rc<Scene>,
@@ -59,7 +57,7 @@ pub fn build_after(
     clock: &mut Clock,
 ) -> Result<Built> {
     let mut kept = Vec::new();
-    if let Some(Done { built: mut last, .. }) = before {
+    if let Some(Done { built: mut last, .. }) = before.filter(|done| settings(&done.built.scene) == settings(&scene)) {
         if serves(&last, &scene) {
             let discrete = &mut last.discrete;
             discrete.model.exchange = Rc::new(Ranks::new(session));
@@ -68,9 +66,7 @@ pub fn build_after(
             discrete.assemblies = 0;
             return Ok(Built { scene, ..last });
         }
-        if settings(&last.scene, without_values) == settings(&scene, without_values) {
-            kept = last.into_condensed();
-        }
+        kept = last.into_condensed();
     }
     match scene.dimension.value {
         2 => build_in::<2>(session, scene, pieces::in_plane, kept, interrupt, clock),
@@ -289,7 +285,8 @@ pub fn targets(scene: &Scene) -> String {
     rules.chain(balanced).collect::<Vec<_>>().join(" or ")
 }
 
-/// Return whether the problem of the run before serves another scene as a whole: only the method differs, and all bodies are condensed.
+/// Return whether the problem of the run before serves a scene that differs in the method alone: all bodies are condensed, and linear steps
+/// are solved alike.
 fn serves(last: &Built, scene: &Scene) -> bool {
     let both = [&*last.scene, scene];
     // an estimate of the error needs the meshes, which are kept only for it
@@ -304,40 +301,13 @@ fn serves(last: &Built, scene: &Scene) -> bool {
         // tables of factors change the loads of bodies
         && both.iter().all(|scene| !scene.method.steps.is_table())
         && old_joint == new_joint
-        && settings(&last.scene, |_| ()) == settings(scene, |_| ())
 }
 
-/// Return the settings of a scene on which bodies can depend, changed by `edit`.
-fn settings(scene: &Scene, edit: fn(&mut Value)) -> Value {
+/// Return the settings of a scene on which its discrete problem can depend.
+fn settings(scene: &Scene) -> Value {
     let mut settings = scene.settings();
     remove(&mut settings, "", &["title", "units", "method", "output"]);
-    edit(&mut settings);
     settings
-}
-
-/// Remove the settings on which stiffness matrices, contact rows and the set of prescribed dofs do not depend.
-fn without_values(settings: &mut Value) {
-    items(settings.get_mut("contact")).for_each(|contact| remove(contact, "", &["gap", "layer", "reference"]));
-    for body in items(settings.get_mut("body")) {
-        remove(body, "", &["force", "path"]);
-        if let Some(Value::Array(loads)) = body.get_mut("load") {
-            // only rigid surfaces change the dofs: they join them
-            loads.retain(|load| load["rigid"] == true);
-        }
-        for key in ["load", "fix"] {
-            for item in items(body.get_mut(key)) {
-                remove(item, "", &["path"]);
-                for key in ["force", "moment", "x", "y", "z", "normal"] {
-                    item.get_mut(key).into_iter().for_each(|value| *value = Value::Bool(true));
-                }
-            }
-        }
-    }
-}
-
-/// Return the items of a list in the settings.
-fn items(list: Option<&mut Value>) -> impl Iterator<Item = &mut Value> {
-    list.and_then(Value::as_array_mut).into_iter().flatten()
 }
 
 /// Refuse, on all ranks, scenes that differ between ranks, data and tables included. Files of the mesh are not compared, as only the

@@ -3,7 +3,7 @@
 use super::stages::{All, Built, Clock, Done, Look};
 use super::verdict::{self, forecast, message, status_name};
 use super::{results, warnings};
-use crate::contact::{ContactPair, Left};
+use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Reached, Row, Status, Whose};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::few;
@@ -205,7 +205,6 @@ fn body_report(info: &BodyInfo, solver: &str) -> BodyReport {
         cells: info.cells,
         inner_facets: info.facets.inner,
         boundary_facets: info.facets.outer,
-        parts: info.facets.parts.count,
         dofs: info.dofs,
         solver: solver.to_owned(),
         rank: info.rank,
@@ -299,8 +298,6 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         carrier: pair.surfaces[0].clone(),
         theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered(),
-        facets_steep: pair.left(Left::Steep),
-        facets_far: pair.left(Left::Far),
         pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
         facets_averaged: pair.averaged(),
         layer_energy: layer.energy[i],

@@ -4,13 +4,13 @@
 use super::numbered;
 use super::stages::{All, Built, Done, Recovered};
 use crate::contact::{ContactPair, moment_in_scene};
-use crate::discretize::{BodyInfo, Discrete, ForceBalance};
+use crate::discretize::{BodyInfo, Discrete, ForceBalance, mean_normal};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{length, minus};
 use crate::linalg::{around, bounds, dot};
-use crate::model::{Body, BodySlot, Model};
+use crate::model::{Body, BodySlot};
 use crate::output::report::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ReactionReport, StepPairReport, StepReport, sci,
@@ -209,12 +209,6 @@ fn strain_in_words(name: &str, strain: &Strained) -> String {
     format!("`{name}` up to {} at ({x}, {y}, {z}), in {percentage} per cent of the body", sci(strain.most, 1))
 }
 
-/// Least length of the integrated normal of a pair relative to its area: below this ratio the pair has no mean normal.
-///
-/// Around a closed surface the integral is zero except for facets without a partner, and one such facet in a thousand does not
-/// define a direction of the contact. Half a circle has the ratio 0.64.
-const CANCELS: f64 = 1e-3;
-
 /// Return the names of the pairs in the order of the scene, made unique.
 pub fn pair_names(built: &Built) -> Vec<String> {
     let model = &built.discrete.model;
@@ -309,34 +303,19 @@ fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
 /// Return the approach of the bodies of each pair along its mean normal, none without a mean normal. Collective, one message.
 pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
     let (discrete, model) = (&done.built.discrete, done.model());
-    let directions: Vec<Option<[f64; 3]>> = (0..model.pairs.len()).map(|i| direction(model, i)).collect();
-    let mut message = vec![0.0; model.pairs.len()];
-    for (i, &n) in directions.iter().enumerate() {
-        let Some(n) = n else { continue };
-        for (side, sign) in [(0, 1.0), (1, -1.0)] {
-            let body = model.pairs[i].bodies[side];
-            message[i] += match &recovered[body] {
-                None => 0.0,
-                Some(Err(_)) => f64::NAN,
-                Some(Ok(Recovered { state, .. })) => {
-                    let u = discrete.bodies[body].post().outer(state, n);
-                    sign * (0..3).map(|k| u[k] * n[k]).sum::<f64>()
-                }
-            };
-        }
+    let mut sums = vec![0.0; model.pairs.len()];
+    for (body, recovered) in recovered.iter().enumerate() {
+        let segments = &model.bodies[body].segments;
+        let each = match recovered {
+            None => continue,
+            Some(Err(_)) => vec![f64::NAN; segments.len()],
+            Some(Ok(Recovered { state, .. })) => discrete.bodies[body].post().approach(state),
+        };
+        segments.iter().zip(each).for_each(|(segment, own)| sums[segment.pair] += own);
     }
-    model.exchange.sum(&mut message);
-    let finite = |(n, value): (Option<[f64; 3]>, f64)| n.map(|_| value).filter(|value| value.is_finite());
-    directions.into_iter().zip(message).map(finite).collect()
-}
-
-/// Return the mean normal of pair `i` from side a to side b, if there is one.
-fn direction(model: &Model, i: usize) -> Option<[f64; 3]> {
-    let pair = &model.pairs[i];
-    let points = || pair.weight.iter().zip(&pair.resultant[0]);
-    let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(weight, n)| weight * n[k]).sum());
-    let (size, total) = (length(sum), pair.weight.iter().sum::<f64>());
-    (size > CANCELS * total).then(|| sum.map(|n| n / size))
+    model.exchange.sum(&mut sums);
+    let known = |(pair, sum): (&ContactPair, f64)| mean_normal(pair).map(|_| sum).filter(|sum| sum.is_finite());
+    model.pairs.iter().zip(sums).map(known).collect()
 }
 
 /// Numbers of a resultant: force and moment.

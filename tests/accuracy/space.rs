@@ -9,7 +9,7 @@ use winkler::internals::Interrupt;
 use winkler::internals::contact::law::{self, OwnLaws};
 use winkler::internals::contact::pieces::{self, Cut, Reach};
 use winkler::internals::contact::{Carriers, ContactPair, Side, assemble};
-use winkler::internals::fem::{Frame, Space, Subdivision, assemble as fem};
+use winkler::internals::fem::{Frame, Space, assemble as fem};
 use winkler::internals::mesh::{Mesh, load};
 
 /// Runs a case with overrides of its scene; the run must converge.
@@ -249,11 +249,10 @@ fn volume_and_area_of_a_ball() {
             let scene = load_scene(&path, &[format!("mesh.set.h={h}")]).expect("a scene");
             let mesh = load::<3>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
             let space = Space::new(&mesh, mesh.group("ball").expect("a body"), degree);
-            let volume = fem::body_force(&space, Subdivision::Whole, &|_| [1.0, 0.0, 0.0]).sum()[0];
+            let volume = fem::body_force(&space, &|_| [1.0, 0.0, 0.0]).sum()[0];
             let facets = space.facets(mesh.group("skin").expect("a surface"));
             let unit = |_, _| [1.0, 0.0, 0.0];
-            let area =
-                winkler::internals::fem::surface::surface_load(&space, &facets, Subdivision::Whole, &unit).sum()[0];
+            let area = winkler::internals::fem::surface::surface_load(&space, &facets, &unit).sum()[0];
             // the boundary found from the cells is the group, facet by facet
             let sorted = |facets: &winkler::internals::fem::Facets<3>| {
                 let mut all: Vec<Vec<u32>> = (0..facets.count()).map(|i| facets.facet(i).to_vec()).collect();

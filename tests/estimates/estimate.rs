@@ -638,23 +638,3 @@ fn an_adaptation_ends_when_only_a_sharp_end_is_left() {
     assert!(soft.number("discretization_error/pressure/0") <= 2e-2, "{}", soft.said());
     assert!(!soft.warnings().contains("sharp end"), "{}", soft.said());
 }
-
-/// A round punch that slides far has other pressures by the normals of the block than by its own, and a warning says so; one that is pressed straight
-/// down has not.
-#[test]
-fn pressures_that_depend_on_the_side_of_the_normals() {
-    let round = PUNCH
-        .replace(
-            "{-1, 0, 0, h}; Point(8) = {1, 0, 0, h}",
-            "{-1, 0.0501256, 0, h}; Point(8) = {1, 0.0501256, 0, h}; Point(11) = {0, 10, 0, h}",
-        )
-        .replace("Line(7) = {7, 8}", "Circle(7) = {7, 11, 8}");
-    assert!(round.contains("Point(11)") && round.contains("Circle(7)"));
-    let warnings = |pressed: &str| {
-        let run = solve(punch(&round, pressed), &["--set", "mesh.set.n=8"]).converged();
-        run.warnings()
-    };
-    let (slid, straight) = (warnings("x = 0.05, y = -5e-3"), warnings("x = 0, y = -5e-3"));
-    assert!(slid.contains("on which of their normals count"), "{slid}");
-    assert!(!straight.contains("on which of their normals count"), "{straight}");
-}

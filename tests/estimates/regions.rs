@@ -87,6 +87,60 @@ fn an_interface_that_ends_in_the_contact_has_its_error() {
     }
 }
 
+/// Two blocks under a layer that is five times as stiff beyond a place: at a node, or within a facet.
+const BLOCKS: &str = "DefineConstant[ n = 8 ];
+Macro Quad
+  Point(b+1)={0,y,0}; Point(b+2)={2,y,0}; Point(b+3)={2,y+1,0}; Point(b+4)={0,y+1,0};
+  For i In {1:4}
+    Line(b+i)={b+i,b+(i%4)+1};
+  EndFor
+  Curve Loop(b)={b+1,b+2,b+3,b+4}; Plane Surface(b)={b}; Transfinite Curve{b+1,b+3}=n+1; Transfinite Curve{b+2,b+4}=n/2+1; Transfinite Surface{b};
+Return
+b=10; y=-1; Call Quad;
+b=20; y=0; Call Quad;
+Physical Surface(\"lower\")={10}; Physical Surface(\"upper\")={20}; Physical Curve(\"floor\")={11}; Physical Curve(\"top\")={23};
+Physical Curve(\"low\")={13}; Physical Curve(\"up\")={21}; Physical Curve(\"low_ends\")={12,14}; Physical Curve(\"up_ends\")={22,24};
+";
+
+/// The told error of the pressures is that of a finer mesh, or more: no function on a facet follows a jump.
+#[test]
+fn a_layer_that_jumps_has_its_error() {
+    let at = |order: usize, n: usize, jump: f64| -> Run {
+        let body = |name: &str, ends: &str, on: &str, y: f64| {
+            format!(
+                "[[body]]\nname = \"{name}\"\nyoung = 1e3\npoisson = 0.3\norder = {order}
+fix = [{{ on = \"{on}\", y = {y} }}, {{ on = \"{ends}\", x = 0 }}]\n"
+            )
+        };
+        let scene = Scene::new(format!(
+            "dimension = 2\nestimate = true\nmesh = {{ geo = \"blocks.geo\", set = {{ n = {n} }} }}\n{}{}[[contact]]
+between = [\"low\", \"up\"]\nlayer = {{ linear = {{ stiffness = \"1e3*(1 + 4*(x > {jump}))\" }} }}\n",
+            body("lower", "low_ends", "floor", 0.0),
+            body("upper", "up_ends", "top", -0.01)
+        ));
+        std::fs::write(scene.path.with_file_name("blocks.geo"), BLOCKS).expect("a script");
+        solve(&scene, &[]).converged()
+    };
+    for jump in [1.0001, 1.06] {
+        let exact = at(2, 128, jump).contact();
+        for order in [1, 2] {
+            let run = at(order, 8, jump);
+            let (own, [mut error, mut whole]) = (run.contact(), [0.0; 2]);
+            for q in 0..own.rows() {
+                // the nearest point on the same side of the jump
+                let is_beside = |r: &usize| (exact["x"][*r] > jump) == (own["x"][q] > jump);
+                let near = |r: &usize| (exact["x"][*r] - own["x"][q]).abs();
+                let beside = (0..exact.rows()).filter(is_beside);
+                let nearest = beside.min_by(|r, s| near(r).total_cmp(&near(s))).expect("a point");
+                error += own["weight"][q] * (own["pressure"][q] - exact["pressure"][nearest]).powi(2);
+                whole += own["weight"][q] * own["pressure"][q].powi(2);
+            }
+            let (told, true_error) = (run.number("discretization_error/pressure/0"), f64::sqrt(error / whole));
+            assert!((0.7..6.0).contains(&(told / true_error)), "order {order}, {jump}: {told:e} {true_error:e}");
+        }
+    }
+}
+
 /// A strip with a stiff layer of one element, stretched by 1e-3: the stress is 100 in the layer and 1 outside, at all nodes of each.
 #[test]
 fn nodal_stresses_are_those_of_one_material() {

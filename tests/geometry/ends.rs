@@ -33,17 +33,14 @@ fn a_contact_at_the_largest_distance_has_a_warning() {
     assert!(solve(&touching, &[]).warnings().contains(REACHES));
 }
 
-/// The warning has the first load step in which the contact reaches the end of the pair, and all facets beyond it are counted.
+/// The warning has the first load step in which the contact reaches the end of the pair.
 #[test]
 fn the_warning_names_the_step() {
     let scene = spheres("between = [\"lower_top\", \"upper_bottom\"]\ndistance = 0.01", 1);
     let run = solve(&scene, &["--set", "method.steps=[0.01, 1, 1]"]).converged();
     let warnings = run.warnings();
     assert!(warnings.contains("places in load step 2 where") && warnings.matches(REACHES).count() == 1, "{warnings}");
-    // no facet lies beyond the end of the other sphere, so that each has a partner or is too far away; one may be cut by the largest distance
-    let cut = run.number("pairs/0/facets_far") - run.number("pairs/0/facets_uncovered");
-    assert!(cut == 0.0 || cut == 1.0, "{warnings}");
-    assert!(run.number("pairs/0/facets_far") > 10.0);
+    assert!(run.count("pairs/0/facets_uncovered") > 10);
 }
 
 /// Return the script of a block with the top y = 0, 0 < x < 2, in 15 facets, below a body whose underside has these points.

@@ -355,3 +355,43 @@ fn loads_that_quadrature_puts_out_of_balance() {
     let run = run.into_iter().find(|run| run.code == 0).expect("one of them balances").converged();
     assert!(run.warnings().contains("they were changed by that share to balance"), "{}", run.warnings());
 }
+
+/// Two plates that three bolts clamp, as opposite forces on discs, and that nothing else holds.
+const CLAMPED: &str = "SetFactory(\"OpenCASCADE\"); e = 1e-6;
+Cylinder(1) = {0,0,-0.4, 0,0,0.4, 2}; Cylinder(2) = {0,0,0, 0,0,0.4, 2};
+For s In {0:1}
+  For k In {0:2}
+    w = 2*Pi*k/3 + 0.2; Disk(100 + 10*s + k) = {1.3*Cos(w), 1.3*Sin(w), (2*s-1)*0.4, 0.35};
+  EndFor
+EndFor
+BooleanFragments{ Volume{1}; Delete; }{ Surface{100:102}; Delete; }
+BooleanFragments{ Volume{2}; Delete; }{ Surface{110:112}; Delete; }
+Physical Volume(\"lower\") = {1}; Physical Volume(\"upper\") = {2}; low() = {}; up() = {};
+For k In {0:2}
+  w = 2*Pi*k/3 + 0.2; x = 1.3*Cos(w); y = 1.3*Sin(w); r = 0.36;
+  low() += Surface In BoundingBox{x-r, y-r, -0.4-e, x+r, y+r, -0.4+e}; up() += Surface In BoundingBox{x-r, y-r, 0.4-e, x+r, y+r, 0.4+e};
+EndFor
+Physical Surface(\"lower_bolts\") = {low()}; Physical Surface(\"upper_bolts\") = {up()};
+MeshSize{:} = 0.5;
+";
+
+/// They run on all meshes of an adaptation, whose discs have other chords on either side, as they do without one.
+#[test]
+fn balanced_bolts_are_enough_on_every_mesh() {
+    let body = |name: &str, force: f64| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nyoung = 2e5\npoisson = 0.3\nload = [{{ on = \"{name}_bolts\", force = [0, 0, {force}] }}]\n"
+        )
+    };
+    let scene = Scene::new(format!(
+        "dimension = 3\nmesh = \"clamped.geo\"\n{}{}[[contact]]\nbetween = \"auto\"\ndistance = 0.1\nlayer = {{ power = {{ B = 1e-3, a = 0.5 }} }}\n",
+        body("lower", 1e3),
+        body("upper", -1e3)
+    ));
+    std::fs::write(scene.path.with_file_name("clamped.geo"), CLAMPED).expect("a script");
+    for more in [&[][..], &["--tolerance", "0.25"]] {
+        let run = solve(&scene, more).converged();
+        assert!(run.warnings().contains("nothing holds them together"), "{}", run.warnings());
+        assert!((run.forces(0)[0][2].abs() / 1e3 - 1.0).abs() < 0.05, "{}", run.said());
+    }
+}

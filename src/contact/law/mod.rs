@@ -7,10 +7,11 @@
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). A point is found from its compression
 //! ([`LayerLaw::response`]), from its pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the graph
-//! ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws). [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the
-//! graph. These methods handle the open layer and the ends of the range. A law implements the methods with `loaded` in their
-//! names if it has a better way than the common search.
+//! ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws), for all laws by one root finder (`numeric`).
+//! [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the graph. These methods handle the open layer and the ends of
+//! the range.
 
+mod expression;
 mod forms;
 mod make;
 mod numeric;
@@ -20,8 +21,8 @@ mod tests;
 
 pub use forms::LinearLaw;
 #[cfg(test)]
-pub use forms::{Cubic, Exponential, Power};
-pub use make::{OwnLaws, make};
+pub use forms::Power;
+pub use make::{LawMaker, OwnLaws, make};
 pub use table::Table;
 
 use std::rc::Rc;
@@ -45,17 +46,6 @@ impl Response {
             tangent: self.tangent,
             energy: self.energy + beyond * (self.pressure + 0.5 * self.tangent * beyond),
         }
-    }
-
-    /// Return by how much more the layer is compressed where the tangent has this `pressure`.
-    fn straight_compression(self, pressure: f64) -> f64 {
-        (pressure - self.pressure) / self.tangent
-    }
-
-    /// Return by how much more than `c`, the compression of this response, the layer is compressed where the tangent meets
-    /// c + p/rho = s. The result is negative if they meet before.
-    fn straight_meet(self, c: f64, s: f64, rho: f64) -> f64 {
-        (s - c - self.pressure / rho) / (1.0 + self.tangent / rho)
     }
 }
 
@@ -99,64 +89,56 @@ pub trait LayerLaw: std::fmt::Debug {
     /// times 1e-16 s times the exponent of the law at c.
     fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
         // All comparisons are false for NaN, which is then returned as it is.
-        if s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY { self.resolvent_loaded(point, s, rho) } else { s }
-    }
-
-    /// Return the same as [`LayerLaw::resolvent`] for finite `s > 0` and `rho > 0`.
-    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        numeric::line_intersection(s, rho, [0.0, s], s, |c| self.pressure_and_tangent(point, c))
+        if !(s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY) {
+            return s;
+        }
+        let sum = |c: f64| {
+            let (pressure, tangent) = self.pressure_and_tangent(point, c);
+            (c + pressure / rho, 1.0 + tangent / rho)
+        };
+        // A law that is NaN from some compression on has a rigid stop there.
+        let (Ok(c) | Err(c)) = numeric::root(s, [0.0, s], s, sum);
+        c
     }
 
     /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a pressure that
     /// the layer cannot reach in double precision; NaN stays NaN.
     fn compression(&self, point: usize, pressure: f64) -> f64 {
-        if pressure > 0.0 && pressure < f64::INFINITY {
-            self.compression_loaded(point, pressure)
-        } else {
-            pressure.clamp(0.0, f64::INFINITY)
+        if !(pressure > 0.0 && pressure < f64::INFINITY) {
+            return pressure.clamp(0.0, f64::INFINITY);
         }
-    }
-
-    /// Return the same as [`LayerLaw::compression`] for a finite `pressure > 0`.
-    fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
-        // The unit of length is unknown, so no start is better than another.
-        let start = 1.0;
+        // Without an end the unit of length is unknown, so no start is better than another.
+        let start = self.end(point).min(1.0);
         numeric::root(pressure, [0.0, f64::MAX], start, |c| self.pressure_and_tangent(point, c))
             .unwrap_or(f64::INFINITY)
     }
 
-    /// Return Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` p, which need not be a point of the graph.
+    /// Return a bound of Fenchel's gap P(c) + P*(p) - c p of a compression `c` and a `pressure` p, which need not be a point of the graph.
     ///
-    /// The gap is an energy per area. P*(p) = sup_c (p c - P(c)) is the complementary energy of P, the energy of the law. The gap
-    /// is not negative and zero on the graph. It is infinite for `pressure < 0` and for a pressure that the layer cannot reach;
-    /// NaN stays NaN.
+    /// The gap is an energy per area. P*(p) = sup_c (p c - P(c)) is the complementary energy of P, the energy of the law. It is the area
+    /// between the graph and the corner (c, p), and the bound is the rectangle around it,
     ///
-    /// The gap is the area between the graph and the corner (c, p), computed without the difference of large numbers. Near
-    /// the graph it follows the difference p(c) - p, which is exact for the p(c) that [`LayerLaw::pressure`] gives. The
-    /// relative error is below 1e-3 as long as |p(c) - p| >= 1e-13 p. If a kink of the law lies between (c, p) and the graph,
-    /// within 1e-12 c, the result is only a bound, which is too large by at most the ratio of the tangents. Closer to the graph
-    /// the result is of the order of 1e-30 p^2/p'(c), or 0.
+    /// ```text
+    /// (c - phi(p)) (p(c) - p),      phi(p) the compression at the pressure p,
+    /// ```
+    ///
+    /// which is twice the gap where the law is straight. It is not negative, and zero on the graph to rounding. It is infinite for
+    /// `pressure < 0` and for a pressure that the layer cannot reach; NaN stays NaN.
     ///
     /// The rounding of p(c) itself, 1e-16 p times the exponent of the law, does not count as an error of the gap. It equals a
     /// change of the law's parameters within double precision.
     fn duality_gap(&self, point: usize, c: f64, pressure: f64) -> f64 {
         if c.is_nan() || pressure.is_nan() {
-            f64::NAN
-        } else if pressure < 0.0 || pressure == f64::INFINITY || c.is_infinite() {
-            // An open layer without pressure is on the graph at any distance.
-            if pressure == 0.0 && c < 0.0 { 0.0 } else { f64::INFINITY }
-        } else if pressure == 0.0 {
-            self.response(point, c).energy
-        } else {
-            // The part of the area below c = 0 is a rectangle.
-            self.gap_loaded(point, c.max(0.0), pressure) + pressure * (-c).max(0.0)
+            return f64::NAN;
         }
-    }
-
-    /// Return the same as [`LayerLaw::duality_gap`] for a finite `c >= 0` and a finite `pressure > 0`.
-    fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
-        let (law, tangent) = (|c| self.pressure(point, c), |c| self.pressure_and_tangent(point, c).1);
-        numeric::gap_by_quadrature(c, pressure, self.compression(point, pressure), law, tangent)
+        if pressure == 0.0 && c <= 0.0 {
+            // An open layer without pressure is on the graph at any distance.
+            return 0.0;
+        }
+        let (at_c, on_graph) = (self.pressure(point, c), self.compression(point, pressure));
+        let gap = (c - on_graph) * (at_c - pressure);
+        // NaN comes from values that overflow or lie beyond the end of a law.
+        if pressure < 0.0 || gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
     }
 }
 
@@ -175,18 +157,6 @@ impl<L: LayerLaw> LayerLaw for PerPoint<L> {
 
     fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
         self.0[point].pressure_and_tangent(0, c)
-    }
-
-    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        self.0[point].resolvent_loaded(0, s, rho)
-    }
-
-    fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
-        self.0[point].compression_loaded(0, pressure)
-    }
-
-    fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
-        self.0[point].gap_loaded(0, c, pressure)
     }
 
     fn end(&self, point: usize) -> f64 {
@@ -220,19 +190,6 @@ impl LayerLaw for Scaled {
     fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
         let (pressure, tangent) = self.law.pressure_and_tangent(point, self.factor * c);
         (pressure / self.factor, tangent)
-    }
-
-    fn resolvent_loaded(&self, point: usize, s: f64, rho: f64) -> f64 {
-        self.law.resolvent(point, self.factor * s, rho) / self.factor
-    }
-
-    fn compression_loaded(&self, point: usize, pressure: f64) -> f64 {
-        self.law.compression(point, self.factor * pressure) / self.factor
-    }
-
-    fn gap_loaded(&self, point: usize, c: f64, pressure: f64) -> f64 {
-        let s = self.factor;
-        self.law.duality_gap(point, s * c, s * pressure) / (s * s)
     }
 
     fn end(&self, point: usize) -> f64 {

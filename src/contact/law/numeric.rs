@@ -1,7 +1,6 @@
-//! Numerical methods of laws: roots of equations with an increasing function of the compression, integrals, and Fenchel's gap, the
-//! area between the graph of a law and the corner (c, p) of a compression and a pressure.
+//! Numerical methods of laws: roots of equations with an increasing function of the compression, and integrals.
 
-use crate::linalg::portable::{exp, expm1, log};
+use crate::linalg::portable::{exp, log};
 
 /// Relative rounding of a law's value. Numbers closer than that are the same.
 const ROUNDING: f64 = 2.0 * f64::EPSILON;
@@ -71,18 +70,6 @@ pub fn root(
     if reached { Ok(high) } else { Err(low) }
 }
 
-/// Return the compression c in the bracket with c + p(c)/rho = s, searched from `start`. `law` gives pressure and tangent. A law that
-/// is NaN from some compression on has a rigid stop there.
-pub fn line_intersection(s: f64, rho: f64, bracket: [f64; 2], start: f64, law: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let sum = |c: f64| {
-        let (pressure, tangent) = law(c);
-        (c + pressure / rho, 1.0 + tangent / rho)
-    };
-    match root(s, bracket, start, sum) {
-        Ok(c) | Err(c) => c,
-    }
-}
-
 /// Points in (0, 1] and weights of the Gauss-Lobatto rule with 7 points on [-1, 1]. The rule includes the ends of an interval, so
 /// that a kink just before an end does not hide between points.
 const LOBATTO: [(f64, f64); 3] = [
@@ -99,14 +86,8 @@ const DEPTH: usize = 30;
 /// Return the integral of `f` from `a` to `b`. Intervals are halved until the rule on each and on its halves agree to 1e-13 of the
 /// whole integral.
 pub fn integral(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
-    integral_to(f, a, b, 1e-13, 0.0)
-}
-
-/// Return the integral of `f` from `a` to `b`. Intervals are halved until the rules agree to a `share` of the whole integral, or to
-/// `rounding`, the error of the integral from that of the values of `f`.
-pub fn integral_to(f: &dyn Fn(f64) -> f64, a: f64, b: f64, share: f64, rounding: f64) -> f64 {
     let whole = rule(f, a, b);
-    halves(f, a, b, whole, rounding.max(share * whole.abs()), DEPTH)
+    halves(f, a, b, whole, 1e-13 * whole.abs(), DEPTH)
 }
 
 fn halves(f: &dyn Fn(f64) -> f64, a: f64, b: f64, whole: f64, tolerance: f64, depth: usize) -> f64 {
@@ -125,57 +106,6 @@ fn rule(f: &dyn Fn(f64) -> f64, a: f64, b: f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     let sides: f64 = LOBATTO.iter().map(|(x, weight)| weight * (f(middle - half * x) + f(middle + half * x))).sum();
     half * (sides + MIDDLE * f(middle))
-}
-
-/// Relative error of the quadrature of the gap. It enters bounds that exceed the error they bound by a factor.
-const SHARE: f64 = 1e-5;
-/// Relative difference of compressions that is too rounded to integrate over: a root has an error of a few units in the last place,
-/// 1e-3 of this many.
-const CLOSE: f64 = 4096.0 * f64::EPSILON;
-/// Relative difference of pressures within which a law counts as straight, if its tangents at both ends agree.
-const NEAR: f64 = 1e-6;
-/// Relative difference up to which these tangents agree. The gap is then too large by at most two thirds of it.
-const STRAIGHT: f64 = 5e-4;
-
-/// Return the gap of a compression c and a `pressure`, which is the integral of p(.) - `pressure` from `on_graph` to c. The law has this
-/// pressure at the compression `on_graph`. `law` gives p(c) and `tangent` p'(c).
-pub fn gap_by_quadrature(
-    c: f64,
-    pressure: f64,
-    on_graph: f64,
-    law: impl Fn(f64) -> f64,
-    tangent: impl Fn(f64) -> f64,
-) -> f64 {
-    if on_graph == f64::INFINITY {
-        return f64::INFINITY;
-    }
-    let excess = |c: f64| law(c) - pressure;
-    let (difference, width) = (excess(c), c - on_graph);
-    let is_close = width.abs() <= CLOSE * c;
-    if is_close || difference.abs() <= NEAR * pressure {
-        if difference == 0.0 {
-            return 0.0;
-        }
-        let [at_c, at_graph] = [c, on_graph].map(tangent);
-        let least = at_c.min(at_graph);
-        if is_close || (at_c - at_graph).abs() < STRAIGHT * least {
-            // The width is rounded, but the difference of pressures is not. The flatter side gives the larger gap.
-            return 0.5 * difference * (difference / least);
-        }
-    }
-    let rounding = ROUNDING * pressure * width.abs();
-    let gap = integral_to(&excess, on_graph, c, SHARE, rounding);
-    // NaN comes from values that overflow or lie beyond the end of a law.
-    if gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
-}
-
-/// Return e^x - 1 - x without cancellation where x is small.
-pub fn exp_less_line(x: f64) -> f64 {
-    if x.abs() < 1e-2 {
-        x * x * (0.5 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0))))
-    } else {
-        expm1(x) - x
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,5 @@
 //! The law given by a curve: a smooth increasing one through measured points.
 
-use super::numeric::{line_intersection, root};
 use super::{LayerLaw, Response};
 use crate::linalg::portable::hypot;
 
@@ -27,13 +26,6 @@ struct Knot {
 }
 
 impl Table {
-    /// Return the two knots around the point of the curve where `value`, which increases along the curve, is `target`. Beyond the
-    /// last knot there is only this one.
-    fn around(&self, target: f64, value: impl Fn(&Knot) -> f64) -> (&Knot, Option<&Knot>) {
-        let above = self.knots.partition_point(|knot| value(knot) < target).max(1);
-        (&self.knots[above - 1], self.knots.get(above))
-    }
-
     /// Make a curve through at least one point (c, p). Both coordinates increase from (0, 0), which is not among the points.
     pub fn new(points: &[[f64; 2]]) -> Self {
         let mut knots = vec![Knot::default()];
@@ -67,12 +59,6 @@ impl Knot {
     }
 }
 
-/// Return the pressure and the tangent of the curve between two knots at compression `c`.
-fn pressure_and_tangent(a: &Knot, b: &Knot, c: f64) -> (f64, f64) {
-    let Response { pressure, tangent, .. } = piece(a, b, c);
-    (pressure, tangent)
-}
-
 /// Return the response of the curve between two knots at compression `c`.
 fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
     let h = b.c - a.c;
@@ -91,31 +77,11 @@ fn piece(a: &Knot, b: &Knot, c: f64) -> Response {
 impl LayerLaw for Table {
     fn compressed(&self, _point: usize, c: f64) -> Response {
         // NaN is evaluated in the first piece and stays NaN.
-        match self.around(c, |knot| knot.c) {
-            (a, Some(b)) => piece(a, b, c),
-            (end, None) => end.response().straight(c - end.c),
-        }
-    }
-
-    fn resolvent_loaded(&self, _point: usize, s: f64, rho: f64) -> f64 {
-        let sum = |knot: &Knot| knot.c + knot.pressure / rho;
-        match self.around(s, sum) {
-            (a, Some(b)) => {
-                let start = a.c + (b.c - a.c) * ((s - sum(a)) / (sum(b) - sum(a)));
-                line_intersection(s, rho, [a.c, b.c], start, |c| pressure_and_tangent(a, b, c))
-            }
-            (end, None) => end.c + end.response().straight_meet(end.c, s, rho),
-        }
-    }
-
-    fn compression_loaded(&self, _point: usize, pressure: f64) -> f64 {
-        match self.around(pressure, |knot| knot.pressure) {
-            (a, Some(b)) => {
-                let start = a.c + (b.c - a.c) * ((pressure - a.pressure) / (b.pressure - a.pressure));
-                let (Ok(c) | Err(c)) = root(pressure, [a.c, b.c], start, |c| pressure_and_tangent(a, b, c));
-                c
-            }
-            (end, None) => end.c + end.response().straight_compression(pressure),
+        let above = self.knots.partition_point(|knot| knot.c < c).max(1);
+        let before = &self.knots[above - 1];
+        match self.knots.get(above) {
+            Some(next) => piece(before, next, c),
+            None => before.response().straight(c - before.c),
         }
     }
 

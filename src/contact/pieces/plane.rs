@@ -1,13 +1,14 @@
 //! Common pieces of two plane curves: intervals of the facets of side a.
 
-use super::{
-    AWAY, BoxTree, Facet, IntegrationPoint, Intersection, Lost, MOST_STEPS, ON_FACET, ROUNDING, Reach, Refused, SNAP,
-    plus,
-};
+use super::facet::{Facet, Lost, Rays, SNAP, plus};
+use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused};
 use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
+
+/// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end exactly where facets do.
+const ON_FACET: f64 = 1e-6;
 
 /// Return the common pieces of two plane curves.
 pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
@@ -18,19 +19,18 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
-        let pieces = search.pieces(a, i, reach, refused, |near, refused| facing(&facet, b, near, reach, refused));
+        let pieces = search.pieces(&facet, reach, refused, |near, refused| facing(&facet, b, near, reach, refused));
         for (low, high, FacetSegment { index, other, .. }) in nearest(&pieces) {
             let offset = minus(facet.from, other.from);
             for &(position, weight) in &rule {
                 let s = low + (high - low) * position;
                 let (on_a, normal) = (facet.at(&place(s)), facet.normal(&place(s)));
-                let from = plus(on_a, offset);
-                let Ok(Some(t)) = other.hit(from, normal) else {
+                let Ok(Some((at_b, t))) = other.hit(plus(on_a, offset), normal, ON_FACET) else {
                     // The normals on both sides of this point hit the facet, so this one is lost.
                     refused.lost += 1;
                     continue;
                 };
-                let gap = other.distance(t, from, normal);
+                let gap = t * length(normal);
                 if !reach.holds(gap) {
                     refused.far.insert(*index);
                     continue;
@@ -39,8 +39,11 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
                     facet_a: i,
                     at_a: place(s),
                     facet_b: *index,
-                    at_b: place(t),
-                    weight: weight * (high - low) * length(facet.tangent(s)) * a.space.circle(&plus(on_a, facet.from)),
+                    at_b,
+                    weight: weight
+                        * (high - low)
+                        * length(facet.tangent(0, &place(s)))
+                        * a.space.circle(&plus(on_a, facet.from)),
                     gap,
                 });
             }
@@ -58,9 +61,7 @@ fn facing(facet: &Facet<2>, b: &Side<2>, near: &[usize], reach: &Reach, refused:
         match FacetSegment::between(facet, other, index) {
             Ok(piece) => pieces.extend(piece.filter(|p| refused.admits(reach, index, p.gap, directions))),
             Err(Lost) => {
-                let points: Vec<_> =
-                    b.facets.coordinates(index, b.space).into_iter().map(|x| minus(x, facet.from)).collect();
-                let is_met = facet.may_meet(&points);
+                let is_met = Rays::of(facet, [f64::INFINITY; 2]).may_meet(&b.facets.coordinates(index, b.space));
                 refused.lost += usize::from(is_met && reach.faces(directions[0], directions[1]));
             }
         }
@@ -101,83 +102,6 @@ fn place(s: f64) -> [f64; 2] {
     [1.0 - s, s]
 }
 
-impl Facet<2> {
-    fn tangent(&self, s: f64) -> [f64; 2] {
-        let [tangent] = self.tangents(&place(s));
-        tangent
-    }
-
-    /// Return the parameter s at which the line through `x` along `n` meets the curve, cross(x(s) - x, n) = 0; `None` if it does
-    /// not meet it.
-    ///
-    /// # Errors
-    /// [`Lost`] if the search does not converge.
-    fn hit(&self, x: [f64; 2], n: [f64; 2]) -> Result<Option<f64>, Lost> {
-        let found = newton(|s| Equation {
-            value: cross(minus(self.at(&place(s)), x), n),
-            slope: cross(self.tangent(s), n),
-            terms: (self.terms(&place(s)) + length(x)) * length(n),
-        })?;
-        Ok(found.filter(|s| (-ON_FACET..=1.0 + ON_FACET).contains(s)))
-    }
-
-    /// Return the signed distance of the point at `s` from `x` along `n`.
-    fn distance(&self, s: f64, x: [f64; 2], n: [f64; 2]) -> f64 {
-        dot(&minus(self.at(&place(s)), x), &n) / length(n)
-    }
-
-    /// Return the parameter s whose normal n(s) passes through `x`, cross(x - x(s), n(s)) = 0; `None` if there is none.
-    ///
-    /// # Errors
-    /// [`Lost`] if the search does not converge.
-    fn foot(&self, x: [f64; 2]) -> Result<Option<f64>, Lost> {
-        let turn = minus(self.normals[1], self.normals[0]);
-        newton(|s| {
-            let (t, n) = (self.tangent(s), self.normal(&place(s)));
-            let arm = minus(x, self.at(&place(s)));
-            Equation {
-                value: cross(arm, n),
-                slope: cross(arm, turn) - cross(t, n),
-                terms: (self.terms(&place(s)) + length(x)) * (1.0 + 2.0 * s.abs()),
-            }
-        })
-    }
-}
-
-/// The value and slope of an equation in the parameter of a curve.
-struct Equation {
-    value: f64,
-    slope: f64,
-    /// Bound of the sum of the sizes of the terms that the value adds.
-    terms: f64,
-}
-
-/// Return a zero of the equation by Newton's method from the middle of \[0, 1\]; `None` if the iterates run away. A value counts as
-/// zero once it is within the rounding of its own evaluation.
-///
-/// # Errors
-/// [`Lost`] if the values stay larger.
-fn newton(equation: impl Fn(f64) -> Equation) -> Result<Option<f64>, Lost> {
-    let mut s = 0.5;
-    for _ in 0..MOST_STEPS {
-        let Equation { value, slope, terms } = equation(s);
-        let next = s - value / slope;
-        let is_away = !next.is_finite() || next.abs() > AWAY;
-        if value.abs() <= ROUNDING * terms {
-            return Ok(Some(if is_away { s } else { next }));
-        }
-        if is_away {
-            return Ok(None);
-        }
-        s = next;
-    }
-    Err(Lost)
-}
-
-fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
-    a[0] * b[1] - a[1] * b[0]
-}
-
 /// The part of a facet of side a that faces one facet of side b.
 struct FacetSegment {
     /// Interval of the parameter on side a.
@@ -203,13 +127,13 @@ impl FacetSegment {
         let offset = minus(b.from, a.from);
         let mut breaks = vec![0.0, 1.0];
         for &x in &b.x[..2] {
-            breaks.extend(a.foot(plus(x, offset))?.filter(|s| *s > SNAP && *s < 1.0 - SNAP));
+            breaks.extend(a.foot(plus(x, offset))?.map(|[_, s]| s).filter(|s| *s > SNAP && *s < 1.0 - SNAP));
         }
         breaks.sort_by(f64::total_cmp);
         let gap_in_middle = |low: f64, high: f64| -> Result<Option<f64>, Lost> {
             let middle = 0.5 * (low + high);
             let (from, normal) = (minus(a.at(&place(middle)), offset), a.normal(&place(middle)));
-            Ok(b.hit(from, normal)?.map(|t| b.distance(t, from, normal)))
+            Ok(b.hit(from, normal, ON_FACET)?.map(|(_, t)| t * length(normal)))
         };
         let mut hits: Vec<&[f64]> = Vec::new();
         for ends in breaks.windows(2).filter(|ends| ends[1] - ends[0] > SNAP) {

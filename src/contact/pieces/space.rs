@@ -7,11 +7,10 @@
 //! curved facet of b is split into four at the middle of its edges. All facets of b are split further where corners of some
 //! have no image.
 
-use super::{
-    AWAY, BoxTree, Facet, IntegrationPoint, Intersection, Lost, MOST_STEPS, ROUNDING, Reach, Refused, SNAP, WHOLE, plus,
-};
+use super::facet::{Facet, Lost, Rays, SNAP, plus};
+use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused, WHOLE};
 use crate::contact::side::Side;
-use crate::fem::{area_vector, cross, element, length, minus};
+use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
@@ -21,9 +20,6 @@ const TINY: f64 = 1e-11;
 /// Largest distance outside of its parameters at which a ray may meet a facet. The edge of a piece is a chord of the image of
 /// b's edge, which bows by an eighth of the angle that the normals turn along it: a tenth if they turn by a radian a facet.
 const ON_FACET: f64 = 0.1;
-
-/// Middle of a facet.
-const MIDDLE: [f64; 3] = [1.0 - 1.0 / 3.0 - 1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0];
 
 /// Numbers of parts into which the edges of facets of side b are split. They are tried one after the other, until a facet of side a is
 /// covered or each corner of the parts lies on one of its normals.
@@ -43,7 +39,7 @@ pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
         let pieces =
-            search.pieces(a, i, reach, refused, |near, refused| facing(&facet, &facets_b, near, reach, refused));
+            search.pieces(&facet, reach, refused, |near, refused| facing(&facet, &facets_b, near, reach, refused));
         for FacetPolygon { polygon, index, .. } in pieces {
             let other = &facets_b[index];
             let offset = minus(facet.from, other.from);
@@ -52,7 +48,7 @@ pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
                 for (l, weight) in rule.iter() {
                     let at_a = place([0, 1].map(|c| (0..3).map(|k| l[k] * triangle[k][c]).sum()));
                     let normal = facet.normal(&at_a);
-                    let Ok(Some((at_b, t))) = other.hit(plus(facet.at(&at_a), offset), normal) else {
+                    let Ok(Some((at_b, t))) = other.hit(plus(facet.at(&at_a), offset), normal, ON_FACET) else {
                         // The point lies under the image of this very facet, so it is lost.
                         refused.lost += 1;
                         continue;
@@ -116,88 +112,6 @@ fn place([u, v]: [f64; 2]) -> [f64; 3] {
     [1.0 - u - v, u, v]
 }
 
-impl Facet<3> {
-    fn is_straight(&self) -> bool {
-        element::is_straight(&self.x, 3)
-    }
-
-    /// Return where the line x + t n meets the surface, as barycentric coordinates and t; `None` if it does not meet it.
-    ///
-    /// # Errors
-    /// [`Lost`] if the search does not converge.
-    fn hit(&self, x: [f64; 3], n: [f64; 3]) -> Result<Option<([f64; 3], f64)>, Lost> {
-        let middle = self.at(&MIDDLE);
-        let found = newton(dot(&minus(middle, x), &n) / dot(&n, &n), |[u, v, t]| {
-            let l = place([u, v]);
-            let (on_facet, [along_u, along_v]) = (self.at(&l), self.tangents(&l));
-            ProjectionEquations {
-                value: std::array::from_fn(|c| on_facet[c] - x[c] - t * n[c]),
-                columns: [along_u, along_v, n.map(|n| -n)],
-                terms: self.terms(&l) + length(x) + t.abs() * length(n),
-            }
-        })?;
-        let Some([u, v, t]) = found else { return Ok(None) };
-        let at = place([u, v]);
-        Ok(at.iter().all(|l| (-ON_FACET..=1.0 + ON_FACET).contains(l)).then_some((at, t)))
-    }
-
-    /// Return the parameters (u, v) whose normal passes through `x`, `None` if there are none.
-    ///
-    /// # Errors
-    /// [`Lost`] if the search does not converge.
-    fn foot(&self, x: [f64; 3]) -> Result<Option<[f64; 2]>, Lost> {
-        let [n, m, o] = self.normals;
-        let turns = [minus(m, n), minus(o, n)];
-        let (middle, normal) = (self.at(&MIDDLE), self.normal(&MIDDLE));
-        let found = newton(dot(&minus(x, middle), &normal) / dot(&normal, &normal), |[u, v, t]| {
-            let l = place([u, v]);
-            let (on_facet, n, tangents) = (self.at(&l), self.normal(&l), self.tangents::<2>(&l));
-            let column = |k: usize| std::array::from_fn(|c| tangents[k][c] + t * turns[k][c]);
-            ProjectionEquations {
-                value: std::array::from_fn(|c| on_facet[c] + t * n[c] - x[c]),
-                columns: [column(0), column(1), n],
-                terms: self.terms(&l) + length(x) + t.abs() * (1.0 + 2.0 * (u.abs() + v.abs())),
-            }
-        })?;
-        Ok(found.map(|[u, v, _]| [u, v]))
-    }
-}
-
-/// The values and derivatives of three equations in (u, v, t).
-struct ProjectionEquations {
-    value: [f64; 3],
-    /// Derivatives by u, v and t.
-    columns: [[f64; 3]; 3],
-    /// Bound of the sum of the sizes of the terms that a value adds.
-    terms: f64,
-}
-
-/// Return a zero (u, v, t) of the system by Newton's method from the middle of a facet; `None` if the iterates run away.
-///
-/// A value counts as zero once it is within the rounding of its own evaluation, since double precision cannot tell whether another
-/// step improves it. That step is made all the same, since the value may have come from far above by a quadratic step.
-///
-/// # Errors
-/// [`Lost`] if the values stay larger.
-fn newton(t: f64, system: impl Fn([f64; 3]) -> ProjectionEquations) -> Result<Option<[f64; 3]>, Lost> {
-    let mut at = [1.0 / 3.0, 1.0 / 3.0, t];
-    for _ in 0..MOST_STEPS {
-        let ProjectionEquations { value, columns: [p, q, r], terms } = system(at);
-        let det = dot(&cross(p, q), &r);
-        let step = [cross(q, r), cross(r, p), cross(p, q)].map(|column| dot(&column, &value) / det);
-        let next = minus(at, step);
-        let is_away = next.iter().any(|x| !x.is_finite()) || next[0].abs().max(next[1].abs()) > AWAY;
-        if value.iter().all(|value| value.abs() <= ROUNDING * terms) {
-            return Ok(Some(if is_away { at } else { next }));
-        }
-        if is_away {
-            return Ok(None);
-        }
-        at = next;
-    }
-    Err(Lost)
-}
-
 /// A part of a facet of side a that faces (a part of) one facet of side b.
 struct FacetPolygon {
     /// Outline in the parameters on side a.
@@ -226,13 +140,13 @@ impl Clipped {
             return clipped;
         }
         let is_same_normal = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;
-        let is_flat =
-            b.order == Order::P1 || (a.is_straight() && b.is_straight() && a.normals.iter().all(is_same_normal));
+        let is_flat = b.order == Order::P1
+            || ([a, b].iter().all(|facet| element::is_straight(&facet.x, 3)) && a.normals.iter().all(is_same_normal));
         let parts = if is_flat { parts } else { 2 * parts };
         let offset = minus(b.from, a.from);
         let foot = |[i, j]: [usize; 2]| {
             let at = place([i, j].map(|k| k as f64 / parts as f64));
-            a.foot(plus(b.at(&at), offset)).map(|foot| foot.map(snap))
+            a.foot(plus(b.at(&at), offset)).map(|foot| foot.map(|[_, u, v]| snap([u, v])))
         };
         let rows = (0..=parts).map(|j| (0..=parts - j).map(|i| foot([i, j])).collect::<Vec<_>>());
         let feet: Vec<Vec<Foot>> = rows.collect();
@@ -248,8 +162,8 @@ impl Clipped {
             match piece {
                 Ok(piece) => clipped.pieces.extend(piece),
                 Err(Lost) => {
-                    let at = |[i, j]: [usize; 2]| plus(b.at(&place([i, j].map(|k| k as f64 / parts as f64))), offset);
-                    clipped.lost += usize::from(a.may_meet(&corners.map(at)));
+                    let at = |[i, j]: [usize; 2]| plus(b.at(&place([i, j].map(|k| k as f64 / parts as f64))), b.from);
+                    clipped.lost += usize::from(Rays::of(a, [f64::INFINITY; 2]).may_meet(&corners.map(at)));
                 }
             }
         }
@@ -274,12 +188,12 @@ impl FacetPolygon {
         }
         let middle = place(middle(&polygon));
         let normal = a.normal(&middle);
-        let hit = b.hit(plus(a.at(&middle), minus(a.from, b.from)), normal)?;
+        let hit = b.hit(plus(a.at(&middle), minus(a.from, b.from)), normal, ON_FACET)?;
         Ok(hit.map(|(_, t)| Self { polygon, index, gap: t * length(normal) }))
     }
 }
 
-/// The result of [`Facet::foot`].
+/// The parameters of the result of [`Facet::foot`].
 type Foot = Result<Option<[f64; 2]>, Lost>;
 
 /// Return the triangles between the points (i, j), i + j <= parts, of a triangle whose edges are split into so many parts.

@@ -1,0 +1,217 @@
+//! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that it needs, with local
+//! numbers.
+
+use super::distribute::{Partition, Share};
+use super::supports::Constraints;
+use crate::exchange::Plain;
+use crate::fem::interpolation::{coarse_nodes, from_vertices};
+use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, place, rigid};
+use crate::linalg::{Csr, dot};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
+use std::rc::Rc;
+
+/// A body on its mesh, or the part of it on the nodes that a rank needs, with local numbers.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
+pub struct BodyMesh<const D: usize> {
+    /// Finite element space: nodes and cells.
+    pub space: Rc<Space<D>>,
+    /// Index of the elastic constants of each cell; empty if the body has no regions.
+    pub regions: Vec<usize>,
+    /// Constraints from supports and rigid surfaces.
+    pub held: Constraints<D>,
+    /// Springs to the ground: the stiffness blocks between nodes for each spring of the scene.
+    pub springs: Vec<Vec<NodalBlock<D>>>,
+    /// Point of the mesh of each node.
+    pub points: Vec<u32>,
+    /// Number of nodes of the whole body and their extent.
+    pub extent: PointExtent,
+    /// Contact rows, pair by pair, with dofs as columns.
+    pub rows: Csr,
+    /// The same rows with displacements of nodes as columns.
+    pub nodal_rows: Csr,
+    /// The displacement towards each contact surface, with displacements of nodes as columns ([`approach::rows`](super::approach::rows)).
+    pub approach: Csr,
+    /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes tied to these.
+    pub load: NodalForces<D>,
+    /// Rigid motions that supports and springs leave.
+    pub left: Vec<RigidMotion<D>>,
+    /// Rigid motions that supports alone leave.
+    pub unsupported: Vec<RigidMotion<D>>,
+    /// Rigid motion by which the supports move the body as one.
+    pub imposed: Option<RigidMotion<D>>,
+    /// Prescribed (dof, value) relative to this motion, sorted by dof.
+    pub prescribed: Vec<(usize, f64)>,
+    /// Dofs of this rank, if the body is distributed.
+    pub share: Option<Share>,
+    /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
+    pub is_owned: bool,
+    /// Coupling of nodes by K, once it was requested on this rank.
+    #[serde(skip)]
+    pub graph: OnceCell<NodeGraph>,
+}
+
+impl<const D: usize> BodyMesh<D> {
+    /// Return the part of a body on the nodes that a rank needs, or on all nodes if `wants_all`. `number` is the index of the body in its matrix.
+    pub fn restrict(&self, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
+        let cells = match wants_all {
+            true => (0..self.space.cell_count()).collect(),
+            false => partition.cells(number, self, rank),
+        };
+        let nodes = partition.nodes(number, self, &cells, rank);
+        let here = |node: u32| place(&nodes, node);
+        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
+        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
+        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
+        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
+            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
+        };
+        let springs = self.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
+        let is_assembled = |node: u32| partition.owner(number, self.held.frame.node(node)) == rank;
+        Self {
+            space: Rc::new(self.space.on(&self.space.corners(&cells), &nodes)),
+            regions: if self.regions.is_empty() {
+                Vec::new()
+            } else {
+                cells.iter().map(|&cell| self.regions[cell]).collect()
+            },
+            held: self.held.on(&nodes),
+            springs: springs.collect(),
+            points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
+            extent: self.extent.clone(),
+            rows: rows_here(&self.rows),
+            nodal_rows: rows_here(&self.nodal_rows),
+            approach: rows_here(&self.approach),
+            load: self.load.only(is_assembled).on(&nodes),
+            left: self.left.clone(),
+            unsupported: self.unsupported.clone(),
+            imposed: self.imposed.clone(),
+            prescribed: self.prescribed.iter().filter_map(prescribed_here).collect(),
+            is_owned: true,
+            graph: OnceCell::new(),
+            share: Some(partition.share::<D>(number, nodes, &self.rows, rank)),
+        }
+    }
+
+    /// Return whether this rank owns each node.
+    pub fn own_nodes(&self) -> Vec<bool> {
+        let is_own = |node| self.share.as_ref().is_none_or(|s| s.is_own::<D>(self.held.frame.node(node) as usize));
+        (0..self.space.nodes.len() as u32).map(is_own).collect()
+    }
+
+    /// Return the coupling of the nodes by K, which is computed when it is first requested.
+    pub fn graph(&self) -> &NodeGraph {
+        self.graph.get_or_init(|| NodeGraph::with_rows(&self.space, &self.rows, &self.held.frame))
+    }
+
+    /// Return the displacements of all dofs in a rigid motion.
+    pub fn dofs_of(&self, motion: &RigidMotion<D>) -> Vec<f64> {
+        self.held.frame.dofs(&motion.nodal(self.space.nodes.iter().copied()))
+    }
+
+    /// Return the rigid motions of the free body.
+    pub fn free(&self) -> Vec<RigidMotion<D>> {
+        rigid::of(&self.extent, self.space.axisymmetric)
+    }
+
+    /// Return the displacements of the dofs of a node in a rigid motion.
+    pub fn at_dofs(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
+        self.held.frame.at(node, |node| self.at(motion, node))
+    }
+
+    /// Return the displacement of a dof in a rigid motion.
+    pub fn dof_of(&self, motion: &RigidMotion<D>, dof: usize) -> f64 {
+        self.held.frame.dof(dof, |node| self.at(motion, node))
+    }
+
+    /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed ones.
+    pub fn products(&self) -> DMatrix<f64> {
+        let (count, mut held) = (self.left.len(), self.prescribed.iter().map(|entry| entry.0).peekable());
+        let mut products = DMatrix::zeros(count, count);
+        for node in 0..self.space.nodes.len() {
+            let mut at: Vec<[f64; D]> = self.left.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
+            while let Some(dof) = held.next_if(|dof| dof / D <= node) {
+                at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
+            }
+            for (i, u) in at.iter().enumerate() {
+                at.iter().enumerate().for_each(|(j, v)| products[(i, j)] += dot(u, v));
+            }
+        }
+        products
+    }
+
+    /// Return the displacement of a node in a rigid motion.
+    fn at(&self, motion: &RigidMotion<D>, node: u32) -> [f64; D] {
+        motion.at(&self.space.nodes[node as usize])
+    }
+
+    /// Return the prescribed (dof, value), sorted by dof.
+    pub fn prescribed_sorted(&self) -> Vec<(usize, f64)> {
+        let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
+        all.sort_unstable_by_key(|entry| entry.0);
+        all
+    }
+
+    /// Return the weights of those combinations of `count` motions that neither supports nor springs resist. `u(k, node)` is the
+    /// displacement of motion k at a node.
+    pub fn unconstrained(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
+        let left = self.left_by_supports(count, u);
+        let springs = self.springs.concat();
+        if springs.is_empty() { left } else { rigid::left_by_springs(left, &rigid::of_springs(count, u, &springs)) }
+    }
+
+    fn left_by_supports(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
+        let value = |k: usize, dof: usize| self.held.frame.dof(dof, |node| u(k, node));
+        rigid::left_by_supports(count, value, &self.prescribed_sorted())
+    }
+
+    /// Return the rigid motions that supports leave, with the stiffness of the springs in terms of them. The result is `None`
+    /// without springs.
+    pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
+        let springs = self.springs.concat();
+        if springs.is_empty() {
+            return None;
+        }
+        let left = self.left_by_supports(free.len(), &|k, node| free[k].at(&self.space.nodes[node as usize]));
+        let left: Vec<_> = left.iter().map(|weights| rigid::combine(free, weights)).collect();
+        let at = |k: usize, node: u32| left[k].at(&self.space.nodes[node as usize]);
+        let stiffness = rigid::of_springs(left.len(), at, &springs);
+        Some((left, stiffness))
+    }
+
+    /// Return the forces on rigid surfaces, at few nodes of each.
+    pub fn rigid_forces(&self) -> impl Iterator<Item = (u32, [f64; D])> + '_ {
+        self.held.rigid.iter().flat_map(|surface| surface.forces.iter().copied())
+    }
+
+    /// Return all loads as forces at dofs.
+    pub fn load_on_dofs(&self) -> NodalForces<D> {
+        self.load
+            .iter()
+            .chain(self.rigid_forces())
+            .flat_map(|(node, force)| self.held.frame.force(node, force))
+            .collect()
+    }
+
+    /// Return the load vector f at all dofs.
+    pub fn load_vector(&self) -> Vec<f64> {
+        let mut load = self.load.all(self.space.nodes.len());
+        for (node, total) in self.rigid_forces() {
+            (0..D).for_each(|c| load[D * node as usize + c] += total[c]);
+        }
+        self.held.frame.forces(&mut load);
+        load
+    }
+
+    /// Return the nodes of linear displacements, sorted.
+    pub fn coarse_nodes(&self) -> Vec<u32> {
+        coarse_nodes(&self.space, &self.held.frame)
+    }
+
+    /// Return the interpolation of the dofs from those at these nodes.
+    pub fn interpolation(&self, coarse: &[u32]) -> Prolongation {
+        from_vertices(&self.space, &self.held.frame, |dof| self.held.prescribed.contains_key(&dof), coarse)
+    }
+}
