@@ -12,7 +12,10 @@ pub const GONE: &[(&str, &str)] = &[
         "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",
     ),
     ("man", "`winkler COMMAND --help` has all that the man pages had"),
-    ("plot", "`winkler solve` draws its plots as SVG, --report shows the bodies, and ParaView opens bodies.pvd of --vtu"),
+    (
+        "plot",
+        "`winkler solve` draws its plots as SVG, --report shows the bodies, and ParaView opens bodies.pvd of --vtu",
+    ),
     ("report", "`winkler solve --report` writes the page of a run"),
 ];
 

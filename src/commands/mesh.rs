@@ -112,12 +112,7 @@ fn load<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &MeshArgs
             MeshOrigin::Cache => "from the cache",
             MeshOrigin::Gmsh => "made by Gmsh",
         },
-        warnings: [notes, verified.notes.clone()]
-            .concat()
-            .into_iter()
-            
-            .chain(of_mesh.into_iter().flatten())
-            .collect(),
+        warnings: [notes, verified.notes.clone()].concat().into_iter().chain(of_mesh.into_iter().flatten()).collect(),
         seconds,
         dimension: D,
         order: mesh.order.degree(),

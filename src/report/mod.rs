@@ -337,13 +337,12 @@ fn command(report: &Report) -> String {
 }
 
 fn versions(report: &Report) -> String {
-    let petsc = report.petsc.as_ref().map_or(String::new(), |version| format!(", PETSc {version}"));
     let options = match report.petsc_options.is_empty() {
         true => "No PETSc options were given.".to_owned(),
         false => format!("PETSc options: <code>{}</code>", escape(&report.petsc_options.join(" "))),
     };
     let ranks = counted(report.ranks, "MPI rank", "MPI ranks");
-    format!("winkler {}{petsc}, BLAS: {}, {ranks}. {options}", report.winkler, escape(&report.blas))
+    format!("winkler {}, PETSc {}, BLAS: {}, {ranks}. {options}", report.winkler, report.petsc, escape(&report.blas))
 }
 
 #[cfg(test)]

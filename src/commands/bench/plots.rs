@@ -1,6 +1,6 @@
 //! The plots of a benchmark: time against error, and time and memory against the degrees of freedom.
 
-use super::{Benchmark, Measured, is_of_mesh};
+use super::plan::{Benchmark, Measured, is_of_mesh};
 use crate::commands::rows::Row;
 use crate::linalg::fit;
 use crate::output::{Color, Plot, PlotAxis, Series, Style};

@@ -1,6 +1,6 @@
 //! One run as a process of its own: its messages, its time and its memory.
 
-use super::usage;
+use super::plan::usage;
 use crate::commands::cases::Case;
 use crate::commands::rows::Row;
 use crate::error::{Error, Kind, Result};
