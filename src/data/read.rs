@@ -2,7 +2,7 @@
 
 use super::rule::DataSpec;
 use crate::error::{Error, Result};
-use crate::file::other_encoding;
+use crate::file::{other_encoding, with_unix_lines};
 use std::fmt::Display;
 
 /// Numbers in rows of one length.
@@ -26,7 +26,7 @@ pub fn rows(spec: &DataSpec) -> Result<NumberRows> {
     let bytes = crate::file::read(&spec.file).map_err(|error| error.at(&spec.place))?;
     let rows = match bytes.strip_prefix(b"\x93NUMPY") {
         Some(rest) => of_numpy(spec, rest)?,
-        None => of_text(spec, &bytes)?,
+        None => of_text(spec, &with_unix_lines(bytes))?,
     };
     match rows.values.iter().position(|value| !value.is_finite()) {
         Some(at) => {
