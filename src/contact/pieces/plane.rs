@@ -127,7 +127,12 @@ impl FacetSegment {
         let offset = minus(b.from, a.from);
         let mut breaks = vec![0.0, 1.0];
         for &x in &b.x[..2] {
-            breaks.extend(a.foot(plus(x, offset))?.map(|[_, s]| s).filter(|s| *s > SNAP && *s < 1.0 - SNAP));
+            let foot = match a.foot(plus(x, offset)) {
+                // normals turn by less than a right angle however far they are continued, so that some points have no foot
+                Err(Lost) if !Rays::of(a, [f64::INFINITY; 2]).may_meet(&[plus(x, b.from)]) => None,
+                found => found?,
+            };
+            breaks.extend(foot.map(|[_, s]| s).filter(|s| *s > SNAP && *s < 1.0 - SNAP));
         }
         breaks.sort_by(f64::total_cmp);
         let gap_in_middle = |low: f64, high: f64| -> Result<Option<f64>, Lost> {
