@@ -5,7 +5,6 @@ use crate::ddm::Row;
 use crate::error::Result;
 use crate::fem::length;
 use crate::linalg::bounds;
-use crate::output::plot::ConvergenceRow;
 use crate::output::{Color, ConvergenceSeries, Folder, Plot, Series, StepReport, Style};
 use crate::problem::{Plane, Units, force_labels, label};
 use crate::run::{Done, numbered, results};
@@ -64,17 +63,13 @@ impl Plots {
     }
 }
 
-/// Return the iterations of a run, those of all load steps numbered through.
-fn history(done: &Done) -> Vec<ConvergenceRow> {
-    let rows = done.earlier.iter().chain(&done.outcome.rows);
-    let steps = done.steps.len() > 1;
-    let row = |(k, row): (usize, &Row)| ConvergenceRow {
-        iteration: if steps { k } else { row.iteration },
-        residual: row.residual,
-        increment: row.increment,
-        error: row.error,
-    };
-    rows.enumerate().map(row).collect()
+/// Return the iterations of a run, those of several load steps numbered through.
+fn history(done: &Done) -> Vec<Row> {
+    let mut rows: Vec<Row> = done.earlier.iter().chain(&done.outcome.rows).cloned().collect();
+    if done.steps.len() > 1 {
+        rows.iter_mut().enumerate().for_each(|(k, row)| row.iteration = k);
+    }
+    rows
 }
 
 /// Return the units of a scene, with a force by length of thickness for bodies in the plane.

@@ -1,6 +1,7 @@
 //! Plots: curves over two axes, as SVG, with a legend beside the axes, where it hides nothing.
 
 use super::axis::Axis;
+use crate::ddm::Row;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -93,20 +94,7 @@ pub struct ConvergenceSeries {
     /// Name of the run.
     pub label: String,
     /// The iterations.
-    pub rows: Vec<ConvergenceRow>,
-}
-
-/// The numbers of an iteration, NaN where there is none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ConvergenceRow {
-    /// Number of the iteration.
-    pub iteration: usize,
-    /// Relative residual.
-    pub residual: f64,
-    /// Relative increment.
-    pub increment: f64,
-    /// Bound or estimate of the error.
-    pub error: f64,
+    pub rows: Vec<Row>,
 }
 
 impl Plot {
@@ -117,7 +105,7 @@ impl Plot {
         let has_increments = runs.iter().flat_map(|run| &run.rows).any(|row| row.increment > 0.0);
         let mut series = Vec::new();
         for (index, run) in runs.iter().enumerate() {
-            let curve = |label: &str, style, value: fn(&ConvergenceRow) -> f64| {
+            let curve = |label: &str, style, value: fn(&Row) -> f64| {
                 let points = run.rows.iter().map(|row| (row.iteration as f64, value(row))).collect();
                 Series::new(label, points, style).color(Color::Palette(index))
             };
