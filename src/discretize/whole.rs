@@ -1,8 +1,8 @@
-//! A body before its matrix is assembled, on the first rank: its contact rows, its loads, the rigid motions that supports leave, and that by
-//! which they move it.
+//! A whole body on the first rank, before its matrix is assembled: its contact rows, its loads, the rigid motions that supports leave, and that
+//! by which they move it.
 
 use super::approach;
-use super::part::SceneBody;
+use super::bodies::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::fem::{NodalForces, RigidMotion, rigid};
@@ -17,7 +17,7 @@ pub const NO_WORK: f64 = 1e-9;
 
 /// A whole body before its matrix is assembled.
 #[derive(Clone)]
-pub struct Unassembled<'a, const D: usize> {
+pub struct WholeBody<'a, const D: usize> {
     /// Space, supports and springs.
     pub part: SceneBody<'a, D>,
     /// Contact rows of the body, pair by pair.
@@ -43,7 +43,7 @@ pub struct FixableDof {
     pub size: f64,
 }
 
-impl<'a, const D: usize> Unassembled<'a, D> {
+impl<'a, const D: usize> WholeBody<'a, D> {
     /// Collect the contact rows and loads of all bodies.
     ///
     /// # Errors

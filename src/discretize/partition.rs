@@ -2,7 +2,7 @@
 //! matrix. The coupling of the nodes determines the work and the memory of each.
 
 use super::body::BodyMesh;
-use super::unassembled::Unassembled;
+use super::whole::WholeBody;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
 use crate::fem::{Couplings, ElasticBody, Prolongation, Space};
@@ -81,7 +81,7 @@ impl Partition {
     /// a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
         set: Vec<usize>,
-        bodies: &[Unassembled<D>],
+        bodies: &[WholeBody<D>],
         pairs: &[ContactPair],
         ranks: usize,
         wants_coarse: &dyn Fn(usize) -> bool,
@@ -263,7 +263,7 @@ impl Share {
 
 /// Return, for each node of the bodies in `set`, the number of nodes with which it is coupled in a matrix of all of them, itself
 /// included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body after the other.
-fn couplings<const D: usize>(bodies: &[Unassembled<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
+fn couplings<const D: usize>(bodies: &[WholeBody<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
     let (mut first, mut all) = (HashMap::new(), Vec::new());
     for &body in set {
         first.insert(body, all.len());
