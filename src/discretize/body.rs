@@ -7,7 +7,7 @@ use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, place, rigid};
 use crate::linalg::{Csr, dot};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -154,31 +154,15 @@ impl<const D: usize> BodyMesh<D> {
         all
     }
 
-    /// Return the weights of those combinations of `count` motions that neither supports nor springs resist. `u(k, node)` is the
-    /// displacement of motion k at a node.
-    pub fn unconstrained(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let left = self.left_by_supports(count, u);
-        let springs = self.springs.concat();
-        if springs.is_empty() { left } else { rigid::left_by_springs(left, &rigid::of_springs(count, u, &springs)) }
+    /// Return the combinations of the `free` motions that supports leave.
+    pub fn left_by_supports(&self, free: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
+        let left = rigid::left_by_supports(free.len(), |k, dof| self.dof_of(&free[k], dof), &self.prescribed_sorted());
+        left.iter().map(|weights| rigid::combine(free, weights)).collect()
     }
 
-    fn left_by_supports(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let value = |k: usize, dof: usize| self.held.frame.dof(dof, |node| u(k, node));
-        rigid::left_by_supports(count, value, &self.prescribed_sorted())
-    }
-
-    /// Return the rigid motions that supports leave, with the stiffness of the springs in terms of them. The result is `None`
-    /// without springs.
-    pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
-        let springs = self.springs.concat();
-        if springs.is_empty() {
-            return None;
-        }
-        let left = self.left_by_supports(free.len(), &|k, node| free[k].at(&self.space.nodes[node as usize]));
-        let left: Vec<_> = left.iter().map(|weights| rigid::combine(free, weights)).collect();
-        let at = |k: usize, node: u32| left[k].at(&self.space.nodes[node as usize]);
-        let stiffness = rigid::of_springs(left.len(), at, &springs);
-        Some((left, stiffness))
+    /// Return the stiffness of the springs to the ground in terms of motions; zero without springs.
+    pub fn ground_stiffness(&self, motions: &[RigidMotion<D>]) -> DMatrix<f64> {
+        rigid::of_springs(motions.len(), |k, node| self.at(&motions[k], node), self.springs.iter().flatten())
     }
 
     /// Return the forces on rigid surfaces, at few nodes of each.
