@@ -80,7 +80,7 @@ impl<const D: usize> BodyMesh<D> {
             held: self.held.on(&nodes),
             springs: springs.collect(),
             points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
-            extent: self.extent.clone(),
+            extent: self.extent,
             rows: rows_here(&self.rows),
             nodal_rows: rows_here(&self.nodal_rows),
             approach: rows_here(&self.approach),
