@@ -16,6 +16,7 @@ mod partition;
 mod patterns;
 mod post;
 mod prepare;
+mod share;
 mod supports;
 mod surface;
 mod verify;

@@ -1,11 +1,11 @@
 //! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that it needs, with local
 //! numbers.
 
-use super::partition::{Partition, Share};
+use super::share::Share;
 use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
-use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, place, rigid};
+use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
 use crate::linalg::{Csr, dot};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -36,6 +36,8 @@ pub struct BodyMesh<const D: usize> {
     pub approach: Csr,
     /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes tied to these.
     pub load: NodalForces<D>,
+    /// Nodal forces of the loads that their quadrature misses, at all nodes, if an estimate of the error needs them.
+    pub missed_load: Vec<f64>,
     /// Rigid motions that supports and springs leave.
     pub left: Vec<RigidMotion<D>>,
     /// Rigid motions that supports alone leave.
@@ -54,47 +56,6 @@ pub struct BodyMesh<const D: usize> {
 }
 
 impl<const D: usize> BodyMesh<D> {
-    /// Return the part of a body on the nodes that a rank needs, or on all nodes if `wants_all`. `number` is the index of the body in its matrix.
-    pub fn restrict(&self, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
-        let cells = match wants_all {
-            true => (0..self.space.cell_count()).collect(),
-            false => partition.cells(number, self, rank),
-        };
-        let nodes = partition.nodes(number, self, &cells, rank);
-        let here = |node: u32| place(&nodes, node);
-        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
-        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
-        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
-        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
-            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
-        };
-        let springs = self.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
-        let is_assembled = |node: u32| partition.owner(number, self.held.frame.node(node)) == rank;
-        Self {
-            space: Rc::new(self.space.on(&self.space.corners(&cells), &nodes)),
-            regions: if self.regions.is_empty() {
-                Vec::new()
-            } else {
-                cells.iter().map(|&cell| self.regions[cell]).collect()
-            },
-            held: self.held.on(&nodes),
-            springs: springs.collect(),
-            points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
-            extent: self.extent,
-            rows: rows_here(&self.rows),
-            nodal_rows: rows_here(&self.nodal_rows),
-            approach: rows_here(&self.approach),
-            load: self.load.only(is_assembled).on(&nodes),
-            left: self.left.clone(),
-            unsupported: self.unsupported.clone(),
-            imposed: self.imposed.clone(),
-            prescribed: self.prescribed.iter().filter_map(prescribed_here).collect(),
-            is_owned: true,
-            graph: OnceCell::new(),
-            share: Some(partition.share::<D>(number, nodes, &self.rows, rank)),
-        }
-    }
-
     /// Return whether this rank owns each node.
     pub fn own_nodes(&self) -> Vec<bool> {
         let is_own = |node| self.share.as_ref().is_none_or(|s| s.is_own::<D>(self.held.frame.node(node) as usize));

@@ -60,7 +60,7 @@ impl<const D: usize> WholeProblem<'_, D> {
         let of_body = |(index, body): (usize, &WholeBody<D>)| {
             let is_owned = body.owner == rank;
             match place_of(&self.partitions, index) {
-                Some((partition, number)) => Some(body.part.mesh.restrict(partition, number, rank, self.keep)),
+                Some((partition, number)) => Some(partition.restrict(&body.part.mesh, number, rank, self.keep)),
                 None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.part.mesh.clone() }),
             }
         };
@@ -103,6 +103,9 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
         let body = &mut bodies[index];
         (body.owner, body.ranks) = (owner, ranks);
+        if keep {
+            body.part.mesh.missed_load = body.part.missed_load(mesh)?;
+        }
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
