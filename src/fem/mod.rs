@@ -21,7 +21,7 @@ mod tests;
 pub use crate::linalg::{cross, length, minus, pad, unit};
 pub use assemble::{Couplings, ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
 pub use elasticity::Elasticity;
-pub use element::{EDGES, Rule};
+pub use element::EDGES;
 pub use facets::{Facets, area_vector};
 pub use frame::{Frame, place};
 pub use interpolation::Prolongation;
