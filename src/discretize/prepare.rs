@@ -73,7 +73,8 @@ fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)
     partitions.iter().find_map(|partition| Some((partition, partition.bodies.binary_search(&body).ok()?)))
 }
 
-/// Prepare a scene on its mesh for this number of `ranks`; see [`discretize`](super::discretize).
+/// Prepare a scene on its mesh for this number of `ranks`: bodies, pairs, free motions, solvers, and the partition; see
+/// [`discretize`](super::discretize).
 ///
 /// # Errors
 /// The scene contradicts its mesh, or `factory` fails.
