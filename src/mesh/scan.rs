@@ -61,7 +61,7 @@ impl<'a> Scanner<'a> {
     }
 
     fn ends_early(&self) -> Error {
-        self.damaged(format!("the file ends within `{}`", self.section))
+        self.damaged("the file ends early")
     }
 
     /// Read the next line that is not blank, and return whether there is one.
