@@ -1,30 +1,31 @@
 //! The step from a scene and its mesh to a [`Model`]. Geometry ends here: nothing below knows the space dimension.
 
 mod approach;
-mod assembler;
+mod assembly;
 mod auto;
+mod bodies;
 mod body;
 mod carrier;
 mod chords;
-mod distribute;
+mod facts;
 mod groups;
-mod local;
 mod mechanism;
 pub mod meshes;
 mod pairs;
-mod part;
+mod partition;
 mod patterns;
 mod post;
 mod prepare;
+mod share;
 mod supports;
 mod surface;
-mod unassembled;
 mod verify;
+mod whole;
 
 pub use approach::mean_normal;
-pub use assembler::{Assembled, Factory, Outline};
+pub use assembly::{Assembled, Factory, Outline};
+pub use facts::BodyInfo;
 pub use groups::point;
-pub use local::BodyInfo;
 pub use pairs::ContactInfo;
 pub use post::{ForceBalance, Unbalanced};
 pub use verify::{Verified, verify};
@@ -37,10 +38,10 @@ use crate::model::{Local, Mechanism, Model};
 use crate::problem::contact::Carrier;
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
-use assembler::Assembler;
+use assembly::Assembler;
 use body::BodyMesh;
 use meshes::{Kept, Meshes};
-use prepare::{ReplicatedProblem, Whole, prepare};
+use prepare::{ReplicatedProblem, WholeProblem, prepare};
 use std::rc::Rc;
 
 /// The discrete problem, with the facts of its origin that reports need.
@@ -121,7 +122,10 @@ where
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
-fn give<const D: usize>(prepared: Option<Whole<D>>, exchange: &Rc<dyn Exchange>) -> Result<Vec<Option<BodyMesh<D>>>>
+fn give<const D: usize>(
+    prepared: Option<WholeProblem<D>>,
+    exchange: &Rc<dyn Exchange>,
+) -> Result<Vec<Option<BodyMesh<D>>>>
 where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,

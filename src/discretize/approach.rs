@@ -1,7 +1,7 @@
 //! The displacement of a body towards its contact, as a row of weights of nodal displacements for each of its contact surfaces.
 
+use super::bodies::SceneBody;
 use super::groups::Line;
-use super::part::SceneBody;
 use super::supports::axis_vector;
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -45,6 +45,9 @@ pub fn rows<const D: usize>(
     mesh: &Mesh<D>,
 ) -> Result<Csr> {
     let mut rows = Csr::new(body.mesh.space.dofs());
+    if segments.is_empty() {
+        return Ok(rows);
+    }
     let holders = holders(body, mesh)?;
     let loads = body.spec.load.iter().map(|load| body.full_load(load, mesh)).collect::<Result<Vec<_>>>()?;
     for &Segment { pair, side } in segments {

@@ -1,6 +1,6 @@
 //! Pairs that rules of the scene find: boundary facets of different bodies that face each other within a distance.
 
-use super::part::SceneBody;
+use super::bodies::SceneBody;
 use super::patterns::pattern;
 use crate::contact::Side;
 use crate::contact::pieces::{BoxTree, Cut, Reach};

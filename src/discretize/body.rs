@@ -1,13 +1,13 @@
 //! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that it needs, with local
 //! numbers.
 
-use super::distribute::{Partition, Share};
+use super::share::Share;
 use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
-use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, place, rigid};
+use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
 use crate::linalg::{Csr, dot};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -36,6 +36,8 @@ pub struct BodyMesh<const D: usize> {
     pub approach: Csr,
     /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes tied to these.
     pub load: NodalForces<D>,
+    /// Nodal forces of the loads that their quadrature misses, at all nodes, if an estimate of the error needs them.
+    pub missed_load: Vec<f64>,
     /// Rigid motions that supports and springs leave.
     pub left: Vec<RigidMotion<D>>,
     /// Rigid motions that supports alone leave.
@@ -54,47 +56,6 @@ pub struct BodyMesh<const D: usize> {
 }
 
 impl<const D: usize> BodyMesh<D> {
-    /// Return the part of a body on the nodes that a rank needs, or on all nodes if `wants_all`. `number` is the index of the body in its matrix.
-    pub fn restrict(&self, partition: &Partition, number: usize, rank: usize, wants_all: bool) -> Self {
-        let cells = match wants_all {
-            true => (0..self.space.cell_count()).collect(),
-            false => partition.cells(number, self, rank),
-        };
-        let nodes = partition.nodes(number, self, &cells, rank);
-        let here = |node: u32| place(&nodes, node);
-        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
-        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
-        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
-        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
-            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
-        };
-        let springs = self.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
-        let is_assembled = |node: u32| partition.owner(number, self.held.frame.node(node)) == rank;
-        Self {
-            space: Rc::new(self.space.on(&self.space.corners(&cells), &nodes)),
-            regions: if self.regions.is_empty() {
-                Vec::new()
-            } else {
-                cells.iter().map(|&cell| self.regions[cell]).collect()
-            },
-            held: self.held.on(&nodes),
-            springs: springs.collect(),
-            points: nodes.iter().map(|&node| self.points[node as usize]).collect(),
-            extent: self.extent,
-            rows: rows_here(&self.rows),
-            nodal_rows: rows_here(&self.nodal_rows),
-            approach: rows_here(&self.approach),
-            load: self.load.only(is_assembled).on(&nodes),
-            left: self.left.clone(),
-            unsupported: self.unsupported.clone(),
-            imposed: self.imposed.clone(),
-            prescribed: self.prescribed.iter().filter_map(prescribed_here).collect(),
-            is_owned: true,
-            graph: OnceCell::new(),
-            share: Some(partition.share::<D>(number, nodes, &self.rows, rank)),
-        }
-    }
-
     /// Return whether this rank owns each node.
     pub fn own_nodes(&self) -> Vec<bool> {
         let is_own = |node| self.share.as_ref().is_none_or(|s| s.is_own::<D>(self.held.frame.node(node) as usize));
@@ -154,31 +115,15 @@ impl<const D: usize> BodyMesh<D> {
         all
     }
 
-    /// Return the weights of those combinations of `count` motions that neither supports nor springs resist. `u(k, node)` is the
-    /// displacement of motion k at a node.
-    pub fn unconstrained(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let left = self.left_by_supports(count, u);
-        let springs = self.springs.concat();
-        if springs.is_empty() { left } else { rigid::left_by_springs(left, &rigid::of_springs(count, u, &springs)) }
+    /// Return the combinations of the `free` motions that supports leave.
+    pub fn left_by_supports(&self, free: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
+        let left = rigid::left_by_supports(free.len(), |k, dof| self.dof_of(&free[k], dof), &self.prescribed_sorted());
+        left.iter().map(|weights| rigid::combine(free, weights)).collect()
     }
 
-    fn left_by_supports(&self, count: usize, u: &dyn Fn(usize, u32) -> [f64; D]) -> Vec<DVector<f64>> {
-        let value = |k: usize, dof: usize| self.held.frame.dof(dof, |node| u(k, node));
-        rigid::left_by_supports(count, value, &self.prescribed_sorted())
-    }
-
-    /// Return the rigid motions that supports leave, with the stiffness of the springs in terms of them. The result is `None`
-    /// without springs.
-    pub fn sprung(&self, free: &[RigidMotion<D>]) -> Option<(Vec<RigidMotion<D>>, DMatrix<f64>)> {
-        let springs = self.springs.concat();
-        if springs.is_empty() {
-            return None;
-        }
-        let left = self.left_by_supports(free.len(), &|k, node| free[k].at(&self.space.nodes[node as usize]));
-        let left: Vec<_> = left.iter().map(|weights| rigid::combine(free, weights)).collect();
-        let at = |k: usize, node: u32| left[k].at(&self.space.nodes[node as usize]);
-        let stiffness = rigid::of_springs(left.len(), at, &springs);
-        Some((left, stiffness))
+    /// Return the stiffness of the springs to the ground in terms of motions; zero without springs.
+    pub fn ground_stiffness(&self, motions: &[RigidMotion<D>]) -> DMatrix<f64> {
+        rigid::of_springs(motions.len(), |k, node| self.at(&motions[k], node), self.springs.iter().flatten())
     }
 
     /// Return the forces on rigid surfaces, at few nodes of each.

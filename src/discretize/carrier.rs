@@ -1,6 +1,6 @@
 //! Which of two surfaces carries the contact points of their pairs.
 
-use super::part::SceneBody;
+use super::bodies::SceneBody;
 use crate::fem::{Facets, area_vector, length};
 use crate::problem::contact::Carrier;
 use crate::problem::order::Order;

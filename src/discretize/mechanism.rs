@@ -9,7 +9,7 @@
 //! work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces may lack balance on facets, and by
 //! quadrature. A small imbalance is taken from the loads, with a warning.
 
-use super::unassembled::{FixableDof, NO_WORK, Unassembled};
+use super::whole::{FixableDof, NO_WORK, WholeBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
 use crate::fem::{PointExtent, RigidMotion, rigid};
@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DVector};
 const LACKING: f64 = 1e-3;
 
 /// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
-pub fn fix<const D: usize>(bodies: &mut [Unassembled<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
+pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
     let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
     for group in search.groups() {
@@ -46,7 +46,7 @@ struct Moving<const D: usize> {
 }
 
 struct MechanismSearch<'p, 's, const D: usize> {
-    bodies: &'p mut [Unassembled<'s, D>],
+    bodies: &'p mut [WholeBody<'s, D>],
     pairs: &'p [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
@@ -189,7 +189,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             }
             self.found.push(mechanism);
         }
-        self.bodies.iter_mut().for_each(Unassembled::find_motions);
+        self.bodies.iter_mut().for_each(WholeBody::find_motions);
     }
 
     /// Return motions of the same bodies with their names. Where the bodies move as one, translations and rotations are apart.
@@ -312,7 +312,7 @@ fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
 
 impl<const D: usize> Moving<D> {
     /// Return the work of the loads on the motion, and the largest work that forces of their magnitudes could do.
-    fn works(&self, bodies: &[Unassembled<D>]) -> [f64; 2] {
+    fn works(&self, bodies: &[WholeBody<D>]) -> [f64; 2] {
         let mut sums = [0.0; 2];
         for (&body, motion) in self.bodies.iter().zip(&self.motions) {
             let works = bodies[body].load.works(|node| bodies[body].part.mesh.at_dofs(motion, node));

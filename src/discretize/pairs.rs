@@ -2,9 +2,9 @@
 //! each other.
 
 use super::auto::{self, ContactEntry, SurfacePair};
+use super::bodies::SceneBody;
 use super::carrier;
 use super::groups::{Owners, find_group, point};
-use super::part::SceneBody;
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Reach};

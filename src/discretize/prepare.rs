@@ -2,14 +2,14 @@
 //!
 //! The factory requests facts about each body, chooses solvers, and decides which bodies share a matrix.
 
-use super::assembler::{Factory, Outline};
+use super::assembly::{Factory, Outline};
+use super::bodies::parts;
 use super::body::BodyMesh;
-use super::distribute::Partition;
-use super::local::BodyInfo;
+use super::facts::BodyInfo;
 use super::pairs::{self, ContactFacts};
-use super::part::parts;
-use super::unassembled::Unassembled;
+use super::partition::Partition;
 use super::verify::Verified;
+use super::whole::WholeBody;
 use super::{chords, mechanism};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
@@ -42,14 +42,14 @@ pub struct ReplicatedProblem<const D: usize, P> {
 }
 
 /// All bodies before their matrices are assembled, with the ranks that own their nodes.
-pub struct Whole<'a, const D: usize> {
-    bodies: Vec<Unassembled<'a, D>>,
+pub struct WholeProblem<'a, const D: usize> {
+    bodies: Vec<WholeBody<'a, D>>,
     partitions: Vec<Partition>,
     /// Whether every rank keeps all meshes, for an estimate of the error.
     keep: bool,
 }
 
-impl<const D: usize> Whole<'_, D> {
+impl<const D: usize> WholeProblem<'_, D> {
     /// Return everything, for the only rank.
     pub fn into_locals(self) -> Vec<Option<BodyMesh<D>>> {
         self.bodies.into_iter().map(|body| Some(body.part.mesh)).collect()
@@ -57,10 +57,10 @@ impl<const D: usize> Whole<'_, D> {
 
     /// Return what a rank receives of each body.
     pub fn on(&self, rank: usize) -> Vec<Option<BodyMesh<D>>> {
-        let of_body = |(index, body): (usize, &Unassembled<D>)| {
+        let of_body = |(index, body): (usize, &WholeBody<D>)| {
             let is_owned = body.owner == rank;
             match place_of(&self.partitions, index) {
-                Some((partition, number)) => Some(body.part.mesh.restrict(partition, number, rank, self.keep)),
+                Some((partition, number)) => Some(partition.restrict(&body.part.mesh, number, rank, self.keep)),
                 None => (is_owned || self.keep).then(|| BodyMesh { is_owned, ..body.part.mesh.clone() }),
             }
         };
@@ -73,7 +73,8 @@ fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)
     partitions.iter().find_map(|partition| Some((partition, partition.bodies.binary_search(&body).ok()?)))
 }
 
-/// Prepare a scene on its mesh for this number of `ranks`; see [`discretize`](super::discretize).
+/// Prepare a scene on its mesh for this number of `ranks`: bodies, pairs, free motions, solvers, and the partition; see
+/// [`discretize`](super::discretize).
 ///
 /// # Errors
 /// The scene contradicts its mesh, or `factory` fails.
@@ -85,7 +86,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     keep: bool,
     ranks: usize,
     factory: &mut F,
-) -> Result<(ReplicatedProblem<D, F::SolverPlan>, Whole<'a, D>)> {
+) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let mesh = &verified.mesh;
     let parts = parts(scene, verified, specs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
@@ -95,33 +96,36 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         fine.extend(found.fine);
     }
     let lack = chords::lack(&parts, mesh)?;
-    let mut bodies = Unassembled::all(parts, &pairs, mesh)?;
+    let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
     let mechanisms = mechanism::fix(&mut bodies, &pairs, lack);
-    bodies.iter_mut().for_each(Unassembled::support);
+    bodies.iter_mut().for_each(WholeBody::support);
     let plan = plan(&bodies, factory)?;
     let partitions = partitions(&bodies, &pairs, factory, ranks);
     for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
         let body = &mut bodies[index];
         (body.owner, body.ranks) = (owner, ranks);
+        if keep {
+            body.part.mesh.missed_load = body.part.missed_load(mesh)?;
+        }
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let imposed = bodies.iter().map(Unassembled::imposed_trace).collect();
+    let imposed = bodies.iter().map(WholeBody::imposed_trace).collect();
     let shared = ReplicatedProblem { bodies: shared, imposed, pairs, contacts, mechanisms, fine, plan };
-    Ok((shared, Whole { bodies, partitions, keep }))
+    Ok((shared, WholeProblem { bodies, partitions, keep }))
 }
 
 /// Return the factory's plan of the solvers of all bodies.
 ///
 /// # Errors
 /// See [`Factory::plan`].
-fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) -> Result<F::SolverPlan> {
+fn plan<const D: usize, F: Factory>(bodies: &[WholeBody<D>], factory: &mut F) -> Result<F::SolverPlan> {
     // Facts of a body are computed when they are requested.
     let graphs: Vec<_> = bodies.iter().map(|body| move || body.part.mesh.graph()).collect();
     let at: Vec<_> =
         bodies.iter().map(|body| move |k: usize, dof: usize| body.part.mesh.dof_of(&body.free[k], dof)).collect();
     let outline = |index: usize| {
-        let Unassembled { part, free, .. } = &bodies[index];
+        let WholeBody { part, free, .. } = &bodies[index];
         Outline {
             name: &part.spec.name.value,
             dimension: D,
@@ -137,7 +141,7 @@ fn plan<const D: usize, F: Factory>(bodies: &[Unassembled<D>], factory: &mut F) 
 
 /// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan.
 fn partitions<const D: usize>(
-    bodies: &[Unassembled<D>],
+    bodies: &[WholeBody<D>],
     pairs: &[ContactPair],
     factory: &impl Factory,
     ranks: usize,
@@ -149,11 +153,7 @@ fn partitions<const D: usize>(
 
 /// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not distributed
 /// stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
-fn owners<const D: usize>(
-    bodies: &[Unassembled<D>],
-    partitions: &[Partition],
-    ranks: usize,
-) -> Vec<(usize, Vec<usize>)> {
+fn owners<const D: usize>(bodies: &[WholeBody<D>], partitions: &[Partition], ranks: usize) -> Vec<(usize, Vec<usize>)> {
     let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.mesh.space.dofs() };
     let owners = crate::parallel::owners(&(0..bodies.len()).map(dofs).collect::<Vec<_>>(), ranks);
     let of_body = |(body, owner): (usize, usize)| match place_of(partitions, body) {

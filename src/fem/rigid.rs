@@ -153,10 +153,10 @@ pub fn left_by_supports(
 }
 
 /// Return the stiffness of springs in terms of `count` motions. `at` gives the displacement of a motion at a node.
-pub fn of_springs<const D: usize>(
+pub fn of_springs<'s, const D: usize>(
     count: usize,
     at: impl Fn(usize, u32) -> [f64; D],
-    springs: &[NodalBlock<D>],
+    springs: impl Iterator<Item = &'s NodalBlock<D>>,
 ) -> DMatrix<f64> {
     let mut stiffness = DMatrix::zeros(count, count);
     for NodalBlock { nodes, block } in springs {
@@ -169,21 +169,11 @@ pub fn of_springs<const D: usize>(
     stiffness
 }
 
-/// Return a basis of those combinations of the `remaining` motions that springs do not resist. The `stiffness` of the springs in terms
-/// of the motions of the free body sets the scale.
-pub fn left_by_springs(remaining: Vec<DVector<f64>>, stiffness: &DMatrix<f64>) -> Vec<DVector<f64>> {
-    let scale = stiffness.diagonal().max();
-    if scale == 0.0 || remaining.is_empty() {
-        return remaining;
-    }
-    let remaining = DMatrix::from_columns(&remaining);
-    let free = Blocks::free(&(remaining.transpose() * stiffness * &remaining), scale, TOLERANCE);
-    free.into_iter().map(|weights| &remaining * weights).collect()
-}
-
 /// Return the combination of motions about the same centre, scaled so that its largest weight is one.
 pub fn combine<const D: usize>(motions: &[RigidMotion<D>], weights: &DVector<f64>) -> RigidMotion<D> {
-    sum(motions, &(weights / weights.amax()))
+    let sum = sum(motions, weights);
+    let largest = sum.largest();
+    RigidMotion { weights: sum.weights.map(|weight| weight / largest), ..sum }
 }
 
 /// Return the weighted sum of motions about the same centre.

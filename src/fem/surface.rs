@@ -1,12 +1,17 @@
 //! Integrals over surfaces: loads, foundations and areas.
 
 use super::assemble::{NodalBlock, NodalForces};
-use super::element;
+use super::element::{self, Rule};
 use super::facets::{Facets, area_vector};
 use super::frame::place;
 use super::length;
 use super::space::Space;
 use crate::problem::order::Order;
+
+/// Return the quadrature rule of loads and springs on the surface of a body.
+pub fn rule<const D: usize>(space: &Space<D>) -> Rule {
+    element::rule(D, if space.order == Order::P1 { 3 } else { 5 })
+}
 
 /// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit normal n.
 pub fn surface_load<const D: usize>(
@@ -14,9 +19,19 @@ pub fn surface_load<const D: usize>(
     facets: &Facets<D>,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
 ) -> NodalForces<D> {
+    surface_load_by(space, facets, &rule(space), traction)
+}
+
+/// Return the nodal forces of a surface load by another quadrature rule.
+pub fn surface_load_by<const D: usize>(
+    space: &Space<D>,
+    facets: &Facets<D>,
+    rule: &Rule,
+    traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
+) -> NodalForces<D> {
     let surface_nodes = facets.distinct_nodes();
     let mut load = vec![0.0; D * surface_nodes.len()];
-    visit(space, facets, |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, rule, |FacetPoint { nodes, phi, weight, x, normal }| {
         let force = traction(x, normal);
         for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&surface_nodes, node)?))) {
             for c in 0..D {
@@ -41,8 +56,7 @@ struct FacetPoint<'a, const D: usize> {
 }
 
 /// Visit the integration points of a surface.
-fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, mut each: impl FnMut(FacetPoint<D>)) {
-    let rule = element::rule(D, if space.order == Order::P1 { 3 } else { 5 });
+fn visit<const D: usize>(space: &Space<D>, facets: &Facets<D>, rule: &Rule, mut each: impl FnMut(FacetPoint<D>)) {
     for index in 0..facets.count() {
         let x = facets.coordinates(index, space);
         for (l, weight) in rule.iter() {
@@ -65,7 +79,7 @@ pub fn foundation<const D: usize>(
     stiffness: &dyn Fn([f64; D], [f64; D]) -> [[f64; D]; D],
 ) -> Vec<NodalBlock<D>> {
     let mut blocks = Vec::new();
-    visit(space, facets, |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, &rule(space), |FacetPoint { nodes, phi, weight, x, normal }| {
         let density = stiffness(x, normal);
         for (a, &first) in nodes.iter().enumerate() {
             for (b, &second) in nodes.iter().enumerate() {
@@ -80,6 +94,6 @@ pub fn foundation<const D: usize>(
 /// Return the length (area) of a surface, in bodies of revolution the area that the curve sweeps over.
 pub fn measure<const D: usize>(space: &Space<D>, facets: &Facets<D>) -> f64 {
     let mut sum = 0.0;
-    visit(space, facets, |point| sum += point.weight);
+    visit(space, facets, &rule(space), |point| sum += point.weight);
     sum
 }

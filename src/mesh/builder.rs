@@ -2,28 +2,26 @@
 //!
 //! Some programs write the boundary of quadratic cells as linear lines and facets. These get the mid-edge nodes of the cells.
 
+use super::Mesh;
 use super::groups::{self, Group, Numbering};
-use super::scan::DAMAGED;
+use super::scan::{DAMAGED, Flaw};
 use super::simplex::{self, EDGES, ElementType, THINGS};
 use super::split::Middles;
-use super::{Mesh, MeshProducer};
 use crate::error::{Error, Result};
 use crate::problem::body::plain;
 use crate::problem::order::Order;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// What is wrong with an entry of a file, and what to do.
-pub struct Flaw {
-    pub what: String,
-    pub help: String,
-}
-
-impl Flaw {
-    /// Make a flaw with its advice.
-    pub fn new(what: impl Into<String>, help: impl Into<String>) -> Self {
-        Self { what: what.into(), help: help.into() }
-    }
+/// The maker of the bytes of a mesh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshProducer {
+    /// The user. Line numbers are meaningful in messages, and groups have names.
+    User,
+    /// Gmsh, from a script.
+    Script,
+    /// Gmsh or this program, from a file of another program, whose groups may have no names.
+    Other,
 }
 
 /// The parts of a mesh as they are read: names of groups, then nodes, then elements.
@@ -54,6 +52,11 @@ pub struct MeshBuilder<const D: usize> {
 
 /// The advice about elements of higher orders.
 const ORDERS: &str = "use elements of order 1 or 2: `gmsh -order 2`";
+
+/// Return an element type of Gmsh.
+pub fn kind_of(number: i32) -> std::result::Result<ElementType, Flaw> {
+    ElementType::of(number).ok_or_else(|| Flaw::new(format!("elements of Gmsh's type {number} cannot be used"), ORDERS))
+}
 
 impl<const D: usize> MeshBuilder<D> {
     /// Start a mesh by its maker. Groups of other programs, and of old formats, may have no names.

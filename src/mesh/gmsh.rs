@@ -182,6 +182,9 @@ fn failure(task: &MeshingTask, status: ExitStatus, said: &str) -> Error {
     );
     let way = if task.is_mesh { String::new() } else { format!("-{} ", task.dimension) };
     match &complaints(said)[..] {
+        [] if task.is_mesh && status.signal().is_some() => {
+            error.help("this Gmsh crashes on the file, as 4.8 does on groups of .unv: take a newer one, or convert the file to .msh by another program")
+        }
         [] => error.help(format!("see what it says: gmsh {way}{}", task.shown.display())),
         causes => causes.iter().fold(error, Error::because),
     }

@@ -1,8 +1,9 @@
 //! The way from the scene's mesh source to a mesh: by Gmsh, from the cache, from a file, or from arrays.
 
+use super::builder::MeshProducer;
 use super::cache::{self, Cache, write};
 use super::gmsh::{Gmsh, MeshingTask};
-use super::msh::{self, MeshProducer};
+use super::msh;
 use super::script::{self, Script, quoted};
 use super::{Mesh, abaqus, arrays, foreign};
 use crate::error::{Error, Located, Place, Result};

@@ -27,12 +27,13 @@ mod split;
 #[cfg(test)]
 mod tests;
 
+pub use builder::MeshProducer;
 pub use check::{Asked, BodyCheck, Components, Duty};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
 pub use load::{Loaded, MeshOrigin, as_msh, load};
 pub use locality::bisect;
-pub use msh::{MeshProducer, parse};
+pub use msh::parse;
 pub use script::unstructured;
 pub use script::view;
 pub use simplex::EDGES;

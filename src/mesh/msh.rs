@@ -1,24 +1,13 @@
 //! A reader of Gmsh's `.msh` 4.1 and 2.2, text and binary, in one pass from front to back. The sections of 2.2 are read in [`super::msh2`].
 
-use super::builder::{Flaw, MeshBuilder};
+use super::builder::{MeshBuilder, MeshProducer, kind_of};
 use super::scan::Scanner;
-use super::simplex::{ElementType, THINGS};
+use super::simplex::THINGS;
 use super::{Mesh, msh2};
 use crate::error::{Error, Result};
 use std::collections::HashMap;
 use std::io::BufRead;
 use std::path::Path;
-
-/// The maker of the bytes of a mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MeshProducer {
-    /// The user. Line numbers are meaningful in messages, and groups have names.
-    User,
-    /// Gmsh, from a script.
-    Script,
-    /// Gmsh or this program, from a file of another program, whose groups may have no names.
-    Other,
-}
 
 /// Read the bytes of a `.msh` file. Cells are in the order of the file, with the local numbering of [`Mesh`].
 ///
@@ -300,10 +289,4 @@ fn read_elements<const D: usize>(scan: &mut Scanner, mesh: &mut MeshBuilder<D>, 
         }
     }
     check_total(scan, "Elements", seen, total)
-}
-
-/// Return an element type of Gmsh.
-pub fn kind_of(number: i32) -> std::result::Result<ElementType, Flaw> {
-    let help = "use elements of order 1 or 2: `gmsh -order 2`";
-    ElementType::of(number).ok_or_else(|| Flaw::new(format!("elements of Gmsh's type {number} cannot be used"), help))
 }

@@ -4,9 +4,8 @@
 //! that groups are those of the physical tags alone. Entities are groups in a dimension without physical groups. An element of several groups
 //! stands in the file once for each of them.
 
-use super::builder::{Flaw, MeshBuilder};
-use super::msh::kind_of;
-use super::scan::Scanner;
+use super::builder::{MeshBuilder, kind_of};
+use super::scan::{Flaw, Scanner};
 use super::simplex::ElementType;
 use crate::error::Result;
 use std::collections::HashSet;

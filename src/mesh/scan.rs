@@ -2,7 +2,6 @@
 //!
 //! A record is a line of a text file, or some bytes of a binary one. [`Scanner::begin`] reads it, and the numbers are then taken from it.
 
-use super::builder::Flaw;
 use crate::error::{Error, Result};
 use std::io::{BufRead, Read};
 use std::path::Path;
@@ -24,6 +23,19 @@ pub struct Scanner<'a> {
     record: Vec<u8>,
     /// Position of the next number in the record.
     at: usize,
+}
+
+/// What is wrong with an entry of a file, and what to do.
+pub struct Flaw {
+    pub what: String,
+    pub help: String,
+}
+
+impl Flaw {
+    /// Make a flaw with its advice.
+    pub fn new(what: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { what: what.into(), help: help.into() }
+    }
 }
 
 /// Advice for a file that is damaged.
@@ -61,7 +73,7 @@ impl<'a> Scanner<'a> {
     }
 
     fn ends_early(&self) -> Error {
-        self.damaged(format!("the file ends within `{}`", self.section))
+        self.damaged("the file ends early")
     }
 
     /// Read the next line that is not blank, and return whether there is one.

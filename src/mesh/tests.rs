@@ -4,7 +4,7 @@ mod mutations;
 
 use super::cache::Cache;
 use super::load::{Meshing, load};
-use super::{Group, Loaded, Mesh, MeshOrigin, msh, simplex, view};
+use super::{Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::MeshSource;
@@ -82,7 +82,7 @@ fn gmsh(script: &str, arguments: &[&str]) -> Vec<u8> {
 }
 
 fn parse<const D: usize>(bytes: &[u8]) -> Result<Mesh<D>> {
-    msh::parse(Path::new("a.msh"), bytes, msh::MeshProducer::User)
+    msh::parse(Path::new("a.msh"), bytes, MeshProducer::User)
 }
 
 /// Return the sum of the measures of a group, times the factorial of its dimension.

@@ -69,16 +69,22 @@ fn meshes_of_other_formats_give_the_same_answer() {
         assert!(distance(&sorted(run), &sorted(&whole)) < size, "{label}");
         assert!(run.warnings().is_empty(), "{label}: {}", run.warnings());
     };
-    for (format, names) in [("msh22", &NAMED), ("unv", &NAMED), ("bdf", &NUMBERED), ("mesh", &NUMBERED)] {
-        let end = if format.starts_with("msh") { "msh" } else { format };
-        let name = format!("a.{end}");
-        let text = made(&patch(), &["-3", "-format", format], &name);
+    // Gmsh 4.8 crashes on groups of its own universal files
+    let folder = tempfile::tempdir().expect("a folder");
+    let without_groups = folder.path().join("two.geo");
+    let script = fs::read_to_string(patch()).expect("a script");
+    let lines: Vec<&str> = script.lines().filter(|line| !line.starts_with("Physical")).collect();
+    fs::write(&without_groups, lines.join("\n") + "\n").expect("a script");
+    for (format, names) in [("msh22", &NAMED), ("unv", &NUMBERED), ("bdf", &NUMBERED), ("mesh", &NUMBERED)] {
+        let name = format!("a.{}", if format.starts_with("msh") { "msh" } else { format });
+        let script = if format == "unv" { &without_groups } else { &patch() };
+        let text = made(script, &["-3", "-format", format], &name);
         let run = solved(&name, &text, &format!("\"{name}\""), names).converged();
         same(&run, format);
     }
     // in the cache now
-    let text = made(&patch(), &["-3", "-format", "unv"], "b.unv");
-    let run = solved("b.unv", &text, "{ msh = \"b.unv\" }", &NAMED).converged();
+    let text = made(&patch(), &["-3", "-format", "mesh"], "b.mesh");
+    let run = solved("b.mesh", &text, "{ msh = \"b.mesh\" }", &NUMBERED).converged();
     same(&run, "a table");
 }
 

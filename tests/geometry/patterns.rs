@@ -329,7 +329,7 @@ fn what_does_not_fit_is_refused() {
             "name = \"brick_*_*\"",
             "name = \"brick_*\"",
             &[
-                "all bodies of `brick_*`, such as `brick_even_4`, belong to later tables",
+                "all bodies of `brick_*`, such as `brick_odd_1`, belong to later tables",
                 "let the table of few bodies follow",
             ],
         ),

@@ -2,15 +2,16 @@
 //! matrix. The coupling of the nodes determines the work and the memory of each.
 
 use super::body::BodyMesh;
-use super::unassembled::Unassembled;
+use super::share::Share;
+use super::whole::WholeBody;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
-use crate::fem::{Couplings, ElasticBody, Prolongation, Space};
+use crate::fem::{NodalBlock, Space, place};
 use crate::linalg::Csr;
 use crate::mesh::bisect;
 use crate::model::Distribution;
 use nalgebra::DMatrix;
-use serde::{Deserialize, Serialize};
+use std::cell::OnceCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
@@ -81,7 +82,7 @@ impl Partition {
     /// a body is interpolated from its coarse nodes.
     pub fn new<const D: usize>(
         set: Vec<usize>,
-        bodies: &[Unassembled<D>],
+        bodies: &[WholeBody<D>],
         pairs: &[ContactPair],
         ranks: usize,
         wants_coarse: &dyn Fn(usize) -> bool,
@@ -106,7 +107,7 @@ impl Partition {
     }
 
     /// Return the rank that owns a node. `number` is the index of the body among those of the matrix.
-    pub fn owner(&self, number: usize, node: u32) -> usize {
+    fn owner(&self, number: usize, node: u32) -> usize {
         self.owner[number][node as usize] as usize
     }
 
@@ -120,10 +121,58 @@ impl Partition {
         (0..self.ranks).filter(|&rank| self.nodes.counts[rank][number] > 0).collect()
     }
 
+    /// Return the part of a body on the nodes that a rank needs, or on all nodes if `wants_all`. `number` is the index of the body in its matrix.
+    pub fn restrict<const D: usize>(
+        &self,
+        body: &BodyMesh<D>,
+        number: usize,
+        rank: usize,
+        wants_all: bool,
+    ) -> BodyMesh<D> {
+        let cells = match wants_all {
+            true => (0..body.space.cell_count()).collect(),
+            false => self.cells(number, body, rank),
+        };
+        let nodes = self.nodes(number, body, &cells, rank);
+        let here = |node: u32| place(&nodes, node);
+        let dof_here = |dof: usize| Some(D * here((dof / D) as u32)? as usize + dof % D);
+        let prescribed_here = |&(dof, u): &(usize, f64)| Some((dof_here(dof)?, u));
+        let rows_here = |rows: &Csr| rows.of_columns(D * nodes.len(), dof_here);
+        let spring_here = |&NodalBlock { nodes: [a, b], block }: &NodalBlock<D>| {
+            Some(NodalBlock { nodes: [here(a)?, here(b)?], block })
+        };
+        let springs = body.springs.iter().map(|blocks| blocks.iter().filter_map(spring_here).collect());
+        let is_assembled = |node: u32| self.owner(number, body.held.frame.node(node)) == rank;
+        BodyMesh {
+            space: Rc::new(body.space.on(&body.space.corners(&cells), &nodes)),
+            regions: if body.regions.is_empty() {
+                Vec::new()
+            } else {
+                cells.iter().map(|&cell| body.regions[cell]).collect()
+            },
+            held: body.held.on(&nodes),
+            springs: springs.collect(),
+            points: nodes.iter().map(|&node| body.points[node as usize]).collect(),
+            extent: body.extent,
+            rows: rows_here(&body.rows),
+            nodal_rows: rows_here(&body.nodal_rows),
+            approach: rows_here(&body.approach),
+            load: body.load.only(is_assembled).on(&nodes),
+            missed_load: body.missed_load.clone(),
+            left: body.left.clone(),
+            unsupported: body.unsupported.clone(),
+            imposed: body.imposed.clone(),
+            prescribed: body.prescribed.iter().filter_map(prescribed_here).collect(),
+            is_owned: true,
+            graph: OnceCell::new(),
+            share: Some(self.share::<D>(number, nodes, &body.rows, rank)),
+        }
+    }
+
     /// Return the indices of the cells of a body that a rank needs. These are the cells at its owned nodes, and all cells that
     /// touch these. So the rank has every cell at a node of the cells at its owned nodes. Tied nodes are assembled on the rank of
     /// their master.
-    pub fn cells<const D: usize>(&self, number: usize, body: &BodyMesh<D>, rank: usize) -> Vec<usize> {
+    fn cells<const D: usize>(&self, number: usize, body: &BodyMesh<D>, rank: usize) -> Vec<usize> {
         let BodyMesh { space, held, .. } = body;
         let is_own = |node: &u32| self.owner(number, held.frame.node(*node)) == rank;
         let cells = || space.cells.chunks_exact(space.stride);
@@ -137,7 +186,7 @@ impl Partition {
 
     /// Return the nodes of a body that a rank with these cells needs, sorted. They are its owned nodes, those of its cells and of
     /// contact rows, and those that move tied nodes.
-    pub fn nodes<const D: usize>(&self, number: usize, body: &BodyMesh<D>, cells: &[usize], rank: usize) -> Vec<u32> {
+    fn nodes<const D: usize>(&self, number: usize, body: &BodyMesh<D>, cells: &[usize], rank: usize) -> Vec<u32> {
         let BodyMesh { space, held, .. } = body;
         let own = (0..space.nodes.len() as u32).filter(|&node| self.owner(number, node) == rank);
         let of_cells = space.corners(cells).into_iter();
@@ -147,7 +196,7 @@ impl Partition {
     }
 
     /// Return the distribution of the dofs of a body for a rank that has these `nodes`. `rows` are the contact rows of the body.
-    pub fn share<const D: usize>(&self, number: usize, nodes: Vec<u32>, rows: &Csr, rank: usize) -> Share {
+    fn share<const D: usize>(&self, number: usize, nodes: Vec<u32>, rows: &Csr, rank: usize) -> Share {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
@@ -193,77 +242,9 @@ impl Partition {
     }
 }
 
-/// What one rank has of the dofs of a distributed body.
-#[derive(Clone, Serialize, Deserialize)]
-pub struct Share {
-    /// Dofs of this rank.
-    pub distribution: Distribution,
-    /// Nodes that this rank has, sorted, as numbered in the body.
-    pub nodes: Vec<u32>,
-    /// Number of each of these nodes in the matrix with the rows of the body.
-    number: Vec<u32>,
-    /// Local indices of the coarse nodes among the nodes of this rank; empty if no interpolation is requested.
-    coarse_nodes: Vec<u32>,
-    /// Numbers of these nodes among the coarse nodes of the bodies in one matrix.
-    coarse_number: Vec<u32>,
-    /// Number of coarse nodes of these bodies on all ranks.
-    coarse_count: usize,
-    /// Number of coarse nodes of this body that this rank owns.
-    own_coarse: usize,
-}
-
-impl Share {
-    /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
-    /// bodies in one matrix.
-    pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
-        let whole = whole(&self.coarse_nodes);
-        let mut rows = Csr::new(D * self.coarse_count);
-        for &dof in &self.distribution.places {
-            let number = |j: usize| D * self.coarse_number[j / D] as usize + j % D;
-            rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
-        }
-        Prolongation { rows, own: D * self.own_coarse }
-    }
-
-    /// Return whether this rank owns a node, given by its local index.
-    pub fn is_own<const D: usize>(&self, node: usize) -> bool {
-        let Distribution { first, own, .. } = &self.distribution;
-        (*first..first + own.len()).contains(&(D * self.number[node] as usize))
-    }
-
-    /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
-    /// rows.
-    pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
-        let own = &self.distribution.places;
-        let Csr { ptr, mut col, mut values, .. } = body.stiffness;
-        let mut starts = vec![0];
-        let mut row = Vec::new();
-        for &dof in own {
-            let range = ptr[dof as usize] as usize..ptr[dof as usize + 1] as usize;
-            let number = |&j: &i32| D as i32 * self.number[j as usize / D] as i32 + j % D as i32;
-            row.clear();
-            row.extend(col[range.clone()].iter().map(number).zip(values[range.clone()].iter().copied()));
-            row.sort_unstable_by_key(|entry| entry.0);
-            for (k, &(j, value)) in range.clone().zip(&row) {
-                (col[k], values[k]) = (j, value);
-            }
-            starts.push(range.end as i32);
-        }
-        let place = |&(dof, value): &(usize, f64)| Some((own.binary_search(&(dof as u32)).ok()?, value));
-        ElasticBody {
-            stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
-            load: self.distribution.of_known(&body.load),
-            prescribed: body.prescribed.iter().filter_map(place).collect(),
-            held: Couplings::default(),
-            lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.of_known(&body.lifting) },
-            ..body
-        }
-    }
-}
-
 /// Return, for each node of the bodies in `set`, the number of nodes with which it is coupled in a matrix of all of them, itself
 /// included. Nodes are coupled by the cells around them and by contact rows. The result runs over one body after the other.
-fn couplings<const D: usize>(bodies: &[Unassembled<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
+fn couplings<const D: usize>(bodies: &[WholeBody<D>], set: &[usize], pairs: &[ContactPair]) -> Vec<u32> {
     let (mut first, mut all) = (HashMap::new(), Vec::new());
     for &body in set {
         first.insert(body, all.len());

@@ -1,8 +1,8 @@
-//! A body before its matrix is assembled, on the first rank: its contact rows, its loads, the rigid motions that supports leave, and that by
-//! which they move it.
+//! A whole body on the first rank, before its matrix is assembled: its contact rows, its loads, the rigid motions that supports leave, and that
+//! by which they move it.
 
 use super::approach;
-use super::part::SceneBody;
+use super::bodies::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::fem::{NodalForces, RigidMotion, rigid};
@@ -17,7 +17,7 @@ pub const NO_WORK: f64 = 1e-9;
 
 /// A whole body before its matrix is assembled.
 #[derive(Clone)]
-pub struct Unassembled<'a, const D: usize> {
+pub struct WholeBody<'a, const D: usize> {
     /// Space, supports and springs.
     pub part: SceneBody<'a, D>,
     /// Contact rows of the body, pair by pair.
@@ -43,7 +43,7 @@ pub struct FixableDof {
     pub size: f64,
 }
 
-impl<'a, const D: usize> Unassembled<'a, D> {
+impl<'a, const D: usize> WholeBody<'a, D> {
     /// Collect the contact rows and loads of all bodies.
     ///
     /// # Errors
@@ -119,13 +119,18 @@ impl<'a, const D: usize> Unassembled<'a, D> {
 
     /// Find the motions that supports and springs leave to the body at present.
     pub fn find_motions(&mut self) {
-        let at = |k: usize, node: u32| self.free[k].at(&self.part.mesh.space.nodes[node as usize]);
-        let left = self.part.mesh.unconstrained(self.free.len(), &at);
-        let left: Vec<_> = left.iter().map(|weights| rigid::combine(&self.free, weights)).collect();
-        let sprung = self.part.mesh.sprung(&self.free).filter(|(all, _)| all.len() > left.len());
-        self.part.mesh.unsupported = sprung.as_ref().map_or_else(|| left.clone(), |(all, _)| all.clone());
-        self.sprung = sprung.map(|(all, stiffness)| Sprung { motions: self.with_works(&all), stiffness });
-        (self.motions, self.part.mesh.left) = (self.with_works(&left), left);
+        let mesh = &self.part.mesh;
+        let unsupported = mesh.left_by_supports(&self.free);
+        let (springs, scale) =
+            (mesh.ground_stiffness(&unsupported), mesh.ground_stiffness(&self.free).diagonal().max());
+        let left = match scale > 0.0 && !unsupported.is_empty() {
+            true => Blocks::free(&springs, scale, TOLERANCE).iter().map(|w| rigid::combine(&unsupported, w)).collect(),
+            false => unsupported.clone(),
+        };
+        let is_sprung = left.len() < unsupported.len();
+        self.sprung = is_sprung.then(|| Sprung { motions: self.with_works(&unsupported), stiffness: springs });
+        self.motions = self.with_works(&left);
+        (self.part.mesh.left, self.part.mesh.unsupported) = (left, unsupported);
     }
 
     /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the

@@ -1,9 +1,9 @@
 //! The step from what one rank has of a body to its matrix and its solver, which a factory makes.
 
+use super::bodies::{SceneBody, elasticity_of};
 use super::body::BodyMesh;
-use super::local::BodyInfo;
+use super::facts::BodyInfo;
 use super::meshes::FemBody;
-use super::part::{SceneBody, elasticity_of};
 use super::post::{OnPart, Post};
 use crate::error::Result;
 use crate::exchange::Plain;

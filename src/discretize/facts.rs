@@ -2,7 +2,7 @@
 
 use super::post::Post;
 use super::supports::axis_vector;
-use super::unassembled::{NO_WORK, Unassembled};
+use super::whole::{NO_WORK, WholeBody};
 use crate::contact::{self, ContactPair};
 use crate::fem;
 use crate::linalg::dot;
@@ -65,7 +65,7 @@ impl BodyInfo {
     }
 }
 
-impl<const D: usize> Unassembled<'_, D> {
+impl<const D: usize> WholeBody<'_, D> {
     /// Return what all ranks have of the body: the arrays of the model and the facts for reports. `checked` is the result of the check of its
     /// mesh.
     pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> (BodySlot, BodyInfo) {

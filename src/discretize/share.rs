@@ -1,0 +1,74 @@
+//! What one rank has of the dofs of a distributed body.
+
+use crate::fem::{Couplings, ElasticBody, Prolongation};
+use crate::linalg::Csr;
+use crate::model::Distribution;
+use serde::{Deserialize, Serialize};
+
+/// What one rank has of the dofs of a distributed body.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Share {
+    /// Dofs of this rank.
+    pub distribution: Distribution,
+    /// Nodes that this rank has, sorted, as numbered in the body.
+    pub nodes: Vec<u32>,
+    /// Number of each of these nodes in the matrix with the rows of the body.
+    pub number: Vec<u32>,
+    /// Local indices of the coarse nodes among the nodes of this rank; empty if no interpolation is requested.
+    pub coarse_nodes: Vec<u32>,
+    /// Numbers of these nodes among the coarse nodes of the bodies in one matrix.
+    pub coarse_number: Vec<u32>,
+    /// Number of coarse nodes of these bodies on all ranks.
+    pub coarse_count: usize,
+    /// Number of coarse nodes of this body that this rank owns.
+    pub own_coarse: usize,
+}
+
+impl Share {
+    /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
+    /// bodies in one matrix.
+    pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
+        let whole = whole(&self.coarse_nodes);
+        let mut rows = Csr::new(D * self.coarse_count);
+        for &dof in &self.distribution.places {
+            let number = |j: usize| D * self.coarse_number[j / D] as usize + j % D;
+            rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
+        }
+        Prolongation { rows, own: D * self.own_coarse }
+    }
+
+    /// Return whether this rank owns a node, given by its local index.
+    pub fn is_own<const D: usize>(&self, node: usize) -> bool {
+        let Distribution { first, own, .. } = &self.distribution;
+        (*first..first + own.len()).contains(&(D * self.number[node] as usize))
+    }
+
+    /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
+    /// rows.
+    pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
+        let own = &self.distribution.places;
+        let Csr { ptr, mut col, mut values, .. } = body.stiffness;
+        let mut starts = vec![0];
+        let mut row = Vec::new();
+        for &dof in own {
+            let range = ptr[dof as usize] as usize..ptr[dof as usize + 1] as usize;
+            let number = |&j: &i32| D as i32 * self.number[j as usize / D] as i32 + j % D as i32;
+            row.clear();
+            row.extend(col[range.clone()].iter().map(number).zip(values[range.clone()].iter().copied()));
+            row.sort_unstable_by_key(|entry| entry.0);
+            for (k, &(j, value)) in range.clone().zip(&row) {
+                (col[k], values[k]) = (j, value);
+            }
+            starts.push(range.end as i32);
+        }
+        let place = |&(dof, value): &(usize, f64)| Some((own.binary_search(&(dof as u32)).ok()?, value));
+        ElasticBody {
+            stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
+            load: self.distribution.of_known(&body.load),
+            prescribed: body.prescribed.iter().filter_map(place).collect(),
+            held: Couplings::default(),
+            lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.of_known(&body.lifting) },
+            ..body
+        }
+    }
+}
