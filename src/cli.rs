@@ -5,7 +5,6 @@ use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::say;
 use crate::petsc::Session;
-use crate::report;
 use crate::solver::options;
 use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -48,17 +47,16 @@ Examples:
 
 const CHECK: &str = "Examples:
   winkler check scene.toml
-  winkler check scene.toml --set mesh.set.n=64 --json
-  winkler check scene.toml -o pictures";
+  winkler check scene.toml --set mesh.set.n=64 --json";
 
 const SWEEP: &str = "Examples:
   winkler sweep scene.toml --over method.gamma=0.3,0.6,0.9
   winkler sweep scene.toml --over contact.0.layer.power.a=0.5,1 --over mesh.set.n=16,32 -o results/sweep";
 
 const BENCH: &str = "Examples:
-  winkler bench scene.toml --over mesh.set.n=16,32,64 --solver mumps,hypre --linear
+  winkler bench scene.toml --over mesh.set.n=16,32,64 --solver mumps,hypre
   winkler bench scene.toml --solver \"-ksp_type cg -pc_type icc\" --order 1,2 --repeat 3
-  winkler bench a.toml b.toml --method newton,robin --ranks 1,2 --budget 600";
+  winkler bench a.toml b.toml --method newton,robin --ranks 1,2 --timeout 600";
 
 #[derive(Subcommand)]
 enum Command {
@@ -69,27 +67,6 @@ enum Command {
     Bench(bench::BenchArgs),
     /// Make the mesh of a scene, or find it in the cache, and print what it has
     Mesh(mesh::MeshArgs),
-    /// Write a page with pictures and tables of a run, from its files alone: one HTML file
-    Report {
-        /// Folder of results
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// File to write [default: report.html in the folder]
-        #[arg(short, value_name = "FILE")]
-        output: Option<PathBuf>,
-    },
-    /// Draw one picture of a run as SVG
-    Plot {
-        /// Folder of results
-        #[arg(value_name = "DIR")]
-        folder: PathBuf,
-        /// What to draw: stress, displacement, pressure, convergence, or over load steps area (in contact over force) or force (over approach)
-        #[arg(value_name = "WHAT")]
-        what: String,
-        /// File to write, .svg [default: WHAT.svg in the folder]
-        #[arg(short, value_name = "FILE")]
-        output: Option<PathBuf>,
-    },
     /// Write a small scene that works, with its script and comments, to begin from
     New {
         /// Folder for it; its last word names the scene
@@ -241,12 +218,6 @@ fn without_session(interrupt: &Interrupt, command: Command, petsc: Vec<String>) 
             bench::bench(interrupt, &request)
         }
         Command::Mesh(request) => mesh::mesh(interrupt, &request),
-        Command::Report { folder, output } => {
-            report::save(&folder, output.as_deref()).and_then(|path| say(path.display())).map(|()| 0)
-        }
-        Command::Plot { folder, what, output } => report::draw(&folder, &what, output.as_deref())
-            .and_then(|paths| paths.iter().try_for_each(|path| say(path.display())))
-            .map(|()| 0),
     };
     ended.unwrap_or_else(|error| complain(&error))
 }

@@ -44,6 +44,19 @@ pub fn scatter<T: Plain>(exchange: &dyn Exchange, mut part: impl FnMut(usize) ->
     Ok(part(0))
 }
 
+/// Return the values of all ranks on the first one, in the order of the ranks, and none on the others (gather). Collective.
+///
+/// # Errors
+/// A message that cannot be read.
+pub fn gather<T: Plain>(exchange: &dyn Exchange, mine: T) -> Result<Vec<T>> {
+    if exchange.rank() > 0 {
+        exchange.send(0, &pack(&mine));
+        return Ok(Vec::new());
+    }
+    let others = (1..exchange.ranks()).map(|rank| unpack(&exchange.receive(rank)));
+    std::iter::once(Ok(mine)).chain(others).collect()
+}
+
 /// Return the value of every rank, in the order of the ranks (all_gather). Collective.
 pub fn all_gather<T: Plain>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {

@@ -113,13 +113,6 @@ pub fn digest_of_bytes(bytes: &[u8]) -> String {
     hexadecimal(&Sha256::digest(bytes))
 }
 
-/// Return the SHA-256 of a file, which is read in blocks, in hexadecimal digits.
-pub fn digest_of_file(path: &Path) -> io::Result<String> {
-    let mut source = Digested::new(File::open(path)?);
-    io::copy(&mut source, &mut io::sink())?;
-    Ok(source.digest())
-}
-
 fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -3,7 +3,6 @@
 pub use crate::commands::checkpoint::settings_digest;
 pub use crate::interrupt::Interrupt;
 pub use crate::linalg::bounds;
-pub use crate::report::save;
 
 pub mod contact {
     //! Contact points and laws of layers.

@@ -1,40 +1,31 @@
-//! `winkler check`: build the problem of a scene and print what it has, without solving it, measured surfaces included.
+//! `winkler check`: build the problem of a scene and print what it has, without solving it.
 
 use super::{SceneArgs, clock_with_phases, load};
 use crate::contact::ContactPair;
-use crate::data::Data;
 use crate::discretize::BodyInfo;
 use crate::error::Result;
 use crate::interrupt::Interrupt;
 use crate::linalg::range;
-use crate::output::{Folder, LISTED, Plot, PlotAxis, Series, Style, safe_name, say, sci, warning_lines};
+use crate::output::{LISTED, say, sci, warning_lines};
 use crate::petsc::Session;
-use crate::problem::{ContactSpec, LayerSpec, label};
 use crate::run::results::{self, CouplingEstimate};
 use crate::run::{self, Built, in_words, report};
 use serde_json::{Value, json};
-use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::rc::Rc;
-use std::sync::Arc;
 
 /// The command line of `winkler check`.
 #[derive(clap::Args)]
 pub struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder for pictures of measured surfaces [default: none are drawn]
-    #[arg(short, value_name = "DIR")]
-    output: Option<PathBuf>,
 }
 
 /// Build a scene's problem, print it and return the exit code.
 ///
-/// Bodies, dofs, surfaces, gaps and the unconstrained rigid motions of each body are printed. With a folder, measured surfaces are
-/// drawn into it.
+/// Bodies, dofs, surfaces, gaps and the unconstrained rigid motions of each body are printed.
 ///
 /// # Errors
-/// Refusals of scene and mesh; pictures that cannot be written.
+/// Refusals of scene and mesh.
 pub fn check(session: &Session, interrupt: &Interrupt, request: &CheckArgs) -> Result<i32> {
     let mut clock = clock_with_phases(session.rank() == 0 && !request.scene.json);
     let mut scene = load(session, &request.scene.scene, &request.scene.overrides())?;
@@ -49,9 +40,6 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &CheckArgs) -> R
     let shared = report::GatheredCounters::gather(&built.discrete);
     if session.rank() != 0 {
         return Ok(0);
-    }
-    if let Some(folder) = &request.output {
-        draw(&built, &Folder::claim(folder)?)?;
     }
     if request.scene.json {
         let headline = json!(report::headline(session, &built, &shared.solvers, &clock));
@@ -74,7 +62,6 @@ fn to_json(built: &Built, settings: Value, headline: Value) -> Value {
         value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
     }
     value["pairs"] = (0..built.discrete.model.pairs.len()).map(|i| pair_to_json(built, i)).collect();
-    value["data"] = data_to_json(built);
     value
 }
 
@@ -107,9 +94,7 @@ fn print(built: &Built, solvers: &str) -> Result<()> {
         _ => all_bodies(built),
     };
     let splits = built.splits.iter().map(|line| format!("  {line}"));
-    let data = in_contacts(built);
-    let data = data.values().flat_map(|data| lines_of_data(data));
-    let lines = splits.chain(lines).chain(data).chain(match built.discrete.model.pairs.len() {
+    let lines = splits.chain(lines).chain(match built.discrete.model.pairs.len() {
         ..=LISTED => each_pair(built),
         _ => all_pairs(built),
     });
@@ -165,7 +150,7 @@ fn all_bodies(built: &Built) -> Vec<String> {
     lines
 }
 
-/// Return two lines for each pair, and one of a measured gap.
+/// Return two lines for each pair.
 fn each_pair(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
     for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
@@ -245,76 +230,4 @@ fn all_pairs(built: &Built) -> Vec<String> {
         ));
     }
     lines
-}
-
-/// Return the data in the gap of a contact and in its layer.
-fn of_contact(spec: &ContactSpec) -> Vec<Arc<Data>> {
-    let mut data: Vec<Arc<Data>> = spec.gap.data().cloned().collect();
-    match &spec.layer {
-        LayerSpec::Form { values, .. } => data.extend(values.iter().flat_map(|field| field.data().cloned())),
-        LayerSpec::Pressure { law, .. } => data.extend(law.data().cloned()),
-        LayerSpec::Table(_) | LayerSpec::Own(_) => {}
-    }
-    data
-}
-
-/// Return the data of all contacts, each once, by name.
-fn in_contacts(built: &Built) -> BTreeMap<String, Arc<Data>> {
-    let contacts = built.discrete.contacts.iter();
-    let data = contacts.flat_map(|info| of_contact(&info.spec));
-    data.map(|data| (data.spec.name.clone(), data)).collect()
-}
-
-/// Return the lines that describe the data of contacts.
-fn lines_of_data(data: &Data) -> Vec<String> {
-    let (name, file) = (&data.spec.name, data.spec.file.display());
-    let Some(grid) = data.grid() else { return Vec::new() };
-    let counts: Vec<String> =
-        grid.axes.iter().filter(|axis| axis.count > 1).map(|axis| axis.count.to_string()).collect();
-    let ranges: Vec<String> = grid.axes[..counts.len()]
-        .iter()
-        .map(|axis| {
-            let [from, to] = axis.range();
-            format!("{} to {}", sci(from, 4), sci(to, 4))
-        })
-        .collect();
-    let [low, high] = range(grid.values.iter().copied());
-    vec![
-        format!("  data {name}: {file}, {} points for {}", counts.join(" x "), ranges.join(" and ")),
-        format!("    heights {} to {}", sci(low, 3), sci(high, 3)),
-    ]
-}
-
-/// Return the range of the data of contacts by name, for `--json`.
-fn data_to_json(built: &Built) -> Value {
-    let data = in_contacts(built).into_iter();
-    data.filter_map(|(name, data)| Some((name, json!({ "range": range(data.grid()?.values.iter().copied()) }))))
-        .collect()
-}
-
-/// Draw the data of contacts into a folder.
-pub fn draw(built: &Built, folder: &Folder) -> Result<()> {
-    for (name, data) in in_contacts(built) {
-        if let Some(plot) = profiles(&data, built) {
-            folder.write(&format!("data-{}.svg", safe_name(&name)), |out| plot.write(out))?;
-        }
-    }
-    Ok(())
-}
-
-/// Return the plot of the heights along the lines through the middle of a grid; none for data on no grid.
-fn profiles(data: &Data, built: &Built) -> Option<Plot> {
-    let grid = data.grid()?;
-    let [columns, rows] = grid.axes.map(|axis| axis.count);
-    let place = |axis: usize, k: usize| grid.axes[axis].origin + grid.axes[axis].spacing * k as f64;
-    let along = (0..columns).map(|i| (place(0, i), grid.values[i + columns * (rows / 2)])).collect();
-    let name = if rows > 1 { "middle row" } else { "" };
-    let mut series = vec![Series::new(name, along, Style::Line)];
-    if rows > 1 {
-        let down = (0..rows).map(|j| (place(1, j), grid.values[columns / 2 + columns * j])).collect();
-        series.push(Series::new("middle column", down, Style::Line));
-    }
-    // data can be heights, moduli or loads
-    let (x, y) = (label("place", built.scene.units.as_ref().map(|units| units.length)), data.spec.name.clone());
-    Some(Plot { title: format!("Data {y}"), x: PlotAxis::linear(x), y: PlotAxis::linear(y), series })
 }

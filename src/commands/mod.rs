@@ -2,14 +2,16 @@
 //! several of them take from the command line and print. What they share with the library is in [`crate::run`].
 
 mod adapt;
-mod axes;
 pub(crate) mod bench;
+mod cases;
 pub(crate) mod check;
 pub mod checkpoint;
 pub(crate) mod gone;
 mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;
+mod plots;
+mod rows;
 pub(crate) mod solve;
 pub(crate) mod sweep;
 mod transfer;

@@ -7,15 +7,14 @@ use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
-use crate::exchange::all_gather;
 use crate::interrupt::Interrupt;
 use crate::output::terminal::ProgressLine;
-use crate::output::{Checksums, Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
+use crate::output::{Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::run::recorder::{is_snapshot, signal};
 use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results, verdict};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The command line of `winkler solve`.
 #[derive(clap::Args)]
@@ -80,8 +79,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
         tables: Tables::default(),
         has_checkpoint,
         has_tables: false,
-        unwritten: Vec::new(),
-        unwritten_before: Vec::new(),
+        written: Ok(()),
     };
     let last = loop {
         let round = solver.solve()?;
@@ -112,18 +110,14 @@ struct Solver<'s> {
     has_checkpoint: bool,
     /// Whether the folder has the tables of this run.
     has_tables: bool,
-    /// Messages about files of this mesh that could not be written.
-    unwritten: Vec<String>,
-    /// Those about files of earlier meshes.
-    unwritten_before: Vec<String>,
+    /// The first failure to write a file, with which the run ends: until then it goes on with what it computes.
+    written: Result<()>,
 }
 
 /// A round that has ended: the solution on one mesh.
 struct Round {
     done: Done,
     estimate: Option<Estimate>,
-    /// Whether its tables were written.
-    tables: Result<()>,
 }
 
 impl Solver<'_> {
@@ -145,36 +139,30 @@ impl Solver<'_> {
         let mut done = run::iterate(ready, interrupt, self, &mut clock)?;
         self.clock = clock;
         drop(stage);
-        done.warnings.append(&mut self.unwritten);
-        done.warnings.extend(self.unwritten_before.drain(..).map(|what| format!("of an earlier mesh: {what}")));
         let stage = session.stage("estimate");
         let mut estimate = run::estimate(&mut done, &mut self.clock)?;
         drop(stage);
         self.table.finish();
         let tables = std::mem::take(&mut self.tables).finish();
+        self.note(tables);
         estimate.iter_mut().for_each(|estimate| self.plan.correct(&done, estimate));
-        Ok(Round { done, estimate, tables })
+        Ok(Round { done, estimate })
     }
 
-    /// Open the tables of a round. If those of a later mesh cannot be written, the run goes on without them, since its results are worth more.
+    /// Open the tables of a round, before the first one of which the folder loses the results of other runs: nothing can be refused any more.
     fn open_tables(&mut self, ready: &Prepared) -> Result<()> {
         if !self.terminal.is_first {
             return Ok(());
         }
-        // nothing can be refused any more: from here on the folder has this run alone
-        if !self.has_tables {
+        if !std::mem::replace(&mut self.has_tables, true) {
             prepare_folder(&self.folder, self.has_checkpoint)?;
         }
-        let is_later = std::mem::replace(&mut self.has_tables, true);
-        match Tables::open(&self.folder, ready) {
-            Err(error) if is_later => self.unwritten_before.push(error.message().to_owned()),
-            opened => self.tables = opened?,
-        }
+        self.tables = Tables::open(&self.folder, ready)?;
         Ok(())
     }
 
     /// Write the results of a mesh that is not the last, so that they exist whatever happens on the next mesh.
-    fn write_round(&mut self, Round { done, estimate, tables }: Round) {
+    fn write_round(&mut self, Round { done, estimate }: Round) {
         let ended = match self.plan.is_stepping() {
             true => "ended while load steps were at work on the last mesh",
             false => "ended while the next mesh was at work: the error asked for is not reached",
@@ -184,34 +172,25 @@ impl Solver<'_> {
             (report.status, report.message) = ("interrupted".to_owned(), ended.to_owned());
         });
         self.clock = clock;
-        // the run goes on with what it computed: a disk that is full now may have room at the end
-        if let Err(error) = tables.and(written) {
-            self.unwritten_before.push(error.message().to_owned());
-        }
+        self.note(written);
     }
 
     /// Return the results of a round that are to be written.
     fn files<'a>(&'a self, done: &'a Done, estimate: Option<&'a Estimate>, fields: bool) -> ResultFiles<'a> {
-        let (session, path, plan) = (self.session, self.folder.path(), &self.plan);
-        ResultFiles { session, path, plan, done, estimate, fields, is_last: false }
+        ResultFiles { session: self.session, folder: &self.folder, plan: &self.plan, done, estimate, fields }
     }
 
     /// Write all results of the last mesh, and return the exit code.
-    fn finish(self, Round { done, estimate, tables }: Round) -> Result<i32> {
+    fn finish(self, Round { done, estimate }: Round) -> Result<i32> {
         let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
         let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
-        let files = ResultFiles { is_last: true, ..self.files(&done, estimate.as_ref(), true) };
-        let (report, written) = files.write(&mut self.clock.clone(), |report| {
+        let (report, written) = self.files(&done, estimate.as_ref(), true).write(&mut self.clock.clone(), |report| {
             report.warnings.extend(plan.costly_end.clone());
             if let Some(limit) = &plan.limit {
                 report.status = "mesh-limit".to_owned();
                 report.message = format!("the error asked for is not reached: {limit}");
             }
         });
-        let written = match plan.scene.output.report {
-            true => written.and(write_page(&done, path, first)),
-            false => written,
-        };
         drop(line);
         let code = if plan.limit.is_some() { 1 } else { verdict::exit_code(&done) };
         if first {
@@ -221,18 +200,14 @@ impl Solver<'_> {
             }
             self.print(&report, &done, code)?;
         }
-        tables.and(written)?;
-        collectively(self.session, if first { plan.save_mesh(&done) } else { Ok(()) })?;
+        self.written.and(written)?;
         Ok(code)
     }
 
-    /// Note a failure to write, each message once. The run goes on: a disk that is full now may have room later.
-    fn note_failure(&mut self, what: &str, written: Result<()>) {
-        if let Err(error) = written {
-            let text = format!("{what} was not written: {}", error.message());
-            if !self.unwritten.contains(&text) {
-                self.unwritten.push(text);
-            }
+    /// Note whether a file was written.
+    fn note(&mut self, written: Result<()>) {
+        if self.written.is_ok() {
+            self.written = written;
         }
     }
 
@@ -268,7 +243,6 @@ pub(super) fn claim(session: &Session, path: PathBuf) -> Result<Folder> {
 /// If this run `goes_on` from the checkpoint in the folder, the results are its own and stay. Another checkpoint is renamed, since hours of work
 /// may be in it.
 fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
-    Checksums::withdraw(folder.path());
     if goes_on {
         return Ok(());
     }
@@ -279,12 +253,6 @@ fn prepare_folder(folder: &Folder, goes_on: bool) -> Result<()> {
             .map_err(|cause| Error::file(&file, "set aside", &cause)),
         Err(_) => Ok(()),
     }
-}
-
-/// Write the page of the results when all ranks have written their fields. Collective.
-fn write_page(done: &Done, path: &Path, first: bool) -> Result<()> {
-    all_gather(&*done.model().exchange, ());
-    if first { crate::report::save(path, None).map(|_| ()) } else { Ok(()) }
 }
 
 /// The tables that grow while a round iterates. They are open only on the rank that writes.
@@ -324,7 +292,6 @@ impl Observer for Solver<'_> {
         self.table.row(row);
         if let Some(history) = &mut self.tables.history {
             history.row(row);
-            history.rows.complaint().iter().for_each(|text| self.table.warn(text));
         }
     }
 
@@ -337,10 +304,10 @@ impl Recorder for Solver<'_> {
     fn state(&mut self, done: &Done) {
         let Status::Paused { asked } = done.outcome.status else { return };
         let is_due = signal(asked).is_some() || !is_snapshot(asked);
-        let Some(head) = is_due.then(|| self.plan.head()).flatten() else { return };
+        let Some(head) = is_due.then(|| self.plan.head()) else { return };
         let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
         self.has_checkpoint |= written.is_ok();
-        self.note_failure("a checkpoint", written);
+        self.note(written);
     }
 
     fn step(&mut self, done: &Done, recovered: &All) {
@@ -348,17 +315,16 @@ impl Recorder for Solver<'_> {
         let history = &scene.method.steps;
         if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
             table.row(&history.names, step);
-            table.rows.complaint().iter().for_each(|text| self.table.warn(text));
         }
         let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
         if !ends {
             let written = write_fields(done, recovered, &self.folder, false);
-            self.note_failure("a field of a load step", written);
+            self.note(written);
         }
     }
 
     fn results(&mut self, done: &mut Done) {
         let (_, written) = self.files(done, None, true).write(&mut self.clock.clone(), |_| {});
-        self.note_failure("a snapshot", written);
+        self.note(written);
     }
 }

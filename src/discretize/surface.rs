@@ -2,7 +2,7 @@
 
 use crate::contact::{ContactPair, Side};
 use crate::fem::element;
-use crate::output::fields::{CellKind, UnstructuredGrid};
+use crate::output::{CellKind, FieldArray, UnstructuredGrid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
@@ -72,10 +72,9 @@ impl ContactSurface {
         surface
     }
 
-    /// Return the mesh with arrays of values at the contact points; each array has a name, a number of components per point, and
-    /// its values. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
+    /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
     /// come, so that a pressure is never negative nor above its peak.
-    pub fn grid(&self, name: String, arrays: &[(&str, usize, Vec<f64>)]) -> UnstructuredGrid {
+    pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {
         let spread = |components: usize, values: &[f64]| {
             let at = |sources: &Vec<(usize, f64)>, c: usize| {
                 let of = |q: usize| values[components * q + c];
@@ -96,10 +95,10 @@ impl ContactSurface {
             cell: self.cell,
             connectivity: self.connectivity.clone(),
             at_points: arrays
-                .iter()
-                .map(|(name, components, values)| ((*name).to_owned(), *components as u32, spread(*components, values)))
+                .into_iter()
+                .map(|array| FieldArray { values: spread(array.components, &array.values), ..array })
                 .collect(),
-            at_cells: vec![("cover".to_owned(), 1, self.cover.clone())],
+            at_cells: vec![FieldArray::new("cover", 1, self.cover.clone())],
         }
     }
 }

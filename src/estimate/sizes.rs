@@ -90,11 +90,6 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     gather(meshes, &counts, &touching(meshes, model, layer), size).within(most)
 }
 
-/// Return sizes that are `factor` times those of the meshes.
-pub fn scaled(meshes: &dyn Meshes, bodies: usize, factor: f64) -> Sizes {
-    gather(meshes, &counts(meshes, bodies), &[], |_, size| factor * size)
-}
-
 /// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would have about
 /// this number of `cells`.
 pub fn coarse(meshes: &dyn Meshes, bodies: usize, cells: usize) -> Sizes {

@@ -210,25 +210,6 @@ impl Wanted<'_> {
     }
 }
 
-/// Return a digest of all that the mesh of a scene is made from: the contents of its files, numbers, and Gmsh. Return `None` if
-/// the mesh depends on more, or if a file cannot be read.
-pub fn made_from(source: &MeshSource, dimension: usize, order: Order) -> Option<String> {
-    let gmsh = || Gmsh::find().map(|gmsh| gmsh.identity()).unwrap_or_default();
-    match source {
-        MeshSource::Geo { file, set, sizes, guard, .. } => {
-            let script = Script::read(&file.value).ok().filter(|script| !script.may_change)?;
-            let name = key(&file.value, &script, dimension, order, (set, sizes.as_deref(), guard));
-            Some(format!("{name} {}", gmsh()))
-        }
-        MeshSource::Msh { file } => {
-            let bytes = as_msh(&file.value, dimension).ok()?;
-            let by_gmsh = foreign::is_mesh(&file.value, &bytes) && !foreign::is_input_file(&file.value);
-            Some(digest(&(digest_of_bytes(&bytes), by_gmsh.then(gmsh))))
-        }
-        MeshSource::Arrays(_) => None,
-    }
-}
-
 /// Return the name in the cache of the mesh of a script, with the numbers that are set in it, the sizes to follow, and the
 /// settings of Gmsh.
 fn key(
@@ -294,21 +275,4 @@ impl Meshing<'_> {
             }
         }
     }
-}
-
-/// Keep the final sizes of an adaptation in the cache. `purpose` identifies all that the mesh was made for, scene and error.
-///
-/// # Errors
-/// The cache cannot be written.
-pub fn keep_final(purpose: &str, sizes: &str) -> Result<()> {
-    Cache::of_user()?.make(&final_name(purpose), |_, made| write(made, sizes))
-}
-
-/// Return the final sizes of an earlier adaptation for the same `purpose`.
-pub fn recall_final(purpose: &str) -> Option<String> {
-    std::fs::read_to_string(Cache::of_user().ok()?.file(&final_name(purpose))).ok()
-}
-
-fn final_name(purpose: &str) -> String {
-    cache::name(purpose, Path::new("sizes")) + ".pos"
 }

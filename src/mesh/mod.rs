@@ -30,7 +30,7 @@ mod tests;
 pub use check::{Asked, BodyCheck, Components, Duty};
 pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
-pub use load::{Loaded, MeshOrigin, as_msh, keep_final, load, made_from, recall_final};
+pub use load::{Loaded, MeshOrigin, as_msh, load};
 pub use locality::bisect;
 pub use msh::{MeshProducer, parse};
 pub use script::unstructured;

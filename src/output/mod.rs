@@ -3,15 +3,18 @@
 //! Nothing here knows the space dimension: points and vectors have three components, with z = 0 in the plane. A function
 //! that writes to an `out` returns the errors of that writer.
 
-pub mod fields;
+mod axis;
+mod fields;
 pub mod folder;
 pub mod plot;
 pub mod report;
 pub mod tables;
 pub mod terminal;
+pub mod views;
+pub mod vtu;
 
-pub use fields::{BodyField, CellKind, Encoding, LargestStress, UnstructuredGrid};
-pub use folder::{Checksums, Folder, make_folder, safe_name, write_whole};
+pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGrid};
+pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, ForecastReport, InnerTimes, IntervalReport, LISTED,

@@ -391,6 +391,11 @@ impl Extent {
         }
     }
 
+    /// Return whether the sizes are areas.
+    pub fn is_area(&self) -> bool {
+        matches!(self, Self::Area { .. })
+    }
+
     /// Return the length or area in contact.
     pub fn contact(&self) -> f64 {
         let (Self::Length { contact_length: contact, .. } | Self::Area { contact_area: contact, .. }) = self;

@@ -4,7 +4,7 @@
   const figure = document.getElementById("bodies"), canvas = figure.querySelector("canvas");
   const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
   if (!gl) {
-    canvas.replaceWith("This browser shows no WebGL 2. The command `winkler plot` draws the bodies as SVG, and ParaView opens bodies.pvd in the folder of results.");
+    canvas.replaceWith("This browser shows no WebGL 2. A run with --vtu writes bodies.pvd for ParaView.");
     return;
   }
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;

@@ -28,6 +28,7 @@ use crate::solver::{Dense, Krylov, Monolithic, Union, options};
 use serde_json::Value;
 use std::borrow::Borrow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
@@ -105,6 +106,8 @@ where
 /// The facts of the file of a mesh, on the rank that has read it.
 struct FileRead {
     digest: String,
+    /// The file.
+    path: PathBuf,
     /// What is to be said about the file, and why the mesh is made anew in each run, if it is.
     warnings: Vec<String>,
 }
@@ -152,6 +155,7 @@ where
             discrete,
             splits: verified.splits(),
             mesh: read.as_ref().map(|read| read.digest.clone()),
+            mesh_file: read.as_ref().map(|read| read.path.clone()),
             linear: inner.linear,
             interpolation: inner.interpolation.take(),
             choice: inner.reason(),
@@ -197,8 +201,8 @@ fn verified<const D: usize>(
     let mut file = None;
     let read = || {
         interrupt.release()?;
-        let Loaded { mesh, digest, notes: warnings, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        file = Some(FileRead { digest, warnings });
+        let Loaded { mesh, file: path, digest, notes: warnings, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        file = Some(FileRead { digest, path, warnings });
         Ok(mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);

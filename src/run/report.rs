@@ -11,8 +11,8 @@ use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, InnerTimes, IntervalReport, LookReport, PairReport, Report,
-    UnstructuredGrid, sci,
+    BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, LookReport, PairReport,
+    Report, UnstructuredGrid, sci,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -353,12 +353,12 @@ pub fn contact_surface(name: &str, done: &Done, i: usize) -> UnstructuredGrid {
     let (pair, range) = (&model.pairs[i], model.range(i));
     done.built.discrete.contacts[i].surface.grid(
         name.to_owned(),
-        &[
-            ("gap", 1, pair.gap.clone()),
-            ("compression", 1, layer.compression[range.clone()].to_vec()),
-            ("pressure", 1, layer.pressure[range].to_vec()),
-            ("normal", 3, pair.normal.as_flattened().to_vec()),
-            (pair.measure, 1, pair.weight.clone()),
+        vec![
+            FieldArray::new("gap", 1, pair.gap.clone()),
+            FieldArray::new("compression", 1, layer.compression[range.clone()].to_vec()),
+            FieldArray::new("pressure", 1, layer.pressure[range].to_vec()),
+            FieldArray::new("normal", 3, pair.normal.as_flattened().to_vec()),
+            FieldArray::new(pair.measure, 1, pair.weight.clone()),
         ],
     )
 }

@@ -13,6 +13,7 @@ use crate::scene::Scene;
 use crate::solver::options::Chosen;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::rc::Rc;
 use std::time::Instant;
 
@@ -26,6 +27,8 @@ pub struct Built {
     pub splits: Vec<String>,
     /// SHA-256 of the file of its mesh, on the rank that has read the file; none on other ranks.
     pub mesh: Option<String>,
+    /// The file itself, on this rank.
+    pub mesh_file: Option<PathBuf>,
     /// The solver of linear steps.
     pub linear: Linear,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.

@@ -5,6 +5,10 @@ use crate::error::Error;
 /// Names that are gone: a key, or a word that was the value of a key.
 pub const GONE: &[(&str, &str)] = &[
     ("asperities", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
+    (
+        "compress",
+        "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder",
+    ),
     ("fill", HEIGHTS),
     ("memory", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
     ("missing", HEIGHTS),

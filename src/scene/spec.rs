@@ -5,7 +5,6 @@ use crate::data::Library;
 use crate::ddm::gamma::{GammaRule, OwnRules};
 use crate::error::{Located, Place, Result};
 use crate::file::digest;
-use crate::output::fields::Encoding;
 use crate::problem::contact::Carrier;
 use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, remove, table, word, words};
@@ -104,8 +103,6 @@ table! {
             pub report: bool = false,
             /// of the numbers in VTU files
             pub precision: Precision = Precision::Double,
-            /// whether VTU files are compressed
-            pub compress: bool = true,
             /// whether to draw the SVG plots
             pub plots: bool = true,
             /// most pairs with files of their own; 24
@@ -119,13 +116,6 @@ table! {
 impl Default for OutputSpec {
     fn default() -> Self {
         Self::with_defaults()
-    }
-}
-
-impl OutputSpec {
-    /// Return how the numbers of VTU files are written.
-    pub fn encoding(&self) -> Encoding {
-        Encoding { single: self.precision == Precision::Single, compress: self.compress }
     }
 }
 

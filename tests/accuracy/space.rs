@@ -1,8 +1,8 @@
 //! Bodies in space and curved surfaces: closed forms, and what the arrays of a pair must satisfy.
 
+use crate::common::vtu::Grid;
 use crate::common::{Scene, case, distance, solve, text_of, winkler};
 use std::collections::HashMap;
-use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 use winkler::api::Order;
 use winkler::api::load as load_scene;
 use winkler::internals::Interrupt;
@@ -322,19 +322,8 @@ fn pairs_are_found_on_the_mesh() {
 
 /// Arrays of the nodes of a surface file by name; `points` are their coordinates.
 fn surface_of<const N: usize>(run: &crate::common::Run, stem: &str, names: [&str; N]) -> [Vec<f64>; N] {
-    let vtk = Vtk::import(run.folder.join(format!("{stem}.vtu"))).expect("a surface");
-    let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("no grid") };
-    let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
-    names.map(|name| {
-        if name == "points" {
-            return piece.points.cast_into::<f64>().expect("points");
-        }
-        let found = piece.data.point.iter().find_map(|attribute| match attribute {
-            Attribute::DataArray(array) if array.name == name => array.data.cast_into::<f64>(),
-            _ => None,
-        });
-        found.unwrap_or_else(|| panic!("no array {name}"))
-    })
+    let grid = Grid::read(&run.folder.join(format!("{stem}.vtu")));
+    names.map(|name| if name == "points" { grid.points.clone() } else { grid.arrays[name].clone() })
 }
 
 /// The surface file has the pressures of the contact table at its points.

@@ -1,9 +1,8 @@
 //! Rigid surfaces that turn under a moment.
 
+use crate::common::vtu::Grid;
 use crate::common::{Run, Scene, case, solve, solve_on};
 use nalgebra::{DMatrix, DVector};
-use vtkio::Vtk;
-use vtkio::model::{Attribute, DataSet, Piece};
 
 /// A bar of length 10 with a square section of side 1, clamped at x = 0, with the end at x = 10 under a load.
 fn bar(dimension: usize, load: &str) -> Scene {
@@ -34,16 +33,9 @@ fn fields(run: &Run) -> [Vec<f64>; 2] {
         if path.extension().is_none_or(|extension| extension != "vtu") {
             continue;
         }
-        let DataSet::UnstructuredGrid { pieces, .. } = Vtk::import(path).expect("fields").data else {
-            panic!("no grid")
-        };
-        let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
-        fields[0].extend(piece.points.cast_into::<f64>().expect("points"));
-        let moved = piece.data.point.iter().find_map(|attribute| match attribute {
-            Attribute::DataArray(array) if array.name == "displacement" => array.data.cast_into::<f64>(),
-            _ => None,
-        });
-        fields[1].extend(moved.expect("displacements"));
+        let grid = Grid::read(&path);
+        fields[1].extend(&grid.arrays["displacement"]);
+        fields[0].extend(grid.points);
     }
     fields
 }

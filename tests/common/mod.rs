@@ -5,6 +5,7 @@ pub mod blocks;
 pub mod here;
 pub mod series;
 pub mod shapes;
+pub mod vtu;
 
 use serde_json::Value;
 use std::fs::{self, File};

@@ -1,9 +1,9 @@
 //! Contact of curved surfaces that become steep: a punch with rounded edges, a cone, a ball in a socket, flanks of gears.
 
 use crate::common::here::solve_here;
+use crate::common::vtu::Grid;
 use crate::common::{Report, Scene, root, solve};
 use std::fs;
-use vtkio::model::{Attribute, DataSet, Piece, Vtk};
 
 const PUNCH: usize = 1;
 const CONE: usize = 2;
@@ -124,17 +124,8 @@ fn steep_facets_are_told() {
     let steep = run.count("pairs/0/facets_uncovered");
     let expected = " of `upper_face` have no partner within `angle` = 60";
     assert!(steep >= 2 && run.warnings().contains(expected), "{steep}: {}", run.warnings());
-    let surface = Vtk::import(run.folder.join("contact-upper-lower.vtu")).expect("a surface");
-    let DataSet::UnstructuredGrid { pieces, .. } = surface.data else { panic!("no grid") };
-    let [Piece::Inline(piece)] = &pieces[..] else { panic!("no piece") };
-    let cells = |name: &str| -> Vec<f64> {
-        let found = piece.data.cell.iter().find_map(|attribute| match attribute {
-            Attribute::DataArray(array) if array.name == name => array.data.clone().cast_into(),
-            _ => None,
-        });
-        found.unwrap_or_else(|| panic!("no array `{name}`"))
-    };
-    assert_eq!(cells("cover").iter().filter(|&&share| share == 0.0).count(), steep);
+    let surface = Grid::read(&run.folder.join("contact-upper-lower.vtu"));
+    assert_eq!(surface.arrays["cover"].iter().filter(|&&share| share == 0.0).count(), steep);
 
     let wide = solve(&scene, &[&soft[..], &["--set", "contact.0.angle=90"]].concat()).converged();
     assert!(wide.count("pairs/0/facets_uncovered") < steep, "{}", wide.warnings());

@@ -1,19 +1,10 @@
 //! Distributed bodies: each rank recovers and writes its part, and all parts together are the body of one rank.
 
+use crate::common::vtu::{Grid, attribute};
 use crate::common::{Run, case, solve, solve_on};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
-use vtkio::model::{Attribute, DataSet, Piece, UnstructuredGridPiece, Vtk};
-
-/// The pieces of a file, as they stand there.
-fn pieces(path: &Path) -> Vec<Piece<UnstructuredGridPiece>> {
-    let bytes = fs::read(path).unwrap_or_else(|cause| panic!("{}: {cause}", path.display()));
-    match Vtk::parse_xml(bytes.as_slice()).unwrap_or_else(|cause| panic!("{}: {cause}", path.display())).data {
-        DataSet::UnstructuredGrid { pieces, .. } => pieces,
-        _ => panic!("{} is no grid", path.display()),
-    }
-}
 
 type Place = [u64; 3];
 
@@ -27,36 +18,26 @@ struct Body {
 impl Body {
     fn read(folder: &Path, file: &str) -> Self {
         let mut body = Body { at: BTreeMap::new(), cells: Vec::new() };
-        let mut rest = vec![file.to_owned()];
-        while let Some(file) = rest.pop() {
-            for piece in pieces(&folder.join(&file)) {
-                match piece {
-                    Piece::Source(file, _) => rest.push(file),
-                    Piece::Inline(piece) => body.add(*piece),
-                    Piece::Loaded(_) => panic!("{file}"),
-                }
-            }
+        if file.ends_with(".vtu") {
+            body.add(&Grid::read(&folder.join(file)));
+        } else {
+            let text = fs::read_to_string(folder.join(file)).expect("a file that joins parts");
+            let parts = text.lines().filter(|line| line.starts_with("<Piece "));
+            parts.for_each(|tag| body.add(&Grid::read(&folder.join(attribute(tag, "Source")))));
         }
         body.cells.sort();
         body
     }
 
-    fn add(&mut self, piece: UnstructuredGridPiece) {
-        let points = piece.points.cast_into::<f64>().expect("numbers");
-        let places: Vec<Place> = points.chunks_exact(3).map(|x| [0, 1, 2].map(|k| x[k].to_bits())).collect();
+    fn add(&mut self, grid: &Grid) {
+        let places: Vec<Place> = grid.points.chunks_exact(3).map(|x| [0, 1, 2].map(|k| x[k].to_bits())).collect();
         let mut numbers = vec![Vec::new(); places.len()];
-        for attribute in &piece.data.point {
-            let Attribute::DataArray(array) = attribute else { panic!("a field") };
-            let all = array.data.cast_into::<f64>().expect("numbers");
-            numbers.iter_mut().zip(all.chunks_exact(array.num_comp())).for_each(|(to, value)| to.extend(value));
+        for name in ["displacement", "stress", "von_mises", "principal"] {
+            let values = grid.arrays[name].chunks_exact(grid.components[name]);
+            numbers.iter_mut().zip(values).for_each(|(to, value)| to.extend(value));
         }
         places.iter().zip(numbers).for_each(|(place, numbers)| self.at.entry(*place).or_default().push(numbers));
-        let (connectivity, offsets) = piece.cells.cell_verts.into_xml();
-        let mut start = 0;
-        for end in offsets {
-            self.cells.push(connectivity[start..end as usize].iter().map(|&node| places[node as usize]).collect());
-            start = end as usize;
-        }
+        self.cells.extend(grid.cells.iter().map(|cell| cell.iter().map(|&node| places[node]).collect()));
     }
 }
 

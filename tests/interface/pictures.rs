@@ -76,9 +76,9 @@ fn a_plane_run_has_a_page_of_its_own() {
     for foreign in ["<img", "<link rel=\"style", "<script src", "@import", "url(", "<b>A</b>", "<script>boom"] {
         assert!(!page.contains(foreign), "{foreign}");
     }
-    let error = if run.report["error_bound"].is_null() { "estimated error" } else { "bound of the error" };
+    let error = if run.report["error_bound"].is_null() { "is estimated as" } else { "is at most" };
     for words in [
-        "&lt;b&gt;A&lt;&#x2f;b&gt; &amp;",
+        "&lt;b&gt;A&lt;/b&gt; &amp;",
         "von Mises stress, MPa",
         "displacement, cm",
         "contact pressure, MPa",

@@ -1,6 +1,6 @@
 //! Load steps: each is the solution of its share of the loads, and no body is made or factored anew for it.
 
-use crate::common::{Run, Scene, case, distance, nanoseconds, root, solve, solve_on, winkler};
+use crate::common::{Run, Scene, case, distance, nanoseconds, root, solve, solve_on};
 
 fn groove(method: &str, more: &[&str]) -> Run {
     let method = format!("method={method}");
@@ -106,7 +106,7 @@ fn steps_on_two_ranks() {
 }
 
 /// The mesh is adapted under the largest step, and all steps run on it: the largest one is the last mesh of a run with these loads alone, and each is the
-/// run with its share of the loads on that mesh, which `winkler mesh` writes.
+/// run with its share of the loads on that mesh, which is written.
 #[test]
 fn steps_run_on_the_mesh_of_the_largest_one() {
     let now = nanoseconds();
@@ -125,19 +125,7 @@ fn steps_run_on_the_mesh_of_the_largest_one() {
     assert!(rounds(&run).len() > 1 && rounds(&run) == rounds(&largest), "{}\n{}", run.said(), largest.said());
     assert_same(step(&run, 1), result(&largest), "the largest step");
 
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("adapted.msh");
-    let write = |more: &[&str]| {
-        let words = ["mesh", graded.to_str().expect("a path"), "-o", file.to_str().expect("a path")];
-        winkler(&[&words[..], more].concat())
-    };
-    let missing = write(&adapted);
-    assert!(missing.code == 3 && missing.stderr.contains("was adapted to an error of 0.002"), "{}", missing.said());
-    let steps = method("steps=[0.5, 2, 1],");
-    let written = write(&[&adapted[..], &["--set", &steps]].concat());
-    let warns = written.stdout.lines().any(|line| line.contains("warning"));
-    assert!(written.code == 0 && !warns, "{}", written.said());
-    let mesh = format!("mesh={}", file.display());
+    let mesh = format!("mesh={}", run.folder.join("adapted.msh").display());
     for (number, factor) in [0.5, 2.0, 1.0].into_iter().enumerate() {
         let load = format!("body.1.load.0.pressure={}", 10.0 * factor);
         let sets = ["--set", &mesh, "--set", &load, "--set", "method={stop={residual=1e-9}}"];
@@ -148,11 +136,9 @@ fn steps_run_on_the_mesh_of_the_largest_one() {
             assert!(distance(&run.contact()["pressure"], &alone.contact()["pressure"]) < 1e-7);
         }
     }
-    let none = winkler(&["mesh", graded.to_str().expect("a path"), "--adapted"]);
-    assert!(none.code == 2 && none.stderr.contains("adapts no mesh"), "{}", none.said());
 }
 
-/// Load steps on the last of a few meshes that do not reach the error: the best one is written, and said to be so.
+/// Load steps on the last of a few meshes that do not reach the error.
 #[test]
 fn steps_on_a_mesh_that_is_not_fine_enough() {
     let now = nanoseconds();
@@ -163,8 +149,6 @@ fn steps_on_a_mesh_that_is_not_fine_enough() {
     assert_eq!((run.code, run.text("status"), run.text("steps/1/status")), (1, "mesh-limit", "converged"));
     let steps = run.report["steps"].as_array().map(Vec::len);
     assert_eq!((steps, run.report["rounds"].as_array().map(Vec::len)), (Some(2), Some(2)), "{}", run.said());
-    let written = winkler(&[&["mesh", graded.to_str().expect("a path"), "--adapted"], &sets[..]].concat());
-    assert!(written.code == 0 && written.stdout.contains("did not reach its error"), "{}", written.said());
 }
 
 /// A step that begins at its solution makes fewer sweeps than the one before; those are not counted again.

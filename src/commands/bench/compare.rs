@@ -1,15 +1,14 @@
-//! The error of a contact pressure, against a table or against the closed form of the scene.
+//! The error of a contact pressure, against the tables of another run or against the closed form of the scene.
 
-use super::plan::{BenchPlan, usage};
 use crate::commands::interpolate::{EXACT, PointTree, Squares, mean};
 use crate::error::{Error, Kind, Result};
-use crate::file::digest;
+use crate::linalg::dot;
 use crate::scene::Scene;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// The contact points of one pair, in the order of the file.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct PairPoints {
     /// Name of the file, without its folder.
     name: String,
@@ -26,47 +25,8 @@ struct PressureRow {
     x: f64,
     y: f64,
     z: f64,
-    weight: Option<f64>,
+    weight: f64,
     pressure: f64,
-}
-
-/// The contact tables of `--against`; empty without it.
-#[derive(Default)]
-pub(super) struct References(Vec<PairPoints>);
-
-impl References {
-    /// Read a contact table, or all tables of a folder of results.
-    ///
-    /// # Errors
-    /// Files that cannot be read, several scenes, one table for several pairs.
-    pub fn read(path: Option<&Path>, plan: &BenchPlan) -> Result<Self> {
-        let Some(path) = path else { return Ok(Self::default()) };
-        let [scene] = &plan.scenes[..] else {
-            return Err(usage("`--against` goes with one scene"));
-        };
-        let found = if path.is_dir() { tables(path)? } else { vec![PairPoints::read(path)?] };
-        if scene.auto.is_empty() && found.len() != scene.contacts.len() {
-            let help = "give the folder of results of the same scene, or the table of its only pair";
-            let message = format!(
-                "{} has {} contact tables, the scene {} pairs",
-                path.display(),
-                found.len(),
-                scene.contacts.len()
-            );
-            return Err(usage(message).help(help));
-        }
-        Ok(Self(found))
-    }
-
-    /// Return a digest of all tables.
-    pub fn digest(&self) -> String {
-        digest(&self.0)
-    }
-
-    /// Return the relative error of the pressures of a run; `None` without `--against`.
-    pub fn error(&self, scene: &Scene, run: &[PairPoints]) -> Option<f64> {
-        (!self.0.is_empty()).then(|| difference(scene.dimension.value, run, &self.0))?
-    }
 }
 
 /// Read the contact tables in a folder of results, in the order of their names.
@@ -83,21 +43,15 @@ pub(super) fn tables(folder: &Path) -> Result<Vec<PairPoints>> {
 
 impl PairPoints {
     fn read(path: &Path) -> Result<Self> {
-        let refuse = |why: String| {
-            Error::new(Kind::File, format!("{} is no contact table: {why}", path.display()))
-                .help("it needs the columns x, y, z and pressure of a contact-*.csv")
-        };
+        let refuse = |why: String| Error::new(Kind::File, format!("{} is no contact table: {why}", path.display()));
         let bytes = crate::file::read(path)?;
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut points = Self { name, ..Self::default() };
         for point in csv::Reader::from_reader(&bytes[..]).deserialize() {
             let PressureRow { x, y, z, weight, pressure } = point.map_err(|cause| refuse(cause.to_string()))?;
             points.at.push([x, y, z]);
-            points.weight.push(weight.unwrap_or(1.0));
+            points.weight.push(weight);
             points.pressure.push(pressure);
-        }
-        if points.at.is_empty() {
-            return Err(refuse("it has no rows".to_owned()));
         }
         Ok(points)
     }
@@ -106,7 +60,7 @@ impl PairPoints {
 /// Return the relative error in L2 of the pressures of a run against those of another run, over all pairs; `None` where they cannot be
 /// compared.
 pub(super) fn difference(dimension: usize, run: &[PairPoints], reference: &[PairPoints]) -> Option<f64> {
-    if run.len() != reference.len() {
+    if run.is_empty() || run.len() != reference.len() {
         return None;
     }
     let known = |own: &PairPoints| -> Option<Vec<f64>> {
@@ -145,14 +99,13 @@ fn relative(run: &[PairPoints], known: &[Vec<f64>]) -> Option<f64> {
 /// Return the pressure at the point of a curve that is nearest to `x`, linear between the points of the table.
 fn on_curve(curve: &PairPoints, x: &[f64; 3]) -> f64 {
     let (mut least, mut pressure) = (f64::INFINITY, curve.pressure.first().copied().unwrap_or(f64::NAN));
-    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
     for q in 1..curve.at.len() {
         let (a, b) = (curve.at[q - 1], curve.at[q]);
         let from_a = |to: &[f64; 3]| -> [f64; 3] { std::array::from_fn(|c| to[c] - a[c]) };
         let edge = from_a(&b);
-        let s = (dot(from_a(x), edge) / dot(edge, edge)).clamp(0.0, 1.0);
+        let s = (dot(&from_a(x), &edge) / dot(&edge, &edge)).clamp(0.0, 1.0);
         let to_edge: [f64; 3] = std::array::from_fn(|c| a[c] + s * edge[c] - x[c]);
-        let squared = dot(to_edge, to_edge);
+        let squared = dot(&to_edge, &to_edge);
         if squared < least {
             (least, pressure) = (squared, (1.0 - s) * curve.pressure[q - 1] + s * curve.pressure[q]);
         }

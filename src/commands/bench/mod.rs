@@ -3,25 +3,21 @@
 
 mod compare;
 mod plan;
+mod plots;
 mod process;
-mod table;
 
 pub use plan::BenchArgs;
 
-use super::folder_of;
+use super::cases::Case;
+use super::rows::{Row, aligned};
 use crate::error::Result;
-use crate::file::digest;
 use crate::interrupt::Interrupt;
-use crate::output::{Folder, say, terminal};
+use crate::output::{Folder, RowFile, say, sci, seconds, terminal};
 use crate::petsc::Session;
-use crate::scene::Scene;
-use compare::References;
-use plan::{BenchCase, BenchPlan, usage};
-use process::{ProcessRun, Runner};
+use compare::{PairPoints, difference};
+use plan::{Benchmark, COLUMNS, Measured, is_of_mesh, usage};
+use process::Runner;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
-use std::time::Instant;
-use table::{BenchRow, BenchTable, SKIPPED};
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -35,108 +31,160 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     if Session::is_one_of_several() {
         return Err(usage("`bench` starts the ranks of its runs itself").help("`--ranks 1,2` instead of mpiexec"));
     }
-    let plan = BenchPlan::new(request)?;
-    let folder = Folder::claim(folder(request, &plan))?;
-    let reference = References::read(request.against.as_deref(), &plan)?;
-    let mut table = BenchTable::open(&folder, &plan, request, &reference)?;
-    let runner = Runner::new(interrupt, request, folder.path())?;
-    let bar = terminal::runs(plan.cases.len(), !request.quiet);
-    let mut meshed = BTreeSet::new();
-    let began = Instant::now();
-    for case in &plan.cases {
+    let bench = Benchmark::new(request)?;
+    let reference = bench.reference(request)?;
+    let folder = Folder::claim(bench.folder(request))?;
+    let runner = Runner::new(interrupt, request.timeout, request.repeat, folder.path())?;
+    let header = [bench.plan.columns.clone(), Row::columns()].concat();
+    let mut file = RowFile::create(&folder, "bench.csv", &header)?;
+    let bar = terminal::runs(bench.plan.cases.len(), !request.quiet);
+    let (mut rows, mut meshed) = (Vec::new(), BTreeSet::new());
+    for case in &bench.plan.cases {
         bar.set_message(case.label.clone());
-        let scene = crate::scene::load(&case.scene, &case.overrides);
-        let inputs = scene.as_ref().ok().and_then(inputs);
-        let old = table.old_row(case, inputs.as_deref());
-        let is_new = old.is_none();
-        let mut row = match old {
-            Some(row) => row,
-            None if table.is_beyond(case) => BenchRow::unsolved(case, SKIPPED, "an earlier mesh took too long"),
-            None if began.elapsed().as_secs_f64() >= request.budget => {
-                BenchRow::unsolved(case, SKIPPED, "the budget is spent")
-            }
-            None => measure(case, scene, &runner, &reference, &mut meshed)?,
+        let mut row = match bench.is_beyond(case, &rows) {
+            true => Row::unsolved("skipped", "an earlier mesh took too long"),
+            false => bench.measure(case, &runner, reference.as_deref(), &mut meshed)?,
         };
-        row.set("inputs", inputs.unwrap_or_default());
-        if !(request.quiet && row.is_good()) {
-            bar.suspend(|| say(row.line(&case.label, is_new)))?;
+        if row.method.is_empty() {
+            bench.plan.value(case, "asked").clone_into(&mut row.method);
         }
-        table.add(row, is_new).iter().for_each(|text| bar.suspend(|| eprintln!("warning: {text}")));
+        if !(request.quiet && row.is_good()) {
+            bar.suspend(|| say(row.line(&case.label)))?;
+        }
+        // written at once, so that it is kept whatever comes next
+        file.push(&[case.key.clone(), row.fields()].concat());
+        rows.push(Measured { case: case.clone(), row });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let mut written = table.complete();
-    for (name, plot) in table::plots(&table.rows, &plan) {
-        written = written.and(folder.write(&name, |out| plot.write(out)));
+    file.finish()?;
+    bench.compare_with_finest(&mut rows, &runner);
+    let mut file = RowFile::create(&folder, "bench.csv", &header)?;
+    rows.iter().for_each(|Measured { case, row }| file.push(&[case.key.clone(), row.fields()].concat()));
+    file.finish()?;
+    for (name, plot) in plots::plots(&rows, &bench) {
+        folder.write(&name, |out| plot.write(out))?;
     }
     if !request.quiet {
-        say(table::summary(&table.rows, &plan))?;
+        say(bench.summary(&rows))?;
     }
     say(format_args!("results in {}", folder.path().display()))?;
-    written?;
-    Ok(i32::from(!table.rows.iter().all(BenchRow::is_good)))
+    Ok(i32::from(!rows.iter().all(|measured| measured.row.is_good())))
 }
 
-/// Return the folder of the results: that of `-o`, else `bench` in that of the only scene, else `results/bench`.
-fn folder(request: &BenchArgs, plan: &BenchPlan) -> PathBuf {
-    match (&request.folder, &plan.scenes[..]) {
-        (Some(folder), _) => folder.clone(),
-        (None, [scene]) => folder_of(scene, None).join("bench"),
-        (None, _) => PathBuf::from("results/bench"),
-    }
-}
-
-/// Return a digest of all inputs of a run: the scene, its data, and what its mesh is made from; none if that is not known before the run.
-fn inputs(scene: &Scene) -> Option<String> {
-    let order = scene.bodies.iter().map(|body| body.order).max()?;
-    let mesh = crate::mesh::made_from(&scene.mesh, scene.dimension.value, order)?;
-    Some(digest(&(scene.problem().to_string(), mesh)))
-}
-
-/// Run a case as often as asked for, and return its row. `meshed` has the overrides of meshes that are in the cache.
-fn measure(
-    case: &BenchCase,
-    scene: Result<Scene>,
-    runner: &Runner,
-    reference: &References,
-    meshed: &mut BTreeSet<Vec<String>>,
-) -> Result<BenchRow> {
-    let scene = match scene {
-        Ok(scene) => scene,
-        Err(error) => {
-            let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
-            return Ok(BenchRow::unsolved(case, "refused", &format!("error: {}{help}", error.message())));
+impl Benchmark {
+    /// Return the contact tables of `--against`.
+    fn reference(&self, request: &BenchArgs) -> Result<Option<Vec<PairPoints>>> {
+        let Some(folder) = &request.against else { return Ok(None) };
+        let [scene] = &self.scenes[..] else { return Err(usage("`--against` goes with one scene")) };
+        let found = compare::tables(folder)?;
+        let (tables, pairs) = (found.len(), scene.contacts.len());
+        if found.is_empty() || (scene.auto.is_empty() && tables != pairs) {
+            let message = format!("{} has {tables} contact tables, the scene {pairs} pairs", folder.display());
+            return Err(usage(message).help("give the folder of results of the same scene"));
         }
-    };
-    // the mesh is made before times are measured
-    if meshed.insert(case.mesh_overrides.clone()) {
-        runner.mesh(case)?;
+        Ok(Some(found))
     }
-    let runs = runner.repeat(case)?;
-    let mut row = BenchRow::new(case, &runs);
-    if row.is_good()
-        && !case.is_linear()
-        && let Some((error, what)) = known_error(&scene, &runs, reference, &runner.folder(case))
-    {
-        row.set_error(error, what);
+
+    /// Return whether a case differs only by its mesh from a row that did not end in time. Lists of meshes go from coarse to fine.
+    fn is_beyond(&self, case: &Case, rows: &[Measured]) -> bool {
+        let columns = &self.plan.columns;
+        let is_like = |key: &[String]| (0..columns.len()).all(|k| is_of_mesh(&columns[k]) || key[k] == case.key[k]);
+        rows.iter().any(|measured| measured.row.status == "timeout" && is_like(&measured.case.key))
     }
-    Ok(row)
+
+    /// Run a case as often as asked for, and return its row. `meshed` has the overrides of meshes that are in the cache.
+    fn measure(
+        &self,
+        case: &Case,
+        runner: &Runner,
+        reference: Option<&[PairPoints]>,
+        meshed: &mut BTreeSet<Vec<String>>,
+    ) -> Result<Row> {
+        let scene = match crate::scene::load(&case.scene, &case.overrides) {
+            Ok(scene) => scene,
+            Err(error) => {
+                let help = error.advice().map_or(String::new(), |help| format!("; help: {help}"));
+                return Ok(Row::unsolved("refused", &format!("error: {}{help}", error.message())));
+            }
+        };
+        // the mesh is made before times are measured
+        let solving = |text: &&String| ["method", "solver", "output"].iter().any(|key| text.starts_with(key));
+        let mesh: Vec<String> = case.overrides.iter().filter(|text| !solving(text)).cloned().collect();
+        if meshed.insert([vec![case.scene.display().to_string()], mesh.clone()].concat()) {
+            runner.mesh(case, &mesh)?;
+        }
+        let ranks = self.plan.value(case, "ranks").parse().unwrap_or(1);
+        let mut row = runner.repeat(case, ranks)?;
+        let tables = compare::tables(&runner.folder(case)).unwrap_or_default();
+        if row.is_good() {
+            let against = reference.and_then(|reference| difference(scene.dimension.value, &tables, reference));
+            if let Some(error) = against {
+                row.set_error(error, "pressure, --against");
+            } else if row.error.is_none()
+                && let Some(error) = compare::closed_form(&scene, &tables)
+            {
+                row.set_error(error, "pressure, reference");
+            }
+        }
+        Ok(row)
+    }
+
+    /// Set the error of every row that has none, against the row of the finest mesh with the same values of all keys that are not of the mesh.
+    ///
+    /// Rows of the finest mesh have no error. Of several rows with as many dofs and the same order, the one with the smallest residual is the
+    /// reference.
+    fn compare_with_finest(&self, rows: &mut [Measured], runner: &Runner) {
+        let keys = self.plan.columns.len() - COLUMNS.len();
+        let is_alike =
+            |a: &Case, b: &Case| (0..keys).all(|k| is_of_mesh(&self.plan.columns[k]) || a.key[k] == b.key[k]);
+        let fineness = |measured: &Measured| (measured.row.dofs, self.plan.value(&measured.case, "order").to_owned());
+        let residual = |measured: &Measured| measured.row.residual.unwrap_or(f64::INFINITY);
+        let mut found = Vec::new();
+        for (index, own) in rows.iter().enumerate().filter(|(_, own)| own.row.is_good() && own.row.error.is_none()) {
+            let group = rows.iter().filter(|other| other.row.is_good() && is_alike(&own.case, &other.case));
+            let finest = group.max_by(|a, b| fineness(a).cmp(&fineness(b)).then(residual(b).total_cmp(&residual(a))));
+            let Some(finest) = finest.filter(|finest| fineness(finest) != fineness(own)) else { continue };
+            let [run, reference] =
+                [own, finest].map(|measured| compare::tables(&runner.folder(&measured.case)).unwrap_or_default());
+            let error = difference(self.scene(&own.case).dimension.value, &run, &reference);
+            let of = format!("pressure, mesh of {} dofs", finest.row.dofs.unwrap_or_default());
+            found.extend(error.map(|error| (index, error, of)));
+        }
+        found.into_iter().for_each(|(index, error, of)| rows[index].row.set_error(error, of));
+    }
+
+    /// Return the table with one line for each row: the values that distinguish it, the method that ran, and the numbers that some row has.
+    fn summary(&self, rows: &[Measured]) -> String {
+        let mut named = self.plan.varied(rows.iter().map(|measured| &measured.case.key));
+        named.retain(|&column| self.plan.columns[column] != "asked");
+        let numbers: Vec<_> =
+            SHOWN.iter().filter(|shown| rows.iter().any(|row| (shown.text)(&row.row).is_some())).collect();
+        let heads = named.iter().map(|&column| self.plan.columns[column].as_str()).chain(["method", "status"]);
+        let mut lines: Vec<Vec<String>> =
+            vec![heads.chain(numbers.iter().map(|shown| shown.heading)).map(str::to_owned).collect()];
+        for Measured { case, row } in rows {
+            let words = named.iter().map(|&column| case.key[column].clone());
+            let words = words.chain([row.method.clone(), row.status.clone()]);
+            lines.push(words.chain(numbers.iter().map(|shown| (shown.text)(row).unwrap_or_default())).collect());
+        }
+        aligned(&lines, named.len() + 2)
+    }
 }
 
-/// Return the error of a run against a known solution, and what it is measured in and against. The solution is that of `--against`, or a closed
-/// form of the scene.
-fn known_error(
-    scene: &Scene,
-    runs: &[ProcessRun],
-    reference: &References,
-    folder: &Path,
-) -> Option<(f64, &'static str)> {
-    let tables = compare::tables(folder).ok()?;
-    if let Some(error) = reference.error(scene, &tables) {
-        return Some((error, "pressure, --against"));
-    }
-    if let Some(error) = runs.first().and_then(|run| run.largest("error_l2")) {
-        return Some((error, "displacement, exact"));
-    }
-    Some((compare::closed_form(scene, &tables)?, "pressure, reference"))
+/// A column of the table on the terminal.
+struct Shown {
+    heading: &'static str,
+    text: fn(&Row) -> Option<String>,
 }
+
+const SHOWN: [Shown; 8] = [
+    Shown { heading: "dofs", text: |row| row.dofs.map(|count| count.to_string()) },
+    Shown { heading: "iterations", text: |row| row.iterations.map(|count| count.to_string()) },
+    Shown { heading: "sweeps", text: |row| row.sweeps.map(|count| count.to_string()) },
+    Shown { heading: "inner iterations", text: |row| row.inner_iterations.map(|count| count.to_string()) },
+    Shown { heading: "s", text: |row| row.seconds.map(seconds) },
+    Shown { heading: "CPU s", text: |row| row.cpu_seconds.map(seconds) },
+    Shown { heading: "MB", text: |row| row.memory_mb.map(|memory| format!("{memory:.0}")) },
+    Shown { heading: "error", text: |row| row.error.map(|error| sci(error, 2)) },
+];

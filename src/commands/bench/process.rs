@@ -1,6 +1,8 @@
 //! One run as a process of its own: its messages, its time and its memory.
 
-use super::plan::{BenchArgs, BenchCase, usage};
+use super::plan::usage;
+use crate::commands::cases::Case;
+use crate::commands::rows::Row;
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
@@ -16,40 +18,6 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use wait4::{ResUse, Wait4};
-
-/// The result of one run.
-pub(super) struct ProcessRun {
-    /// Status of the report, or `refused`, `timeout`, `killed` or `failed`.
-    pub status: String,
-    pub message: String,
-    /// Wall seconds from start to end of the process.
-    pub seconds: f64,
-    /// CPU seconds, user and system, of all its ranks.
-    pub cpu: f64,
-    /// Largest resident memory of one of its processes, in bytes.
-    pub memory: u64,
-    /// `report.json`; null if there is none.
-    pub report: Value,
-    /// Inner iterations of its last sweep; `None` without a history of two rows.
-    pub last_sweep: Option<f64>,
-}
-
-impl ProcessRun {
-    /// Return the number at a path of the report.
-    pub fn number(&self, path: &str) -> Option<f64> {
-        self.report.pointer(path).and_then(Value::as_f64)
-    }
-
-    /// Return the largest number of this name of the bodies of the report that have it.
-    pub fn largest(&self, key: &str) -> Option<f64> {
-        items(&self.report["bodies"]).iter().filter_map(|body| body[key].as_f64()).reduce(f64::max)
-    }
-}
-
-/// Return the items of a list of a report; none if it is no list.
-pub(super) fn items(list: &Value) -> &[Value] {
-    list.as_array().map_or(&[], Vec::as_slice)
-}
 
 /// The program that starts runs, and their limits.
 pub(super) struct Runner {
@@ -68,9 +36,6 @@ const GRACE: Duration = Duration::from_secs(5);
 /// Time between checks for a signal.
 const CHECK_INTERVAL: Duration = Duration::from_millis(100);
 
-/// Name of the folder of the results of all runs.
-pub(super) const RUNS: &str = "runs";
-
 /// Longest name of the folder of a run. Half as many characters, of at most four bytes, and 13 of the
 /// digest are 253 bytes of the 255 that file systems allow.
 const LONGEST_NAME: usize = 120;
@@ -80,47 +45,65 @@ impl Runner {
     ///
     /// # Errors
     /// A time limit that is no time, a system on which the path of the program cannot be found.
-    pub fn new(interrupt: &Interrupt, request: &BenchArgs, folder: &Path) -> Result<Self> {
-        let timeout = Duration::try_from_secs_f64(request.timeout)
+    pub fn new(interrupt: &Interrupt, timeout: f64, repeat: usize, folder: &Path) -> Result<Self> {
+        let timeout = Duration::try_from_secs_f64(timeout)
             .ok()
             .filter(|timeout| !timeout.is_zero())
-            .ok_or_else(|| usage(format!("`--timeout {}` is no time in seconds", request.timeout)))?;
+            .ok_or_else(|| usage(format!("`--timeout {timeout}` is no time in seconds")))?;
         let program =
             std::env::current_exe().map_err(|cause| Error::file(Path::new("this program"), "find", &cause))?;
-        let (folder, interrupt) = (folder.join(RUNS), interrupt.clone());
-        Ok(Self { program, folder, timeout, repeat: request.repeat, interrupt })
+        Ok(Self { program, folder: folder.join("runs"), timeout, repeat, interrupt: interrupt.clone() })
     }
 
-    /// Return the folder of a run's results.
-    pub fn folder(&self, case: &BenchCase) -> PathBuf {
-        folder_of(&self.folder, &case.key)
+    /// Return the folder of the results of a case.
+    pub fn folder(&self, case: &Case) -> PathBuf {
+        let name = safe_name(&case.key.join("_").replace(' ', "_"));
+        if name.len() <= LONGEST_NAME {
+            return self.folder.join(name);
+        }
+        let start: String = name.chars().take(LONGEST_NAME / 2).collect();
+        self.folder.join(format!("{start}-{:.12}", digest(&name)))
     }
 
-    /// Make the mesh of a run. A failure is not reported here, since the run itself fails in the same way.
-    pub fn mesh(&self, case: &BenchCase) -> Result<()> {
+    /// Make the mesh of a case with these overrides. A failure is not reported here, since the run itself fails in the same way.
+    pub fn mesh(&self, case: &Case, overrides: &[String]) -> Result<()> {
         let mut command = Command::new(&self.program);
         command.arg("mesh").arg(&case.scene);
-        command.args(case.mesh_overrides.iter().flat_map(|text| ["--set", text]));
+        command.args(overrides.iter().flat_map(|text| ["--set", text]));
         self.finish(command, &self.folder(case)).map(|_| ())
     }
 
-    /// Run a case as often as asked for, or until it fails.
-    pub fn repeat(&self, case: &BenchCase) -> Result<Vec<ProcessRun>> {
-        let mut runs = Vec::new();
-        for _ in 0..self.repeat {
-            let run = self.run(case)?;
-            let has_report = !run.report.is_null();
-            runs.push(run);
-            if !has_report {
-                break;
-            }
+    /// Run a case as often as asked for, or until it fails, and return its row: that of the first run that failed, else of the first, with the
+    /// medians of all times.
+    pub fn repeat(&self, case: &Case, ranks: usize) -> Result<Row> {
+        let mut rows = Vec::new();
+        while rows.len() < self.repeat && rows.iter().all(Row::is_good) {
+            rows.push(self.run(case, ranks)?);
         }
-        Ok(runs)
+        let of = |number: fn(&Row) -> Option<f64>| median(rows.iter().filter_map(number).collect());
+        let times: Vec<f64> = rows.iter().filter_map(|row| row.seconds).collect();
+        let longest = times.iter().copied().reduce(f64::max).zip(times.iter().copied().reduce(f64::min));
+        let seconds = of(|row| row.seconds);
+        let spread = longest.zip(seconds).map(|((most, least), middle)| (most - least) / middle);
+        Ok(Row {
+            runs: rows.len(),
+            seconds,
+            spread: spread.filter(|_| rows.len() > 1),
+            mesh_seconds: of(|row| row.mesh_seconds),
+            discretize_seconds: of(|row| row.discretize_seconds),
+            set_up_seconds: of(|row| row.set_up_seconds),
+            iterate_seconds: of(|row| row.iterate_seconds),
+            factor_seconds: of(|row| row.factor_seconds),
+            solve_seconds: of(|row| row.solve_seconds),
+            cpu_seconds: of(|row| row.cpu_seconds),
+            memory_mb: of(|row| row.memory_mb),
+            ..rows.iter().find(|row| !row.is_good()).or(rows.first()).cloned().unwrap_or_default()
+        })
     }
 
-    fn run(&self, case: &BenchCase) -> Result<ProcessRun> {
+    fn run(&self, case: &Case, ranks: usize) -> Result<Row> {
         let folder = self.folder(case);
-        let mut command = match case.ranks {
+        let mut command = match ranks {
             1 => Command::new(&self.program),
             ranks => {
                 let mut command = launcher();
@@ -140,21 +123,19 @@ impl Runner {
         let _ = fs::remove_dir_all(&folder);
         let ended = self.finish(command, &folder)?;
         let report = fs::read(folder.join("report.json")).ok();
-        let report: Value = report.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
-        let (status, message) = match (ended.used.as_ref(), report["status"].as_str()) {
-            (None, _) => ("failed".to_owned(), ended.output),
-            _ if ended.is_late => ("timeout".to_owned(), format!("not ended after {:?}", self.timeout)),
-            (_, Some(status)) => (status.to_owned(), report["message"].as_str().unwrap_or_default().to_owned()),
-            (Some(used), None) => (status_of(used.status).to_owned(), message(&ended.output, used.status)),
+        let report = report.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let row = match (ended.used.as_ref(), report) {
+            (None, _) => Row::unsolved("failed", &ended.output),
+            _ if ended.is_late => Row::unsolved("timeout", &format!("not ended after {:?}", self.timeout)),
+            (_, Some(report)) => Row::of_report(&report),
+            (Some(used), None) => Row::unsolved(status_of(used.status), &message(&ended.output, used.status)),
         };
-        Ok(ProcessRun {
-            status,
-            message,
-            seconds: ended.seconds,
-            cpu: ended.used.as_ref().map_or(f64::NAN, |used| (used.rusage.utime + used.rusage.stime).as_secs_f64()),
-            memory: ended.used.map_or(0, |used| used.rusage.maxrss),
-            report: if ended.is_late { Value::Null } else { report },
-            last_sweep: last_sweep(&folder.join("history.csv")),
+        let cpu = |used: &ResUse| (used.rusage.utime + used.rusage.stime).as_secs_f64();
+        Ok(Row {
+            seconds: Some(ended.seconds).filter(|seconds| seconds.is_finite()),
+            cpu_seconds: ended.used.as_ref().map(cpu),
+            memory_mb: ended.used.as_ref().map(|used| used.rusage.maxrss as f64 / 1e6),
+            ..row
         })
     }
 
@@ -179,7 +160,7 @@ impl Runner {
         let (answer, is_late) = self.wait(child, began);
         if let Some(signal) = self.interrupt.asked() {
             let message = format!("ended by {}: the rows so far are kept", interrupt::name(signal));
-            return Err(Error::new(Kind::Stopped(signal), message).help("`--resume` makes those that are missing"));
+            return Err(Error::new(Kind::Stopped(signal), message));
         }
         let seconds = began.elapsed().as_secs_f64();
         let output = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();
@@ -209,27 +190,8 @@ impl Runner {
     }
 }
 
-/// Return the number of inner iterations between the last two rows of a history.
-fn last_sweep(history: &Path) -> Option<f64> {
-    let mut reader = csv::Reader::from_path(history).ok()?;
-    let column = reader.headers().ok()?.iter().position(|name| name == "inner_iterations")?;
-    let counts = reader.records().map(|row| row.ok()?.get(column)?.parse().ok()).collect::<Option<Vec<f64>>>()?;
-    let [.., before, last] = counts[..] else { return None };
-    Some(last - before)
-}
-
 /// The answer of the thread that waits for a process.
 type Answer = Result<std::io::Result<ResUse>, RecvTimeoutError>;
-
-/// Return the folder of the results of a run with a key, below the folder of all runs.
-pub(super) fn folder_of(runs: &Path, key: &[String]) -> PathBuf {
-    let name = safe_name(&key.join("_").replace(' ', "_"));
-    if name.len() <= LONGEST_NAME {
-        return runs.join(name);
-    }
-    let start: String = name.chars().take(LONGEST_NAME / 2).collect();
-    runs.join(format!("{start}-{:.12}", digest(&name)))
-}
 
 struct Ended {
     /// Resources that it used; `None` if it could not be started or waited for.
@@ -238,6 +200,17 @@ struct Ended {
     seconds: f64,
     /// Its standard output and standard error.
     output: String,
+}
+
+/// Return the median of some numbers, which is the mean of the two middle ones if their count is even.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        count if count.is_multiple_of(2) => Some(0.5 * (values[middle - 1] + values[middle])),
+        _ => Some(values[middle]),
+    }
 }
 
 /// Return the status of a run without a report.
@@ -272,6 +245,13 @@ fn message(output: &str, status: ExitStatus) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_median_is_the_middle() {
+        assert_eq!(median(vec![5.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 100.0]), Some(3.0));
+        assert_eq!(median(Vec::new()), None);
+    }
 
     #[test]
     fn refusals_are_reported_in_their_words() {

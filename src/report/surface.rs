@@ -1,0 +1,251 @@
+//! The surfaces that the page shows: those of bodies after deformation, joined from the parts of all ranks, and those in contact.
+
+use crate::fem::length;
+use crate::linalg::bounds;
+use crate::output::{BodyField, CellKind, UnstructuredGrid};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::collections::HashMap;
+
+/// The four triangles of a quadratic triangle (corners, then mid-edges 01 12 02).
+const QUADRATIC: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
+/// Faces of a tetrahedron, oriented as seen from outside, with the mid-edges of a quadratic one.
+const FACES: [[usize; 6]; 4] = [[0, 2, 1, 6, 5, 4], [0, 1, 3, 4, 8, 7], [1, 2, 3, 5, 9, 8], [0, 3, 2, 7, 9, 6]];
+
+/// Triangles of a body or of a contact surface. The surface of one rank's part of a body ends where the parts of other ranks begin, until
+/// [`Surface::join`] has joined them.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct Surface {
+    /// Name of the body or surface.
+    pub name: String,
+    /// Points before deformation.
+    points: Vec<[f64; 3]>,
+    /// Displacement at each point, zero for contact surfaces.
+    displacement: Vec<[f64; 3]>,
+    /// Von Mises stress at each point, or the contact pressure; NaN where there is none.
+    value: Vec<f64>,
+    /// Points of each face: three corners, behind which those of second order have their mid-edges.
+    faces: Vec<Vec<u32>>,
+}
+
+impl Surface {
+    /// Return the surface of a part of a body: all of its cells in the plane, the faces of one cell alone in space.
+    pub fn of_body(field: &BodyField) -> Self {
+        let cells = field.connectivity.chunks_exact(field.cell.stride());
+        let corners = match field.cell {
+            CellKind::Tetra => 3,
+            CellKind::QuadraticTetra => 6,
+            _ => 0,
+        };
+        let faces: Vec<Vec<u32>> = match corners {
+            0 => cells.map(<[u32]>::to_vec).collect(),
+            _ => cells.flat_map(|cell| FACES.map(|face| face[..corners].iter().map(|&k| cell[k]).collect())).collect(),
+        };
+        Self {
+            name: field.name.clone(),
+            points: field.points.clone(),
+            displacement: field.displacement.clone(),
+            value: field.von_mises.clone(),
+            faces: if corners > 0 { single(faces) } else { faces },
+        }
+        .without_other_points()
+    }
+
+    /// Return the surface of a pair with its pressures.
+    pub fn of_contact(grid: UnstructuredGrid) -> Self {
+        let pressure = grid.at_points.into_iter().find(|array| array.name == "pressure");
+        Self {
+            name: grid.title,
+            displacement: vec![[0.0; 3]; grid.points.len()],
+            points: grid.points,
+            value: pressure.map_or(Vec::new(), |array| array.values),
+            faces: grid.connectivity.chunks_exact(grid.cell.stride()).map(<[u32]>::to_vec).collect(),
+        }
+    }
+
+    /// Return the surface of a body from those of its parts. Parts share points with the same coordinates, and the faces between them are inside.
+    pub fn join(parts: Vec<Self>) -> Self {
+        let mut all = Self::default();
+        let mut numbers: HashMap<[u64; 3], u32> = HashMap::new();
+        for part in parts {
+            let mut own = Vec::new();
+            let bits: Vec<[u64; 3]> = part.points.iter().map(|x| x.map(f64::to_bits)).collect();
+            for (i, place) in bits.iter().enumerate() {
+                // points of the same part stay separate, as on both sides of a crack
+                own.push(numbers.get(place).copied().unwrap_or_else(|| {
+                    all.points.push(part.points[i]);
+                    all.displacement.push(part.displacement[i]);
+                    all.value.push(part.value[i]);
+                    all.points.len() as u32 - 1
+                }));
+            }
+            numbers.extend(bits.into_iter().zip(own.iter().copied()));
+            all.faces.extend(part.faces.iter().map(|face| face.iter().map(|&node| own[node as usize]).collect()));
+            all.name = part.name;
+        }
+        let faces = single(std::mem::take(&mut all.faces));
+        Self { faces, ..all }.without_other_points()
+    }
+
+    /// Return the surface with the points of its faces alone.
+    fn without_other_points(mut self) -> Self {
+        let (mut number, mut kept) = (vec![u32::MAX; self.points.len()], Vec::new());
+        for node in self.faces.iter_mut().flatten() {
+            let new = &mut number[*node as usize];
+            if *new == u32::MAX {
+                *new = kept.len() as u32;
+                kept.push(*node as usize);
+            }
+            *node = *new;
+        }
+        self.points = kept.iter().map(|&node| self.points[node]).collect();
+        self.displacement = kept.iter().map(|&node| self.displacement[node]).collect();
+        self.value = kept.iter().map(|&node| self.value[node]).collect();
+        self
+    }
+
+    /// Return the numbers of the corners of all triangles; a face of second order has four.
+    fn triangles(&self) -> Vec<u32> {
+        let split = |face: &Vec<u32>| match face.len() {
+            3 => face.clone(),
+            _ => QUADRATIC.as_flattened().iter().map(|&k| face[k]).collect(),
+        };
+        self.faces.iter().flat_map(split).collect()
+    }
+
+    fn travel(&self) -> impl Iterator<Item = f64> {
+        self.displacement.iter().map(|&u| length(u))
+    }
+
+    /// Return the numbers of the view, with points relative to `low` (float32, which has too few digits for a small body far from the origin),
+    /// and values scaled to the range (uint16).
+    fn data(&self, low: [f64; 3], [least, most]: [f64; 2]) -> Value {
+        let points: Vec<[f64; 3]> = self.points.iter().map(|x| relative(low, x)).collect();
+        let short = |value: &f64| match value.is_finite() {
+            // the least value is that of open contacts alone
+            true => ((value - least) / (most - least) * f64::from(NONE - 1))
+                .round()
+                .max(f64::from(u8::from(*value > least))) as u16,
+            false => NONE,
+        };
+        let floats = |points: &[[f64; 3]]| -> Vec<u8> {
+            points.as_flattened().iter().flat_map(|&x| (x as f32).to_le_bytes()).collect()
+        };
+        json!({
+            "name": self.name,
+            "points": STANDARD.encode(floats(&points)),
+            "displacement": STANDARD.encode(floats(&self.displacement)),
+            "value": STANDARD.encode(self.value.iter().map(short).flat_map(u16::to_le_bytes).collect::<Vec<_>>()),
+            "triangles": STANDARD.encode(self.triangles().iter().flat_map(|n| n.to_le_bytes()).collect::<Vec<_>>()),
+        })
+    }
+}
+
+/// Return the faces that occur once, whatever the order of their corners.
+fn single(faces: Vec<Vec<u32>>) -> Vec<Vec<u32>> {
+    let key = |face: &[u32]| {
+        let mut key = [face[0], face[1], face[2]];
+        key.sort_unstable();
+        key
+    };
+    let mut count: HashMap<[u32; 3], u8> = HashMap::new();
+    faces.iter().for_each(|face| *count.entry(key(face)).or_default() += 1);
+    faces.into_iter().filter(|face| count[&key(face)] == 1).collect()
+}
+
+/// Marks points without a value.
+const NONE: u16 = u16::MAX;
+
+/// Twelve colours from the smallest to the largest value: viridis, which colour-blind readers can follow.
+const COLORS: [&str; 12] = [
+    "#440154", "#482173", "#433e85", "#38588c", "#2d708e", "#25858e", "#1e9b8a", "#2ab07f", "#52c569", "#86d549",
+    "#c2df23", "#fde725",
+];
+
+/// Return the numbers of the view of bodies and contact surfaces, which `viewer.js` reads.
+pub fn view(bodies: &[Surface], contacts: &[Surface], is_space: bool) -> Value {
+    let [low, high] = bounds(bodies.iter().chain(contacts).flat_map(|part| &part.points).copied());
+    let stress = range(bodies.iter().flat_map(|part| part.value.iter().copied()));
+    let [_, most] = range(contacts.iter().flat_map(|part| part.value.iter().copied()));
+    let parts = |parts: &[Surface], ends| parts.iter().map(|part| part.data(low, ends)).collect::<Vec<Value>>();
+    json!({
+        "bodies": parts(bodies, stress),
+        "surfaces": parts(contacts, [0.0, most]),
+        "travel": range(bodies.iter().flat_map(Surface::travel)),
+        "stress": stress,
+        "pressure": [0.0, most],
+        "low": [0.0, 0.0, 0.0],
+        "high": relative(low, &high),
+        "scale": magnification(bodies),
+        "space": is_space,
+        "colors": COLORS,
+    })
+}
+
+fn relative(low: [f64; 3], x: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| x[c] - low[c])
+}
+
+/// Return the smallest and the largest finite value. They are never equal.
+fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let [low, high] = crate::linalg::range(values.filter(|value| value.is_finite()));
+    if low < high {
+        [low, high]
+    } else if low == high {
+        [low, low + low.abs().max(1e-300)]
+    } else {
+        [0.0, 1.0]
+    }
+}
+
+/// Return the factor by which displacements are multiplied: the largest of 1, 2, 5 times a power of ten with which no displacement is
+/// longer than a twentieth of the diagonal of all bodies, but 1 at least. Motions can then be seen, and bodies still look like themselves.
+fn magnification(bodies: &[Surface]) -> f64 {
+    let [low, high] = bounds(bodies.iter().flat_map(|part| &part.points).copied());
+    let most = bodies.iter().flat_map(Surface::travel).fold(0.0, f64::max);
+    let wish = 0.05 * length(relative(low, &high)) / most;
+    if !wish.is_finite() || wish <= 1.0 {
+        return 1.0;
+    }
+    let unit = 10f64.powf(wish.log10().floor());
+    unit * [5.0, 2.0].into_iter().find(|factor| factor * unit <= wish).unwrap_or(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two tetrahedra with a common face, each on a rank of its own: six faces, and five points.
+    #[test]
+    fn parts_are_joined_at_their_common_face() {
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 1.0, 1.0]];
+        let part = |nodes: [usize; 4]| {
+            Surface::of_body(&BodyField {
+                name: "body".to_owned(),
+                points: nodes.map(|node| points[node]).to_vec(),
+                cell: CellKind::Tetra,
+                connectivity: vec![0, 1, 2, 3],
+                displacement: vec![[0.0, 0.0, 0.01]; 4],
+                stress: vec![[0.0; 6]; 4],
+                von_mises: vec![1.0; 4],
+                largest: None,
+                principal: vec![[0.0; 3]; 4],
+            })
+        };
+        let parts = vec![part([0, 1, 2, 3]), part([4, 1, 2, 3])];
+        assert_eq!(parts[0].faces.len(), 4);
+        let whole = Surface::join(parts);
+        assert_eq!((whole.points.len(), whole.faces.len(), whole.triangles().len()), (5, 6, 18));
+        // a twentieth of the diagonal sqrt(3) is 8.7 displacements
+        assert_eq!(magnification(&[whole]), 5.0);
+    }
+
+    #[test]
+    fn a_range_is_never_a_point() {
+        assert_eq!(range([3.0, f64::NAN, 1.0].into_iter()), [1.0, 3.0]);
+        assert_eq!(range([2.0, 2.0].into_iter()), [2.0, 4.0]);
+        assert_eq!(range([].into_iter()), [0.0, 1.0]);
+    }
+}
