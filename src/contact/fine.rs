@@ -6,7 +6,6 @@
 use super::basis::{Carriers, PressureBasis};
 use super::pair::{ContactPair, Coverage};
 use super::pieces::{IntegrationPoint, Intersection};
-use super::review::height;
 use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
 use crate::fem::{Facets, element, length, minus, unit};
@@ -22,7 +21,7 @@ pub struct FinePoint {
     /// Length (area) of the point.
     pub weight: f64,
     /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
-    /// less by the heights of both curved surfaces above their straight facets (`review::height`).
+    /// less by the heights of both curved surfaces above their straight facets (`rise`).
     pub gap: f64,
     /// Facet of side a under the point. Points on one facet follow each other.
     pub facet: usize,
@@ -107,7 +106,7 @@ impl<const D: usize> Fine<D> {
         let rounding = a.rounding_along_normals();
         let rise_of_both = |point: &IntegrationPoint<D>| match touching {
             true => 0.0,
-            false => height(a, point.facet_a, &point.at_a) + height(b, point.facet_b, &point.at_b),
+            false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);
@@ -281,7 +280,27 @@ fn project<const D: usize>(b: &Side<D>, facet: usize, from: [f64; D], normal: [f
 
 /// Return the distance along a normal from a point to the surface at the barycentric coordinates `at` of a facet.
 fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64; D], normal: [f64; D]) -> f64 {
-    dot(&normal, &minus(b.facets.point(facet, b.space, at), from)) - height(b, facet, at)
+    dot(&normal, &minus(b.facets.point(facet, b.space, at), from)) - rise(b, facet, at)
+}
+
+/// Return the height of the surface of a side above a facet at barycentric coordinates.
+///
+/// A quadratic facet is the surface itself. Over a straight facet the surface is taken to rise by
+/// l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a curve between two normals is a parabola. Here l_i is the
+/// barycentric coordinate, n_i the normal and x_i the place of corner i.
+fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
+    if side.facets.order != Order::P1 {
+        return 0.0;
+    }
+    let x = side.facets.coordinates(facet, side.space);
+    let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
+    let mut rise = 0.0;
+    for i in 0..D {
+        for j in i + 1..D {
+            rise += 0.5 * at[i] * at[j] * dot(&minus(normals[j], normals[i]), &minus(x[j], x[i]));
+        }
+    }
+    rise
 }
 
 /// Return, for each facet of side a, whether it lies at a rim, where the pressure may be singular, since one of the surfaces ends there.

@@ -40,11 +40,6 @@ impl Chords {
     }
 }
 
-/// Return the height of the surface of a side above a facet at barycentric coordinates. A curve between two normals is a parabola.
-pub fn height<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
-    rises(side, facet).iter().zip(products(at)).map(|(rise, l)| rise * l).sum()
-}
-
 /// Return the rise of a curved surface over each edge of a facet, in the order of [`products`]: the factor of l_i l_j in the height of the
 /// surface above the facet. It is zero on a facet that is curved itself.
 ///
