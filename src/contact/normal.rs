@@ -33,6 +33,8 @@ impl<const D: usize> Side<'_, D> {
         for (at, facing) in facing(self, b, common).into_iter().enumerate() {
             let Some(Facing { normal, curvature, .. }) = facing else { continue };
             let own = &mut self.nodes[at];
+            // beyond a plane of symmetry the other side goes on, too
+            let normal = unit(self.mirrors.mean(self.space, own.node, normal, -1.0));
             let tilt: [f64; D] = std::array::from_fn(|c| own.normal[c] + normal[c]);
             let faces = dot(&own.normal, &normal) < 0.0;
             if !faces || length(tilt) <= ROUNDING {
