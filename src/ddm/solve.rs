@@ -12,7 +12,7 @@ use crate::linalg::axpy;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::Motions;
+use crate::model::rigid::{self, Motions};
 use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
@@ -141,7 +141,7 @@ impl Run<'_> {
         let is_near = is_known && known.is_none();
         let has_displacements = known.is_some();
         let mut u = known.unwrap_or_else(|| Field { rigid: self.motions_of(rigid), ..Field::rest(self.model) });
-        let fallen = self.model.trace_of_motions(&u.rigid);
+        let fallen = rigid::trace(self.model, &u.rigid);
         self.model.close_gap(&fallen);
         match method {
             Method::Newton(linear) => {
@@ -174,7 +174,7 @@ impl Run<'_> {
 
     /// Return the result of a run whose loop has ended.
     fn conclude(mut self, mut end: LoopEnd, method: &mut Method) -> Outcome {
-        axpy(1.0, &self.model.trace_of_motions(&end.iterate.rigid), &mut end.iterate.trace);
+        axpy(1.0, &rigid::trace(self.model, &end.iterate.rigid), &mut end.iterate.trace);
         self.model.gap = std::mem::take(&mut self.gap);
         let surfaces = surface_slopes(self.model);
         let answer: Vec<f64> = end.answer.iter().zip(surfaces).map(|(rho, surface)| surface.max(*rho)).collect();

@@ -3,7 +3,7 @@
 
 use super::body::{Body, Energy};
 use super::layer::Layer;
-use super::{BodySlot, Model};
+use super::{BodySlot, Model, rigid};
 use crate::linalg::{axpy, dot};
 
 /// Displacements v + E a of all bodies, with rigid motions E that supports and springs leave free.
@@ -40,30 +40,30 @@ impl Field {
         }
     }
 
-    /// Return a step with these whole displacements of the local bodies, and the sums over ranks of `more` numbers. One message, so that all ranks have the
-    /// same numbers although their processors may round differently.
-    pub fn of_step(model: &Model, states: Vec<Vec<f64>>, more: &[f64]) -> (Field, Vec<f64>) {
-        let mut field = Field { states, ..Self::zero(model) };
+    /// Return the step with the displacements u + E a of the local bodies, and the sums over ranks of `more` numbers. u may have rigid parts; a are the amounts
+    /// `apart` of the motions of each local body, or empty where all is in u. One message, so that all ranks have the same numbers although their processors may
+    /// round differently.
+    pub fn of_step(model: &Model, states: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
+        let (mut field, mut fallen) = (Field { states, ..Self::zero(model) }, Self::zero(model).rigid);
         field.trace_here(model);
-        for ((slot, state), rigid) in model.bodies.iter().zip(&field.states).zip(&mut field.rigid) {
+        for (index, slot) in model.bodies.iter().enumerate() {
             if let Some(body) = slot.local.as_ref() {
-                *rigid = body.states().amounts(state);
+                field.rigid[index] = body.states().amounts(&field.states[index]);
+                fallen[index].iter_mut().zip(&apart[index]).for_each(|(sum, a)| *sum = *a);
             }
         }
-        let mut message = [&field.trace[..], &field.rigid.concat(), more].concat();
+        let mut message = [&field.trace[..], &field.rigid.concat(), &fallen.concat(), more].concat();
         model.exchange.sum(&mut message);
         let mut numbers = message.into_iter();
-        field
-            .trace
-            .iter_mut()
-            .chain(field.rigid.iter_mut().flatten())
-            .zip(&mut numbers)
-            .for_each(|(to, sum)| *to = sum);
+        let rigid = field.rigid.iter_mut().chain(&mut fallen).flatten();
+        field.trace.iter_mut().chain(rigid).zip(&mut numbers).for_each(|(to, sum)| *to = sum);
         for ((slot, state), rigid) in model.bodies.iter().zip(&mut field.states).zip(&field.rigid) {
             if let Some(body) = slot.local.as_ref() {
                 body.states().add_motions(-1.0, rigid, state);
             }
         }
+        axpy(1.0, &rigid::trace(model, &fallen), &mut field.trace);
+        field.rigid.iter_mut().zip(&fallen).for_each(|(rigid, a)| axpy(1.0, a, rigid));
         (field, numbers.collect())
     }
 
@@ -94,7 +94,7 @@ impl Field {
     /// Add t `step` to an iterate, whose rigid part goes into the gap of the model.
     pub fn advance(&mut self, model: &mut Model, t: f64, step: &Field) {
         let fall: Vec<Vec<f64>> = step.rigid.iter().map(|amounts| amounts.iter().map(|a| t * a).collect()).collect();
-        let falling = model.trace_of_motions(&fall);
+        let falling = rigid::trace(model, &fall);
         self.add(t, step);
         axpy(-1.0, &falling, &mut self.trace);
         model.close_gap(&falling);

@@ -87,15 +87,15 @@ impl Joint {
         load
     }
 
-    /// Return the displacements of each local body from the unknowns of the matrix. `like` has a vector of each local body.
-    fn displacements(&self, model: &Model, x: &[f64], like: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    /// Return v and the amounts a of each local body from the unknowns of the matrix, for its displacements v + E a. `like` has a vector of each local body.
+    fn displacements(&self, x: &[f64], like: &[Vec<f64>]) -> [Vec<Vec<f64>>; 2] {
         let mut all = self.apart(x, like);
-        for (body, (u, pins)) in all.iter_mut().zip(&self.pins).enumerate() {
-            let Some(local) = model.bodies[body].local.as_ref() else { continue };
-            let amounts: Vec<f64> = pins.iter().map(|&pin| std::mem::take(&mut u[pin])).collect();
-            local.states().add_motions(1.0, &amounts, u);
-        }
-        all
+        let amounts = all.iter_mut().zip(&self.pins).map(|(u, pins)| match u.is_empty() {
+            true => Vec::new(),
+            false => pins.iter().map(|&pin| std::mem::take(&mut u[pin])).collect(),
+        });
+        let amounts = amounts.collect();
+        [all, amounts]
     }
 
     /// Return vectors of the local bodies as one vector; it is zero for bodies of other ranks.
@@ -155,12 +155,15 @@ impl LinearStep for Joint {
         if let (false, Some(reason)) = (self.is_redundant, &failure) {
             return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
-        let Some((field, energy)) =
-            collect(model, self.displacements(model, &x, residual), residual, failure.is_some())
-        else {
+        let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
+        let energy: f64 = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum();
+        let [states, apart] = self.displacements(&x, residual);
+        let (field, sums) = Field::of_step(model, states, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
+        let (energy, failures) = (sums[0], sums[1]);
+        if failures > 0.0 {
             let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
             return Ok(Err(Failure { body: None, reason: failure.unwrap_or_else(elsewhere) }));
-        };
+        }
         let accuracy = self.matrix.solver().accuracy();
         let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
         Ok(Ok(LinearSolution { field, energy, error, is_exact: accuracy == 0.0 }))
@@ -192,14 +195,6 @@ fn estimated_error(iterate: &KspIterate, energy: f64) -> f64 {
         Some(least) => iterate.residual / least.sqrt(),
         None => iterate.residual / iterate.first * energy.sqrt(),
     }
-}
-
-/// Collect a solution x of all ranks from the `states` of the local bodies. Return x with the traces of all bodies, and x'r, or `None` if the solver of some rank
-/// has failed. One message.
-fn collect(model: &Model, states: Vec<Vec<f64>>, residual: &[Vec<f64>], has_failed: bool) -> Option<(Field, f64)> {
-    let energy: f64 = states.iter().zip(residual).map(|(x, r)| dot(x, r)).sum();
-    let (field, numbers) = Field::of_step(model, states, &[energy, f64::from(u8::from(has_failed))]);
-    (numbers[1] <= 0.0).then_some((field, numbers[0]))
 }
 
 /// Return the matrix with all entries stored, row by row.

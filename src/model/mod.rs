@@ -26,7 +26,7 @@ use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::exchange::Exchange;
 use crate::linalg::dot;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::rc::Rc;
@@ -148,11 +148,6 @@ impl Model {
     pub fn scale_gaps(&mut self, factor: f64) {
         let gaps = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(move |q| free_gap(pair, q, factor)));
         self.gap = gaps.collect();
-    }
-
-    /// Return the trace vector (2n) of rigid motions by these amounts, one list a body.
-    pub fn trace_of_motions(&self, amounts: &[Vec<f64>]) -> Vec<f64> {
-        Motions::of(self).trace(self, &DVector::from_vec(amounts.concat()))
     }
 
     /// Subtract the closings of a trace vector (2n) from the gaps.

@@ -203,6 +203,11 @@ impl<'a> Motions<'a> {
     }
 }
 
+/// Return the trace vector (2n) of free motions of the bodies of a model by these amounts, one list a body.
+pub fn trace(model: &Model, amounts: &[Vec<f64>]) -> Vec<f64> {
+    Motions::of(model).trace(model, &DVector::from_vec(amounts.concat()))
+}
+
 /// Return the name of a combination of motions, from the names of those with an amount that matters.
 pub fn combined<'n>(names: impl Iterator<Item = &'n str>, amounts: impl Iterator<Item = f64> + Clone) -> String {
     let least = PART * amounts.clone().fold(0.0, |most: f64, amount| most.max(amount.abs()));

@@ -9,7 +9,7 @@ use crate::model::body::Energy;
 use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
-use crate::model::rigid::{Moved, TOLERANCE, combined};
+use crate::model::rigid::{self, Moved, TOLERANCE, combined};
 use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
@@ -91,7 +91,8 @@ impl Sweeper {
                 sums[5] += counts.inner_iterations as f64;
             }
         }
-        let (correction, numbers) = Field::of_step(model, corrections, &[&sums[..], &failed, &asks(asked)].concat());
+        let (correction, numbers) =
+            Field::of_step(model, corrections, &vec![Vec::new(); bodies], &[&sums[..], &failed, &asks(asked)].concat());
         let (sums, rest) = numbers.split_at(SUMS);
         let (failed, asked) = rest.split_at(bodies);
         let failed = failed.iter().position(|&failed| failed != 0.0);
@@ -269,7 +270,7 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
             *held += springs[q] * (trace[q] - iterate.trace[q]);
         }
     }
-    let fallen = model.trace_of_motions(&iterate.rigid);
+    let fallen = rigid::trace(model, &iterate.rigid);
     axpy(-1.0, &fallen, &mut iterate.trace);
     model.close_gap(&fallen);
     Ok(Ok(iterate))
