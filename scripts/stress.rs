@@ -206,6 +206,23 @@ impl<'a> Results<'a> {
         let solvable = case.expect == Expect::Solution && verdict != Verdict::Named;
         self.tallies.entry(name).or_default().take(answer, &verdict, solvable);
         let wrong = matches!(verdict, Verdict::Wrong(_));
+        println!(
+            "@ {} {name} {} {} {} {:.2e} {:.2e} {:.2e} {} {}",
+            case.index,
+            answer.status,
+            answer.iterations,
+            answer.sweeps,
+            answer.residual,
+            answer.rounding,
+            runs::difference(case, reference, answer),
+            match &verdict {
+                Verdict::Right => "right",
+                Verdict::Named => "named",
+                Verdict::Failed => "failed",
+                Verdict::Wrong(_) => "wrong",
+            },
+            reference.status
+        );
         self.sound &= !wrong && (name != "auto" || verdict != Verdict::Failed);
         if self.arguments.only.is_some() {
             println!(

@@ -38,7 +38,7 @@ pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
 pub use crate::ddm::gamma::GammaRule;
 pub use crate::ddm::robin::Iterate;
-pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status, Whose};
+pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
 pub use crate::model::field::Unbounded;
@@ -49,7 +49,6 @@ pub use crate::problem::{
     LayerSpec, Linear, Load, LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Overlap, Plane,
     Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Units, Zone,
 };
-pub use crate::robin::Ritz;
 pub use crate::run::recorder::Recorder;
 pub use crate::scene::{AdaptSpec, Most, OutputSpec, Precision, Scene, load};
 

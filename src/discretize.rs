@@ -27,7 +27,7 @@ pub use assembly::{Assembled, Factory, Outline};
 pub use facts::BodyInfo;
 pub use groups::point;
 pub use pairs::ContactInfo;
-pub use post::{ForceBalance, Unbalanced};
+pub use post::ForceBalance;
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};
@@ -192,7 +192,7 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
     match &scene.method.start {
-        Start::Auto | Start::Nested => return Ok(None),
+        Start::Auto => return Ok(None),
         Start::Zero => {}
         Start::Normal(field) => {
             let positions = model.pairs.iter().flat_map(|pair| &pair.position);

@@ -8,7 +8,7 @@ mod held;
 mod pressure;
 pub mod sizes;
 
-use crate::ddm::{Discretisation, respond};
+use crate::ddm::respond;
 use crate::discretize::meshes::{Meshes, RecoveredFields};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Errors;
@@ -19,7 +19,6 @@ use crate::model::{Field, Layer, LinearStep, Model};
 use held::HoldingSprings;
 pub use pressure::{Cause, Guess, softness};
 use pressure::{LayerError, PressureErrors, SAFETY};
-use std::rc::Rc;
 
 /// Estimated errors of a discrete solution.
 #[derive(Debug, Clone, Default)]
@@ -326,14 +325,4 @@ fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
         left += energy * rho / (rho + layer.tangent[q]);
     }
     if full > 0.0 { TOLERANCE * f64::sqrt(left / full) } else { TOLERANCE }
-}
-
-/// The estimate as the discretisation error of a balanced stop.
-pub struct Nodal(pub Rc<dyn Meshes>);
-
-impl Discretisation for Nodal {
-    fn error(&mut self, model: &mut Model, step: &mut dyn LinearStep, iterate: &Field, layer: &Layer) -> Result<f64> {
-        let estimate = estimate(&*self.0, model, step, iterate, layer, 1.0)?;
-        Ok(estimate.nodal.min(estimate.energy))
-    }
 }

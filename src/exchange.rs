@@ -80,9 +80,8 @@ fn received<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
     unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
-/// Kinds of requests to a run from outside: three signals, a snapshot and a checkpoint. They are bits of one number. They are summed over the ranks in
-/// messages that ranks send anyway.
-pub const ASKS: usize = 5;
+/// Signals that end a run. They are bits of one number, and are summed over the ranks in messages that ranks send anyway.
+pub const ASKS: usize = 3;
 
 /// Return one number per kind of request, to be summed over the ranks.
 pub fn asks(asked: u8) -> [f64; ASKS] {

@@ -1,6 +1,5 @@
 //! The items of private modules that integration tests and examples use. They change without notice.
 
-pub use crate::commands::checkpoint::settings_digest;
 pub use crate::interrupt::Interrupt;
 pub use crate::linalg::bounds;
 

@@ -1,11 +1,11 @@
-//! Signals that request the program to end, or to write its present results.
+//! Signals that request the program to end.
 //!
 //! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
 //! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once. Handlers set
 //! flags and do nothing else.
 
 use crate::error::{Error, Kind, Result};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -20,8 +20,6 @@ pub struct Interrupt {
     at_once: Arc<AtomicBool>,
     /// Number of the signal that requested the end; 0 for none.
     asked: Arc<AtomicUsize>,
-    /// Whether a snapshot was requested.
-    snapshot: Arc<AtomicBool>,
 }
 
 impl Interrupt {
@@ -45,7 +43,6 @@ impl Interrupt {
             flag::register(signal, self.at_once.clone())?;
             flag::register_usize(signal, self.asked.clone(), signal as usize)?;
         }
-        flag::register(SIGUSR1, self.snapshot.clone())?;
         flag::register(SIGXFSZ, Arc::default()).map(|_| ())
     }
 
@@ -69,11 +66,6 @@ impl Interrupt {
             0 => None,
             signal => Some(signal as i32),
         }
-    }
-
-    /// Whether a snapshot was requested since the last call.
-    pub fn wants_snapshot(&self) -> bool {
-        self.snapshot.swap(false, Ordering::SeqCst)
     }
 }
 

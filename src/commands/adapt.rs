@@ -1,8 +1,8 @@
 //! The rounds of a run on several meshes, which are adapted to an error: solve, estimate, stop or follow the sizes of the next mesh.
 
-use super::checkpoint::{Checkpoint, CheckpointHeader, settings_digest};
+use super::checkpoint::{Checkpoint, CheckpointHeader};
 use super::transfer::{self, EstimatedSolution};
-use crate::ddm::{InitialGuess, Status};
+use crate::ddm::{InitialGuess, Solution, Status};
 use crate::discretize::meshes::Meshes;
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
@@ -52,7 +52,7 @@ pub struct AdaptiveRun {
     /// The checkpoint from which the first round goes on.
     resumed: Option<Checkpoint>,
     /// The scene as it was requested.
-    requested: Rc<Scene>,
+    pub requested: Rc<Scene>,
     /// The solution that the next round starts from; empty without one.
     start_from: Vec<ContactTable>,
     /// Seconds from the begin of the run to the end of the round before.
@@ -207,7 +207,7 @@ impl AdaptiveRun {
     /// Return where this round begins: where a checkpoint or an earlier round ended.
     pub fn begin(&mut self, built: &Built) -> Result<Begin> {
         match self.resumed.take() {
-            Some(checkpoint) => checkpoint.resume(built),
+            Some(checkpoint) => checkpoint.resume(&self.requested, built),
             None => Ok(Begin { start: self.start(built), ..Begin::default() }),
         }
     }
@@ -215,7 +215,6 @@ impl AdaptiveRun {
     /// Return the head of a checkpoint of this round.
     pub fn head(&self) -> CheckpointHeader {
         CheckpointHeader {
-            settings: settings_digest(&self.requested),
             rounds: self.rounds.clone(),
             sizes: self.sizes().map(|view| view.to_string()),
             on_last_mesh: self.is_stepping(),
@@ -229,14 +228,17 @@ impl AdaptiveRun {
         let Built { scene, discrete, .. } = built;
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
         (!self.start_from.is_empty()).then(|| match newton {
-            true => InitialGuess::Pressure(transfer::pressure(&self.start_from, discrete)),
+            true => {
+                let compression = discrete.model.compressions_of(&transfer::pressure(&self.start_from, discrete));
+                InitialGuess::Known(Box::new(Solution { compression, ..Solution::default() }))
+            }
             false => InitialGuess::Trace(transfer::trace(&self.start_from, discrete)),
         })
     }
 
     /// Make the plan of the next round. Return whether there is one.
     pub fn advance(&mut self, done: &Done, estimate: Option<&Estimate>, clock: &mut Clock) -> bool {
-        if matches!(done.outcome.status, Status::Paused { .. }) || self.is_stepping() {
+        if matches!(done.outcome.status, Status::Interrupted { .. }) || self.is_stepping() {
             return false;
         }
         let (Some(goal), Some(estimate)) = (self.goal.clone(), estimate) else { return false };

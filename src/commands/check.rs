@@ -8,7 +8,6 @@ use crate::interrupt::Interrupt;
 use crate::linalg::range;
 use crate::output::{LISTED, say, sci, warning_lines};
 use crate::petsc::Session;
-use crate::run::results::{self, CouplingEstimate};
 use crate::run::{self, Built, in_words, report};
 use serde_json::{Value, json};
 use std::rc::Rc;
@@ -68,8 +67,6 @@ fn to_json(built: &Built, settings: Value, headline: Value) -> Value {
 fn pair_to_json(built: &Built, i: usize) -> Value {
     let pair = &built.discrete.model.pairs[i];
     let [low, high] = range(pair.gap.iter().copied());
-    let coupling = results::coupling(built, i);
-    let sweeps = coupling.sweeps.iter().filter(|_| coupling.pressure > 0.0);
     json!({
         "surfaces": pair.surfaces,
         "contact": built.discrete.contacts[i].spec.table,
@@ -80,9 +77,6 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "facets_uncovered": pair.uncovered(),
         "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
         "facets_averaged": pair.averaged(),
-        "mean_pressure": Some(coupling.pressure).filter(|&pressure| pressure > 0.0),
-        "theta": coupling.theta,
-        "expected_sweeps": sweeps.map(|(method, count)| json!({ "method": method, "sweeps": count })).collect::<Vec<_>>(),
     })
 }
 
@@ -153,7 +147,7 @@ fn all_bodies(built: &Built) -> Vec<String> {
 /// Return two lines for each pair.
 fn each_pair(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
-    for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
+    for pair in &built.discrete.model.pairs {
         let [low, high] = range(pair.gap.iter().copied());
         lines.push(format!(
             "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
@@ -166,42 +160,15 @@ fn each_pair(built: &Built) -> Vec<String> {
             sci(low, 3),
             sci(high, 3)
         ));
-        let coupling = results::coupling(built, i);
-        lines.push(match coupling.pressure == 0.0 {
-            true => "    no load of its bodies presses it: pressure and sweeps cannot be estimated".to_owned(),
-            false => format!(
-                "    mean pressure {} if it carries the load alone, {}",
-                sci(coupling.pressure, 3),
-                expected(&coupling)
-            ),
-        });
     }
     lines
 }
 
-/// Number of sweeps beyond which a method is of no use, so that the order of the number does not matter. A sweep of the smallest problems
-/// takes some tens of microseconds, so that this many take a minute.
-const MOST_SWEEPS: f64 = 1e6;
-
-/// Return theta and the expected number of sweeps of a pair as a text.
-///
-/// Each side has theta = kappa/(k + kappa), with the stiffness k of its body and the tangent kappa of the layer.
-fn expected(coupling: &CouplingEstimate) -> String {
-    let sweeps = coupling.sweeps.iter().map(|(method, count)| match *count {
-        ..=MOST_SWEEPS => format!("{method} {count:.0}"),
-        count if count.is_finite() => format!("{method} more than {MOST_SWEEPS}"),
-        _ => format!("{method} does not converge"),
-    });
-    let [a, b] = coupling.theta;
-    let sweeps = sweeps.collect::<Vec<_>>().join(", ");
-    format!("theta {a:.3} and {b:.3}; sweeps to expect for a residual of 1e-8: {sweeps}")
-}
-
-/// Return sums over the pairs, and the number of sweeps to expect from the pair with the largest theta.
+/// Return sums over the pairs.
 fn all_pairs(built: &Built) -> Vec<String> {
     let pairs = &built.discrete.model.pairs;
     let [low, high] = range(pairs.iter().flat_map(|pair| pair.gap.iter().copied()));
-    let mut lines = vec![format!(
+    vec![format!(
         "  {} contacts: {} points, {} {:.6}, gap {} to {}; --json has every one",
         pairs.len(),
         pairs.iter().map(ContactPair::len).sum::<usize>(),
@@ -209,25 +176,5 @@ fn all_pairs(built: &Built) -> Vec<String> {
         pairs.iter().flat_map(|pair| &pair.weight).sum::<f64>(),
         sci(low, 3),
         sci(high, 3)
-    )];
-    let all = (0..pairs.len()).map(|i| (&pairs[i], results::coupling(built, i)));
-    let pressed: Vec<(&ContactPair, CouplingEstimate)> = all.filter(|(_, coupling)| coupling.pressure > 0.0).collect();
-    if pressed.len() < pairs.len() {
-        let rest = pairs.len() - pressed.len();
-        lines.push(format!(
-            "    {rest} of them have no load of a body as a whole across: their pressure cannot be estimated"
-        ));
-    }
-    let product = |coupling: &CouplingEstimate| coupling.theta[0] * coupling.theta[1];
-    if let Some((pair, coupling)) = pressed.iter().max_by(|(_, a), (_, b)| product(a).total_cmp(&product(b))) {
-        let pressures = || pressed.iter().map(|(_, coupling)| coupling.pressure);
-        let [least, most] = [f64::min, f64::max].map(|pick| pressures().reduce(pick));
-        let [least, most] = [least, most].map(|pressure| sci(pressure.unwrap_or(f64::NAN), 3));
-        let [a, b] = &pair.surfaces;
-        lines.push(format!(
-            "    mean pressure {least} to {most}; the largest theta, of {a} - {b}: {}",
-            expected(coupling)
-        ));
-    }
-    lines
+    )]
 }

@@ -4,6 +4,7 @@
 pub const GONE: &[(&str, &str)] = &[
     ("--adapted", "a run that adapts its mesh writes adapted.msh into the folder of results"),
     ("--budget", "--timeout bounds each run"),
+    ("--checkpoint", "states are saved at the end of each load step, and when a signal ends the run"),
     ("--color", "messages have colours on a terminal, and none where NO_COLOR is set"),
     ("--linear", "`winkler solve --method robin --set method.stop.iterations=1` factors and solves each body"),
     ("--resume", "every benchmark makes all of its runs"),

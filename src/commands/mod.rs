@@ -107,7 +107,7 @@ pub struct SceneArgs {
     /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Method: auto, robin, ncg, anderson, newton-robin or newton (short for --set method.name=NAME)
+    /// Method: auto, robin, newton-robin or newton (short for --set method.name=NAME)
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
     /// Estimate the error of the discretisation (short for --set estimate=true)

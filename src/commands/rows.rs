@@ -11,11 +11,9 @@ pub struct Row {
     pub status: String,
     pub message: String,
     pub method: String,
-    /// Degrees of freedom of all bodies, contact points of all pairs, and the coupling of the most strongly coupled pair, the geometric mean of
-    /// those of its sides.
+    /// Degrees of freedom of all bodies, and contact points of all pairs.
     pub dofs: Option<usize>,
     pub points: Option<usize>,
-    pub theta: Option<f64>,
     /// Counters and numbers of the report.
     pub iterations: Option<usize>,
     pub sweeps: Option<usize>,
@@ -72,7 +70,6 @@ impl Row {
             method: text("method"),
             dofs: count("/dofs"),
             points: pairs.map(|_| of_pairs(|pair| pair["points"].as_f64()).iter().sum::<f64>() as usize),
-            theta: largest_of(of_pairs(|pair| Some((pair["theta"][0].as_f64()? * pair["theta"][1].as_f64()?).sqrt()))),
             iterations: count("/iterations"),
             sweeps: count("/sweeps"),
             inner_iterations: count("/inner_iterations"),
@@ -175,7 +172,7 @@ mod tests {
     fn a_row_stands_under_its_columns() {
         let report = serde_json::json!({
             "status": "converged", "message": "a, b", "residual": 1e-9, "dofs": 12,
-            "pairs": [{ "points": 3, "theta": [0.25, 1.0], "peak_pressure": null }, { "points": 4, "theta": [0.5, 0.5] }],
+            "pairs": [{ "points": 3, "peak_pressure": null }, { "points": 4 }],
         });
         let row = Row::of_report(&report);
         let value = |name: &str| {
@@ -183,8 +180,8 @@ mod tests {
             row.fields()[place].clone()
         };
         assert_eq!(Row::columns().len(), row.fields().len());
-        let names = ["status", "message", "dofs", "points", "theta", "residual", "F1", "peak_pressure"];
-        assert_eq!(names.map(value), ["converged", "a, b", "12", "7", "0.5", "1e-9", "", ""]);
+        let names = ["status", "message", "dofs", "points", "residual", "F1", "peak_pressure"];
+        assert_eq!(names.map(value), ["converged", "a, b", "12", "7", "1e-9", "", ""]);
     }
 
     #[test]

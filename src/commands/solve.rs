@@ -12,7 +12,6 @@ use crate::output::terminal::ProgressLine;
 use crate::output::{Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
-use crate::run::recorder::{is_snapshot, signal};
 use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results, verdict};
 use std::path::PathBuf;
 
@@ -33,9 +32,6 @@ pub struct SolveArgs {
     /// Write a page with pictures and tables of the run, report.html (short for --set output.report=true)
     #[arg(long)]
     report: bool,
-    /// Minutes between checkpoints (short for --set output.checkpoint=T)
-    #[arg(long, value_name = "T", allow_hyphen_values = true)]
-    checkpoint: Option<String>,
     /// Go on from the checkpoint in a folder of results
     #[arg(long, value_name = "DIR")]
     restart: Option<PathBuf>,
@@ -46,8 +42,7 @@ pub struct SolveArgs {
 impl SolveArgs {
     fn overrides(&self) -> Vec<String> {
         let flags = flags([(self.vtu, "--vtu"), (self.msh, "--msh"), (self.report, "--report")]);
-        let checkpoint = self.checkpoint.iter().map(|minutes| format!("--checkpoint {minutes}"));
-        self.scene.overrides().into_iter().chain(flags).chain(checkpoint).collect()
+        self.scene.overrides().into_iter().chain(flags).collect()
     }
 }
 
@@ -60,7 +55,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let mut clock = clock_with_phases(terminal.is_loud());
     let scene = load(session, &request.scene.scene, &request.overrides())?;
-    let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder, &scene);
+    let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
     let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
     let plan = AdaptiveRun::new(session, scene, checkpoint, interrupt, &mut clock)?;
@@ -69,8 +64,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     let mut solver = Solver {
         session,
         interrupt,
-        // only one rank measures the time between checkpoints
-        requests: Requests::new(interrupt, plan.scene.output.checkpoint.filter(|_| terminal.is_first)),
+        requests: Requests(interrupt.clone()),
         folder,
         terminal,
         clock,
@@ -94,7 +88,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
 }
 
 /// The state of the command over its rounds, one for each mesh. It is the observer of each round: it writes iterations and load steps to the
-/// terminal and to tables, passes requests of the user on, and writes checkpoints and snapshots.
+/// terminal and to tables, passes signals on, and writes checkpoints.
 struct Solver<'s> {
     session: &'s Session,
     interrupt: &'s Interrupt,
@@ -302,10 +296,11 @@ impl Observer for Solver<'_> {
 
 impl Recorder for Solver<'_> {
     fn state(&mut self, done: &Done) {
-        let Status::Paused { asked } = done.outcome.status else { return };
-        let is_due = signal(asked).is_some() || !is_snapshot(asked);
-        let Some(head) = is_due.then(|| self.plan.head()) else { return };
-        let written = Checkpoint::write(self.folder.path(), head, done, self.session.rank() == 0);
+        let (path, head) = (self.folder.path(), self.plan.head());
+        let written = match self.session.rank() {
+            0 => Checkpoint::write(path, head, &self.plan.requested, done),
+            _ => Ok(()),
+        };
         self.has_checkpoint |= written.is_ok();
         self.note(written);
     }
@@ -316,15 +311,11 @@ impl Recorder for Solver<'_> {
         if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
             table.row(&history.names, step);
         }
-        let ends = done.steps.len() == history.steps.len() || matches!(done.outcome.status, Status::Paused { .. });
+        let is_interrupted = matches!(done.outcome.status, Status::Interrupted { .. });
+        let ends = done.steps.len() == history.steps.len() || is_interrupted;
         if !ends {
             let written = write_fields(done, recovered, &self.folder, false);
             self.note(written);
         }
-    }
-
-    fn results(&mut self, done: &mut Done) {
-        let (_, written) = self.files(done, None, true).write(&mut self.clock.clone(), |_| {});
-        self.note(written);
     }
 }

@@ -66,7 +66,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         plots: Plots::default(),
         reports: Vec::new(),
     };
-    let mut requests = Requests::new(interrupt, None);
+    let mut requests = Requests(interrupt.clone());
     let (mut exit, mut before) = (0, None);
     for (case, scene) in plan.cases.iter().zip(&scenes) {
         let mut clock = Clock::default();
@@ -79,7 +79,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         if session.rank() == 0 {
             sweep.add(case, &done, report)?;
         }
-        if matches!(done.outcome.status, Status::Paused { .. }) {
+        if matches!(done.outcome.status, Status::Interrupted { .. }) {
             break;
         }
         before = Some(done);

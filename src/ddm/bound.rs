@@ -12,58 +12,18 @@
 //! Beside the bound stand what errors are measured by ([`Scale`]), and what roundoff makes of compressions and pressures where displacements are far
 //! larger than compressions.
 
-use super::progress::Equilibrium;
 use super::start;
-use super::stop::Status;
+use super::step::Equilibrium;
 use crate::contact::LayerLaw;
 use crate::linalg::dot;
 use crate::model::Model;
-use crate::model::layer::{Layer, in_series, meeting_slopes, surface_slopes};
+use crate::model::layer::{Layer, in_series, surface_slopes};
 use crate::model::linear::LinearSolution;
 use crate::model::rigid::PART;
 
-/// Relative residual up to which a linear step is exact: half of the digits. Rounding alone leaves up to 1e-7 where moduli differ by five orders (a wide
-/// random scene); the error is called an estimate there and not a bound, and nothing else depends on it.
-const EXACT: f64 = 1.5e-8;
-
-/// The distance of layer states from the laws at the compressions of the bodies.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct OffLaws {
-    /// The duality gap, an energy.
-    gap: f64,
-    /// Largest difference of a pressure.
-    mismatch: f64,
-    /// The pair with that difference.
-    pair: usize,
-}
-
-impl OffLaws {
-    /// Measure the distance of the layer states `places` where the bodies have these compressions, n, which are known but for their `roundoff`, n.
-    pub(super) fn new(model: &Model, places: &Layer, compression: &[f64], roundoff: &[f64]) -> Self {
-        let mut off = Self::default();
-        // bodies and layer answer an error of a compression like springs in series; a steep law alone would make any pressure of it
-        let rho = meeting_slopes(model);
-        let resolved = Layer::resolve(model, compression, &places.pressure, &rho, &[]);
-        for (i, pair) in model.pairs.iter().enumerate() {
-            for q in model.range(i) {
-                let (point, p) = (q - model.offset[i], places.pressure[q]);
-                let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
-                let mismatch = if rho[q] < f64::INFINITY {
-                    let known = rho[q] * roundoff[q] + f64::EPSILON * (p.abs() + resolved.pressure[q].abs());
-                    // `clamp` keeps NaN
-                    ((p - resolved.pressure[q]).abs() - known).clamp(0.0, f64::INFINITY)
-                } else {
-                    (p - pair.law.pressure(point, c)).abs()
-                };
-                off.gap += model.weight[q] * pair.law.duality_gap(point, c, p);
-                if mismatch.is_nan() || mismatch > off.mismatch {
-                    (off.mismatch, off.pair) = (mismatch, i);
-                }
-            }
-        }
-        off
-    }
-}
+/// Energy norm of the unbalanced forces, relative to bodies and layers, up to which a linear step is exact: half of the digits. An inexact factorisation
+/// leaves more, and no bound holds then.
+pub(super) const EXACT: f64 = 1.5e-8;
 
 /// The relative errors that end a run of Newton's method.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -75,8 +35,8 @@ pub struct Reached {
     /// Error of the pressures. It is the largest difference from the law, relative to the largest pressure, or the error of an inexact linear
     /// step, relative to the energy of the contact alone.
     pub pressure: f64,
-    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies, by the pressures in equilibrium and by
-    /// those of the layers, which are the result.
+    /// Forces out of balance on a body, as a share of its contact forces: the largest over all bodies, by the pressures of the layers, which are
+    /// the result.
     pub imbalance: f64,
 }
 
@@ -136,65 +96,29 @@ impl Reached {
             error: scale.relative(absolute * absolute, energy),
             is_bound,
             pressure: mismatch.max(missed),
-            imbalance: scale.imbalance(model, &model.forces(pressure), strain).max(scale.imbalance(
-                model,
-                &places.force,
-                strain,
-            )),
+            imbalance: scale.imbalance(model, &places.force, strain),
         }
     }
 
-    /// Verify the equilibrium after a step that its solver takes for exact: f - K u - B' omega p has the relative length `unbalanced`. An inexact
-    /// factorisation leaves a share of the forces, and no bound holds then.
+    /// Verify the equilibrium after a step that its solver takes for exact: f - K u - B' omega p has the relative energy norm `unbalanced`.
     pub(super) fn verify(&mut self, unbalanced: f64) {
         self.is_bound &= unbalanced <= EXACT;
     }
 
-    /// Return the errors of a result with u'Ku = `strain`. Its layer states `places` have the distance `off` from the laws, and the forces out of
-    /// balance have the energy norm `unbalanced`; in results `of_steps` of Newton's method this is an error of the pressures, too, as in
-    /// [`Reached::new`]. The second value is the pair whose distance from its law is the largest of all errors, if one is.
-    pub(super) fn of_result(
-        model: &Model,
-        scale: &Scale,
-        strain: f64,
-        unbalanced: f64,
-        off: &OffLaws,
-        places: &Layer,
-        of_steps: bool,
-    ) -> (Self, Option<usize>) {
-        let (energy, absolute) = (strain + places.work, (2.0 * off.gap).sqrt() + unbalanced);
-        // pressures are measured by at least PART of what the bodies carry, and energies by its square
-        let contact = contact_energy(model, places).max(PART * PART * energy);
-        let missed = if of_steps { scale.relative(unbalanced * unbalanced, contact) } else { 0.0 };
-        let mismatch = if off.mismatch == 0.0 { 0.0 } else { off.mismatch / scale.peak(&places.pressure, strain) };
-        let reached = Self {
-            error: scale.relative(absolute * absolute, energy),
-            is_bound: false,
-            pressure: if mismatch.is_nan() || mismatch > missed { mismatch } else { missed },
-            imbalance: scale.imbalance(model, &places.force, strain),
-        };
-        let is_worst = mismatch > missed && mismatch >= reached.worst();
-        (reached, is_worst.then_some(off.pair))
-    }
-
-    /// Add what rounding left of the equilibrium of a step from the states `before` to `places`. A further step `more` with the same matrix shows
-    /// it. If that one is exact, it is rounded, too, and may miss as much again; an inexact one knows its own error. Return the larger error
-    /// that was added.
-    pub(super) fn add_rounding(
+    /// Add twice what is left of equilibrium after a step from the states `before` to `places`. The solution `more` with the same matrix shows it.
+    pub(super) fn add_unbalanced(
         &mut self,
         (scale, strain): (&Scale, f64),
         more: &LinearSolution,
         before: &Layer,
         places: &Layer,
-    ) -> f64 {
-        let times = if more.is_exact { 2.0 } else { 1.0 };
+    ) {
         let missed = scale.relative(more.energy + more.error * more.error, strain + places.work);
         let closing = more.field.closing();
         let change = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
         let change = if change == 0.0 { 0.0 } else { change / scale.peak(&places.pressure, strain) };
-        self.error += times * missed;
-        self.pressure += times * change;
-        times * missed.max(change)
+        self.error += 2.0 * missed;
+        self.pressure += 2.0 * change;
     }
 
     /// Return the largest of the errors, NaN if one of them is.
@@ -300,10 +224,6 @@ impl Scale {
     }
 }
 
-/// Squared factor between rounding errors and their estimate. The estimate counts the worst case of each row once, and smooth errors weigh more
-/// in K^-1 than in the inverse of its diagonal. The root, a factor of 30 in the error, is an estimate: it has no benchmark yet.
-pub(super) const ROUNDING: f64 = 1e3;
-
 /// Return the error of every compression c = u_a + u_b - d by rounding of the gap d and of both displacements, n. `trace` is a trace vector (2n).
 pub(super) fn compression_roundoff(model: &Model, trace: &[f64]) -> Vec<f64> {
     let points = model.points();
@@ -311,14 +231,8 @@ pub(super) fn compression_roundoff(model: &Model, trace: &[f64]) -> Vec<f64> {
     (0..points).map(|q| f64::EPSILON * terms(q)).collect()
 }
 
-/// Return how many times its [roundoff](compression_roundoff) a compression may be off. Traces and gaps are sums, which are rounded before they are
-/// added. Sweeps that roundoff ended have only reached the level of [`ROUNDING`], a square.
-pub(super) fn roundoff_safety(is_sweeps: bool, status: &Status) -> f64 {
-    if is_sweeps && *status == Status::RoundoffLimited { ROUNDING.sqrt() } else { 2.0 }
-}
-
 /// Return the largest error of a pressure by rounding of the gap and of both displacements, relative to the `peak` by which pressures are
-/// measured. `trace` is a trace vector (2n); `answer`, n, is the stiffness per area with which the bodies answer an error of the gap.
+/// measured. Traces and gaps are sums, which are rounded before they are added, so that the roundoff of a compression counts twice. `trace` is a trace vector (2n); `answer`, n, is the stiffness per area with which the bodies answer an error of the gap.
 ///
 /// Where bodies fall far, the origin keeps the digits of every iterate, but the gap is data with the digits that it has. Layer and bodies answer an
 /// error of the gap like springs in series, 1/(1/kappa + 1/answer). In Newton's method pressures are in equilibrium, the bodies answer with their
@@ -328,7 +242,7 @@ pub(super) fn pressure_roundoff(model: &Model, trace: &[f64], layer: &Layer, ans
     let roundoff = compression_roundoff(model, trace);
     let error = |q: usize| in_series(layer.tangent[q], answer[q]) * roundoff[q];
     let most = (0..roundoff.len()).filter(|&q| layer.pressure[q] > 0.0).map(error).fold(0.0, f64::max);
-    if most > 0.0 { most / peak } else { 0.0 }
+    if most > 0.0 { 2.0 * most / peak } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -400,9 +314,9 @@ mod tests {
         assert!(exact.is_bound);
         // a further step that closes the points by 0.01, -0.03, 0 and 0.02
         let more = step(vec![0.01, -0.01, 0.0, 0.0, 0.0, -0.02, 0.0, 0.02], 0.05, 0.1);
-        close(exact.add_rounding((&scale, 5.0), &more, &places, &places), (0.06 / all).sqrt());
-        close(exact.error, ((2.0 * gap).sqrt() + 0.06f64.sqrt()) / all.sqrt());
-        close(exact.pressure, 0.1 + 0.04 / 4.0);
+        exact.add_unbalanced((&scale, 5.0), &more, &places, &places);
+        close(exact.error, ((2.0 * gap).sqrt() + 2.0 * 0.06f64.sqrt()) / all.sqrt());
+        close(exact.pressure, 0.1 + 2.0 * 0.04 / 4.0);
     }
 
     /// The law p = 4 c, and an open point, whose law has zero pressure at any c < 0.

@@ -5,17 +5,17 @@
 //! element, no mesh and no PETSc. Where a function says nothing else, its errors are failures of the solver library; not converging is a [`Status`].
 
 mod bound;
+mod forcing;
 pub mod gamma;
 mod newton;
-mod progress;
 pub mod robin;
 mod run;
 mod solve;
 mod start;
+mod step;
 mod stop;
 
-pub use bound::Reached;
-pub use newton::{resisting, respond};
+pub use forcing::respond;
 pub use run::{Observer, Row, Silent};
-pub use solve::{InitialGuess, Method, Outcome, Settings, State, first_springs, solve};
-pub use stop::{Discretisation, Inaccuracy, SHARE, Status, Whose};
+pub use solve::{InitialGuess, Method, Outcome, Settings, Solution, first_springs, solve};
+pub use stop::{Inaccuracy, Status};

@@ -43,6 +43,9 @@ const PROXIMAL: f64 = 1e-9;
 /// Most Newton steps; random scenes and walls of 4096 bricks take 2 to 20.
 const STEPS: usize = 200;
 
+/// Accuracy of line searches, relative to the first slope. A step is only a way to the next, and the energy falls with any accuracy below one.
+pub(super) const SEARCH: f64 = 1e-3;
+
 /// Return the start of a model. If a trace is `given` (2n), the surfaces of the rigid bodies are displaced by it. These displacements count as
 /// shapes, not as motions.
 ///
@@ -58,7 +61,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     let mut ground = motions.blocks();
     let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
     sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
-    let mut rigid = Rigid { model, motions: &motions, work, slope, gap, ground, balanced: PART };
+    let mut rigid = Rigid { model, motions: &motions, work, slope, gap, ground };
     let mut amounts = DVector::zeros(motions.count());
     if !amounts.is_empty() {
         // first with rho0 of whole surfaces, then with rho0 of the contact that was found
@@ -86,22 +89,6 @@ pub fn at(model: &Model, trace: &[f64]) -> Layer {
     at_approach(model, &model.compression(trace), &surface_slopes(model))
 }
 
-/// Return the amounts by which the motions have to move states (c, p), n each, until the pressures of the laws, resolved on lines of slope `rho` (n),
-/// balance the loads to a tolerance; none if nothing stops a motion.
-pub fn balance(
-    model: &Model,
-    motions: &Motions,
-    [compression, pressure]: [&[f64]; 2],
-    rho: &[f64],
-    tolerance: f64,
-) -> Option<DVector<f64>> {
-    let gap = compression.iter().zip(pressure).zip(rho).map(|((c, p), rho)| -c - p / rho).collect();
-    let (work, slope) = (motions.loads(), rho.to_vec());
-    Rigid { model, motions, work, slope, gap, ground: motions.blocks(), balanced: tolerance }
-        .descend(DVector::zeros(motions.count()))
-        .ok()
-}
-
 /// Return the layer states at the approach s of rigid surfaces, n, whose springs have the stiffness `slope`, n: those with c + p/slope = s.
 fn at_approach(model: &Model, approach: &[f64], slope: &[f64]) -> Layer {
     Layer::resolve(model, approach, &vec![0.0; approach.len()], slope, &[])
@@ -119,8 +106,6 @@ struct Rigid<'a> {
     gap: Vec<f64>,
     /// Stiffness of the springs to the ground that resist the motions, one block a body.
     ground: Blocks,
-    /// Forces out of balance that count as zero, relative to the acting forces.
-    balanced: f64,
 }
 
 impl Rigid<'_> {
@@ -163,7 +148,7 @@ impl Rigid<'_> {
             let acting = self.motions.sizes(&places.force);
             let pull = self.ground.multiply(&amounts);
             let lacking = &self.work - &push - &pull;
-            let zero = |i: usize| self.balanced * (acting[i].max(self.work[i].abs()).max(PART * largest));
+            let zero = |i: usize| PART * (acting[i].max(self.work[i].abs()).max(PART * largest));
             if (0..lacking.len()).all(|i| lacking[i].abs() <= zero(i)) {
                 break;
             }
@@ -183,7 +168,7 @@ impl Rigid<'_> {
                 dot(&force, &closing) + first_slope + t * resisted
             };
             let first = dot(&places.force, &closing) + first_slope;
-            match field::zero(slope, first, 1e-3) {
+            match field::zero(slope, first, SEARCH) {
                 Ok(t) => amounts += t * &step,
                 Err(Unbounded) if gains => return Err(step),
                 // no load works on this way, and the energy of layers that push less and less is bounded below by zero

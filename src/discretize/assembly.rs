@@ -59,8 +59,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             let load = mesh.load.all(mesh.space.nodes.len());
             let (name, exact) = (info.name.clone(), spec.exact.clone());
             let (mesh, elasticity) = (mesh.clone(), elasticity.clone());
-            let post =
-                OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len(), load, nodes: info.nodes };
+            let post = OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len(), load };
             post.check_exact()?;
             info.points = post.points();
             info.post = Some(Box::new(post) as Box<dyn Post>);

@@ -1,9 +1,8 @@
 //! What all ranks have of a body: the arrays of the model, and the facts that reports need.
 
 use super::post::Post;
-use super::supports::axis_vector;
-use super::whole::{NO_WORK, WholeBody};
-use crate::contact::{self, ContactPair};
+use super::whole::WholeBody;
+use crate::contact::ContactPair;
 use crate::fem;
 use crate::linalg::dot;
 use crate::mesh::BodyCheck;
@@ -34,12 +33,6 @@ pub struct BodyInfo {
     pub left_by_all: Vec<String>,
     /// Warning for the user about the elasticity.
     pub warning: Option<String>,
-    /// Stiffness of the body against a uniform contact pressure, per area. It is the modulus over the depth, which is the area
-    /// (volume) over the length (area) of its contact surfaces. It is zero if supports leave the body a motion that contact
-    /// resists.
-    pub stiffness: f64,
-    /// Sum of the loads, zero where it is rounding. In a body of revolution radial forces are added as if they had one direction.
-    pub load: [f64; 3],
     /// Rank that owns the body or, if it is distributed, most of it.
     pub rank: usize,
     /// Ranks that have a part of the body.
@@ -85,7 +78,7 @@ impl<const D: usize> WholeBody<'_, D> {
             depth,
             row_stiffness: Vec::new(),
         };
-        (slot, self.info(checked, plane, modulus, depth))
+        (slot, self.info(checked, plane))
     }
 
     /// Return the trace on the contact rows of the rigid motion that supports impose.
@@ -94,17 +87,9 @@ impl<const D: usize> WholeBody<'_, D> {
         mesh.imposed.as_ref().map_or_else(|| vec![0.0; mesh.rows.rows()], |motion| self.trace(motion))
     }
 
-    fn info(&self, checked: &BodyCheck, plane: Plane, modulus: f64, depth: f64) -> BodyInfo {
+    fn info(&self, checked: &BodyCheck, plane: Plane) -> BodyInfo {
         let (part, unresisted) = (&self.part, self.unresisted());
         let spec = part.spec;
-        let is_held = self.motions.len() == unresisted.len() && depth.is_finite();
-        // Loads that balance, as a pressure in a closed ring does, leave rounding, which counts as zero.
-        let mut load = part.mesh.load.sum();
-        for (c, sum) in load.iter_mut().enumerate().take(D) {
-            let [work, largest] = part.mesh.load.works(|_| axis_vector(c));
-            *sum = if work.abs() <= NO_WORK * largest { 0.0 } else { *sum };
-        }
-        part.mesh.rigid_forces().for_each(|(_, force)| contact::add(&mut load, fem::pad(force)));
         BodyInfo {
             name: spec.name.value.clone(),
             datum: fem::pad(part.mesh.space.datum),
@@ -117,8 +102,6 @@ impl<const D: usize> WholeBody<'_, D> {
             left_by_supports: part.mesh.left.iter().map(|motion| motion.name.clone()).collect(),
             left_by_all: unresisted,
             warning: part.locking(plane),
-            stiffness: if is_held { modulus / depth } else { 0.0 },
-            load,
             rank: self.owner,
             ranks: self.ranks.clone(),
             supports: spec.fix.iter().map(|support| support.on.value.clone()).collect(),

@@ -1,8 +1,8 @@
-//! What follows from the displacement of a body: stresses, strains, internal forces and energies, and its error against a known one.
+//! What follows from the displacement of a body: stresses, strains, and its error against a known one.
 
-use super::elasticity::{Elasticity, Material};
-use super::space::{CellPoint, Slope, Space};
-use super::{assemble, element};
+use super::elasticity::Elasticity;
+use super::element;
+use super::space::{Slope, Space};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::Matrix3;
@@ -222,107 +222,10 @@ pub fn norms_of_error<const D: usize>(
     squares.map(|sum| Norms { l2: sum.l2.sqrt(), h1: sum.h1.sqrt(), energy: sum.energy.sqrt() })
 }
 
-/// The internal forces of the cells of a body on its nodes, and the scales that these forces are compared with.
-///
-/// They check the results of solvers that use assembled matrices. Therefore they share with assembly only the integration points and
-/// Hooke's law.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Internal {
-    /// K u, one entry a dof.
-    pub force: Vec<f64>,
-    /// Bound of the rounding errors in `force`, one entry a node.
-    pub rounding: Vec<f64>,
-    /// Bound of the diagonal entries of K, one entry a node.
-    pub diagonal: Vec<f64>,
-    /// Integral of the norm of Hooke's law, shared among the nodes of each cell, one entry a node.
-    pub bulk: Vec<f64>,
-}
-
-/// Visit the integration points of some cells, which are those of [`assemble::stiffness`]. A cell that cannot be integrated is skipped,
-/// since assembly has already failed on it.
-fn visit<const D: usize>(
-    space: &Space<D>,
-    elasticity: &Elasticity,
-    cells: impl Iterator<Item = usize>,
-    mut each: impl FnMut(&CellPoint<D>, &Material),
-) {
-    let rules = assemble::Rules::new::<D>(space.order);
-    for index in cells {
-        let _ = assemble::visit(space, elasticity, &rules, index, &mut each);
-    }
-}
-
-/// Return the internal forces of some cells for a displacement `u`, one entry a dof. They are complete at nodes all of whose cells are
-/// visited.
-///
-/// A force is a sum over stresses, each stress is a sum over strains, and each strain is a sum over displacements. A sum of n terms has a
-/// rounding error of at most n eps times the sum of their sizes. The bound is therefore eps times the lengths of all three sums times
-/// the sizes.
-pub fn internal_forces<const D: usize>(
-    space: &Space<D>,
-    elasticity: &Elasticity,
-    cells: impl Iterator<Item = usize>,
-    u: &[f64],
-) -> Internal {
-    let count = space.nodes.len();
-    let zero = || vec![0.0; count];
-    let mut sums = Internal { force: vec![0.0; D * count], rounding: zero(), diagonal: zero(), bulk: zero() };
-    let mut terms = zero();
-    visit(space, elasticity, cells, |point, material| {
-        point.cell.iter().for_each(|&node| terms[node as usize] += 1.0);
-        sums.add(space, point, material, u);
-    });
-    // A strain has D * stride terms, a stress has six, and a force has D for each integration point.
-    let inner = (D * space.stride + 6 + D) as f64;
-    sums.rounding.iter_mut().zip(terms).for_each(|(rounding, terms)| *rounding *= f64::EPSILON * (inner + terms));
-    sums
-}
-
-impl Internal {
-    /// Add the forces and bounds of an integration point; `rounding` is still without the factor of eps and the lengths of sums.
-    fn add<const D: usize>(&mut self, space: &Space<D>, point: &CellPoint<D>, material: &Material, u: &[f64]) {
-        let size = |v: &[f64]| v.iter().map(|v| v.abs()).sum::<f64>();
-        let stress = material.stress(&point.slope(u).strain());
-        let stiffness = point.weight * material.norm();
-        let slope = |a: usize| size(&point.gradient[a]) + space.hoop(&point.at, point.phi[a]).abs();
-        let size_of_strain = |(a, &node): (usize, &u32)| slope(a) * size(&u[D * node as usize..][..D]);
-        let strains: f64 = point.cell.iter().enumerate().map(size_of_strain).sum();
-        for (a, &node) in point.cell.iter().enumerate() {
-            let node = node as usize;
-            let force = point.force(&stress, a);
-            (0..D).for_each(|c| self.force[D * node + c] += point.weight * force[c]);
-            self.rounding[node] += stiffness * slope(a) * strains;
-            self.diagonal[node] += stiffness * slope(a).powi(2);
-            self.bulk[node] += stiffness / space.stride as f64;
-        }
-    }
-}
-
-/// Return the products v_i'K v_j of n displacements, with one entry a dof each, over some cells: an n x n matrix by rows.
-pub fn energy_products<const D: usize>(
-    space: &Space<D>,
-    elasticity: &Elasticity,
-    cells: impl Iterator<Item = usize>,
-    fields: &[Vec<f64>],
-) -> Vec<f64> {
-    let n = fields.len();
-    let mut products = vec![0.0; n * n];
-    visit(space, elasticity, cells, |point, material| {
-        let strains: Vec<[f64; 6]> = fields.iter().map(|u| point.slope(u).strain()).collect();
-        for (i, strain) in strains.iter().enumerate() {
-            let stress = material.stress(strain);
-            (0..n).for_each(|j| products[n * i + j] += point.weight * dot(&stress, &strains[j]));
-        }
-    });
-    products
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::fem::space::sample::block;
-    use crate::fem::{Frame, NodeGraph};
-    use crate::problem::{BodySpec, Plane};
 
     #[test]
     fn invariants_of_a_stress() {
@@ -352,42 +255,6 @@ mod tests {
             assert_eq!((still.most, still.measure[0]), (0.0, 0.0));
             let both = still.with(found);
             assert_eq!((both.most, both.measure[0]), (found.most, found.measure[0]));
-        }
-    }
-
-    /// Check that the assembled matrix gives the same forces, and that its entries lie below the bounds.
-    fn same_as_matrix<const D: usize>(order: Order, plane: Plane) {
-        let mut space = block::<D>(2, order);
-        space.axisymmetric = plane == Plane::Axisymmetric;
-        space.nodes.iter_mut().for_each(|x| x[0] += 1.0);
-        let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
-        let elasticity = Elasticity::new(&[&spec], Vec::new(), D, plane).expect("a material");
-        let graph = NodeGraph::new(&space, &[], &Frame::default());
-        let matrix = assemble::stiffness(&space, &graph, &Frame::default(), &elasticity).expect("a matrix");
-        let u: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.7).sin()).collect();
-        let v: Vec<f64> = (0..space.dofs()).map(|i| (i as f64 * 0.3).cos()).collect();
-        let mut expected = vec![0.0; u.len()];
-        matrix.multiply(&u, &mut expected);
-        let found = internal_forces(&space, &elasticity, 0..space.cell_count(), &u);
-        for (i, (force, expected)) in found.force.iter().zip(&expected).enumerate() {
-            assert!((force - expected).abs() <= 2.0 * found.rounding[i / D], "{i}: {force} {expected}");
-            assert!(matrix.diagonal(i) <= found.diagonal[i / D] && found.rounding[i / D] < 1e-8);
-        }
-        let fields = [u, v];
-        let products = energy_products(&space, &elasticity, 0..space.cell_count(), &fields);
-        for (j, field) in fields.iter().enumerate() {
-            assert!((products[j] - dot(&expected, field)).abs() < 1e-12 * products[0]);
-        }
-        assert!((products[1] - products[2]).abs() < 1e-12 * products[0]);
-    }
-
-    #[test]
-    fn internal_forces_are_those_of_the_matrix() {
-        for order in [Order::P1, Order::P2] {
-            for plane in [Plane::Strain, Plane::Stress, Plane::Axisymmetric] {
-                same_as_matrix::<2>(order, plane);
-            }
-            same_as_matrix::<3>(order, Plane::Strain);
         }
     }
 }

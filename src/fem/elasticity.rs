@@ -447,11 +447,6 @@ impl Material {
         }
     }
 
-    /// Return the largest row sum of the absolute entries of C, which is no less than its largest eigenvalue.
-    pub fn norm(&self) -> f64 {
-        self.stiffness.0.iter().map(|row| row.iter().map(|c| c.abs()).sum()).fold(0.0, f64::max)
-    }
-
     /// Return the stress (xx yy zz xy yz xz) of a strain (xx yy zz, and 2 eps of xy yz xz) (2).
     pub fn stress(&self, strain: &[f64; 6]) -> [f64; 6] {
         std::array::from_fn(|i| (0..6).map(|j| self.stiffness.0[i][j] * strain[j]).sum())

@@ -12,10 +12,6 @@ pub struct Energy {
     pub strain: f64,
     /// u'Ku/2 - f'u.
     pub potential: f64,
-    /// Squared length |r|^2 of the equilibrium residual.
-    pub rest: f64,
-    /// Squared lengths |f|^2 + |K u|^2 of the forces in it.
-    pub forces: f64,
 }
 
 /// The outcome of a solve G z = r.
@@ -107,8 +103,9 @@ pub trait Body {
     /// energies of u.
     fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
 
-    /// Return the estimated size of the rounding errors e in [`Body::residual`], as the square of |e|_{diag(G)^-1}.
-    fn rounding(&self, u: &[f64], force: &[f64]) -> f64;
+    /// Return the squared energy norm of forces r at the dofs of a state, taken for each dof alone: r'D^-1 r with the diagonal D of
+    /// K + B' diag(`springs`) B, for `springs` at each row.
+    fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64;
 
     /// Compute y = K u, for a body that has not given its K away.
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]);

@@ -105,8 +105,6 @@ pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, 
     for energy in energies {
         sum.strain += energy.strain;
         sum.potential += energy.potential;
-        sum.rest += energy.rest;
-        sum.forces += energy.forces;
     }
     (all, sum)
 }
@@ -122,6 +120,15 @@ pub fn residuals(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>,
         (r, energy)
     };
     products.into_iter().enumerate().map(of_body).unzip()
+}
+
+/// Return the squared energy norm of unbalanced forces r of the local bodies, taken for each dof alone: r'D^-1 r with the diagonal D of
+/// K + B' diag(`springs`) B, for springs omega kappa at the points (n). The caller adds the sums of all ranks.
+pub fn unbalanced(model: &Model, r: &[Vec<f64>], springs: &[f64]) -> f64 {
+    let of_body = |(index, slot): (usize, &BodySlot)| {
+        slot.local.as_ref().map_or(0.0, |body| body.unbalanced(&r[index], &model.at_rows(index, springs)))
+    };
+    model.bodies.iter().enumerate().map(of_body).sum()
 }
 
 /// Add B' `force` to y for every local body, for forces at the points (n).
@@ -161,11 +168,6 @@ impl<'a> LineEnergy<'a> {
         Self { model, compression: &layer.compression, closing, slope, curvature: sums[1] }
     }
 
-    /// Return v'K v.
-    pub fn curvature(&self) -> f64 {
-        self.curvature
-    }
-
     /// Return d/dt F1(u + t v).
     pub fn derivative(&self, t: f64) -> f64 {
         let mut sum = self.slope + t * self.curvature;
@@ -179,19 +181,6 @@ impl<'a> LineEnergy<'a> {
             }
         }
         // a law that leaves the range of numbers resists with an infinite force
-        if sum.is_nan() { f64::INFINITY } else { sum }
-    }
-
-    /// Return F1(u + t v) - F1(u); infinite beyond the range of numbers.
-    pub fn change(&self, t: f64) -> f64 {
-        let mut sum = t * (self.slope + 0.5 * t * self.curvature);
-        for (i, pair) in self.model.pairs.iter().enumerate() {
-            for q in self.model.range(i) {
-                let energy = |c: f64| pair.law.response(q - self.model.offset[i], c).energy;
-                let c = self.compression[q];
-                sum += self.model.weight[q] * (energy(c + t * self.closing[q]) - energy(c));
-            }
-        }
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 

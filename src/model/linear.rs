@@ -109,9 +109,4 @@ pub trait LinearStep {
     fn describe(&self) -> String {
         String::new()
     }
-
-    /// Return estimated bounds of the spectrum of the preconditioned matrix, if the solver has made enough iterations for an estimate.
-    fn spectrum(&self) -> Option<(f64, f64)> {
-        None
-    }
 }

@@ -173,6 +173,12 @@ impl Model {
         self.weight.iter().zip(pressure).map(|(weight, pressure)| weight * pressure).collect()
     }
 
+    /// Return the compressions of the layers, n, that carry these pressures, n.
+    pub fn compressions_of(&self, pressure: &[f64]) -> Vec<f64> {
+        let points = (0..self.pairs.len()).flat_map(|i| self.range(i).map(move |q| (i, q)));
+        points.map(|(i, q)| self.pairs[i].law.compression(q - self.offset[i], pressure[q])).collect()
+    }
+
     /// Return the stiffness of the nodes under every contact row, as a trace vector (2n).
     pub fn row_stiffness(&self) -> Vec<f64> {
         let mut all = vec![0.0; 2 * self.points()];

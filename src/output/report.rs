@@ -18,12 +18,12 @@ pub struct Report {
     pub ranks: usize,
     /// Title of the scene.
     pub title: String,
-    /// Status at the end of the run: `converged`, `roundoff-limited`, `iteration-limit`, `not-finite`, `out-of-range`, `cycle`,
-    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`; `running` in a snapshot.
+    /// Status at the end of the run: `converged`, `roundoff-limited`, `stagnated`, `iteration-limit`, `not-finite`, `out-of-range`,
+    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
-    /// Method of the last step: `robin`, `ncg`, `anderson`, `newton-robin`, `newton`.
+    /// Method of the last step: `robin`, `newton-robin`, `newton`.
     pub method: String,
     /// Solver of the linear steps of all bodies together, such as `cg + hypre`; empty if each body had its own solver.
     pub linear_step: String,
@@ -47,8 +47,6 @@ pub struct Report {
     pub factorizations_avoided: usize,
     /// Solves of one body, those of the start included.
     pub body_solves: usize,
-    /// Solves of one body that were skipped because its data did not change.
-    pub body_solves_skipped: usize,
     /// Changes of a body's Robin term.
     pub robin_updates: usize,
     /// Robin terms that did not change, so that no factorisation was needed.
@@ -70,16 +68,12 @@ pub struct Report {
     /// Possible error of a pressure from rounding of gaps and displacements, relative to the largest pressure. The errors above do
     /// not include it.
     pub rounding: Option<f64>,
-    /// Errors that the last look at the result found; none if a run has no result.
-    pub last_look: Option<LookReport>,
+    /// Energy norm of the forces f - K u - B' omega p of each node alone, computed with K itself, relative to the energy of bodies and layers.
+    pub unbalanced: Option<f64>,
     /// Estimated errors of the discretisation, if requested.
     pub discretization_error: Option<EstimateReport>,
     /// Adapted meshes, one after another.
     pub rounds: Vec<RoundReport>,
-    /// Estimated bounds of the spectrum of G^-1 F1''.
-    pub spectrum: Option<[f64; 2]>,
-    /// Forecast of further iterations.
-    pub forecast: Option<ForecastReport>,
     /// Interval (33) of gamma, if requested.
     pub gamma_interval: Option<IntervalReport>,
     /// Relative increment of the last update, the largest of the bodies.
@@ -117,19 +111,6 @@ pub struct Report {
     pub files: Vec<String>,
 }
 
-/// The forecast of further iterations from the spectrum and the observed rate of the method.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct ForecastReport {
-    /// Factor by which an iteration reduces the residual in the long run.
-    pub factor: f64,
-    /// Iterations from the result to the requested residual; null if it is never reached.
-    pub iterations: Option<f64>,
-    /// The best stationary gamma, 2/(lowest + highest of the spectrum), if there are bounds.
-    pub best_gamma: Option<f64>,
-    /// The factor of `robin` with that gamma.
-    pub best_factor: Option<f64>,
-}
-
 /// The intervals of gamma by theorem 3 on the level set of the start. They begin at zero, which is excluded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct IntervalReport {
@@ -152,23 +133,6 @@ pub struct InnerTimes {
     pub first: f64,
     /// Solves.
     pub solve: f64,
-}
-
-/// The relative errors that the last look found, which sums the forces anew from the displacements of a result. They are lower bounds.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct LookReport {
-    /// Error in the energy norm; null if it is not finite, like the others.
-    pub error: Option<f64>,
-    /// Error of the pressures, relative to the largest.
-    pub pressure: Option<f64>,
-    /// Out-of-balance force of a body, relative to its contact forces.
-    pub imbalance: Option<f64>,
-    /// The body or the bodies with the largest of these errors.
-    pub at: Vec<String>,
-    /// Number of cells in the sums.
-    pub cells: usize,
-    /// Wall seconds.
-    pub seconds: f64,
 }
 
 /// Estimated relative errors of the discretisation.
@@ -293,8 +257,6 @@ pub struct PairReport {
     pub points: usize,
     /// Surface on whose mesh the contact points lie.
     pub carrier: String,
-    /// Estimated coupling theta of each side (docs/theory.md).
-    pub theta: [f64; 2],
     /// Facets of the carrier without a partner.
     pub facets_uncovered: usize,
     /// Pieces of the carrier without common points because the search failed. A warning names their position.

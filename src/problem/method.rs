@@ -28,11 +28,9 @@ keys! {
             ///
             /// It is the interval (33).
             pub interval: bool = false,
-            /// earlier steps that `anderson` mixes
-            pub depth: usize = 5,
             /// how linear steps are solved; chosen by the program without it
             pub linear: Option<Linear> = None,
-            /// start of the iteration: "auto", "zero", "nested" or { normal = 1e-4 }
+            /// start of the iteration: "auto", "zero" or { normal = 1e-4 }
             pub start: Start = Start::Auto,
             /// load steps: a number, shares that end with 1, or a table
             pub steps: History = History::default(),
@@ -63,10 +61,6 @@ words! {
         Auto = "auto",
         /// The paper's iteration (41)-(42).
         Robin = "robin",
-        /// Nonlinear conjugate gradients over the sweep.
-        Ncg = "ncg",
-        /// Anderson acceleration of the sweep.
-        Anderson = "anderson",
         /// Newton's method with linear steps by conjugate gradients over the sweep.
         NewtonRobin = "newton-robin",
         /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
@@ -100,22 +94,13 @@ pub enum Gamma {
     LineSearch,
     /// Aitken's rule.
     Aitken,
-    /// The rule of Barzilai and Borwein.
-    BarzilaiBorwein,
-    /// The best stationary value for the estimated spectrum.
-    Spectral,
     /// The rule of this name from a Rust program ([`Scene::rule`](crate::scene::Scene::rule)).
     Own(String),
 }
 
 impl Gamma {
     /// All rules of the program with their names in the scene.
-    pub const NAMED: [(&'static str, Gamma); 4] = [
-        ("line-search", Gamma::LineSearch),
-        ("aitken", Gamma::Aitken),
-        ("barzilai-borwein", Gamma::BarzilaiBorwein),
-        ("spectral", Gamma::Spectral),
-    ];
+    pub const NAMED: [(&'static str, Gamma); 2] = [("line-search", Gamma::LineSearch), ("aitken", Gamma::Aitken)];
 }
 
 /// The start of the iteration, given on the contact surfaces.
@@ -125,8 +110,6 @@ pub enum Start {
     Auto,
     /// Zero normal displacement.
     Zero,
-    /// The solution on a mesh of elements twice as large.
-    Nested,
     /// Outer normal displacement on every contact surface.
     Normal(Field),
 }
@@ -171,10 +154,6 @@ keys! {
             ///
             /// Tolerance of the relative increment of normal displacements, in every body.
             pub increment: Option<f64> = None,
-            /// whether a tenth of the mesh's error is enough
-            ///
-            /// The run then stops where the error of the iteration is a tenth of the error of the discretisation.
-            pub balanced: bool = false,
             /// most iterations
             pub iterations: usize = 2000,
         }
@@ -199,11 +178,7 @@ impl Setting for StopRule {
     }
 
     fn echo(&self, dimension: usize) -> Json {
-        let mut entries = self.entries(dimension);
-        if !self.balanced {
-            entries.remove("balanced");
-        }
-        entries.into()
+        self.entries(dimension).into()
     }
 }
 
@@ -270,7 +245,6 @@ impl Setting for MethodSpec {
         entries.retain(|key, _| match key.as_str() {
             "gamma" => is_robin,
             "interval" => is_robin && self.interval,
-            "depth" => self.name == MethodName::Anderson,
             _ => true,
         });
         entries.into()
@@ -364,13 +338,13 @@ impl Setting for Zone {
 
 impl Setting for Start {
     fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Word(vec!["auto", "zero", "nested"]), start_shape().into()])
+        ValueKind::Either(vec![ValueKind::Word(vec!["auto", "zero"]), start_shape().into()])
     }
 
     fn read(node: &Node, context: &Context) -> Result<Self> {
         if let Value::String(_) = node.value {
-            let all = "it is \"auto\", \"zero\", \"nested\" or { normal = 1e-4 }";
-            let starts = [("auto", Self::Auto), ("zero", Self::Zero), ("nested", Self::Nested)];
+            let all = "it is \"auto\", \"zero\" or { normal = 1e-4 }";
+            let starts = [("auto", Self::Auto), ("zero", Self::Zero)];
             return choose(node, "start", &starts).map_err(|error| error.help(all));
         }
         let keys = Keys::open(node, &start_shape())?;
@@ -381,7 +355,6 @@ impl Setting for Start {
         match self {
             Self::Auto => json!("auto"),
             Self::Zero => json!("zero"),
-            Self::Nested => json!("nested"),
             Self::Normal(normal) => json!({ "normal": normal.echo(dimension) }),
         }
     }

@@ -6,6 +6,5 @@ pub mod spectrum;
 pub mod sweep;
 mod sweeps;
 
-pub use spectrum::Ritz;
-pub use sweep::{Coefficient, Sweep, Sweeper, prepare};
+pub use sweep::{Coefficient, Sweep, prepare};
 pub use sweeps::Sweeps;

@@ -2,214 +2,116 @@
 //! a trace extended into every body.
 
 use crate::error::{Error, Result};
-use crate::exchange::{self, ASKS, Exchange, asks};
-use crate::linalg::{Blocks, axpy, dot};
-use crate::model::body::{Body, Energy};
-use crate::model::field::{Field, residuals};
+use crate::exchange::{self, ASKS, asks};
+use crate::linalg::{Blocks, dot};
+use crate::model::Model;
+use crate::model::body::Energy;
+use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
 use crate::model::rigid::{Moved, TOLERANCE, combined};
-use crate::model::{BodySlot, Model};
 use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
-// Positions of the numbers that a body adds to the message of a sweep.
-const DECREMENT: usize = 0;
-const STRAIN: usize = 1;
-const POTENTIAL: usize = 2;
-const FAILED: usize = 3;
-const SKIPPED: usize = 4;
-const FACTORIZATIONS: usize = 5;
-const INNER_ITERATIONS: usize = 6;
-const PRODUCT: usize = 7;
-
-/// How many numbers these are.
-const SCALARS: usize = 8;
-
-/// Result of a sweep at an iterate: G z = r in every body.
+/// Result of a sweep at an iterate: G z = r in every body. Numbers are sums over all bodies and ranks.
 #[derive(Debug, Clone, Default)]
 pub struct Sweep {
     /// r of each body that lives on this rank.
     pub residual: Vec<Vec<f64>>,
     /// z.
     pub correction: Field,
-    /// r'z = r'G^-1 r of each body.
-    pub decrement: Vec<f64>,
-    /// Energies of the iterate in each body.
-    pub energy: Vec<Energy>,
-    /// The first body whose inner solver failed, with the reason if this rank knows it.
-    pub failed: Option<Failure>,
-    /// Numeric factorisations so far, all bodies.
-    pub factorizations: usize,
-    /// Krylov iterations so far, all bodies.
-    pub inner_iterations: usize,
-    /// Requests from outside, of all ranks (see [`exchange::asked`]).
-    pub asked: u8,
+    /// r'z = r'G^-1 r.
+    pub decrement: f64,
+    /// u'Ku of the iterate.
+    pub strain: f64,
+    /// u'Ku/2 - f'u of the iterate.
+    pub potential: f64,
     /// y'z for another residual y, if one was given.
     pub product: f64,
-    /// Whether each body was open: no pressure and no Robin term.
-    open: Vec<bool>,
+    /// Numeric factorisations so far.
+    pub factorizations: usize,
+    /// Krylov iterations so far.
+    pub inner_iterations: usize,
+    /// The first body whose inner solver failed, with the reason if this rank knows it.
+    pub failed: Option<Failure>,
+    /// Requests from outside, of all ranks (see [`exchange::asked`]).
+    pub asked: u8,
 }
 
-/// Makes sweeps, and reuses results that are known without a solve.
+/// Numbers in the message of a sweep, besides traces, failures and requests.
+const SUMS: usize = 6;
+
+/// Makes sweeps, and counts them.
 #[derive(Debug, Default, Clone)]
 pub struct Sweeper {
     /// Sweeps made.
     pub sweeps: usize,
-    /// Solves of a body that were not needed.
-    pub solves_skipped: usize,
-}
-
-/// What a sweep solves: G z = `residual` in every body.
-struct Task<'a> {
-    /// r of each body that lives on this rank.
-    residual: Vec<Vec<f64>>,
-    /// z of each body where it is known without a solve.
-    known: Vec<Option<Vec<f64>>>,
-    /// Energies of the iterate in each body.
-    energies: Vec<Energy>,
-    /// The residual y of the product y'z. A sweep that is given one serves as a preconditioner.
-    other: Option<&'a [Vec<f64>]>,
-    /// Requests from outside, of this rank.
-    asked: u8,
 }
 
 impl Sweeper {
-    /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`. The model carries the Robin term `weight` = omega psi kappa of the
-    /// contact rows (2n). `last` is the sweep that led here, with its relaxation gamma. The requests `asked` of this rank go with the message.
-    ///
-    /// A body without pressure and Robin term, now and in the last sweep, has r = (1 - gamma) r_last and the same G. Its z is known without a
-    /// solve, as long as rounding is far below r.
-    pub fn sweep(
-        &mut self,
-        model: &mut Model,
-        iterate: &Field,
-        layer: &Layer,
-        weight: &[f64],
-        last: Option<(&Sweep, f64)>,
-        asked: u8,
-    ) -> Result<Sweep> {
-        let open: Vec<bool> = (0..model.bodies.len()).map(|index| is_open(model, index, layer, weight)).collect();
-        let (residual, energies) = residuals(model, iterate, &layer.force);
-        let known = |index: usize| {
-            let (last, gamma) = last.filter(|(last, _)| open[index] && last.open[index])?;
-            known_correction(model, index, &residual[index], last, 1.0 - gamma)
-        };
-        let known = (0..model.bodies.len()).map(known).collect();
-        let mut sweep = self.solve(model, Task { residual, known, energies, other: None, asked })?;
-        sweep.open = open;
-        Ok(sweep)
+    /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`, with the Robin term that the model carries. The requests `asked` of this rank go with
+    /// the message.
+    pub fn sweep(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, asked: u8) -> Result<Sweep> {
+        let (residual, energy) = residual(model, iterate, &layer.force);
+        self.solve(model, residual, energy, None, asked)
     }
 
     /// Apply G^-1 to any residual as a preconditioner; the result keeps the residual. `product` of the result is `other`'z.
     pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
-        let bodies = model.bodies.len();
-        let (known, energies) = (vec![None; bodies], vec![Energy::default(); bodies]);
-        self.solve(model, Task { residual, known, energies, other: Some(other), asked: 0 })
+        self.solve(model, residual, Energy::default(), Some(other), 0)
     }
 
-    /// Solve in every body that lives on this rank, and sum the results over the ranks.
-    fn solve(&mut self, model: &mut Model, mut task: Task) -> Result<Sweep> {
-        let (bodies, rows) = (model.bodies.len(), 2 * model.points());
-        // one message: the traces, SCALARS numbers of each body, and the requests
-        let end = rows + SCALARS * bodies;
-        let mut message = vec![0.0; end + ASKS];
-        message[end..].copy_from_slice(&asks(task.asked));
-        let mut states = Vec::with_capacity(bodies);
-        let mut reasons = vec![String::new(); bodies];
-        for index in 0..bodies {
-            let slot = &mut model.bodies[index];
-            let Some(body) = slot.local.as_mut() else {
-                states.push(Vec::new());
-                continue;
-            };
-            let scalars = &mut message[rows + SCALARS * index..][..SCALARS];
-            let z = task.solve_body(index, body, scalars, &mut reasons[index])?;
-            let mut trace = vec![0.0; slot.row_stiffness.len()];
-            body.states().trace(&z, &mut trace);
-            model.put(index, &trace, &mut message[..rows]);
-            states.push(z);
-        }
-        model.exchange.sum(&mut message);
-        let mut sweep = Sweep { residual: task.residual, asked: exchange::asked(&message[end..]), ..Sweep::default() };
-        self.collect(&mut sweep, &message[rows..end], &reasons);
-        message.truncate(rows);
-        sweep.correction = Field { states, trace: message };
-        Ok(sweep)
-    }
-
-    /// Take the sums of the bodies' numbers, [`SCALARS`] a body, into the result, and count the sweep.
-    fn collect(&mut self, sweep: &mut Sweep, sums: &[f64], reasons: &[String]) {
-        for (index, scalars) in sums.chunks_exact(SCALARS).enumerate() {
-            sweep.decrement.push(scalars[DECREMENT]);
-            sweep.energy.push(Energy { strain: scalars[STRAIN], potential: scalars[POTENTIAL], ..Energy::default() });
-            if scalars[FAILED] != 0.0 && sweep.failed.is_none() {
-                sweep.failed = Some(Failure { body: Some(index), reason: reasons[index].clone() });
-            }
-            self.solves_skipped += usize::from(scalars[SKIPPED] != 0.0);
-            sweep.factorizations += scalars[FACTORIZATIONS] as usize;
-            sweep.inner_iterations += scalars[INNER_ITERATIONS] as usize;
-            sweep.product += scalars[PRODUCT];
-        }
-        self.sweeps += 1;
-    }
-}
-
-impl Task<'_> {
-    /// Return z of a body. Its numbers for the message go to `scalars`; if its inner solver fails, the cause goes to `reason`.
-    fn solve_body(
+    /// Solve in every body that lives on this rank, and sum the results over the ranks in one message. With `other` the solves are those of a preconditioner.
+    fn solve(
         &mut self,
-        index: usize,
-        body: &mut dyn Body,
-        scalars: &mut [f64],
-        reason: &mut String,
-    ) -> Result<Vec<f64>> {
-        let r = &self.residual[index];
-        let known = self.known[index].take();
-        let is_skipped = known.is_some();
-        let mut z = known.unwrap_or_else(|| vec![0.0; r.len()]);
-        if !is_skipped {
-            let solved = if self.other.is_some() { body.precondition(r, &mut z)? } else { body.solve(r, &mut z)? };
+        model: &mut Model,
+        residual: Vec<Vec<f64>>,
+        energy: Energy,
+        other: Option<&[Vec<f64>]>,
+        asked: u8,
+    ) -> Result<Sweep> {
+        let (bodies, mut reasons) = (model.bodies.len(), vec![String::new(); model.bodies.len()]);
+        let mut correction = Field::zero(model);
+        let (mut sums, mut failed) = ([0.0; SUMS], vec![0.0; bodies]);
+        (sums[1], sums[2]) = (energy.strain, energy.potential);
+        for index in 0..bodies {
+            let Some(body) = model.bodies[index].local.as_mut() else { continue };
+            let (r, z) = (&residual[index], &mut correction.states[index]);
+            let solved = if other.is_some() { body.precondition(r, z)? } else { body.solve(r, z)? };
             if let Some(failure) = solved.failure {
-                *reason = failure;
-                scalars[FAILED] = 1.0;
+                (failed[index], reasons[index]) = (1.0, failure);
+            }
+            sums[0] += dot(r, z);
+            sums[3] += other.map_or(0.0, |other| dot(&other[index], z));
+            // a body that is distributed over several ranks counts once
+            if body.states().leads() {
+                let counts = body.counts();
+                sums[4] += counts.factorizations as f64;
+                sums[5] += counts.inner_iterations as f64;
             }
         }
-        scalars[DECREMENT] = dot(r, &z);
-        scalars[STRAIN] = self.energies[index].strain;
-        scalars[POTENTIAL] = self.energies[index].potential;
-        scalars[PRODUCT] = self.other.map_or(0.0, |other| dot(&other[index], &z));
-        // a body that is distributed over several ranks counts once
-        if body.states().leads() {
-            let counts = body.counts();
-            scalars[SKIPPED] = f64::from(is_skipped);
-            scalars[FACTORIZATIONS] = counts.factorizations as f64;
-            scalars[INNER_ITERATIONS] = counts.inner_iterations as f64;
-        }
-        Ok(z)
+        correction.trace_here(model);
+        let mut message = [&correction.trace[..], &sums, &failed, &asks(asked)].concat();
+        model.exchange.sum(&mut message);
+        let rest = message.split_off(correction.trace.len());
+        correction.trace = message;
+        let (sums, rest) = rest.split_at(SUMS);
+        let (failed, asked) = rest.split_at(bodies);
+        let failed = failed.iter().position(|&failed| failed != 0.0);
+        self.sweeps += 1;
+        Ok(Sweep {
+            residual,
+            correction,
+            decrement: sums[0],
+            strain: sums[1],
+            potential: sums[2],
+            product: sums[3],
+            factorizations: sums[4] as usize,
+            inner_iterations: sums[5] as usize,
+            failed: failed.map(|body| Failure { body: Some(body), reason: std::mem::take(&mut reasons[body]) }),
+            asked: exchange::asked(&asked[..ASKS]),
+        })
     }
-}
-
-/// Whether a body has neither pressure nor Robin term.
-fn is_open(model: &Model, body: usize, layer: &Layer, weight: &[f64]) -> bool {
-    let (force, springs) = (model.at_rows(body, &layer.force), model.of_body(body, weight));
-    force.iter().chain(&springs).all(|&value| value == 0.0)
-}
-
-/// Return z = `factor` z_last of a body that lives on this rank, if r = `factor` r_last to rounding. Collective for a distributed body.
-fn known_correction(model: &Model, index: usize, r: &[f64], last: &Sweep, factor: f64) -> Option<Vec<f64>> {
-    let body = model.bodies[index].local.as_ref()?;
-    // |r - factor r_last|^2 and |r|^2
-    let difference = r.iter().zip(&last.residual[index]).map(|(r, last)| (r - factor * last).powi(2)).sum();
-    let mut sums = [difference, dot(r, r)];
-    if body.states().distribution.is_some() {
-        model.exchange.sum(&mut sums);
-    }
-    (sums[0] <= 1e-12 * sums[1]).then(|| {
-        let mut z = vec![0.0; body.states().size()];
-        axpy(factor, &last.correction.states[index], &mut z);
-        z
-    })
 }
 
 /// The zone and the rule of the Robin term, with the weights that a frozen rule keeps.
@@ -325,24 +227,16 @@ fn springs(model: &Model, body: usize, weight: &[f64]) -> DMatrix<f64> {
 /// Springs of the constraint B u = t over the stiffness of the nodes under them: half the digits of a number are left to the body.
 const STIFF: f64 = 1e4;
 
-/// Steps of the augmented Lagrangian method; each gains a factor of about `STIFF` over the surface's compliance.
+/// Sweeps of the augmented Lagrangian method; each gains a factor of about [`STIFF`] over the surface's compliance.
 const STEPS: usize = 4;
 
-/// Give every body that lives on this rank the Robin term of its extension, and set its solver up. A refusal of the solver or of an option
-/// then comes before the first sweep, and the extension needs no other factorisation.
+/// Give every body the Robin term of its extension, and set its solver up. A refusal of the solver or of an option then comes before the first sweep, and
+/// the extension needs no other factorisation.
 pub fn prepare(model: &mut Model) -> Result<()> {
-    for index in 0..model.bodies.len() {
-        let springs = extension_springs(&model.bodies[index]);
-        if let Some(body) = model.bodies[index].local.as_mut() {
-            body.robin(&springs)?;
-            body.set_up()?;
-        }
-    }
-    Ok(())
-}
-
-fn extension_springs(slot: &BodySlot) -> Vec<f64> {
-    slot.row_stiffness.iter().map(|k| STIFF * k).collect()
+    let springs: Vec<f64> = model.row_stiffness().iter().map(|k| STIFF * k).collect();
+    model.robin(&springs)?;
+    let mut bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+    bodies.try_for_each(|body| body.set_up())
 }
 
 /// Return the iterate with the given trace (2n). Values at rows that a support prescribes are ignored. Collective.
@@ -351,79 +245,31 @@ fn extension_springs(slot: &BodySlot) -> Vec<f64> {
 /// Failures of the solver library.
 ///
 /// The sweep (41) depends on the iterate through its traces only, so a start is a trace. The extension minimises the energy of the body among
-/// all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every step
-/// the error shrinks by the ratio of the two stiffnesses.
+/// all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every sweep
+/// the error shrinks by the ratio of the two stiffnesses. A start that closes no contact must not close any by its error.
 pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Field, Failure>> {
-    let mut iterate = Field { states: Vec::new(), trace: vec![0.0; trace.len()] };
-    let mut failed = vec![0.0; model.bodies.len()];
-    let mut reasons = vec![String::new(); model.bodies.len()];
-    for index in 0..model.bodies.len() {
-        let target = model.of_body(index, trace);
-        let slot = &mut model.bodies[index];
-        let springs = extension_springs(slot);
-        let Some(body) = slot.local.as_mut() else {
-            iterate.states.push(Vec::new());
-            continue;
-        };
-        let Extension { state, rows, failure } = extend_body(body, &*model.exchange, &springs, &target)?;
-        model.put(index, &rows, &mut iterate.trace);
-        iterate.states.push(state);
-        if let Some(reason) = failure {
-            failed[index] = 1.0;
-            reasons[index] = reason;
+    let springs: Vec<f64> = model.row_stiffness().iter().map(|k| STIFF * k).collect();
+    model.robin(&springs)?;
+    let (mut iterate, without_contact) = (Field::rest(model), vec![0.0; model.points()]);
+    let mut multiplier = vec![0.0; trace.len()];
+    for _ in 0..STEPS {
+        let (mut r, energy) = residual(model, &iterate, &without_contact);
+        let apart = trace.iter().zip(&iterate.trace).map(|(target, trace)| target - trace);
+        let pull: Vec<f64> =
+            apart.zip(&springs).zip(&multiplier).map(|((apart, spring), held)| spring * apart + held).collect();
+        for (index, r) in r.iter_mut().enumerate() {
+            let Some(body) = model.bodies[index].local.as_ref() else { continue };
+            body.states().add_rows(1.0, &model.of_body(index, &pull), r);
+            body.states().balance(r);
+        }
+        let sweep = Sweeper::default().solve(model, r, energy, None, 0)?;
+        if let Some(failure) = sweep.failed {
+            return Ok(Err(failure));
+        }
+        iterate.add(1.0, &sweep.correction);
+        for (q, held) in multiplier.iter_mut().enumerate() {
+            *held += springs[q] * (trace[q] - iterate.trace[q]);
         }
     }
-    // one message: traces, then which inner solvers failed
-    let mut message = [&iterate.trace[..], &failed[..]].concat();
-    model.exchange.sum(&mut message);
-    let failed = message.split_off(trace.len());
-    iterate.trace = message;
-    Ok(match failed.iter().position(|&failed| failed != 0.0) {
-        Some(body) => Err(Failure { body: Some(body), reason: std::mem::take(&mut reasons[body]) }),
-        None => Ok(iterate),
-    })
-}
-
-/// The extension of a trace into one body.
-struct Extension {
-    state: Vec<f64>,
-    /// B u of the state.
-    rows: Vec<f64>,
-    /// Why the inner solver failed last, if it did.
-    failure: Option<String>,
-}
-
-/// Extend the trace `target` of a body, with springs of this stiffness at its contact rows. Collective for a distributed body.
-fn extend_body(body: &mut dyn Body, exchange: &dyn Exchange, springs: &[f64], target: &[f64]) -> Result<Extension> {
-    body.robin(springs)?;
-    let mut u = body.states().rest();
-    let [mut r, mut z, mut product] = [(); 3].map(|()| vec![0.0; u.len()]);
-    let [mut rows, mut multiplier, mut force] = [(); 3].map(|()| vec![0.0; springs.len()]);
-    let (mut first, mut failure) = (None, None);
-    for step in 0..STEPS {
-        body.states().trace(&u, &mut rows);
-        if body.states().distribution.is_some() {
-            exchange.sum(&mut rows);
-        }
-        let mut violation = 0.0f64;
-        for q in 0..rows.len() {
-            let difference = if springs[q] > 0.0 { rows[q] - target[q] } else { 0.0 };
-            violation = violation.max(difference.abs());
-            if step > 0 {
-                multiplier[q] += springs[q] * difference;
-            }
-            force[q] = multiplier[q] + springs[q] * difference;
-        }
-        // the interior is in equilibrium from the first solve on
-        if first.is_some_and(|first: f64| violation <= 1e-9 * first) {
-            break;
-        }
-        first.get_or_insert(violation.max(f64::MIN_POSITIVE));
-        body.apply_stiffness(&u, &mut product);
-        body.residual(&u, &product, &force, &mut r);
-        failure = body.solve(&r, &mut z)?.failure.or(failure);
-        axpy(1.0, &z, &mut u);
-    }
-    body.states().trace(&u, &mut rows);
-    Ok(Extension { state: u, rows, failure })
+    Ok(Ok(iterate))
 }

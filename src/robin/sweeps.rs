@@ -32,7 +32,6 @@ pub struct Sweeps {
     coefficient: Option<Coefficient>,
     sweeper: Sweeper,
     systems: usize,
-    spectrum: Option<(f64, f64)>,
     /// Least eigenvalue found in any system so far.
     least: f64,
 }
@@ -45,7 +44,7 @@ impl Sweeps {
 
     /// Return a solver that takes the Robin term that the bodies carry.
     pub fn with_robin_term() -> Self {
-        Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, spectrum: None, least: f64::INFINITY }
+        Self { coefficient: None, sweeper: Sweeper::default(), systems: 0, least: f64::INFINITY }
     }
 }
 
@@ -67,7 +66,6 @@ impl LinearStep for Sweeps {
             Ok(found) => found,
             Err(failure) => return Ok(Err(failure)),
         };
-        self.spectrum = found.spectrum.or(self.spectrum);
         self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
         let LinearSolution { energy, error, .. } = found.solution;
         if self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
@@ -85,10 +83,6 @@ impl LinearStep for Sweeps {
 
     fn sweeps(&self) -> usize {
         self.sweeper.sweeps
-    }
-
-    fn spectrum(&self) -> Option<(f64, f64)> {
-        self.spectrum
     }
 }
 
@@ -117,7 +111,7 @@ pub(super) fn gradients(
         if let Some(failure) = sweep.failed {
             return Ok(Err(failure));
         }
-        let rz: f64 = sweep.decrement.iter().sum();
+        let rz = sweep.decrement;
         let lanczos = &state.lanczos;
         let error = lanczos.squared_error(rz);
         let trial = Trial { closing: &state.x.closing(), energy: lanczos.energy, error: error.max(0.0).sqrt() };

@@ -199,7 +199,7 @@ impl<'a> SolverFactory<'a> {
             let step = match self.method {
                 _ if joined => StepSolver::Joined,
                 MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => StepSolver::Swept,
-                MethodName::Robin | MethodName::Ncg | MethodName::Anderson => StepSolver::Sweeps,
+                MethodName::Robin => StepSolver::Sweeps,
             };
             let graphs: Vec<_> = outlines.iter().map(|outline| (outline.graph)()).collect();
             let candidates = plans.iter().zip(&graphs).map(|(plan, graph)| {

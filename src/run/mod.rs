@@ -4,7 +4,6 @@
 //! Errors are failures of the solver library, but for what functions say of their own.
 
 pub mod inner;
-pub mod look;
 pub mod phases;
 pub mod recorder;
 pub mod report;

@@ -6,9 +6,8 @@ use super::recorder::{self, Recorder};
 use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
 use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
-use crate::ddm::gamma::{self, Relaxed};
-use crate::ddm::robin::{Acceleration, Anderson, Conjugate};
-use crate::ddm::{self, InitialGuess, Method, Outcome, Status, first_springs};
+use crate::ddm::gamma;
+use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
 use crate::discretize::{self, Verified, point};
 use crate::error::{Error, Kind, Result, few};
 use crate::estimate::{self, Estimate};
@@ -135,7 +134,7 @@ where
         scene.method.steps.apply(step, &mut bodies);
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
-        let keep = scene.estimate || scene.method.stop.balanced || scene.adapt.is_some();
+        let keep = scene.estimate || scene.adapt.is_some();
         let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
@@ -150,7 +149,7 @@ where
         let mut warnings = warnings::of_problem(session, &discrete);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
-        let mut built = Built {
+        let built = Built {
             scene: scene.clone(),
             discrete,
             splits: verified.splits(),
@@ -164,9 +163,6 @@ where
             warnings,
             legs: None,
         };
-        let pairs = 0..built.discrete.model.pairs.len();
-        let swapped: Vec<String> = pairs.filter_map(|i| warnings::swapped_table(&built, i)).collect();
-        built.warnings.extend(swapped);
         Ok(built)
     }
 
@@ -217,7 +213,7 @@ fn verified<const D: usize>(
 pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clock) -> Result<Prepared> {
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
-    let Begin { start, steps, earlier } = begin;
+    let Begin { start, steps } = begin;
     let mut start = match start {
         Some(start) => start,
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
@@ -237,7 +233,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
         options::show_help(session)?;
     }
     clock.phase("set-up");
-    Ok(Prepared { built, method, start, steps, earlier, warnings })
+    Ok(Prepared { built, method, start, steps, earlier: Vec::new(), warnings })
 }
 
 /// Iterate. From here on a signal ends the run after the current step, so that its results are written.
@@ -247,7 +243,11 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
 pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     interrupt.hold();
     let mut done = match ready.built.scene.method.steps.is_empty() {
-        true => recorder::solve(ready, true, keep),
+        true => recorder::solve(ready, true, keep).inspect(|done| {
+            if matches!(done.outcome.status, Status::Interrupted { .. }) {
+                keep.state(done);
+            }
+        }),
         false => steps::iterate(ready, keep, clock),
     }?;
     warnings::note_ends(&mut done);
@@ -281,8 +281,7 @@ pub fn targets(scene: &Scene) -> String {
     let stop = &scene.method.stop;
     let rules = [("residual", stop.residual), ("increment", stop.increment)];
     let rules = rules.iter().filter_map(|(name, value)| value.map(|value| format!("{name} <= {value:e}")));
-    let balanced = stop.balanced.then(|| format!("error <= {} of the discretisation's", ddm::SHARE));
-    rules.chain(balanced).collect::<Vec<_>>().join(" or ")
+    rules.collect::<Vec<_>>().join(" or ")
 }
 
 /// Return whether the problem of the run before serves a scene that differs in the method alone: all bodies are condensed, and linear steps
@@ -290,7 +289,7 @@ pub fn targets(scene: &Scene) -> String {
 fn serves(last: &Built, scene: &Scene) -> bool {
     let both = [&*last.scene, scene];
     // an estimate of the error needs the meshes, which are kept only for it
-    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate || scene.method.stop.balanced);
+    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate);
     // how linear steps are solved was chosen for the method
     let [old_joint, new_joint] = both.map(|scene| {
         let MethodSpec { name, linear, .. } = &scene.method;
@@ -350,17 +349,13 @@ fn keys_and_values(mut contents: Value) -> Vec<(String, String)> {
 /// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
 /// automatic start, it is stored in `start`.
 fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
-    let (scene, coefficient) = (built.scene.clone(), coefficient_of(&built.scene));
-    let acceleration: Box<dyn Acceleration> = match scene.method.name {
-        MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => {
-            return linear_step(session, built, start).map(Method::Newton);
-        }
-        MethodName::Robin => Box::new(Relaxed::new(gamma::rule(&scene.method.gamma, &scene.rules)?)),
-        MethodName::Ncg => Box::new(Conjugate::default()),
-        MethodName::Anderson => Box::new(Anderson::new(scene.method.depth)),
-    };
+    let scene = built.scene.clone();
+    if scene.method.name != MethodName::Robin {
+        return linear_step(session, built, start).map(Method::Newton);
+    }
+    let rule = gamma::rule(&scene.method.gamma, &scene.rules)?;
     crate::robin::prepare(&mut built.discrete.model)?;
-    Ok(Method::Sweeps { acceleration, coefficient, linear: Box::new(Sweeps::with_robin_term()) })
+    Ok(Method::Robin { rule, coefficient: coefficient_of(&scene), linear: Box::new(Sweeps::with_robin_term()) })
 }
 
 fn coefficient_of(scene: &Scene) -> Coefficient {

@@ -1,18 +1,18 @@
 //! The report and the contact tables of a run, from its outcome.
 
-use super::stages::{All, Built, Clock, Done, Look};
-use super::verdict::{self, forecast, message, status_name};
+use super::stages::{All, Built, Clock, Done};
+use super::verdict::{self, message, status_name};
 use super::{results, warnings};
 use crate::contact::ContactPair;
-use crate::ddm::{Outcome, Reached, Row, Status, Whose};
+use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::few;
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
 use crate::model::{BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, LookReport, PairReport,
-    Report, UnstructuredGrid, sci,
+    BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
+    UnstructuredGrid,
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
@@ -27,9 +27,6 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     report.messages = model.exchange.messages();
     report.memory_of_ranks = all_gather(&*model.exchange, clock.memory.clone());
     report.steps = done.steps.clone();
-    if let Some(look) = &done.look {
-        add_look(&mut report, look_report(look, discrete, model), &outcome.status);
-    }
     report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
     report.warnings.extend(too_large);
@@ -49,9 +46,6 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
         .warnings
         .extend(reactions.filter_map(|(_, (info, balance))| warnings::of_fixed(&info.name, balance, digits)));
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
-    if let Some(message) = lost_digits(done) {
-        add_lost_digits(&mut report, message, &outcome.status);
-    }
     report
 }
 
@@ -62,8 +56,6 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
     report.message = message(outcome, model);
     report.method = outcome.method.to_owned();
     report.linear_step = outcome.linear_step.clone();
-    report.spectrum = outcome.spectrum.map(|(low, high)| [low, high]);
-    report.forecast = forecast(outcome);
     report.gamma_interval = outcome.interval.map(|interval| IntervalReport {
         theorem: Some(interval.theorem()).filter(|&end| end > 0.0),
         descent: interval.descent(),
@@ -71,16 +63,21 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
         upper: interval.upper,
     });
     // the iterates of other runs are no approximations of a solution
-    let is_measured = matches!(outcome.status, Status::IterationLimit | Status::Paused { .. } | Status::Inaccurate(_))
-        || outcome.status.is_solved();
+    let is_measured = matches!(
+        outcome.status,
+        Status::IterationLimit | Status::Stagnated | Status::Interrupted { .. } | Status::Inaccurate(_)
+    ) || outcome.status.is_solved();
     let measured = last.filter(|_| is_measured);
     // a relative error of one or more leaves no digit, and then the bound has none either
-    let is_bound = |row: &&Row| row.is_bound && row.residual < 1.0;
+    let is_inaccurate = matches!(outcome.status, Status::Inaccurate(_));
+    let is_bound = |row: &&Row| row.is_bound && row.residual < 1.0 && !is_inaccurate;
     report.error_bound = measured.filter(is_bound).and_then(|row| finite(row.error));
     report.error_estimate = measured
         .filter(|row| !is_bound(row))
-        .and_then(|row| finite(if row.is_bound { row.residual } else { row.error }));
+        .and_then(|row| finite(if row.is_bound { row.residual } else { row.error }))
+        .map(|error| error.max(outcome.unbalanced));
     report.rounding = finite(outcome.rounding);
+    report.unbalanced = finite(outcome.unbalanced);
     report.residual = last.and_then(|row| finite(row.residual));
     report.increment = last.and_then(|row| finite(row.increment));
     report.f1 = last.and_then(|row| finite(row.energy));
@@ -97,7 +94,6 @@ fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcom
     report.sweeps = outcome.sweeps;
     report.smoothed_steps = outcome.rows.last().map_or(0, |row| row.smoothed);
     report.body_solves = counts.solves;
-    report.body_solves_skipped = outcome.solves_skipped;
     report.inner_iterations = counts.inner_iterations + joint.inner_iterations;
     report.factorizations = counts.factorizations + joint.factorizations;
     report.factorizations_avoided = counts.factorizations_avoided;
@@ -114,66 +110,6 @@ fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcom
         solve: counts.solve_seconds + joint.solve_seconds,
     };
 }
-
-/// Add the last look at a result. If it found a larger error than the iteration, that error replaces the bound or estimate, as an
-/// estimate.
-fn add_look(report: &mut Report, found: LookReport, status: &Status) {
-    let error = report.error_bound.or(report.error_estimate);
-    let is_more = |found: f64| error.map_or(matches!(status, Status::Inaccurate(_)), |error| found > error);
-    if found.error.is_some_and(is_more) {
-        (report.error_bound, report.error_estimate) = (None, found.error);
-    }
-    report.last_look = Some(found);
-}
-
-/// Put the message that few digits are left for the pressures into the report.
-fn add_lost_digits(report: &mut Report, message: String, status: &Status) {
-    match status {
-        Status::Converged | Status::RoundoffLimited => {
-            (report.status, report.message) = (status_name(&Status::RoundoffLimited).to_owned(), message);
-        }
-        Status::IterationLimit | Status::Cycle { .. } => {
-            report.message = format!("not converged in {} iterations: {message}", report.iterations);
-        }
-        _ => {}
-    }
-}
-
-fn look_report(look: &Look, discrete: &Discrete, model: &Model) -> LookReport {
-    let at = match look.whose {
-        Whose::Body(body) => vec![body],
-        Whose::Pair(pair) => model.pairs[pair].bodies.to_vec(),
-        Whose::Rounding => Vec::new(),
-    };
-    let Reached { error, pressure, imbalance, .. } = look.reached;
-    LookReport {
-        error: finite(error),
-        pressure: finite(pressure),
-        imbalance: finite(imbalance),
-        at: at.into_iter().map(|body| model.bodies[body].name.clone()).collect(),
-        cells: discrete.bodies.iter().map(|body| body.cells).sum(),
-        seconds: look.seconds,
-    }
-}
-
-/// Return a message if displacements that are far larger than the deformations leave few digits for the pressures. It appears when
-/// rounding exceeds ten times the tolerances of the run and of its inner solvers.
-fn lost_digits(done: &Done) -> Option<String> {
-    let stop = &done.built.scene.method.stop;
-    let reached = done.outcome.rows.last().map(|row| row.error).filter(|error| stop.balanced && error.is_finite());
-    let tolerance = [stop.residual, stop.increment, reached].into_iter().flatten().fold(INNER, f64::max);
-    let pressure = done.outcome.rounding;
-    (pressure > 10.0 * tolerance).then(|| {
-        format!(
-            "the displacements are so large beside what compresses the layers that few digits are left for the pressures, which may be off \
-             by {} of their peak: begin with a smaller gap, let supports move bodies less, or take softer layers",
-            sci(pressure, 1)
-        )
-    })
-}
-
-/// Default relative tolerance of an inner solver.
-const INNER: f64 = 1e-6;
 
 /// Return the part of the report that is known before the first sweep. `solvers` are the inner solvers of the bodies in words.
 pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Clock) -> Report {
@@ -288,7 +224,6 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let sides = discrete.sides(i);
-    let coupling = results::coupling(&done.built, i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
         surfaces: discrete.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
@@ -296,7 +231,6 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         contact: discrete.contacts[i].spec.table,
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
-        theta: sides.map(|side| coupling.theta[side]),
         facets_uncovered: pair.uncovered(),
         pieces_lost: pair.lost.map_or(0, |lost| lost.pieces),
         facets_averaged: pair.averaged(),

@@ -1,5 +1,5 @@
 //! Results from the displacements of the bodies: largest stresses and strains with their positions, errors against a known solution, forces,
-//! approach and contact size of each pair, and reactions and balance of each body. Before the first sweep there are estimates ([`coupling`]).
+//! approach and contact size of each pair, and reactions and balance of each body.
 
 use super::numbered;
 use super::stages::{All, Built, Done, Recovered};
@@ -9,14 +9,13 @@ use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{length, minus};
-use crate::linalg::{around, bounds, dot};
+use crate::linalg::{around, bounds};
 use crate::model::{Body, BodySlot};
 use crate::output::report::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ReactionReport, StepPairReport, StepReport, sci,
 };
 use crate::problem::history::History;
-use crate::problem::method::Gamma;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
@@ -386,71 +385,4 @@ fn balance(info: &BodyInfo, numbers: &[f64]) -> BalanceReport {
 fn imbalance(vectors: impl Iterator<Item = [f64; 3]> + Clone, size: f64) -> f64 {
     let sum = |c: usize| vectors.clone().map(|vector| vector[c]).sum::<f64>();
     if size > 0.0 { length([0, 1, 2].map(sum)) / size } else { 0.0 }
-}
-
-/// The estimates for a pair.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CouplingEstimate {
-    /// Mean pressure that the loads give.
-    pub pressure: f64,
-    /// theta of side a and side b.
-    pub theta: [f64; 2],
-    /// Expected sweeps to a relative residual of 1e-8, by method. The number is infinite where the estimate predicts no
-    /// convergence.
-    pub sweeps: Vec<(&'static str, f64)>,
-}
-
-/// Logarithm ln(1e8) of the reduction of the residual in the estimates.
-const DIGITS: f64 = 18.42;
-
-/// Return the coupling of pair `i`.
-pub fn coupling(built: &Built, i: usize) -> CouplingEstimate {
-    let Built { scene, discrete, .. } = built;
-    let pair = &discrete.model.pairs[i];
-    let area: f64 = pair.weight.iter().sum();
-    let pressure =
-        pair.bodies.map(|body| pressing(pair, discrete.bodies[body].load)).into_iter().fold(0.0, f64::max) / area;
-    let tangent = tangent_at(pair, pressure);
-    let theta = pair.bodies.map(|body| {
-        let stiffness = discrete.bodies[body].stiffness;
-        if tangent == 0.0 { 0.0 } else { tangent / (stiffness + tangent) }
-    });
-    let both = (theta[0] * theta[1]).sqrt();
-    let gamma = match scene.method.gamma {
-        Gamma::Stationary(gamma) => gamma,
-        _ => 1.0,
-    };
-    let factor = (1.0 - gamma * (1.0 - both)).abs().max((1.0 - gamma * (1.0 + both)).abs());
-    let relaxed = if factor < 1.0 { (DIGITS / -factor.ln()).max(2.0) } else { f64::INFINITY };
-    let condition = (1.0 + both) / (1.0 - both);
-    let gradients = if both < 1.0 { (0.5 * condition.sqrt() * (DIGITS + 0.7)).max(2.0) } else { f64::INFINITY };
-    let sweeps = vec![("robin", relaxed), ("ncg", gradients), ("newton-robin", 1.5 * gradients + 5.0), ("newton", 6.0)];
-    CouplingEstimate { pressure, theta, sweeps }
-}
-
-/// Return the part of a load that presses the surface of a pair: along the mean normal where the surface faces one way, and the whole
-/// load where its normals turn around, as those of a pin in a hole do.
-///
-/// On a flat surface the load along the mean normal is the mean of |n.F|. Where it is less than half of that mean, the normals cancel.
-fn pressing(pair: &ContactPair, load: [f64; 3]) -> f64 {
-    let mean = |value: &dyn Fn(&[f64; 3]) -> f64| {
-        pair.weight.iter().zip(&pair.normal).map(|(weight, normal)| weight * value(normal)).sum::<f64>()
-            / pair.weight.iter().sum::<f64>()
-    };
-    let along_each = mean(&|normal| dot(&load, normal).abs());
-    let size = dot(&load, &load).sqrt();
-    // A load across all normals leaves rounding along them, which is treated as zero.
-    if along_each <= f64::EPSILON.sqrt() * size {
-        return 0.0;
-    }
-    let normal: [f64; 3] = std::array::from_fn(|c| mean(&|normal| normal[c]));
-    let along_mean = dot(&load, &normal).abs() / dot(&normal, &normal).sqrt().max(f64::MIN_POSITIVE);
-    if along_mean < 0.5 * along_each { size } else { along_mean }
-}
-
-/// Return the tangent p' of the layer at the pair's first point where it carries `pressure`. The result is zero for a pressure
-/// that the layer cannot reach.
-fn tangent_at(pair: &ContactPair, pressure: f64) -> f64 {
-    let compression = pair.law.compression(0, pressure);
-    if compression > 0.0 && compression.is_finite() { pair.law.response(0, compression).tangent } else { 0.0 }
 }

@@ -1,9 +1,8 @@
 //! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock that measures its phases.
 
-use crate::ddm::{Discretisation, InitialGuess, Method, Outcome, Reached, Row, Whose};
+use crate::ddm::{InitialGuess, Method, Outcome, Row};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::{Error, Result};
-use crate::estimate::Nodal;
 use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
 use crate::model::{BodySlot, Model};
@@ -58,8 +57,6 @@ pub struct Begin {
     pub start: Option<InitialGuess>,
     /// Earlier load steps.
     pub steps: Vec<StepReport>,
-    /// Iteration rows of the earlier load steps.
-    pub earlier: Vec<Row>,
 }
 
 /// A problem that is prepared for its first iteration, with the method set up and a start.
@@ -68,7 +65,7 @@ pub struct Prepared {
     pub built: Built,
     /// The method with its solvers, all set up.
     pub method: Method,
-    /// The start. Each load step determines its own, except for one that another process has begun.
+    /// The start. Each load step determines its own, unless it goes on from another solution.
     pub start: InitialGuess,
     /// Earlier load steps.
     pub steps: Vec<StepReport>,
@@ -78,35 +75,27 @@ pub struct Prepared {
     pub warnings: Vec<String>,
 }
 
-/// A run that has ended, with or without a solution, or has paused.
+/// A run that has ended, with or without a solution.
 pub struct Done {
     /// The problem.
     pub built: Built,
     /// The method in its last state.
     pub method: Method,
-    /// The outcome. That of a paused load step is in the units of the step.
+    /// The outcome.
     pub outcome: Outcome,
     /// Factor of the loads and prescribed displacements to which the outcome belongs.
     pub share: f64,
     /// Load steps so far.
     pub steps: Vec<StepReport>,
-    /// Iteration rows of the load steps before a paused one.
+    /// Iteration rows of the load steps before.
     pub earlier: Vec<Row>,
     /// Warnings on the set-up.
     pub warnings: Vec<String>,
     /// Displacements of its bodies, once the run has ended.
     pub recovered: Option<Rc<All>>,
-    /// Errors that the last look found, for a result that may be a solution.
-    pub look: Option<Look>,
 }
 
 impl Built {
-    /// Return the estimator of the discretisation error, if the scene lets the run end by it.
-    pub fn balance(&self) -> Option<Box<dyn Discretisation>> {
-        let meshes = self.discrete.meshes.clone().filter(|_| self.scene.method.stop.balanced);
-        meshes.map(|meshes| Box::new(Nodal(meshes)) as _)
-    }
-
     /// Return the condensed bodies with their counters reset, for other loads, layers or gaps.
     pub fn into_condensed(self) -> Vec<BodySlot> {
         let mut slots = self.discrete.model.bodies;
@@ -161,17 +150,6 @@ pub fn scaled(all: &All, factor: f64) -> All {
         Err(error) => Err(Error::new(error.kind(), error.message())),
     };
     all.iter().map(|recovered| recovered.as_ref().map(scaled)).collect()
-}
-
-/// The errors that the last look found.
-#[derive(Debug, Clone)]
-pub struct Look {
-    /// Relative errors.
-    pub reached: Reached,
-    /// Body or pair with the largest error.
-    pub whose: Whose,
-    /// Wall seconds of the last look.
-    pub seconds: f64,
 }
 
 /// The clock of a run, which measures its phases.

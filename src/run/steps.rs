@@ -12,7 +12,7 @@ use super::stages::{self, All, Begin, Clock, Done, Prepared};
 use super::verdict::{message, status_name};
 use super::warnings;
 use crate::contact::law::{LayerLaw, Scaled};
-use crate::ddm::{InitialGuess, Method, Observer, Outcome, Row, Status};
+use crate::ddm::{InitialGuess, Observer, Outcome, Row, Solution, Status};
 use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::model::{BodyCounts, Field, Layer, Model};
@@ -37,9 +37,9 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
         all.step += 1;
         let (last, factor) = (all.step == history.steps.len(), all.factor);
         scale_loads(&mut ready.built.discrete.model, &all.laws, factor);
-        ready.start = start(ready.start, &mut ready.method, &ready.built.discrete, &scene, [before, factor])?;
+        ready.start = start(ready.start, &ready.built.discrete, &scene, [before, factor])?;
         let mut done = recorder::solve(ready, last, &mut all)?;
-        let interrupted = matches!(done.outcome.status, Status::Paused { .. });
+        let interrupted = matches!(done.outcome.status, Status::Interrupted { .. });
         if interrupted && !last {
             let (step, count) = (all.step, history.steps.len());
             done.warnings.push(format!(
@@ -51,6 +51,9 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
         warnings::note_ends(&mut done);
         all.keep.step(&done, &recovered);
         drop(recovered);
+        if interrupted || !last {
+            all.keep.state(&done);
+        }
         if last || interrupted {
             return Ok(done);
         }
@@ -60,8 +63,10 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
             done.recovered = None;
             (done.outcome, done.share) = (of_step, 1.0);
             scale_loads(&mut done.built.discrete.model, &all.laws, factor);
-            ready = done
-                .go_on(|outcome| if usable { InitialGuess::Resume(outcome.iterate) } else { InitialGuess::Automatic });
+            ready = done.go_on(|Outcome { iterate: field, layer, .. }| match usable {
+                true => InitialGuess::Known(Box::new(Solution { field, compression: layer.compression })),
+                false => InitialGuess::Automatic,
+            });
         } else {
             ready = all.end_leg(done, &of_step, usable, clock)?;
         }
@@ -77,29 +82,25 @@ fn scale_loads(model: &mut Model, laws: &[Rc<dyn LayerLaw>], factor: f64) {
     }
 }
 
-/// Return the start of a step, from the load factors of the previous step and of this one.
-fn start(
-    start: InitialGuess,
-    method: &mut Method,
-    discrete: &Discrete,
-    scene: &Scene,
-    [before, factor]: [f64; 2],
-) -> Result<InitialGuess> {
+/// Return the start of a step, from the load factor in whose units a known solution is, and that of this step.
+fn start(start: InitialGuess, discrete: &Discrete, scene: &Scene, [before, factor]: [f64; 2]) -> Result<InitialGuess> {
     Ok(match start {
-        InitialGuess::Resume(field) => {
-            if let Method::Sweeps { acceleration, .. } = method {
-                acceleration.restart();
-            }
-            InitialGuess::Resume(rescaled(&discrete.model, field, before / factor))
+        InitialGuess::Known(mut solution) => {
+            let ratio = before / factor;
+            solution.compression.iter_mut().for_each(|c| *c *= ratio);
+            solution.field = rescaled(&discrete.model, solution.field, ratio);
+            InitialGuess::Known(solution)
         }
-        paused @ InitialGuess::Continue(_) => paused,
-        InitialGuess::Pressure(pressure) => InitialGuess::Pressure(pressure.into_iter().map(|p| p / factor).collect()),
         _ => discretize::start(scene, discrete, factor)?.into(),
     })
 }
 
 /// Return the displacements multiplied by a ratio, except for the part that supports prescribe, which stays.
 fn rescaled(model: &Model, mut field: Field, ratio: f64) -> Field {
+    if field.states.is_empty() {
+        field.scale(ratio);
+        return field;
+    }
     let rest = Field::rest(model);
     field.add_to(ratio, &rest);
     field.add(-ratio, &rest);
@@ -122,8 +123,6 @@ struct Steps<'a> {
     sweeps: usize,
     /// Newton steps with smoothed laws in the steps before.
     smoothed: usize,
-    /// Body solves skipped in the steps before.
-    skipped: usize,
     /// Wall seconds of the steps before.
     seconds: f64,
     /// Counters of the bodies in the legs before.
@@ -133,8 +132,6 @@ struct Steps<'a> {
 impl<'a> Steps<'a> {
     /// Continue after the steps that another process has solved.
     fn new(keep: &'a mut dyn Recorder, ready: &Prepared) -> Self {
-        ready.earlier.iter().for_each(|row| keep.row(row));
-        let last = ready.earlier.last().cloned().unwrap_or_default();
         let iterations = ready.steps.iter().map(|step| step.iterations).sum();
         Self {
             keep,
@@ -143,10 +140,9 @@ impl<'a> Steps<'a> {
             factor: 1.0,
             step: ready.steps.len(),
             iterations,
-            sweeps: last.sweeps,
-            smoothed: last.smoothed,
-            skipped: 0,
-            seconds: last.seconds,
+            sweeps: 0,
+            smoothed: 0,
+            seconds: 0.0,
             counts: BodyCounts::default(),
         }
     }
@@ -170,7 +166,6 @@ impl<'a> Steps<'a> {
         self.iterations += of_step.iterations;
         self.sweeps += of_step.sweeps;
         self.smoothed += of_step.rows.last().map_or(0, |row| row.smoothed);
-        self.skipped += of_step.solves_skipped;
         self.seconds += of_step.rows.last().map_or(0.0, |row| row.seconds);
     }
 
@@ -183,13 +178,14 @@ impl<'a> Steps<'a> {
         let Discrete { assemblies, assemblies_avoided, .. } = done.built.discrete;
         let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
         // at zero load the ratio p/s is undefined, so there is no warm start
-        let start =
-            (usable && !self.history.is_at_rest(self.step)).then_some(InitialGuess::Pressure(outcome.layer.pressure));
+        let known = || Box::new(Solution { compression: outcome.layer.compression, ..Solution::default() });
+        let start = (usable && !self.history.is_at_rest(self.step)).then(|| InitialGuess::Known(known()));
         let (legs, mut known) = (built.legs.clone(), built.warnings.clone());
         drop(method);
         let condensed = built.into_condensed();
         let Some(legs) = legs else { unreachable!("a history of several legs comes with the way to them") };
-        let mut ready = legs.prepare(self.step, Begin { start, steps, earlier }, condensed, clock)?;
+        let mut ready = legs.prepare(self.step, Begin { start, steps }, condensed, clock)?;
+        (ready.earlier, self.factor) = (earlier, 1.0);
         ready.built.legs = Some(legs);
         ready.built.discrete.assemblies += assemblies;
         ready.built.discrete.assemblies_avoided += assemblies_avoided;
@@ -211,7 +207,6 @@ impl<'a> Steps<'a> {
         let (status, message) = (status_name(&outcome.status), message(outcome, &built.discrete.model));
         outcome.iterations += self.iterations;
         outcome.sweeps += self.sweeps;
-        outcome.solves_skipped += self.skipped;
         outcome.joint += self.counts;
         outcome.rows = earlier.iter().cloned().chain(outcome.rows.iter().map(|row| self.in_scene(row))).collect();
         if self.factor != 1.0 {
@@ -242,17 +237,4 @@ impl Observer for Steps<'_> {
     }
 }
 
-impl Recorder for Steps<'_> {
-    fn state(&mut self, done: &Done) {
-        self.keep.state(done);
-    }
-
-    fn results(&mut self, done: &mut Done) {
-        let paused = done.outcome.clone();
-        self.complete(done);
-        self.keep.results(done);
-        done.steps.pop();
-        (done.outcome, done.share) = (paused, 1.0);
-        scale_loads(&mut done.built.discrete.model, &self.laws, self.factor);
-    }
-}
+impl Recorder for Steps<'_> {}

@@ -3,27 +3,25 @@
 use super::in_words;
 use super::recorder;
 use super::stages::Done;
-use crate::ddm::robin::{best_factor, best_gamma};
-use crate::ddm::{Inaccuracy, Outcome, Status, Whose};
+use crate::ddm::{Inaccuracy, Outcome, Status};
 use crate::error::Kind;
 use crate::model::{Mechanism, Model, Moved};
-use crate::output::{ForecastReport, StepReport, sci};
+use crate::output::{StepReport, sci};
 
 /// Return the name of a status in `report.json`.
 pub fn status_name(status: &Status) -> &'static str {
     match status {
         Status::Converged => "converged",
         Status::RoundoffLimited => "roundoff-limited",
+        Status::Stagnated => "stagnated",
         Status::IterationLimit => "iteration-limit",
         Status::NotFinite { .. } => "not-finite",
         Status::OutOfRange { .. } => "out-of-range",
-        Status::Cycle { .. } => "cycle",
         Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
         Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
         Status::Inaccurate(_) => "inaccurate",
-        Status::Paused { asked } if recorder::signal(*asked).is_some() => "interrupted",
-        Status::Paused { .. } => "running",
+        Status::Interrupted { .. } => "interrupted",
     }
 }
 
@@ -31,7 +29,7 @@ pub fn status_name(status: &Status) -> &'static str {
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
         Status::Converged | Status::RoundoffLimited if step_warnings(&done.steps).is_empty() => 0,
-        Status::Paused { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
+        Status::Interrupted { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
 }
@@ -43,14 +41,17 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
     let other = alternative(outcome);
     match &outcome.status {
         Status::Converged => format!("converged in {k} iteration{}", if k == 1 { "" } else { "s" }),
+        Status::RoundoffLimited if outcome.rounding > 10.0 * residual(outcome) => few_digits(outcome.rounding),
         Status::RoundoffLimited => {
             format!("{} after {k} iterations: rounding allows no less", measure(outcome))
         }
+        Status::Stagnated => format!(
+            "not converged: {} after {k} iterations, the last three of which made no progress: try {other}",
+            measure(outcome)
+        ),
         Status::IterationLimit => format!(
-            "not converged in {k} iterations, {}: allow more (method.stop.iterations{}) or try {}",
-            measure(outcome),
-            outlook(outcome),
-            advice(outcome).unwrap_or_else(|| other.to_owned())
+            "not converged in {k} iterations, {}: allow more (method.stop.iterations) or try {other}",
+            measure(outcome)
         ),
         Status::NotFinite { body } => not_finite(name(body), k, other),
         Status::OutOfRange { energy } => format!(
@@ -58,14 +59,6 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
              and lengths are nearer to 1",
             sci(*energy, 1)
         ),
-        Status::Cycle { period: 1 } => {
-            format!(
-                "the contact stays as it is, and neither residual nor F1 falls (seen in iteration {k}): try {other}"
-            )
-        }
-        Status::Cycle { period } => {
-            format!("the iterates repeat every {period} iterations (seen in iteration {k}): try {other}")
-        }
         Status::Underconstrained(Moved { body, name: motion }) => format!(
             "body `{}`: neither a support nor a spring nor a closed contact holds its {motion} in iteration {k}: add a support, \
              or a start that closes the contact (method.start), or try {other}",
@@ -78,13 +71,10 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             let whose = failure.body.map_or("all bodies".to_owned(), |body| format!("body `{}`", name(&body)));
             format!("{whose}: the inner solver failed in iteration {k}: {reason}")
         }
-        Status::Inaccurate(inaccuracy) => inaccurate(inaccuracy, model),
-        Status::Paused { asked } => {
-            let what = match recorder::signal_name(*asked) {
-                "" => "snapshot".to_owned(),
-                name => format!("interrupted by {name}"),
-            };
-            format!("{what} after {k} iterations, {}", measure(outcome))
+        Status::Inaccurate(Inaccuracy::Roundoff(found)) => few_digits(*found),
+        Status::Inaccurate(Inaccuracy::Unbalanced(found)) => inaccurate(*found, residual(outcome)),
+        Status::Interrupted { asked } => {
+            format!("interrupted by {} after {k} iterations, {}", recorder::signal_name(*asked), measure(outcome))
         }
     }
 }
@@ -132,75 +122,41 @@ fn unbounded(moving: &[Moved], model: &Model) -> String {
 /// Relative error up to which the message on an inaccurate result tells how to accept it: that of a result with three digits.
 const ACCEPTABLE: f64 = 1e-3;
 
-/// Return the message on a result that the last look found to be inaccurate.
-fn inaccurate(Inaccuracy { reported, found, whose }: &Inaccuracy, model: &Model) -> String {
-    let what = match whose {
-        Whose::Body(body) => format!("body `{}`: its forces, summed anew, lack balance", model.bodies[*body].name),
-        Whose::Pair(pair) => {
-            let [a, b] = model.pairs[*pair].bodies.map(|body| &model.bodies[body].name);
-            format!("`{a}` - `{b}`: pressures are not those of the layer at the compressions of the bodies")
-        }
-        Whose::Rounding => {
-            return format!(
-                "few digits are left for the pressures, which rounding may change by {} of their peak: take softer layers, begin with a smaller \
-                 gap, or let supports move bodies less",
-                sci(*found, 1)
-            );
-        }
-    };
+/// Return the message on a result whose forces lack balance by the relative error `found`, where the run saw the error `reported`.
+fn inaccurate(found: f64, reported: f64) -> String {
     // a body with few digits, such as a slender one under a force that is tiny beside the others, has such an error with any solver
-    let accept = if *found < ACCEPTABLE {
-        format!(", or accept it (--set method.stop.residual={})", sci(2.0 * found, 0))
+    let accept = if found < ACCEPTABLE {
+        format!(", or accept it (--set method.stop.residual={})", sci(found, 0))
     } else {
         String::new()
     };
     format!(
-        "{what}: the relative error is {} at least, where the run saw {}: leave options of the inner solver (-ksp_..., -pc_..., -mat_...) and \
-         method.robin at their defaults, take another solver (--set solver=mumps){accept}",
-        sci(*found, 1),
-        sci(*reported, 1)
+        "the forces of the result, computed with the stiffness of the bodies itself, lack balance: the relative error is about {}, where the run \
+         saw {}: leave options of the inner solver (-ksp_..., -pc_..., -mat_...) and method.robin at their defaults, take another solver \
+         (--set solver=mumps){accept}",
+        sci(found, 1),
+        sci(reported, 1)
     )
+}
+
+/// Return the message on pressures that roundoff of gaps and displacements may change by this share of their peak.
+fn few_digits(share: f64) -> String {
+    format!(
+        "the displacements are so large beside what compresses the layers that few digits are left for the pressures, which may be off by {} of \
+         their peak: begin with a smaller gap, let supports move bodies less, or take softer layers",
+        sci(share, 1)
+    )
+}
+
+/// Return the last value of the stopping test.
+fn residual(outcome: &Outcome) -> f64 {
+    outcome.rows.last().map_or(f64::NAN, |row| row.residual)
 }
 
 /// Return the last value of the stopping test with its name.
 fn measure(outcome: &Outcome) -> String {
-    let residual = outcome.rows.last().map_or(f64::NAN, |row| row.residual);
     let name = if outcome.method.starts_with("newton") { "largest relative error" } else { "residual" };
-    format!("{name} {}", sci(residual, 1))
-}
-
-/// Return the forecast of further iterations for the report.
-pub fn forecast(outcome: &Outcome) -> Option<ForecastReport> {
-    let goes_on = matches!(
-        outcome.status,
-        Status::Converged | Status::RoundoffLimited | Status::IterationLimit | Status::Cycle { .. }
-    );
-    let forecast = outcome.forecast.as_ref().filter(|_| goes_on)?;
-    Some(ForecastReport {
-        factor: forecast.factor,
-        iterations: Some(forecast.iterations).filter(|iterations| iterations.is_finite()),
-        best_gamma: outcome.spectrum.map(best_gamma),
-        best_factor: outcome.spectrum.map(best_factor),
-    })
-}
-
-/// Return the remaining iterations in words, as a continuation of the advice to allow more.
-fn outlook(outcome: &Outcome) -> String {
-    match forecast(outcome).map(|forecast| forecast.iterations) {
-        None => String::new(),
-        Some(Some(0.0)) => "; that is enough, but pressures still move or a body lacks balance".to_owned(),
-        Some(None) => "; at this rate no number is enough".to_owned(),
-        Some(Some(more)) => format!("; about {more} more at this rate"),
-    }
-}
-
-/// Return advice for the method `robin` if the spectrum is known.
-fn advice(outcome: &Outcome) -> Option<String> {
-    let spectrum = outcome.spectrum.filter(|_| outcome.method == "robin")?;
-    let (gamma, factor) = (best_gamma(spectrum), best_factor(spectrum));
-    // for a factor near 1, the digits that matter are those of the difference
-    let factor = if factor > 0.99 { format!("1 - {}", sci(1.0 - factor, 1)) } else { format!("{factor:.3}") };
-    Some(format!("--method auto; the best number for method.gamma is {gamma:.2}, a factor of {factor} an iteration"))
+    format!("{name} {}", sci(residual(outcome), 1))
 }
 
 /// Whether a load step has found its solution.

@@ -2,18 +2,17 @@
 //! estimates that are guesses.
 
 use super::in_words;
-use super::results::{coupling, peak};
-use super::stages::{Built, Done};
+use super::results::peak;
+use super::stages::Done;
 use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, LostPieces};
 use crate::discretize::{ContactInfo, Discrete, point};
 use crate::estimate::{Cause, Estimate, softness};
-use crate::linalg::{self, diagonal};
+use crate::linalg;
 use crate::model::Mechanism;
 use crate::output::report::readable;
 use crate::output::{BalanceReport, sci};
 use crate::petsc::Session;
-use crate::problem::LayerSpec;
 use std::f64::consts::PI;
 
 /// Return the warnings about a problem before it is solved.
@@ -209,36 +208,6 @@ fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
             pair.surfaces[0], share, pair.measure
         )
     })
-}
-
-/// Return the warning for pair `i`, if its layer is a table that makes sense as (p, c) alone.
-///
-/// Numbers have no units here, so that two facts of the bodies decide. The stiffness of the layer, p/c at the end of the table, is compared
-/// with that of the stiffer body against a uniform pressure, its modulus over its depth: c/p is nearer to it than p/c. And the table does not
-/// fit: its largest pressure is below the mean pressure of the loads, or without loads its largest compression exceeds the contact surface.
-/// A layer that is really as soft as that has a table which reaches to its loads.
-pub fn swapped_table(built: &Built, i: usize) -> Option<String> {
-    let (pair, contact) = (&built.discrete.model.pairs[i], &built.discrete.contacts[i]);
-    let LayerSpec::Table(points) = &contact.spec.layer else { return None };
-    let &[c, p] = points.last()?;
-    let stiffness = pair.bodies.map(|body| built.discrete.bodies[body].stiffness).into_iter().fold(0.0, f64::max);
-    let distance = |other: f64| (other / stiffness).ln().abs();
-    let load = coupling(built, i).pressure;
-    let fits = if load > 0.0 { load <= p } else { c <= diagonal(&pair.position) };
-    if stiffness == 0.0 || fits || distance(c / p) >= distance(p / c) {
-        return None;
-    }
-    let [a, b] = &pair.surfaces;
-    let loads =
-        if load > 0.0 { format!(", and the loads give a mean pressure of {}", sci(load, 2)) } else { String::new() };
-    Some(format!(
-        "{a} - {b}: the table of the layer ends at a compression of {} with a pressure of {}: its stiffness is {}, that of the bodies (modulus \
-         over depth) {}{loads}; points are [compression, pressure]: if these are [pressure, compression], swap the columns",
-        sci(c, 2),
-        sci(p, 2),
-        sci(p / c, 2),
-        sci(stiffness, 2)
-    ))
 }
 
 /// Return the warning for pair `i`, if its layer is compressed beyond the end of its law, at the solution or in a load step. There the

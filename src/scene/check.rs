@@ -10,7 +10,7 @@ use crate::problem::body::{SPELLING, fault, is_in_name};
 use crate::problem::pattern::is_pattern;
 use crate::problem::{
     AutoContact, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, LayerSpec, Load, LoadKind, MeshSource,
-    MethodName, MethodSpec, Plane, RobinRule, SpringKind, SpringSpec, Start, StopRule, Support,
+    MethodName, MethodSpec, Plane, RobinRule, SpringKind, SpringSpec, StopRule, Support,
 };
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -83,7 +83,7 @@ impl Scene {
     /// # Errors
     /// The first refusal, with the line of the program where the body, surface or group was named.
     pub fn check(&self) -> Result<()> {
-        if self.adapt.is_some() || matches!(self.method.start, Start::Nested) {
+        if self.adapt.is_some() {
             let message = "several meshes for one scene: only the command line makes them";
             return Err(Error::scene(&self.dimension.place, message));
         }
@@ -102,8 +102,7 @@ impl Scene {
             check_contact(&at_contact(contact), contact)?;
         }
         check_method(&at("method"), &self.method)?;
-        self.check_adapt(&at("adapt"))?;
-        self.output.checkpoint.map_or(Ok(()), |time| at("output.checkpoint").positive("the time in minutes", time))
+        self.check_adapt(&at("adapt"))
     }
 
     fn is_plane(&self) -> bool {
@@ -304,9 +303,6 @@ fn check_method(at: &CheckedKey, method: &MethodSpec) -> CheckResult {
     if let RobinRule::Floor(floor) = method.robin {
         at.positive_in("robin.floor", "the floor", floor)?;
     }
-    if !(1..=50).contains(&method.depth) {
-        return at.below("depth").refuse("the depth must lie between 1 and 50", "", "");
-    }
     if method.linear.is_some() && !matches!(method.name, MethodName::Auto | MethodName::Newton) {
         let help = "name = \"newton\", or leave `linear` away";
         return at.below("linear").refuse("only Newton's method has linear steps of all bodies", "", help);
@@ -336,10 +332,6 @@ fn check_gamma(at: &CheckedKey, gamma: &Gamma) -> CheckResult {
 }
 
 fn check_steps(at: &CheckedKey, method: &MethodSpec) -> CheckResult {
-    if !method.steps.is_empty() && matches!(method.start, Start::Nested) {
-        let help = "each step starts from the one before: leave `start = \"nested\"` away";
-        return at.refuse("load steps after a start from a coarser mesh", "", help);
-    }
     // the numbers of a table were checked when its file was read
     if method.steps.is_table() {
         return Ok(());

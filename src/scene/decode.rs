@@ -49,7 +49,9 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     let mut scene = Scene { contacts, auto, data, ..Scene::decode(&keys, context, path.to_owned(), title, dimension)? };
     // meshes that are adapted need no more digits than they are worth, unless the scene says how many
     let has_stop = keys.get("method").is_some_and(|method| method.has_key("stop"));
-    scene.method.stop.balanced |= scene.adapt.is_some() && !has_stop;
+    if let (Some(adapt), false) = (&scene.adapt, has_stop) {
+        scene.method.stop.residual = Some(0.1 * adapt.error.value);
+    }
     scene.method.steps.join(&scene.bodies)?;
     Ok(scene)
 }

@@ -4,18 +4,29 @@ use crate::error::Error;
 
 /// Names that are gone: a key, or a word that was the value of a key.
 pub const GONE: &[(&str, &str)] = &[
+    ("anderson", SWEEPS),
     ("asperities", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
+    ("balanced", "runs with an adapted mesh stop at a tenth of `adapt.error`"),
+    ("barzilai-borwein", "gamma = \"aitken\" or \"line-search\""),
+    ("checkpoint", "states are saved at the end of each load step, and when a signal ends the run"),
     (
         "compress",
         "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder",
     ),
+    ("depth", "the method `anderson`, which had it, is gone"),
     ("fill", HEIGHTS),
     ("memory", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
     ("missing", HEIGHTS),
+    ("ncg", SWEEPS),
+    ("nested", "start = \"auto\" takes about as many steps"),
     ("options", "PETSc options follow the scene on the command line, or stand in a file: -options_file FILE"),
     ("parabola", HEIGHTS),
     ("points", HEIGHTS),
+    ("spectral", "gamma = \"aitken\" or \"line-search\""),
 ];
+
+/// Advice for methods over the sweep.
+const SWEEPS: &str = "name = \"auto\", or \"robin\" with gamma = \"aitken\"";
 
 /// Advice for heights that are no whole grid.
 const HEIGHTS: &str =

@@ -82,8 +82,7 @@ fn read_text(path: &Path) -> Result<String> {
 }
 
 /// Options with a value, and the key that each sets.
-const SHORT: [(&str, &str); 3] =
-    [("--method", "method.name"), ("--tolerance", "adapt.error"), ("--checkpoint", "output.checkpoint")];
+const SHORT: [(&str, &str); 2] = [("--method", "method.name"), ("--tolerance", "adapt.error")];
 
 /// Options without a value, and the key that each sets to true.
 const FLAGS: [(&str, &str); 4] =

@@ -107,8 +107,6 @@ table! {
             pub plots: bool = true,
             /// most pairs with files of their own; 24
             pub pairs: Option<Most> = None,
-            /// minutes between checkpoints; none without it
-            pub checkpoint: Option<f64> = None,
         }
     }
 }

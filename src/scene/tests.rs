@@ -70,10 +70,7 @@ fn defaults_and_a_scene_in_space() {
     assert!(matches!(scene.method.start, Start::Auto));
     assert_eq!((scene.method.name, scene.method.robin), (MethodName::Auto, RobinRule::Auto));
     assert_eq!(scene.method.gamma, Gamma::Stationary(0.6));
-    assert_eq!(
-        scene.method.stop,
-        StopRule { residual: Some(1e-8), increment: None, balanced: false, iterations: 2000 }
-    );
+    assert_eq!(scene.method.stop, StopRule { residual: Some(1e-8), increment: None, iterations: 2000 });
     assert_eq!(scene.solver, SolverSpec { preset: Some(Preset::Hypre) });
     assert_eq!(scene.output, OutputSpec { dir: Some("out".into()), vtu: true, ..OutputSpec::default() });
 }
@@ -304,11 +301,13 @@ const CASES: &[Case] = &[
     ("power = { B = 2.5e-5, a = 0.5 }", "linear = { stiffness = 1 }, up_to = 1", "up_to", "`up_to` without an expression", ""),
     ("[method]", "[[contact]]\nbetween = [\"upper_bottom\", \"lower_top\"]\nlayer.linear.stiffness = 1\n[method]", "\"upper_bottom\"", "a second contact of `upper_bottom` and `lower_top`", ""),
     // The method.
-    ("[method]", "[method]\nname = \"ncg\"\ninterval = true", "true", "only the method `robin` has an interval of gamma", "name = \"robin\""),
+    ("[method]", "[method]\nname = \"ncg\"", "\"ncg\"", "unknown method `ncg`", "auto"),
+    ("start = { normal = 1e-4 }", "start = \"nested\"", "\"nested\"", "unknown start `nested`", "auto"),
+    ("[method]", "[method]\ndepth = 3", "depth", "unknown key `depth`", "anderson"),
+    ("[method]", "[method]\nname = \"newton\"\ninterval = true", "true", "only the method `robin` has an interval of gamma", "name = \"robin\""),
     ("[method]", "[method]\nsteps = [0.5, 0.9]", "[0.5, 0.9]", "the last load step is not the full load", "end the list with 1"),
     ("[method]", "[method]\nsteps = [0, 1]", "0", "the factor is 0", ""),
     ("[method]", "[method]\nsteps = 0", "0", "`steps` is 0", ""),
-    ("start = { normal = 1e-4 }", "start = \"nested\"\nsteps = 3", "3", "load steps after a start from a coarser mesh", "nested"),
     ("[[contact]]", "adapt = { error = 1e-3 }\n[[contact]]", "", "", ""),
     // The mesh.
     ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "msh", "the mesh has both `geo` and `msh`", ""),

@@ -125,8 +125,8 @@ impl Body for CondensedBody {
         self.body.residual(u, product, force, r)
     }
 
-    fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
-        self.body.rounding(u, force)
+    fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64 {
+        self.body.unbalanced(r, springs)
     }
 
     fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {

@@ -16,8 +16,8 @@ pub struct SparseBody<S> {
     body: ElasticBody,
     states: States,
     robin: Lazy<S>,
-    /// The size of each row of K, if K itself is in the solver or was given away; else empty.
-    sizes: Vec<RowSize>,
+    /// The diagonal of K, if K itself is in the solver or was given away; else empty.
+    diagonal: Vec<f64>,
 }
 
 /// The matrix G, which is made when something is first solved. A body that is only measured, or joined with others, needs none.
@@ -33,13 +33,6 @@ enum Lazy<S> {
 
 /// A function that makes a solver of K.
 type SolverBuilder<S> = Box<dyn FnOnce(Rows) -> Result<S>>;
-
-/// What remains of a row of K.
-struct RowSize {
-    diagonal: f64,
-    /// Sum of the magnitudes of all entries.
-    sum: f64,
-}
 
 impl<S: InnerSolver> SparseBody<S> {
     /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them prescribed), and the rigid motions
@@ -60,7 +53,7 @@ impl<S: InnerSolver> SparseBody<S> {
         body.held = Couplings::default();
         let prescribed = std::mem::take(&mut body.prescribed);
         let states = States::new(body.load.len(), prescribed, rows, free, distribution);
-        Self { body, states, robin, sizes: Vec::new() }
+        Self { body, states, robin, diagonal: Vec::new() }
     }
 
     /// Replace the loads by those of a body without K, and keep K. The work of the loads on the motions that supports leave is in `free`.
@@ -76,7 +69,7 @@ impl<S: InnerSolver> SparseBody<S> {
             && let Some(make) = make.take()
         {
             let stiffness = if S::HAS_ROWS { self.take_stiffness() } else { self.body.stiffness.clone() };
-            let diagonal = |i: usize| self.sizes.get(i).map_or_else(|| stiffness.diagonal(i), |size| size.diagonal);
+            let diagonal = |i: usize| self.diagonal.get(i).map_or_else(|| stiffness.diagonal(i), |value| *value);
             let square = |q: usize| self.states.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
             let mut row_stiffness: Vec<f64> = (0..self.states.rows.rows()).map(square).collect();
             if let Some(distribution) = &self.states.distribution {
@@ -93,13 +86,12 @@ impl<S: InnerSolver> SparseBody<S> {
         }
     }
 
-    /// Return K and keep the sizes of its rows.
+    /// Return K and keep its diagonal.
     fn take_stiffness(&mut self) -> Csr {
         let k = std::mem::replace(&mut self.body.stiffness, Csr::new(0));
         let first = self.states.distribution.as_ref().map_or(0, |distribution| distribution.first);
         let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
-        let size = |i: usize| RowSize { diagonal: diagonal(i), sum: k.row(i).map(|(_, a)| a.abs()).sum() };
-        self.sizes = (0..k.rows()).map(size).collect();
+        self.diagonal = (0..k.rows()).map(diagonal).collect();
         k
     }
 
@@ -140,8 +132,6 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         Energy {
             strain: quadratic + 2.0 * dot(&self.body.lifting, v) + self.body.strain_constant,
             potential: 0.5 * quadratic - work + self.body.energy_constant,
-            rest: dot(&r[..n], &r[..n]),
-            forces: dot(&self.body.load, &self.body.load) + dot(&product[..n], &product[..n]),
         }
     }
 
@@ -186,27 +176,16 @@ impl<S: InnerSolver> Body for SparseBody<S> {
         self.apply(z, |solver, z| solver.precondition(&r[..n], z))
     }
 
-    fn rounding(&self, u: &[f64], force: &[f64]) -> f64 {
-        let k = &self.body.stiffness;
-        let mut size: Vec<f64> = self.body.load.iter().map(|f| f.abs()).collect();
-        for (i, size) in size.iter_mut().enumerate() {
-            *size += match self.sizes.get(i) {
-                None => k.row(i).map(|(j, a)| (a * u[j]).abs()).sum::<f64>(),
-                // without K, neighbours are taken to move by as much
-                Some(row) => row.sum * u[i].abs(),
-            };
-        }
-        for q in 0..self.states.rows.rows() {
-            for (i, b) in self.states.rows.row(q) {
-                size[i] += (b * force[q]).abs();
-            }
-        }
-        let diagonal = |i: usize| match self.sizes.get(i) {
-            None => k.position(i, i).map_or(f64::INFINITY, |at| k.values[at]),
-            Some(row) => row.diagonal,
+    fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64 {
+        let mut diagonal = match self.diagonal.is_empty() {
+            true => (0..self.states.dofs).map(|i| self.body.stiffness.diagonal(i)).collect(),
+            false => self.diagonal.clone(),
         };
-        let sum: f64 = size.iter().enumerate().map(|(i, size)| size * size / diagonal(i)).sum();
-        sum * f64::EPSILON * f64::EPSILON
+        for (q, spring) in springs.iter().enumerate().filter(|(_, spring)| **spring > 0.0) {
+            self.states.rows.row(q).for_each(|(i, b)| diagonal[i] += spring * b * b);
+        }
+        let squared = |(r, diagonal): (&f64, &f64)| if *r == 0.0 { 0.0 } else { r * r / diagonal };
+        r.iter().zip(&diagonal).map(squared).sum()
     }
 
     fn counts(&self) -> BodyCounts {

@@ -523,37 +523,6 @@ fn an_overlap_of_facets_is_told() {
     assert_eq!(warned(1, "{ n = 16, m = 16 }", ""), None);
 }
 
-/// A pin of radius 1 in a hole, half of both, under a load of 1000 across the axis; and the whole, under a pressure that balances.
-#[test]
-fn the_mean_pressure_has_a_meaning_where_normals_turn() {
-    let half = "Point(1) = {0,0,0}; Point(2) = {0,-1,0}; Point(3) = {1,0,0}; Point(4) = {0,1,0};
-Circle(1) = {2,1,3}; Circle(2) = {3,1,4}; Line(3) = {4,2}; Curve Loop(1) = {1:3}; Plane Surface(1) = {1};
-Point(12) = {0,-1,0}; Point(13) = {1,0,0}; Point(14) = {0,1,0}; Point(15) = {0,5,0}; Point(16) = {5,5,0}; Point(17) = {5,-5,0}; Point(18) = {0,-5,0};
-Circle(11) = {12,1,13}; Circle(12) = {13,1,14}; Line(13) = {14,15}; Line(14) = {15,16}; Line(15) = {16,17}; Line(16) = {17,18}; Line(17) = {18,12};
-Curve Loop(2) = {11:17}; Plane Surface(2) = {2}; Mesh.MeshSizeMax = 0.5;
-Physical Surface(\"pin\") = {1}; Physical Surface(\"plate\") = {2};
-Physical Curve(\"axis\") = {3}; Physical Curve(\"plate_axis\") = {13,17}; Physical Curve(\"skin\") = {1,2}; Physical Curve(\"hole\") = {11,12}; Physical Curve(\"far\") = {14:16};
-";
-    let half_text = "dimension = 2\nmesh = \"part.geo\"
-[[body]]\nname = \"pin\"\nyoung = 2e5\npoisson = 0.3\nfix = [{ on = \"axis\", x = 0 }]\nforce = [0, \"-2000/pi\"]
-[[body]]\nname = \"plate\"\nyoung = 2e5\npoisson = 0.3\nfix = [{ on = \"plate_axis\", x = 0 }, { on = \"far\", x = 0, y = 0 }]
-[[contact]]\nbetween = [\"skin\", \"hole\"]\ntouching = true\nlayer = { linear = { stiffness = 1e9 } }\n";
-    let rings = "dimension = 2\nmesh = \"part.geo\"
-[[body]]\nname = \"shaft\"\nyoung = 2e5\npoisson = 0.3
-[[body]]\nname = \"ring\"\nyoung = 2e5\npoisson = 0.3\nload = [{ on = \"rim\", pressure = 7 }]
-[[contact]]\nbetween = [\"skin\", \"bore\"]\ntouching = true\nlayer = { linear = { stiffness = 1e7 } }\n";
-    let forecast = |script: &str, text: &str| {
-        let scene = beside(script, text);
-        let run = crate::common::winkler(&["check", "--json", scene.path.to_str().expect("a path")]);
-        let value: serde_json::Value = serde_json::from_str(&run.stdout).unwrap_or_else(|_| panic!("{}", run.said()));
-        value["pairs"][0]["mean_pressure"].clone()
-    };
-    // the load over the length of the half circle
-    let pressure = forecast(half, half_text).as_f64().expect("a number");
-    assert!((pressure / (1000.0 / std::f64::consts::PI) - 1.0).abs() < 0.05, "{pressure}");
-    assert_eq!(forecast(FIT, rings), serde_json::Value::Null);
-}
-
 /// Two grains of a tessellation: a pair of faces that the search has found has no common piece with the normals of its own, and is left out.
 #[test]
 fn found_pairs_without_a_common_piece_are_left_out() {

@@ -5,7 +5,6 @@ use serde_json::Value;
 use std::f64::consts::PI;
 use std::fs;
 use winkler::api::load;
-use winkler::internals::settings_digest;
 
 /// A bilinear function on 4 x 4 points three apart, from -1 on, as a file.
 fn bilinear(value: impl Fn(f64, f64) -> f64) -> String {
@@ -78,7 +77,7 @@ fn contents_are_part_of_the_scene() {
     let scene = measured();
     let digest = |sets: &[&str]| {
         let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
-        settings_digest(&load(&scene.path, &sets).unwrap_or_else(|error| panic!("{error}")))
+        load(&scene.path, &sets).unwrap_or_else(|error| panic!("{error}")).problem().to_string()
     };
     let folder = scene.path.parent().expect("a folder");
     let first = digest(&[]);

@@ -34,13 +34,13 @@ fn scene(name: &str) -> String {
 fn errors_fall_with_the_mesh_and_rows_are_whole() {
     let exact = "contact.0.reference=40 + 6.3508814*cos(pi*x)";
     let solvers = ["--solver", "mumps", "--solver", "-ksp_type cg -pc_type jacobi -ksp_rtol 1e-10"];
-    let over = ["--over", "mesh.set.n=8,16,32", "--repeat", "2", "--set", exact, "--method", "ncg"];
+    let over = ["--over", "mesh.set.n=8,16,32", "--repeat", "2", "--set", exact, "--method", "newton-robin"];
     let (run, rows) = bench(&[&[scene("wavy").as_str()], &solvers[..], &over].concat());
     assert_eq!(run.code, 0, "{}", run.said());
     // three meshes, two solvers
     assert_eq!(rows.len(), 6);
     let solved = |solver: &str| -> Vec<&BTreeMap<String, String>> {
-        rows.iter().filter(|row| row["solver"].starts_with(solver) && row["method"] == "ncg").collect()
+        rows.iter().filter(|row| row["solver"].starts_with(solver) && row["method"] == "newton-robin").collect()
     };
     for solver in ["mumps", "-ksp_type cg"] {
         let rows = solved(solver);
@@ -53,7 +53,7 @@ fn errors_fall_with_the_mesh_and_rows_are_whole() {
         for row in rows {
             assert_eq!((row["status"].as_str(), row["runs"].as_str()), ("converged", "2"));
             assert_eq!(row["error_of"], "pressure, reference");
-            for column in ["cpu_seconds", "factor_seconds", "solve_seconds", "iterate_seconds", "theta"] {
+            for column in ["cpu_seconds", "factor_seconds", "solve_seconds", "iterate_seconds"] {
                 assert!(number(row, column) > 0.0, "{column}");
             }
             // no two runs take the same time; no process takes more than all cores
@@ -123,8 +123,6 @@ fn rows_are_their_reports() {
         ] {
             assert_eq!(number(row, column), of(path), "{column}");
         }
-        let theta = (of("/pairs/0/theta/0") * of("/pairs/0/theta/1")).sqrt();
-        assert!((number(row, "theta") / theta - 1.0).abs() < 1e-12);
     }
 }
 
@@ -180,7 +178,7 @@ fn orders_are_an_axis_and_lines_name_what_differs() {
 /// What goes wrong is a row with its words, and the other rows are there.
 #[test]
 fn failures_are_rows() {
-    let methods = ["--method", "robin,ncg,nonsense", "--set", "method.stop={residual=1e-8,iterations=3}"];
+    let methods = ["--method", "robin,newton-robin,nonsense", "--set", "method.stop={residual=1e-8,iterations=3}"];
     let solvers = ["--solver", "mumps", "--solver", "-pc_type nonsense", "--over", "mesh.set.n=4,wrong"];
     let (run, rows) = bench(&[&[scene("groove-held").as_str()], &methods[..], &solvers].concat());
     assert_eq!(run.code, 1, "{}", run.said());
@@ -196,9 +194,9 @@ fn failures_are_rows() {
     assert!(status == "iteration-limit" && words.contains("3 iterations"), "{status}: {words}");
     let (status, words) = of("4", "nonsense", "mumps");
     assert!(status == "refused" && words.contains("nonsense"), "{status}: {words}");
-    let (status, words) = of("4", "ncg", "-pc_type");
+    let (status, words) = of("4", "newton-robin", "-pc_type");
     assert!(status == "refused" && words.contains("nonsense"), "{status}: {words}");
-    let (status, words) = of("wrong", "ncg", "mumps");
+    let (status, words) = of("wrong", "newton-robin", "mumps");
     assert!(status == "refused" && words.contains("number"), "{status}: {words}");
     // a run that takes too long
     let late = ["--solver", "mumps", "--over", "mesh.set.n=64,128", "--order", "1,2", "--timeout", "0.05"];
@@ -207,9 +205,9 @@ fn failures_are_rows() {
     assert_eq!((run.code, &status[..]), (1, &["timeout", "timeout", "skipped", "skipped"][..]), "{}", run.said());
 }
 
-/// Ranks are started by mpiexec, and theta is varied by the stiffness of the layer.
+/// Ranks are started by mpiexec, beside other keys.
 #[test]
-fn ranks_and_theta() {
+fn ranks_and_keys() {
     let over = ["--over", "contact.0.layer.linear.stiffness=1e4,1e6", "--set", "mesh.set.n=4"];
     let linear = ["--set", "contact.0.layer={linear={stiffness=1}}", "--ranks", "1,2", "--solver", "mumps"];
     let (run, rows) =
@@ -217,11 +215,10 @@ fn ranks_and_theta() {
     assert_eq!((run.code, rows.len()), (0, 4), "{}", run.said());
     for pair in rows.chunks(2) {
         assert_eq!((pair[0]["ranks"].as_str(), pair[1]["ranks"].as_str()), ("1", "2"));
-        for column in ["sweeps", "dofs", "theta"] {
+        for column in ["sweeps", "dofs"] {
             assert_eq!(pair[0][column], pair[1][column], "{column}");
         }
     }
-    assert!(number(&rows[2], "theta") > number(&rows[0], "theta"));
 }
 
 #[test]

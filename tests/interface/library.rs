@@ -93,7 +93,7 @@ impl LayerLaw for Lazy {
 struct Lost;
 
 impl GammaRule for Lost {
-    fn gamma(&mut self, _here: &mut Iterate, _ritz: &mut Ritz) -> Result<f64, Unbounded> {
+    fn gamma(&mut self, _here: &mut Iterate) -> Result<f64, Unbounded> {
         Ok(f64::NAN)
     }
 }
@@ -207,7 +207,6 @@ fn scenes_that_contradict_themselves_are_refused() {
     refused(&|s| s.method.stop.residual = Some(f64::NAN), "the tolerance is NaN");
     refused(&|s| s.method.stop.residual = None, "has a tolerance");
     refused(&|s| s.method.steps = History::of_shares(vec![0.5, 0.75]), "not the full load");
-    refused(&|s| s.method.start = Start::Nested, "only the command line");
     refused(&|s| s.bodies[1] = s.bodies[1].clone().traction("top", [0.0, 0.0, 1.0]), "a load in z");
     let force = |total| LoadKind::Force { total, rigid: false };
     refused(&|s| s.bodies[1] = s.bodies[1].clone().load("top", force([0.0, f64::INFINITY, 0.0])), "the force is");

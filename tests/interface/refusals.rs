@@ -355,9 +355,9 @@ const COARSE: [&str; 2] = ["--set", "mesh.set.n=8"];
 #[test]
 fn a_gamma_that_is_too_large() {
     for (gamma, status) in [
-        ("1.5", &["cycle"][..]),
-        ("2.5", &["cycle", "not-finite", "iteration-limit"]),
-        ("3", &["cycle", "not-finite", "iteration-limit"]),
+        ("1.5", &["iteration-limit"][..]),
+        ("2.5", &["not-finite", "iteration-limit"]),
+        ("3", &["not-finite", "iteration-limit"]),
         ("1e200", &["not-finite"]),
     ] {
         let gamma = format!("method.gamma={gamma}");
@@ -366,7 +366,7 @@ fn a_gamma_that_is_too_large() {
     }
     let stiff = ["--set", "method.gamma=1", "--set", "contact.0.layer={linear={stiffness=1e9}}"];
     let run = solve(case("groove"), &[&COARSE[..], &stiff].concat());
-    failed(&run, &["cycle"], &["every 2 iterations", "smaller method.gamma"]);
+    failed(&run, &["iteration-limit"], &["smaller method.gamma"]);
 }
 
 #[test]
@@ -389,7 +389,7 @@ fn a_start_so_large_that_the_law_overflows() {
         let law = ["--set", "contact.0.layer.power={a=0.1,B=1e-6}", "--set", &start];
         let rules = ["--set", "method.stop={residual=1e-8,iterations=200}"];
         let run = solve(case("groove"), &[&COARSE[..], &law, &rules].concat());
-        failed(&run, &["not-finite", "cycle", "iteration-limit"], &["iteration"]);
+        failed(&run, &["not-finite", "iteration-limit"], &["iteration"]);
     }
 }
 

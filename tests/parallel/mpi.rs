@@ -40,7 +40,7 @@ fn two_ranks_report_what_one_reports() {
     assert_eq!((serial.count("ranks"), parallel.count("ranks")), (1, 2));
     // one message a sweep, and some of a run
     assert!(serial.count("messages") == 0 && parallel.count("messages") <= parallel.count("sweeps") + 12);
-    let differ = ["petsc", "ranks", "messages", "times", "inner_times", "bodies", "command", "directory", "last_look"];
+    let differ = ["petsc", "ranks", "messages", "times", "inner_times", "bodies", "command", "directory"];
     let (ours, theirs) = (serial.report.as_object(), parallel.report.as_object());
     let (ours, theirs) = (ours.expect("a table"), theirs.expect("a table"));
     assert!(ours.keys().eq(theirs.keys()));

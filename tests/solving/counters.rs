@@ -17,11 +17,9 @@ fn counts<const N: usize>(run: &Run, names: [&str; N]) -> [usize; N] {
     names.map(|name| run.count(name))
 }
 
-/// Solves of bodies in sweeps: all without those of the start, which are 1 to 4 a body. They are even as both bodies of
-/// these scenes need the same, so a solve too many or too few in a sweep shows.
+/// Solves of bodies in sweeps: all without those of the start, which are four a body.
 fn assert_solves(run: &Run, in_sweeps: usize) {
-    let in_start = run.count("body_solves") - in_sweeps;
-    assert!((2..=8).contains(&in_start) && in_start.is_multiple_of(2), "{in_start} solves in the start");
+    assert_eq!(run.count("body_solves") - in_sweeps, 8, "four solves a body in the start");
 }
 
 #[test]
@@ -33,7 +31,6 @@ fn a_nonlinear_layer_factors_every_body_in_every_sweep() {
     // the lift asks for the springs that set-up has given already
     assert_eq!(counts(&run, ["robin_updates", "robin_updates_skipped"]), [18, 2]);
     assert_solves(&run, 2 * 8);
-    assert_eq!(run.count("body_solves_skipped"), 0);
     assert_eq!(counts(&run, ["inner_iterations", "messages"]), [0, 0]);
     let history = run.history();
     assert_eq!(history.counts("iteration"), (0..8).collect::<Vec<_>>());
@@ -94,31 +91,6 @@ fn a_linear_layer_is_factored_again_only_when_the_contact_set_changes() {
     changing_contact("contact.0.layer={power={B=2.5e-5,a=1}}");
 }
 
-/// r = (1 - gamma) r_last with the same G needs no solve. One sweep with gamma = 1 gives the answer without that.
-#[test]
-fn bodies_that_never_touch_are_solved_once() {
-    let apart = ["--set", "contact.0.gap=1", "--set", "method.stop={residual=1e-5}"];
-    let run = coarse("groove", &apart);
-    let direct = coarse("groove", &[&apart[..], &["--set", "method.gamma=1"]].concat());
-    let sweeps = run.count("sweeps");
-    assert!(sweeps > 10, "{sweeps} sweeps tell nothing");
-    assert_solves(&run, 2);
-    assert_eq!(run.count("body_solves_skipped"), 2 * (sweeps - 1));
-    // the start, then K
-    assert_eq!(counts(&run, ["factorizations", "robin_updates"]), [4, 4]);
-    // with gamma = 1 all that is left is rounding, which is nobody's multiple
-    assert_eq!(counts(&direct, ["iterations", "body_solves_skipped"]), [1, 0]);
-    let (skipped, solved) = (run.contact(), direct.contact());
-    for column in ["u_n_lower", "u_n_upper", "compression"] {
-        assert!(distance(&skipped[column], &solved[column]) < 1e-4, "{column}");
-    }
-    assert!((run.number("F1") / direct.number("F1") - 1.0).abs() < 1e-9);
-    // where rounding is a part of the residual the solves are done again
-    let far = coarse("groove", &[&apart[..2], &["--set", "method.stop={residual=1e-12}"]].concat());
-    assert!(far.count("body_solves_skipped") < 2 * (far.count("sweeps") - 1));
-    assert!(run.contact()["pressure"].iter().all(|&p| p == 0.0));
-}
-
 /// Preconditioners count as factorisations, Krylov iterations are counted, and direct solves have none.
 #[test]
 fn krylov_iterations_are_counted() {
@@ -143,21 +115,19 @@ fn multigrid_is_kept_while_the_robin_term_moves_a_little_and_cycles_precondition
     assert!(distance(&run.contact()["pressure"], &always.contact()["pressure"]) < 1e-6);
     // an application of the preconditioner for each step of conjugate gradients, a solve only for each iterate
     let each = |run: &Run| run.count("inner_iterations") as f64 / run.count("sweeps") as f64;
-    let solves = coarse("groove-held", &["--method", "ncg", "-pc_type", "hypre"]);
+    let aitken = ["--method", "robin", "--set", "method.gamma=aitken"];
+    let solves = coarse("groove-held", &[&aitken[..], &["-pc_type", "hypre"]].concat());
     assert!(each(&run) < 0.7 * each(&solves), "{} and {} in a sweep", each(&run), each(&solves));
 }
 
-/// The weights of the contact table are the lengths that the report sums up, and theta is that of `check`.
+/// The weights of the contact table are the lengths that the report sums up.
 #[test]
-fn the_table_has_the_lengths_and_the_report_theta() {
+fn the_table_has_the_lengths_of_the_report() {
     let run = solve(case("groove-held"), &["--set", "mesh.set.n=4"]).converged();
     let table = run.contact();
     let closed = |q: &usize| table["compression"][*q] > 0.0;
     let length: f64 = (0..table.rows()).filter(closed).map(|q| table["weight"][q]).sum();
     assert!((length / run.number("pairs/0/contact_length") - 1.0).abs() < 1e-12, "{length}");
-    let check = winkler(&["check", case("groove-held").to_str().expect("a path"), "--set", "mesh.set.n=4", "--json"]);
-    let checked: serde_json::Value = serde_json::from_str(&check.stdout).expect("JSON");
-    assert_eq!(run.report["pairs"][0]["theta"], checked["pairs"][0]["theta"]);
     // both inner phases were measured, and lie within the run
     let inner = ["factor", "solve"].map(|phase| run.number(&format!("inner_times/{phase}")));
     assert!(inner.iter().all(|&seconds| seconds > 0.0) && inner.iter().sum::<f64>() < run.number("times/total"));
@@ -181,7 +151,7 @@ fn a_sweep_over_methods_keeps_condensed_bodies() {
     let reports = sweep(&["method.gamma=0.5,0.6"], &[]);
     assert_eq!([counts(&reports[0]), counts(&reports[1])], [once, never]);
     // each method with its own linear steps, whatever the one before had
-    let methods = ["newton-robin", "newton", "robin", "newton-robin", "ncg", "newton"];
+    let methods = ["newton-robin", "newton", "robin", "newton-robin", "robin", "newton"];
     let reports = sweep(&[&format!("method.name={}", methods.join(","))], &["--set", "method.gamma=0.6"]);
     assert!(reports.iter().zip(methods).all(|(report, method)| report["method"] == method));
     assert!(reports[1..].iter().all(|report| report["factorizations"] == 0));

@@ -165,22 +165,10 @@ fn rigid_bodies_foretell_the_contact() {
     assert!(last > 100 && closed[0].abs_diff(last) <= 40, "{closed:?}");
 }
 
-/// The estimated spectrum of G^-1 F1'' lies around one: 1 - theta and 1 + theta.
-#[test]
-fn the_spectrum_is_symmetric_about_one() {
-    let sets = ["mesh.set.n=16", "method={gamma=\"spectral\", stop={residual=1e-8}}"];
-    let run = solve_here(case("groove-held"), &sets).converged();
-    let (low, high) = (run.number("spectrum/0"), run.number("spectrum/1"));
-    // Ritz values come from inside
-    assert!(high < 2.0 - low + 1e-6 && high > 1.7 && low > 0.26 && low < 0.27, "{low} {high}");
-    let error = run.number("error_estimate") / run.number("residual");
-    assert!((error - low.recip().sqrt()).abs() < 1e-6, "{error}");
-}
-
 /// Loads that push a body off its contact have no solution: said at once, by every method.
 #[test]
 fn a_body_that_is_pulled_off() {
-    for method in ["auto", "robin", "newton", "ncg"] {
+    for method in ["auto", "robin", "newton", "newton-robin"] {
         let off = ["--method", method, "--set", "body.1.load.0.pressure=-10", "--set", "mesh.set.n=4"];
         let run = solve(case("groove-held"), &off);
         assert_eq!((run.code, run.text("status"), run.count("sweeps")), (1, "unbounded", 0), "{method}");
@@ -246,8 +234,9 @@ fn leaves_peel_in_a_few_steps() {
             assert_eq!(smoothed.last(), Some(&run.count("smoothed_steps")));
             assert!(run.count("smoothed_steps") > 0, "{}", run.said());
             assert!((run.number("pairs/0/force/1/1") - 2.0).abs() < 2e-3, "{}", run.said());
-            let nested = ["--set", "method={name=\"newton\", start=\"nested\"}"];
-            let reference = solve(&leaves(n, layer).path, &nested).converged().contact();
+            // small load steps
+            let steps = ["--set", "method={name=\"newton\", steps=20}"];
+            let reference = solve(&leaves(n, layer).path, &steps).converged().contact();
             let apart = distance(&run.contact()["pressure"], &reference["pressure"]);
             assert!(apart < 1e-7, "{layer} {n}: {apart:e}");
         }
@@ -255,17 +244,16 @@ fn leaves_peel_in_a_few_steps() {
     }
 }
 
-/// Smoothed laws are the same with multigrid, by one factorisation, on two ranks, and where a run pauses at each iterate.
+/// Smoothed laws are the same with multigrid, by one factorisation, and on two ranks.
 #[test]
 fn leaves_peel_by_any_linear_step() {
     let scene = leaves(60, "linear = { stiffness = 1e5 }");
     let whole = solve(&scene.path, &["--method", "newton"]).converged();
     let pressure = &whole.contact()["pressure"];
-    let others: [(usize, &[&str]); 4] = [
+    let others: [(usize, &[&str]); 3] = [
         (1, &["--method", "newton", "--set", "solver=hypre"]),
         (1, &["--method", "newton", "--set", "solver=mumps"]),
         (2, &["--method", "newton"]),
-        (1, &["--method", "newton", "--checkpoint", "1e-9"]),
     ];
     for (ranks, args) in others {
         let run = solve_on(ranks, &scene.path, args);
@@ -276,59 +264,5 @@ fn leaves_peel_by_any_linear_step() {
         assert!(is_smoothed && run.count("iterations") <= 15, "{args:?}: {}", run.said());
         let apart = distance(&run.contact()["pressure"], pressure);
         assert!(apart < 1e-6, "{args:?}: {apart:e}");
-        if args.contains(&"--checkpoint") {
-            assert_eq!(run.count("iterations"), whole.count("iterations"));
-            assert_eq!(run.contact()["pressure"], whole.contact()["pressure"]);
-        }
     }
-}
-
-/// A quarter of a bearing cap on its base, pressed down at its ear and up in its bore.
-const CAP: &str = r#"
-SetFactory("OpenCASCADE"); e = 0.01;
-Cylinder(1) = {0, 0, 0, 0, 0, 12, 24, Pi/2}; Box(2) = {0, 0, 0, 40, 12, 12}; Cylinder(3) = {0, 0, 0, 0, 0, 12, 15, Pi/2};
-BooleanUnion(4) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
-BooleanDifference(5) = { Volume{4}; Delete; }{ Volume{3}; Delete; };
-Box(6) = {15, -25, 0, 25, 25, 12};
-Physical Volume("cap") = {5}; Physical Volume("base") = {6};
-split() = {}; faces() = Boundary{ Volume{5}; };
-For i In {0 : #faces() - 1}
-  b() = BoundingBox Surface{faces(i)};
-  If (b(4) < e)
-    split() += faces(i);
-  EndIf
-EndFor
-Physical Surface("split") = {split()};
-top() = {}; faces() = Boundary{ Volume{6}; };
-For i In {0 : #faces() - 1}
-  b() = BoundingBox Surface{faces(i)};
-  If (b(1) > -e)
-    top() += faces(i);
-  EndIf
-EndFor
-Physical Surface("top") = {top()};
-Physical Surface("middle") = {Surface In BoundingBox{-e, 0, -e, e, 30, 13}};
-Physical Surface("ear") = {Surface In BoundingBox{15, 12 - e, -e, 41, 12 + e, 13}};
-Physical Surface("foot") = {Surface In BoundingBox{14, -25 - e, -e, 41, -25 + e, 13}};
-Physical Surface("bore") = {Surface In BoundingBox{-e, -e, -e, 15 + e, 15 + e, 13}};
-Mesh.MeshSizeMax = 4;
-"#;
-
-/// The first linear step from the pressures of a coarse mesh is solved well enough to stay near them: from an error of a tenth four steps follow.
-/// Two iterations of conjugate gradients would close all points, and eight steps would follow.
-#[test]
-fn the_first_step_from_a_coarse_mesh_stays_near_its_solution() {
-    let scene = Scene::new(
-        "dimension = 3\nmesh = { geo = \"cap.geo\" }\nsolver = \"hypre\"\nmethod = { start = \"nested\" }\n\
-         [[body]]\nname = \"cap\"\nyoung = 1.1e5\npoisson = 0.28\nfix = [{ on = \"middle\", x = 0 }]\n\
-         load = [{ on = \"ear\", force = [0, -6000, 0] }, { on = \"bore\", pressure = 15 }]\n\
-         [[body]]\nname = \"base\"\nyoung = 1.1e5\npoisson = 0.28\nfix = [{ on = \"foot\", x = 0, y = 0, z = 0 }]\n\
-         [[contact]]\nbetween = [\"split\", \"top\"]\nlayer = { power = { B = 2e-3, a = 0.5 } }\n",
-    );
-    std::fs::write(scene.path.with_file_name("cap.geo"), CAP).expect("a script");
-    let run = solve(&scene, &[]).converged();
-    assert_eq!(run.solvers(), ["cg + hypre"; 2]);
-    let first = run.history()["error"][0];
-    assert!(first < 0.2, "{first}");
-    assert!(run.count("iterations") <= 5, "{}", run.count("iterations"));
 }

@@ -3,8 +3,8 @@
 mod agree;
 mod condensed;
 mod counters;
-mod forecast;
 mod histories;
+mod interval;
 mod many;
 mod mechanisms;
 mod methods;

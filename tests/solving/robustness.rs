@@ -97,7 +97,7 @@ fn blocks_without_a_load() {
 load = [{ on = "b2_top", pressure = 0 }]"#;
     for gap in ["0", "1e-6*x"] {
         for layer in ["linear = { stiffness = 1e4 }", "power = { B = 3e-6, a = 0.3 }"] {
-            for method in ["auto", "newton-robin", "robin", "ncg", "anderson"] {
+            for method in ["auto", "newton-robin", "robin"] {
                 let scene = blocks([1e3, 1e5], [4, 4], upper, gap, layer);
                 let run = solve(scene, &["--method", method, "--set", "method.robin=auto"]).converged();
                 assert!(run.count("iterations") <= 1, "{method}: {}", run.said());
@@ -133,16 +133,10 @@ fn corners_of_stiffness() {
     for young in [[1.0, 1.0], [1.0, 1e6], [1e6, 1.0]] {
         for kappa in [1e-6, 1.0, 1e6] {
             let expected = shared(young, 1.0 / kappa, 1.0, 1e-3);
-            for method in ["auto", "newton", "newton-robin", "ncg", "anderson"] {
+            for method in ["auto", "newton", "newton-robin"] {
                 let scene =
                     blocks(young, [3, 2], &pressed(1e-3), "0", &format!("linear = {{ stiffness = {kappa:e} }}"));
-                let run = solve(scene, &["--method", method]);
-                // sweeps over such a layer are hundreds, and last digits decide how many, whether a cycle is seen, or rounding
-                if (method, kappa, run.code) == ("ncg", 1e6, 1) {
-                    continue;
-                }
-                let is_rounded = (method, kappa, run.text("status")) == ("anderson", 1e6, "roundoff-limited");
-                assert_pressure(&if is_rounded { run } else { run.converged() }, expected, 1e-6);
+                assert_pressure(&solve(scene, &["--method", method]).converged(), expected, 1e-6);
             }
         }
     }
@@ -152,7 +146,7 @@ fn corners_of_stiffness() {
 #[test]
 fn corners_of_the_law() {
     for (b, a) in [(1e-6, 0.1), (1e-6, 1.0), (2e-4, 0.1), (2e-4, 1.0)] {
-        for method in ["auto", "newton", "ncg"] {
+        for method in ["auto", "newton", "newton-robin"] {
             let scene = blocks([2.1e5; 2], [3, 2], &pressed(2e-4), "0", &format!("power = {{ B = {b:e}, a = {a} }}"));
             let run = solve(scene, &["--method", method]).converged();
             assert_pressure(&run, shared([2.1e5; 2], b, a, 2e-4), 1e-6);
@@ -211,7 +205,7 @@ fn forces_are_in_balance_after_any_fall() {
 fn lost_digits_have_their_status() {
     let pressed = "fix = [{ on = \"b2_left\", x = 0 }]\nload = [{ on = \"b2_top\", pressure = 0.5 }]";
     for gap in ["1", "1e3", "1e6", "1e9", "1e12", "1e15"] {
-        for method in ["auto", "ncg"] {
+        for method in ["auto", "newton-robin"] {
             let scene = blocks([2.1e5; 2], [3, 2], pressed, gap, "linear = { stiffness = 1e6 }");
             let run = solve(scene, &["--method", method, "--set", "method.stop.iterations=60"]);
             let worst = run.contact()["pressure"].iter().map(|p| (p / 0.5 - 1.0).abs()).fold(0.0, f64::max);
@@ -328,24 +322,15 @@ fn a_contact_that_vanishes_beside_loads() {
     assert!(largest < 1e-6 * 1e-6, "{largest:e}");
 }
 
-/// Further steps at the rounding floor wander: the run ends at the best of its iterates.
+/// Further steps at the rounding floor make no progress: the run ends after three of them.
 #[test]
-fn a_run_that_rounding_ends_is_at_its_best_iterate() {
+fn a_run_that_rounding_ends_is_soon_over() {
     let run = solve(
         concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/groove-held/scene.toml"),
         &["--set", "method={stop={residual=1e-16}}", "--set", "mesh.set.n=16"],
     );
-    assert_eq!(run.text("status"), "roundoff-limited", "{}", run.said());
-    let history = run.history();
-    let least = history["residual"].iter().copied().fold(f64::INFINITY, f64::min);
-    assert_eq!(history["residual"].last(), Some(&least));
-    assert_eq!(run.number("residual"), least);
-    // going back to an earlier iterate is a row, but no step; where the last iterate is the best there is no such row
-    let (gamma, iteration) = (&history["gamma"], &history["iteration"]);
-    let returns = gamma.iter().filter(|&&gamma| gamma == 0.0).count();
-    let repeats = iteration.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    assert!(returns <= 1 && returns == repeats, "{gamma:?}, {iteration:?}");
-    assert_eq!(run.count("iterations") + returns, gamma.len());
+    assert_eq!((run.code, run.text("status")), (0, "roundoff-limited"), "{}", run.said());
+    assert!(run.number("residual") < 1e-12 && run.count("iterations") <= 12, "{}", run.said());
 }
 
 /// Solvers have thresholds: MUMPS takes pivots below 1e-20 for zeros, and residuals below 1e-50 were none. Units change nothing but the last digits.
@@ -354,7 +339,13 @@ fn units_are_the_users_choice() {
     let two = |exponent| 2f64.powi(exponent);
     let units = [(two(-74), 1.0), (two(-100), two(-66)), (1e9, 1e-9), (1e-40, 1e30), (1e44, 1e-35)];
     for (shape, condensed) in SHAPES.iter().zip([true, false, true]) {
-        let all = ["solver=condensed", "solver=mumps", "solver=hypre", "method.name=newton-robin", "method.name=ncg"];
+        let all = [
+            "solver=condensed",
+            "solver=mumps",
+            "solver=hypre",
+            "method.name=newton-robin",
+            "method={gamma=\"aitken\",robin=\"auto\"}",
+        ];
         for set in &all[..if condensed { 5 } else { 3 }] {
             let expected = shape.pressures(1.0, 1.0, set);
             for (stress, length) in units {
@@ -412,7 +403,7 @@ fn stiff_layers_have_their_error() {
     }
     let upper = "fix = [{ on = \"b2_left\", x = 0 }]\nload = [{ on = \"b2_top\", pressure = 150 }]";
     for stiffness in ["1e12", "1e16", "1e18", "1e20"] {
-        for method in ["newton", "ncg"] {
+        for method in ["newton", "newton-robin"] {
             let scene = blocks([1e5; 2], [3, 2], upper, "1e-3", &format!("linear = {{ stiffness = {stiffness} }}"));
             let run = solve(scene, &["--method", method]);
             let off = run.contact()["pressure"].iter().map(|p| (p / 150.0 - 1.0).abs()).fold(0.0, f64::max);

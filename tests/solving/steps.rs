@@ -46,7 +46,8 @@ fn prescribed_displacements_are_scaled_and_gaps_are_not() {
         block("b2", "{ on = \"b2_top\", y = -0.01 }")
     );
     for (start, solver) in [("\"auto\"", "condensed"), ("\"zero\"", "mumps"), ("{normal=1e-3}", "mumps")] {
-        let method = format!("method={{name=\"ncg\", steps=5, start={start}, stop={{residual=1e-10}}}}");
+        let method =
+            format!("method={{gamma=\"aitken\", robin=\"auto\", steps=5, start={start}, stop={{residual=1e-10}}}}");
         let solver = format!("solver={solver}");
         let run = solve(Scene::new(text.clone()), &["--set", &method, "--set", &solver]).converged();
         for number in 0..5 {
@@ -69,7 +70,7 @@ fn prescribed_displacements_are_scaled_and_gaps_are_not() {
 fn steps_assemble_and_factor_nothing() {
     let names = ["assemblies", "factorizations", "symbolic_factorizations"];
     let counts = |run: &Run| names.map(|name| run.count(name));
-    let steps = groove("{name=\"ncg\", steps=6}", &[]).converged();
+    let steps = groove("{name=\"newton\", steps=6}", &[]).converged();
     assert_eq!(counts(&steps), [2, 2, 2]);
     // without a Robin term: the start, then K, whatever the steps
     let linear = |steps: &str| {
@@ -80,8 +81,8 @@ fn steps_assemble_and_factor_nothing() {
     assert_eq!(counts(&linear("steps=3,")), [2, 4, 2]);
     assert_eq!(counts(&linear("")), [2, 4, 2]);
     // a step starts from the one before: the same load again is there at once
-    let again = groove("{name=\"ncg\", steps=[1, 1]}", &[]).converged();
-    assert_eq!(again.count("steps/1/iterations"), 0);
+    let again = groove("{name=\"newton\", steps=[1, 1]}", &[]).converged();
+    assert_eq!(again.count("steps/1/iterations"), 1);
 }
 
 /// A step that is not solved is reported, and the next one goes on from where it ended.
@@ -98,7 +99,7 @@ fn a_step_that_is_not_solved() {
 
 #[test]
 fn steps_on_two_ranks() {
-    let args = ["--set", "mesh.set.n=8", "--set", "method={name=\"ncg\", steps=3}"];
+    let args = ["--set", "mesh.set.n=8", "--set", "method={name=\"newton-robin\", steps=3}"];
     let (serial, parallel) =
         (solve(case("groove-held"), &args).converged(), solve_on(2, case("groove-held"), &args).converged());
     assert_eq!(serial.report["steps"], parallel.report["steps"]);

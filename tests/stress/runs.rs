@@ -34,19 +34,7 @@ pub struct Recipe {
 }
 
 /// Every method, by the name in the table. `any` is robin with the scene's own gamma.
-pub const NAMES: [&str; 11] = [
-    "auto",
-    "newton-robin",
-    "newton",
-    "ncg",
-    "anderson",
-    "line-search",
-    "aitken",
-    "barzilai-borwein",
-    "spectral",
-    "0.6",
-    "any",
-];
+pub const NAMES: [&str; 7] = ["auto", "newton-robin", "newton", "line-search", "aitken", "0.6", "any"];
 
 impl Recipe {
     /// The method of a name, for a scene.
@@ -55,8 +43,7 @@ impl Recipe {
         let (words, limit) = match name {
             "auto" => (String::new(), None),
             "newton-robin" | "newton" => (format!("name = \"{name}\""), Some(500)),
-            "ncg" | "anderson" => (format!("name = \"{name}\""), Some(300)),
-            "line-search" | "aitken" | "barzilai-borwein" | "spectral" => robin(format!("\"{name}\"")),
+            "line-search" | "aitken" => robin(format!("\"{name}\"")),
             "any" => robin(format!("{}", case.gamma)),
             number => robin(number.to_owned()),
         };

@@ -1,4 +1,4 @@
-//! What a run says of itself: the estimated error of the iteration, the spectrum, the iterations left, the interval of gamma.
+//! The interval of gamma (33).
 
 use crate::common::{Run, Scene, case, solve};
 

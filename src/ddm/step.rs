@@ -16,12 +16,14 @@
 //! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself (docs/methods.md).
 
 use crate::model::Model;
-use crate::model::layer::Layer;
+use crate::model::layer::{Layer, meeting_slopes};
 use crate::model::rigid::PART;
 
 /// What Newton's method remembers of its steps.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Progress {
+    /// Slopes rho as long as no step has shown how the bodies answer, n.
+    unit: Vec<f64>,
     /// Pressures in equilibrium with the iterate, n; empty before the first.
     pressure: Vec<f64>,
     /// Slopes for each pair after the last step, as multiples of [`meeting_slopes`](crate::model::layer::meeting_slopes); empty before the second.
@@ -35,27 +37,55 @@ pub(super) struct Progress {
 const HALVINGS: i32 = 7;
 
 /// Length of a step that comes nearer to the laws at no tried length, where F1 cannot fall either: half of the least tried one.
-pub(super) const SHORTEST: f64 = 1.0 / (1 << HALVINGS) as f64;
+const SHORTEST: f64 = 1.0 / (1 << HALVINGS) as f64;
 
 /// Share of a step's length by which the squared distance from the laws must fall (Armijo's rule with its usual constant). Of 540 random scenes all had
 /// the same histories as with zero.
 const FALLS: f64 = 1e-4;
 
+/// A whole linear step, n each.
+pub(super) struct WholeStep<'a> {
+    /// Compressions at its beginning.
+    pub from: &'a [f64],
+    /// Error of these by roundoff.
+    pub roundoff: &'a [f64],
+    /// Compressions at its end.
+    pub compression: &'a [f64],
+    /// Pressures there.
+    pub pressure: &'a [f64],
+}
+
+/// The part of a linear step that is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StepLength {
+    /// 1 for a whole step.
+    pub length: f64,
+    /// Ratio of the squared distance from the laws at its end to that at its beginning; 1 where there is none to compare with.
+    pub fall: f64,
+    /// Whether no part of the step comes nearer to the laws, so that the least one is taken.
+    pub is_lost: bool,
+}
+
 impl Progress {
-    /// Return the stiffnesses with which the bodies answered the last step, n, of meeting slopes `unit`, n.
-    pub fn answers(&self, model: &Model, unit: &[f64]) -> Vec<f64> {
-        let mut answers = unit.to_vec();
+    /// Begin a run on a model.
+    pub fn new(model: &Model) -> Self {
+        Self { unit: meeting_slopes(model), ..Self::default() }
+    }
+
+    /// Return the stiffnesses with which the bodies answered the last step, n.
+    pub fn answers(&self, model: &Model) -> Vec<f64> {
+        let mut answers = self.unit.clone();
         for (pair, answer) in self.answer.iter().enumerate() {
             answers[model.range(pair)].iter_mut().for_each(|slope| *slope *= answer);
         }
         answers
     }
 
-    /// Return rho, n: the slopes on which laws are resolved after a step from `states`, of meeting slopes `unit`, n.
-    pub fn slopes(&self, model: &Model, unit: &[f64], states: &Layer) -> Vec<f64> {
-        let mut slopes = self.answers(model, unit);
+    /// Return rho, n: the slopes on which laws are resolved after a step from `states`.
+    pub fn slopes(&self, model: &Model, states: &Layer) -> Vec<f64> {
+        let mut slopes = self.answers(model);
         if !states.smoothing.is_empty() {
-            let nodes_and_layers = unit.iter().zip(&states.tangent);
+            let nodes_and_layers = self.unit.iter().zip(&states.tangent);
             slopes
                 .iter_mut()
                 .zip(nodes_and_layers)
@@ -65,7 +95,8 @@ impl Progress {
     }
 
     /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
-    fn observe(&mut self, model: &Model, unit: &[f64], dc: &[f64], dp: &[f64]) {
+    fn observe(&mut self, model: &Model, dc: &[f64], dp: &[f64]) {
+        let unit = &self.unit;
         self.answer.resize(model.pairs.len(), 1.0);
         for (pair, answer) in self.answer.iter_mut().enumerate() {
             let (mut pressures, mut compressions) = (0.0, 0.0);
@@ -75,36 +106,31 @@ impl Progress {
             }
             let stiffness = (pressures / compressions).sqrt();
             if stiffness.is_finite() {
-                // softer are motions of whole bodies, which `fit` finds
+                // softer are motions of whole bodies, stiffer is rounding
                 *answer = stiffness.clamp(PART, PART.recip());
             }
         }
     }
 
-    /// Return the length of a step from compressions `from`, known but for their `roundoff`, to the state (c, p), n each: the part of the way that comes
-    /// nearer to the laws with the smoothing of `states`, from which the step is taken. Return none if no part does. Meeting slopes are `unit`.
-    pub fn step_length(
-        &mut self,
-        model: &Model,
-        unit: &[f64],
-        states: &Layer,
-        [[from, roundoff], [c, p]]: [[&[f64]; 2]; 2],
-    ) -> Option<f64> {
+    /// Return the length of a step: the part of the way that comes nearer to the laws with the smoothing of `states`, from which the step is taken.
+    pub fn step_length(&mut self, model: &Model, states: &Layer, step: &WholeStep) -> StepLength {
+        let &WholeStep { from, roundoff, compression: c, pressure: p } = step;
         if self.pressure.is_empty() {
-            return Some(1.0);
+            return StepLength { length: 1.0, fall: 1.0, is_lost: false };
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
-        self.observe(model, unit, &change(from, c), &change(&self.pressure, p));
-        let rho = &self.slopes(model, unit, states)[..];
+        self.observe(model, &change(from, c), &change(&self.pressure, p));
+        let rho = &self.slopes(model, states)[..];
         let off = |t: f64| {
             let (compression, pressure) = (&between(from, c, t)[..], &between(&self.pressure, p, t)[..]);
             Equilibrium { compression, roundoff, pressure, rho }.distance(model, &states.smoothing)
         };
         let here = off(0.0);
-        let mut lengths = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings));
-        let length = lengths.find(|&t| off(t) <= (1.0 - FALLS * t) * here);
-        self.path.note(length.unwrap_or(SHORTEST), !states.smoothing.is_empty());
-        length
+        let mut tried = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings)).map(|t| (t, off(t)));
+        let found = tried.find(|&(t, there)| there <= (1.0 - FALLS * t) * here);
+        let (length, there) = found.unwrap_or_else(|| (SHORTEST, off(SHORTEST)));
+        self.path.note(length, !states.smoothing.is_empty());
+        StepLength { length, fall: if here == 0.0 { 1.0 } else { there / here }, is_lost: found.is_none() }
     }
 
     /// Forget the pressures of the iterate, so that the next step is taken whole.
@@ -230,7 +256,10 @@ mod tests {
         let rho = [2.0, 0.5, 0.25, 3.0];
         let (from, start, exact) = ([0.5, 0.5, 1.0, 1.0], [2.0, 4.0, 1.0, 1.0], [0.0; 4]);
         let length = |progress: &mut Progress, rho: &[f64; 4], roundoff: &[f64; 4], c: &[f64; 4], p: &[f64; 4]| {
-            progress.step_length(&model, rho, &Layer::default(), [[&from, roundoff], [c, p]])
+            progress.unit = rho.to_vec();
+            let step = WholeStep { from: &from, roundoff, compression: c, pressure: p };
+            let step = progress.step_length(&model, &Layer::default(), &step);
+            (!step.is_lost).then_some(step.length)
         };
         let begin = || Progress { pressure: start.to_vec(), ..Progress::default() };
         let mut progress = Progress::default();
@@ -260,15 +289,15 @@ mod tests {
         let (dc, dp) = ([1.0, -0.5, 1.0, 0.0], [-6.0, 12.0, 0.0, 0.0]);
         let [w, v] = [model.weight[0], model.weight[1]];
         let times = ((w * 36.0 / 2.0 + v * 144.0 / 8.0) / (w * 2.0 + v * 0.25 * 8.0)).sqrt();
-        let mut progress = Progress::default();
-        progress.observe(&model, &unit, &dc, &dp);
+        let mut progress = Progress { unit: unit.to_vec(), ..Progress::default() };
+        progress.observe(&model, &dc, &dp);
         let smoothed = Layer { tangent: vec![27.0, 0.0, 1.0, 1e-3], smoothing: vec![1.0; 4], ..Layer::default() };
         let expected = [
             (Layer::default(), [2.0 * times, 8.0 * times, 1e-6, 1e-6]),
             (smoothed, [3.0 * (4.0 * times).cbrt(), 8.0 * times.sqrt(), 1e-2, 1e-3]),
         ];
         for (states, expected) in expected {
-            let slopes = progress.slopes(&model, &unit, &states);
+            let slopes = progress.slopes(&model, &states);
             assert!(slopes.iter().zip(expected).all(|(s, e)| (s - e).abs() < 1e-14 * e), "{slopes:?} {expected:?}");
         }
     }
