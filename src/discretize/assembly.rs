@@ -56,10 +56,9 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mesh = Rc::new(mesh);
         if mesh.is_owned {
             let split = Split::new(&mesh.space, &elasticity);
-            let load = mesh.load.all(mesh.space.nodes.len());
             let (name, exact) = (info.name.clone(), spec.exact.clone());
             let (mesh, elasticity) = (mesh.clone(), elasticity.clone());
-            let post = OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len(), load };
+            let post = OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len() };
             post.check_exact()?;
             info.points = post.points();
             info.post = Some(Box::new(post) as Box<dyn Post>);

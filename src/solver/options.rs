@@ -287,7 +287,8 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     for option in &typed {
         let bare = names::bare(option, bodies);
         // a solve reads this one
-        let is_read = read.contains(option) || (has_solvers && bare.ends_with("ksp_converged_reason"));
+        let is_read =
+            read.contains(option) || (has_solvers && is_of_family(bare) && bare.ends_with("ksp_converged_reason"));
         if is_read || !is_listed {
             options.has(option);
         }
