@@ -81,7 +81,6 @@ pub fn solve(session: &Session, scene: Scene) -> Result<Solution> {
 /// Those of [`solve`].
 pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Recorder) -> Result<Solution> {
     scene.check()?;
-    run::refuse_other_scenes(session, &[&scene])?;
     let (interrupt, mut clock) = (Interrupt::default(), Clock::default());
     let built = run::build(session, scene, &interrupt, &mut clock)?;
     let ready = run::set_up(session, built, Begin::default(), &mut clock)?;

@@ -49,7 +49,9 @@ pub struct LineSearch;
 
 impl GammaRule for LineSearch {
     fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
-        LineEnergy::new(here.model, here.layer, &here.sweep.residual, &here.sweep.correction).minimize(1e-6)
+        let z = &here.sweep.correction;
+        let products = here.model.multiply(&z.states);
+        LineEnergy::new(here.model, here.layer, &here.sweep.residual, z, &products).minimize(1e-6)
     }
 }
 

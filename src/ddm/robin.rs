@@ -88,7 +88,7 @@ pub(super) fn iterate(
                 ..LoopEnd::at_start(status, u, layer)
             });
         }
-        u.add(gamma, &sweep.correction);
+        u.advance(run.model, gamma, &sweep.correction);
         let moved = sweep.correction.trace.iter().map(|z| gamma * z).collect();
         last = Some(LastStep { gamma, decrement: sweep.decrement, moved });
     }

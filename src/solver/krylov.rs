@@ -1,12 +1,11 @@
 //! Any KSP and PC of PETSc as inner solver.
 
 use super::options::{Chosen, Group};
-use super::{Change, InnerSolver};
+use super::{Change, InnerSolver, Solved};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::linalg::Csr;
 use crate::linalg::portable::log10;
-use crate::model::Solved;
 use crate::petsc::{ConvergenceTest, Ksp, Matrix, Rows, Session};
 use std::rc::Rc;
 
@@ -187,8 +186,6 @@ impl Krylov {
 }
 
 impl InnerSolver for Krylov {
-    const HAS_ROWS: bool = true;
-
     fn matrix_mut(&mut self) -> Option<&mut Matrix> {
         Some(&mut self.matrix)
     }
