@@ -86,7 +86,7 @@ fn rows_are_distributed() {
         let solver = format!("solver={solver}");
         let args = ["--method", "newton", "--set", "mesh.set.n=4", "--set", &solver, "-newton_ksp_view"];
         let run = solve_on(3, case("groove3d"), &args).converged();
-        let view = ["KSP Object: newton (newton_) 3 MPI processes", "type: mpiaij", "rows=1020, cols=1020"];
+        let view = ["KSP Object: (newton_) 3 MPI processes", "type: mpiaij", "rows=1020, cols=1020"];
         assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
     }
 }
