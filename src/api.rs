@@ -36,8 +36,7 @@
 
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
-pub use crate::ddm::gamma::GammaRule;
-pub use crate::ddm::robin::Iterate;
+pub use crate::ddm::gamma::{GammaRule, Iterate};
 pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
@@ -81,7 +80,6 @@ pub fn solve(session: &Session, scene: Scene) -> Result<Solution> {
 /// Those of [`solve`].
 pub fn solve_with(session: &Session, scene: Scene, keep: &mut dyn Recorder) -> Result<Solution> {
     scene.check()?;
-    run::refuse_other_scenes(session, &[&scene])?;
     let (interrupt, mut clock) = (Interrupt::default(), Clock::default());
     let built = run::build(session, scene, &interrupt, &mut clock)?;
     let ready = run::set_up(session, built, Begin::default(), &mut clock)?;

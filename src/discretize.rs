@@ -33,8 +33,7 @@ pub use verify::{Verified, verify};
 use crate::contact::{self, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
-use crate::linalg::axpy;
-use crate::model::{Local, Mechanism, Model};
+use crate::model::{Mechanism, Model};
 use crate::problem::contact::Carrier;
 use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
@@ -54,9 +53,6 @@ pub struct Discrete {
     pub contacts: Vec<ContactInfo>,
     /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
-    /// Trace (2n) of the rigid motions that supports impose on bodies. Layer states, and so the traces of iterates, are relative
-    /// to them.
-    pub imposed: Vec<f64>,
     /// The meshes, kept only if an estimate of the error was requested.
     pub meshes: Option<Rc<dyn Meshes>>,
     /// Number of stiffness matrices assembled on this rank.
@@ -96,7 +92,7 @@ where
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, imposed, mut pairs, contacts, mechanisms, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, fine, plan } = shared;
     let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
@@ -117,8 +113,7 @@ where
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    let imposed = impose(&mut model, &imposed);
-    Ok(Discrete { model, bodies: infos, contacts, mechanisms, imposed, meshes, assemblies, assemblies_avoided })
+    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, assemblies, assemblies_avoided })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
@@ -142,15 +137,6 @@ where
     Ok(locals)
 }
 
-/// Impose on the bodies of a model the rigid motions of their supports. `each` holds the traces of these motions on the contact
-/// rows of each body. Return the trace of all of them, 2n.
-fn impose(model: &mut Model, each: &[Vec<f64>]) -> Vec<f64> {
-    let mut imposed = vec![0.0; 2 * model.points()];
-    each.iter().enumerate().for_each(|(body, trace)| model.put(body, trace, &mut imposed));
-    model.impose(&imposed);
-    imposed
-}
-
 impl Discrete {
     /// Return which surface carries the contact points of each pair.
     pub fn carriers(&self) -> Vec<Carrier> {
@@ -169,7 +155,7 @@ impl Discrete {
         let mut message = vec![0.0; count + 2 * self.model.points()];
         for (body, slot) in self.model.bodies.iter().enumerate() {
             message[body] = slot.scale;
-            if !matches!(slot.local, Local::Elsewhere) {
+            if slot.local.is_some() {
                 self.model.put(body, &slot.row_stiffness, &mut message[count..]);
             }
         }
@@ -203,6 +189,5 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
             }
         }
     }
-    axpy(-1.0, &discrete.imposed, &mut trace);
     Ok(Some(trace))
 }

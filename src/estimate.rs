@@ -105,7 +105,8 @@ pub fn estimate(
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
-    let mut strain = [residual(model, iterate, &vec![0.0; model.points()]).1.strain];
+    let products = step.multiply(model, &iterate.states);
+    let mut strain = [residual(model, products, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] - held.energy + layer.work;
     // the error of nodal values is a part of the whole error
@@ -137,14 +138,13 @@ pub fn estimate(
 /// Return the displacements of all nodes of each body, on the rank that owns it. Collective.
 fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<Vec<Option<Vec<f64>>>> {
     let mut all = Vec::new();
-    for (index, state) in iterate.states.iter().enumerate() {
+    for (index, (state, rigid)) in iterate.states.iter().zip(&iterate.rigid).enumerate() {
         let slot = &model.bodies[index];
         let Some(body) = slot.local.as_ref() else {
             all.push(None);
             continue;
         };
-        let mut u = body.recover(state)?;
-        u.iter_mut().zip(&slot.imposed).for_each(|(u, imposed)| *u += imposed);
+        let u = body.recover(&body.states().join(state, rigid))?;
         all.push(body.states().leads().then(|| meshes.displacements(index, &u)));
     }
     Ok(all)

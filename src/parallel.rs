@@ -1,14 +1,12 @@
 //! Owner ranks of bodies, and messages between ranks by the `mpi` crate.
 
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, all_gather, pack};
+use crate::exchange::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
 use mpi::point_to_point::send_receive_into;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
-use sha2::{Digest, Sha256};
 use std::cell::Cell;
-use std::collections::{BTreeMap, BTreeSet};
 
 /// The ranks of a run.
 pub struct Ranks {
@@ -131,38 +129,6 @@ pub fn owners(loads: &[usize], ranks: usize) -> Vec<usize> {
         sum[rank] += loads[body];
     }
     owner
-}
-
-/// A fact that a rank has other than the first rank.
-pub struct Difference {
-    /// The rank.
-    pub rank: usize,
-    /// Name of the fact.
-    pub what: String,
-}
-
-/// Compare facts (name and value) that should be the same on all ranks. Return the differences, the same list on all ranks. If there are none, this
-/// takes one short message. Collective.
-pub fn differences(session: &Session, facts: &BTreeMap<String, String>) -> Vec<Difference> {
-    if session.size() == 1 {
-        return Vec::new();
-    }
-    let sum = Sha256::digest(pack(facts));
-    let sum = u64::from_le_bytes(std::array::from_fn(|byte| sum[byte]));
-    // the largest of all sums, and the smallest as the complement of the largest complement
-    let (mine, mut largest) = ([sum, !sum], [0; 2]);
-    session.world().all_reduce_into(&mine[..], &mut largest[..], SystemOperation::max());
-    if largest[0] == !largest[1] {
-        return Vec::new();
-    }
-    let all = all_gather(&Ranks::new(session), facts.clone());
-    let mut found = Vec::new();
-    for (rank, other) in all.iter().enumerate().skip(1) {
-        let names: BTreeSet<&String> = other.keys().chain(all[0].keys()).collect();
-        let differing = names.into_iter().filter(|name| other.get(*name) != all[0].get(*name));
-        found.extend(differing.map(|what| Difference { rank, what: what.clone() }));
-    }
-    found
 }
 
 /// Make the results of all ranks agree: if one rank failed, all fail, with the error of the lowest rank that has a message. The other ranks get an

@@ -118,7 +118,7 @@ impl Checkpoint {
             return Err(Error::new(Kind::Scene, message).help(help));
         }
         let Self { head, trace, compression, .. } = self;
-        let solution = Solution { field: Field { states: Vec::new(), trace }, compression };
+        let solution = Solution { field: Field { trace, ..Field::default() }, compression };
         Ok(Begin { start: Some(InitialGuess::Known(Box::new(solution))), steps: head.steps })
     }
 }

@@ -12,6 +12,7 @@ pub const GONE: &[(&str, &str)] = &[
         "--trust-geo",
         "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",
     ),
+    ("-o", "`check` draws nothing any more; `solve`, `sweep`, `bench` and `mesh` write to what -o names"),
     ("man", "`winkler COMMAND --help` has all that the man pages had"),
     (
         "plot",

@@ -18,8 +18,10 @@ mod transfer;
 mod write;
 
 use crate::error::Result;
+use crate::exchange::broadcast;
 use crate::output::LISTED;
 use crate::output::terminal::ProgressLine;
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::MethodName;
 use crate::run::report::{GatheredCounters, solvers_in_words};
@@ -153,14 +155,18 @@ fn case_of(path: &Path) -> &OsStr {
     }
 }
 
-/// Read a scene on every rank. A refusal is printed once.
+/// Read a scene, whose text the first rank sends to all. A refusal is printed once.
 ///
 /// # Errors
-/// Refusals of the scene, or of scenes that are not the same on all ranks.
+/// Refusals of the scene.
 pub fn load(session: &Session, path: &Path, overrides: &[String]) -> Result<Rc<Scene>> {
-    let scene = crate::parallel::collectively(session, crate::scene::load(path, overrides).map(Rc::new))?;
-    run::refuse_other_scenes(session, &[&*scene])?;
-    Ok(scene)
+    let text = text_of(session, path)?;
+    collectively(session, crate::scene::parse(path, text, overrides)).map(Rc::new)
+}
+
+/// Return the text of a scene file as the first rank reads it.
+fn text_of(session: &Session, path: &Path) -> Result<String> {
+    broadcast(&Ranks::new(session), || crate::scene::text(path))
 }
 
 /// Return a clock. If `is_shown`, a line on the terminal names the phase under way, up to the first iteration.

@@ -43,13 +43,13 @@ pub struct SweepArgs {
 /// Refusals of any scene of the sweep, before the first run; failures of the file system.
 pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> Result<i32> {
     let plan = collectively(session, plan(request))?;
+    let text = super::text_of(session, &request.scene.scene)?;
     let load = |case: &Case| {
         let own = case.overrides.iter().map(|text| format!("--over {text}"));
         let overrides: Vec<String> = request.scene.overrides().into_iter().chain(own).collect();
-        crate::scene::load(&case.scene, &overrides).map(Rc::new)
+        crate::scene::parse(&case.scene, text.clone(), &overrides).map(Rc::new)
     };
     let scenes = collectively(session, plan.cases.iter().map(load).collect::<Result<Vec<Rc<Scene>>>>())?;
-    run::refuse_other_scenes(session, &scenes.iter().map(|scene| &**scene).collect::<Vec<_>>())?;
     let folder = collectively(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = terminal::runs(plan.cases.len(), terminal.is_loud());

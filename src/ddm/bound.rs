@@ -256,7 +256,7 @@ mod tests {
     }
 
     fn step(trace: Vec<f64>, energy: f64, error: f64) -> LinearSolution {
-        LinearSolution { field: Field { states: Vec::new(), trace }, energy, error, is_exact: error == 0.0 }
+        LinearSolution { field: Field { trace, ..Field::default() }, energy, error, is_exact: error == 0.0 }
     }
 
     fn state<'a>(compression: &'a [f64], pressure: &'a [f64], rho: &'a [f64]) -> Equilibrium<'a> {

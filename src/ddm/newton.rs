@@ -140,7 +140,8 @@ impl Newton<'_, '_> {
         let (model, states) = (&mut *self.run.model, &self.states);
         let springs = resisting(model, states.springs(model));
         let compression = model.compression(&self.u.trace);
-        let (residual, _) = residual(model, &self.u, &model.forces(&states.linear(&compression)));
+        let products = self.linear.multiply(model, &self.u.states);
+        let (residual, _) = residual(model, products, &self.u, &model.forces(&states.linear(&compression)));
         let rho = self.progress.slopes(model, states);
         let scale = (self.tolerance, &self.run.scale);
         let limit = if std::mem::take(&mut self.is_near) { NEAR } else { 1.0 };
@@ -167,10 +168,10 @@ impl Newton<'_, '_> {
     /// The distance from the laws falls along no step whose tangents nearly vanish, as where a law saturates or hardly anything holds a body. F1 is convex,
     /// and a step of Newton's method always descends. The least F1 may be at a tiny part of the step, which halving would not find.
     fn descend(&mut self) -> Result<bool> {
-        let start = self.u.clone();
+        let (start, gap) = (self.u.clone(), self.run.model.gap.clone());
         for _ in 0..self.run.stop.iterations {
             let Some(length) = self.descent_step()? else {
-                self.u = start;
+                (self.u, self.run.model.gap) = (start, gap);
                 return Ok(false);
             };
             if length == 0.0 || (length - 1.0).abs() <= WHOLE {
@@ -196,27 +197,29 @@ impl Newton<'_, '_> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
         let springs = resisting(model, layer.springs(model));
-        let (residual, _) = residual(model, &self.u, &layer.force);
+        let products = self.linear.multiply(model, &self.u.states);
+        let (residual, _) = residual(model, products, &self.u, &layer.force);
         let roughest = self.linear.roughest();
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(roughest);
         let system =
             System { model: &mut *model, places: &layer, springs: &springs, residual: &residual, enough: &mut enough };
         let Ok(step) = self.linear.solve(system)? else { return Ok(None) };
-        let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field).minimize(SEARCH) else {
+        let products = self.linear.multiply(model, &step.field.states);
+        let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field, &products).minimize(SEARCH) else {
             return Ok(None);
         };
-        self.u.add(length, &step.field);
+        self.u.advance(model, length, &step.field);
         self.u.retrace(model);
         Ok(Some(length))
     }
 
     /// Take this part of a step, and resolve the laws at its end.
     fn advance(&mut self, mut step: LinearSolution, part: StepLength) -> StepResult {
-        let model = &*self.run.model;
+        let model = &mut *self.run.model;
         let before = model.compression(&self.u.trace);
         let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
         step.field.scale(part.length);
-        self.u.add(1.0, &step.field);
+        self.u.advance(model, 1.0, &step.field);
         self.u.retrace(model);
         // pressures of the linear step, not of the compressions at its end: a stiff layer would magnify the roundoff of displacements
         let pressure = self.progress.go(part.length, self.states.linear(&whole));
@@ -231,7 +234,8 @@ impl Newton<'_, '_> {
     fn measure(&mut self, iterate: &StepResult) -> Result<Measured> {
         let StepResult { step, resolved, .. } = iterate;
         let run = &mut *self.run;
-        let (rest, energy) = residual(run.model, &self.u, &run.model.forces(&iterate.pressure));
+        let products = self.linear.multiply(run.model, &self.u.states);
+        let (rest, energy) = residual(run.model, products, &self.u, &run.model.forces(&iterate.pressure));
         let sums = self.sum(&rest, energy);
         let run = &mut *self.run;
         let layer = Layer::new(run.model, iterate.compression.clone());

@@ -2,10 +2,11 @@
 
 use super::bound::Scale;
 use super::stop::{Status, relative_increment};
+use crate::linalg::axpy;
 use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
-use crate::model::rigid::DisplacementOrigin;
+use crate::model::rigid;
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
 use serde::{Deserialize, Serialize};
@@ -17,7 +18,8 @@ pub(super) struct Run<'a> {
     pub stop: &'a StopRule,
     pub observer: &'a mut dyn Observer,
     pub began: Instant,
-    pub origin: Option<DisplacementOrigin>,
+    /// The gaps of the undeformed bodies, n. Those of the model are relative to the rigid motions of the iterate.
+    pub gap: Vec<f64>,
     pub scale: Scale,
     pub rows: Vec<Row>,
 }
@@ -50,12 +52,10 @@ impl LoopEnd {
 
 impl Run<'_> {
     /// Complete the row of an iterate u, show it and keep it. `moved` is the step of the traces that led to u (2n), none for a start. Return the first body
-    /// with a trace that is not finite. Traces and energies in a row refer to the undeformed bodies, not to the origin.
+    /// with a trace that is not finite.
     pub fn record(&mut self, u: &Field, moved: Option<&[f64]>, row: Row) -> Option<usize> {
-        let mut trace = u.trace.clone();
-        if let Some(origin) = &self.origin {
-            crate::linalg::axpy(1.0, origin.trace(), &mut trace);
-        }
+        let mut trace = rigid::trace(self.model, &u.rigid);
+        axpy(1.0, &u.trace, &mut trace);
         let of = |body: usize| match moved {
             None => f64::NAN,
             Some(moved) => relative_increment(&self.model.of_body(body, moved), &self.model.of_body(body, &trace)),
@@ -64,7 +64,6 @@ impl Run<'_> {
         let row = Row {
             increment: increments.iter().copied().fold(f64::NAN, f64::max),
             increments,
-            energy: row.energy + self.origin.as_ref().map_or(0.0, |origin| origin.energy),
             points: self.model.points(),
             seconds: self.began.elapsed().as_secs_f64(),
             ..row

@@ -8,12 +8,12 @@ use super::start::{self, RigidStart};
 use super::stop::{Inaccuracy, Status};
 use super::{newton, robin};
 use crate::error::Result;
-use crate::model::Model;
-use crate::model::body::BodyCounts;
+use crate::linalg::axpy;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::DisplacementOrigin;
+use crate::model::rigid::{self, Motions};
+use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
@@ -104,7 +104,8 @@ pub fn solve(
         InitialGuess::Found(rigid) => Ok((**rigid).clone()),
         _ => find_start(model),
     };
-    let mut run = Run { model, stop: &stop, observer, began, origin: None, scale, rows: Vec::new() };
+    let gap = model.gap.clone();
+    let mut run = Run { model, stop: &stop, observer, began, gap, scale, rows: Vec::new() };
     let end = match found {
         Ok(rigid) => run.iterate(method, start, &rigid, interval)?,
         Err(status) => {
@@ -127,52 +128,54 @@ impl Run<'_> {
     ) -> Result<LoopEnd> {
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
         let states = first_states(self.model, &start, rigid);
-        if self.model.bodies.iter().any(|slot| !slot.motions.is_empty()) {
-            self.origin = DisplacementOrigin::take(self.model, &rigid.amounts);
-        }
         let is_known = matches!(start, InitialGuess::Known(_));
         let mut trace = match &start {
             InitialGuess::Trace(given) => given.clone(),
             InitialGuess::Known(solution) => solution.field.trace.clone(),
             _ => rigid.trace.clone(),
         };
-        let known = self.displacements(start);
+        let known = match start {
+            InitialGuess::Known(solution) if !solution.field.states.is_empty() => Some(solution.field),
+            _ => None,
+        };
+        let is_near = is_known && known.is_none();
+        let has_displacements = known.is_some();
+        let mut u = known.unwrap_or_else(|| Field { rigid: self.motions_of(rigid), ..Field::rest(self.model) });
+        let fallen = rigid::trace(self.model, &u.rigid);
+        self.model.close_gap(&fallen);
         match method {
             Method::Newton(linear) => {
-                let is_near = is_known && known.is_none();
-                let begin = |origin: &mut DisplacementOrigin| std::mem::take(&mut origin.rest);
-                let u = known.or_else(|| self.origin.as_mut().map(begin)).unwrap_or_else(|| Field::rest(self.model));
+                u.retrace(self.model);
                 newton::iterate(self, &mut **linear, u, states, is_near)
             }
             Method::Robin { rule, coefficient, .. } => {
-                if let Some(origin) = &self.origin {
-                    crate::linalg::axpy(-1.0, origin.trace(), &mut trace);
-                }
-                match known.map_or_else(|| extend(self.model, &trace), |field| Ok(Ok(field)))? {
-                    Ok(u) => robin::iterate(self, &mut **rule, coefficient, u, wants_interval),
-                    Err(failure) => {
-                        Ok(LoopEnd::at_start(Status::InnerSolver(failure), Field::rest(self.model), states))
+                if has_displacements {
+                    u.retrace(self.model);
+                } else {
+                    axpy(-1.0, &fallen, &mut trace);
+                    match extend(self.model, &trace)? {
+                        Ok(bent) => u = Field { rigid: sums(&u.rigid, &bent.rigid), ..bent },
+                        Err(failure) => return Ok(LoopEnd::at_start(Status::InnerSolver(failure), u, states)),
                     }
                 }
+                robin::iterate(self, &mut **rule, coefficient, u, wants_interval)
             }
         }
     }
 
-    /// Return the displacements of a start relative to the origin, if it has those of bodies and not only their traces.
-    fn displacements(&self, start: InitialGuess) -> Option<Field> {
-        let InitialGuess::Known(solution) = start else { return None };
-        let mut field = Some(solution.field).filter(|field| !field.states.is_empty())?;
-        if let Some(origin) = &self.origin {
-            origin.take_from(self.model, &mut field);
+    /// Return the amounts of the free motions of each body in a start. Bodies on springs begin at rest, since springs resist some of the motions of the start.
+    fn motions_of(&self, rigid: &RigidStart) -> Vec<Vec<f64>> {
+        let mut amounts = Motions::with_springs(self.model).of_bodies(&rigid.amounts);
+        for (amounts, slot) in amounts.iter_mut().zip(&self.model.bodies).filter(|(_, slot)| slot.sprung.is_some()) {
+            *amounts = vec![0.0; slot.motions.len()];
         }
-        Some(field)
+        amounts
     }
 
     /// Return the result of a run whose loop has ended.
     fn conclude(mut self, mut end: LoopEnd, method: &mut Method) -> Outcome {
-        if let Some(origin) = self.origin.take() {
-            origin.give(self.model, &mut end.iterate);
-        }
+        axpy(1.0, &rigid::trace(self.model, &end.iterate.rigid), &mut end.iterate.trace);
+        self.model.gap = std::mem::take(&mut self.gap);
         let surfaces = surface_slopes(self.model);
         let answer: Vec<f64> = end.answer.iter().zip(surfaces).map(|(rho, surface)| surface.max(*rho)).collect();
         let peak = self.scale.peak(&end.layer.pressure, end.strain);
@@ -216,6 +219,11 @@ impl Run<'_> {
         let tolerance = self.stop.increment.map_or(tolerance, |increment| increment.max(tolerance));
         if rounding > TIMES * tolerance.max(INNER) { Status::RoundoffLimited } else { end.status.clone() }
     }
+}
+
+/// Return the sums of two lists of amounts.
+fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
 }
 
 /// Number of tolerances above which unbalanced forces, or the roundoff of pressures, are told: norms differ by less than a digit.

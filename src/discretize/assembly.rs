@@ -8,10 +8,10 @@ use super::post::{OnPart, Post};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::{self, AtDofs};
-use crate::fem::{ElasticBody, NodeGraph, Prolongation, Split};
+use crate::fem::{ElasticBody, Prolongation, Split};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
-use crate::model::{BodySlot, Distribution, FreeMotion, Loads, Local};
+use crate::model::{Body, BodySlot, Distribution, Loads};
 use crate::problem::order::Order;
 use crate::problem::{BodySpec, Plane};
 use std::cell::OnceCell;
@@ -56,10 +56,9 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mesh = Rc::new(mesh);
         if mesh.is_owned {
             let split = Split::new(&mesh.space, &elasticity);
-            let load = mesh.load.all(mesh.space.nodes.len());
             let (name, exact) = (info.name.clone(), spec.exact.clone());
             let (mesh, elasticity) = (mesh.clone(), elasticity.clone());
-            let post = OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len(), load };
+            let post = OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len() };
             post.check_exact()?;
             info.points = post.points();
             info.post = Some(Box::new(post) as Box<dyn Post>);
@@ -72,13 +71,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// [`Discrete::share`](super::Discrete::share).
     fn give_solver(&mut self, part: &mut SceneBody<D>, slot: &mut BodySlot, owner: usize) -> Result<()> {
         let mesh = &part.mesh;
-        let loads = Loads {
-            force: mesh.load_vector(),
-            prescribed: mesh.prescribed.clone(),
-            imposed: mesh.imposed.as_ref().map_or_else(Vec::new, |motion| mesh.dofs_of(motion)),
-            work: slot.motions.iter().map(|motion| motion.work).collect(),
-        };
-        slot.imposed = loads.imposed.clone();
+        let loads = Loads { force: mesh.load_vector(), prescribed: mesh.prescribed.clone() };
         let kept = self.factory.kept(&slot.name).filter(|_| mesh.share.is_none());
         if let Some(before) = reload(kept, &loads)? {
             self.avoided += 1;
@@ -93,16 +86,16 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact rows.
     fn assemble(&mut self, part: &mut SceneBody<D>, loads: Loads, slot: &mut BodySlot) -> Result<()> {
-        let Loads { force, prescribed, imposed, work } = loads;
-        let free = part.mesh.left.iter().zip(work);
-        let left = free.map(|(motion, work)| FreeMotion::new(part.mesh.dofs_of(motion), &prescribed, work)).collect();
+        let Loads { force, prescribed } = loads;
+        let mut left: Vec<Vec<f64>> = part.mesh.left.iter().map(|motion| part.mesh.dofs_of(motion)).collect();
+        left.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
         part.mesh.graph();
         let (share, rows) = (part.mesh.share.take(), std::mem::take(&mut part.mesh.rows));
         let mut graph = part.mesh.graph.take().unwrap_or_else(|| unreachable!("the graph was requested"));
         if let Some(share) = &share {
             graph = graph.of(|node| share.is_own::<D>(node));
         }
-        let mut body = part.assemble(self.mesh, &graph, force, prescribed, &imposed)?;
+        let mut body = part.assemble(self.mesh, &graph, force, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
@@ -117,7 +110,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
         // displacements and rotations of its section as a plane body.
         let smooth = || rigid::modes(&mesh.extent).iter().map(|motion| mesh.dofs_of(motion)).collect();
-        slot.local = self.factory.make(Assembled {
+        let body = self.factory.make(Assembled {
             name: slot.name.clone(),
             dimension: D,
             body,
@@ -127,6 +120,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             left,
             interpolation,
         })?;
+        slot.local = Some(body);
         Ok(())
     }
 }
@@ -149,14 +143,15 @@ pub struct Outline<'a> {
     pub dimension: usize,
     /// Order of the elements.
     pub order: Order,
+    /// Number of its cells, and of the facets on its boundary.
+    pub cells: usize,
+    pub facets: usize,
     /// All contact rows of the body, pair by pair, with its dofs as columns.
     pub rows: &'a Csr,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: &'a [(usize, f64)],
     /// Rigid motions of the free body.
     pub motions: AtDofs<'a>,
-    /// Coupling of nodes by K. It is computed when it is first requested.
-    pub graph: &'a dyn Fn() -> &'a NodeGraph,
 }
 
 /// A maker of the inner solvers of bodies.
@@ -187,7 +182,7 @@ pub trait Factory {
     ///
     /// # Errors
     /// PETSc refuses a matrix or the value of an option.
-    fn make(&mut self, assembled: Assembled) -> Result<Local>;
+    fn make(&mut self, assembled: Assembled) -> Result<Body>;
 
     /// Return a body of this name with the same K and contact rows that an earlier scene or leg has left. It is on the rank that
     /// owns the body.
@@ -209,8 +204,8 @@ pub struct Assembled<'a> {
     /// Motions with hardly any strain in a few cells, for the near-null space of multigrid. They are the rigid motions of the
     /// free body, in a body of revolution those of its meridian. Each is one vector over these dofs.
     pub motions: &'a dyn Fn() -> Vec<Vec<f64>>,
-    /// Rigid motions that the supports leave, on these dofs.
-    pub left: Vec<FreeMotion>,
+    /// Displacements of the rigid motions that supports and springs leave, on these dofs.
+    pub left: Vec<Vec<f64>>,
     /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The columns belong
     /// to this body alone, or to all bodies of the matrix if the dofs are distributed.
     pub interpolation: Option<Prolongation>,

@@ -184,15 +184,13 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         })
     }
 
-    /// Assemble K on its graph, with f and the supports. `imposed` is the rigid motion that was subtracted from `prescribed`, if
-    /// any. If the graph has the rows of some nodes only, so have K and f.
+    /// Assemble K on its graph, with f and the supports. If the graph has the rows of some nodes only, so have K and f.
     pub fn assemble(
         &self,
         mesh: &Mesh<D>,
         graph: &NodeGraph,
         mut load: Vec<f64>,
         prescribed: Vec<(usize, f64)>,
-        imposed: &[f64],
     ) -> Result<ElasticBody> {
         let name = &self.spec.name;
         countable(&format!("the stiffness matrix of body `{}`", name.value), graph.entries::<D>())?;
@@ -213,7 +211,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         self.mesh.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
         // These rows belong to other ranks.
         (0..load.len()).filter(|&i| stiffness.range(i).is_empty()).for_each(|i| load[i] = 0.0);
-        Ok(support(stiffness, load, prescribed, imposed))
+        Ok(support(stiffness, load, prescribed))
     }
 }
 
@@ -282,7 +280,6 @@ pub fn parts<'a, const D: usize>(
             missed_load: Vec::new(),
             left: Vec::new(),
             unsupported: Vec::new(),
-            imposed: None,
             prescribed: Vec::new(),
             share: None,
             is_owned: true,

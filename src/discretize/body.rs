@@ -42,9 +42,7 @@ pub struct BodyMesh<const D: usize> {
     pub left: Vec<RigidMotion<D>>,
     /// Rigid motions that supports alone leave.
     pub unsupported: Vec<RigidMotion<D>>,
-    /// Rigid motion by which the supports move the body as one.
-    pub imposed: Option<RigidMotion<D>>,
-    /// Prescribed (dof, value) relative to this motion, sorted by dof.
+    /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
     /// Dofs of this rank, if the body is distributed.
     pub share: Option<Share>,

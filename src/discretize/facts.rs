@@ -6,7 +6,7 @@ use crate::contact::ContactPair;
 use crate::fem;
 use crate::linalg::dot;
 use crate::mesh::BodyCheck;
-use crate::model::{BodySlot, Local};
+use crate::model::BodySlot;
 use crate::problem::Plane;
 use serde::{Deserialize, Serialize};
 
@@ -68,8 +68,7 @@ impl<const D: usize> WholeBody<'_, D> {
         let (modulus, depth) = (dot(&moduli, &along_axes(of_body())), volume / surface);
         let slot = BodySlot {
             name: self.part.spec.name.value.clone(),
-            local: Local::default(),
-            imposed: Vec::new(),
+            local: None,
             segments: self.segments.clone(),
             motions: self.motions.clone(),
             sprung: self.sprung.clone(),
@@ -79,12 +78,6 @@ impl<const D: usize> WholeBody<'_, D> {
             row_stiffness: Vec::new(),
         };
         (slot, self.info(checked, plane))
-    }
-
-    /// Return the trace on the contact rows of the rigid motion that supports impose.
-    pub fn imposed_trace(&self) -> Vec<f64> {
-        let mesh = &self.part.mesh;
-        mesh.imposed.as_ref().map_or_else(|| vec![0.0; mesh.rows.rows()], |motion| self.trace(motion))
     }
 
     fn info(&self, checked: &BodyCheck, plane: Plane) -> BodyInfo {

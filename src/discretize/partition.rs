@@ -161,7 +161,6 @@ impl Partition {
             missed_load: body.missed_load.clone(),
             left: body.left.clone(),
             unsupported: body.unsupported.clone(),
-            imposed: body.imposed.clone(),
             prescribed: body.prescribed.iter().filter_map(prescribed_here).collect(),
             is_owned: true,
             graph: OnceCell::new(),

@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, Split, assemble, pad};
-use crate::linalg::Csr;
 use crate::output::{BodyField, CellKind, LargestStress};
 use std::rc::Rc;
 
@@ -55,8 +54,6 @@ pub struct OnPart<const D: usize> {
     pub elasticity: Rc<Elasticity>,
     /// Number of supports in the scene.
     pub supports: usize,
-    /// Nodal forces of the loads without those on rigid surfaces.
-    pub load: Vec<f64>,
 }
 
 impl<const D: usize> OnPart<D> {
@@ -115,13 +112,6 @@ impl<const D: usize> OnPart<D> {
         let at = |place: usize| (nodes[place], std::array::from_fn(|c| force(D * place + c)));
         (0..nodes.len()).filter(|&place| held[nodes[place] as usize]).map(at).collect()
     }
-
-    /// Return the contribution of owned nodes to the products of rows, whose columns are displacements of nodes, with a field.
-    fn products_with(&self, rows: &Csr, field: &[f64]) -> Vec<f64> {
-        let nodal = self.nodal(field);
-        let own = |row: usize| rows.row(row).filter(|(dof, _)| self.own[dof / D]);
-        (0..rows.rows()).map(|row| own(row).map(|(dof, b)| b * nodal[dof]).sum()).collect()
-    }
 }
 
 impl<const D: usize> Post for OnPart<D> {
@@ -168,8 +158,9 @@ impl<const D: usize> Post for OnPart<D> {
         self.mesh.nodal_rows.add_transpose(-1.0, force, &mut contact);
         let space = &self.mesh.space;
         let mut sum = Resultants { size: [0.0; 2], part: self };
-        let parts = vec![sum.of(&self.load), sum.of(&contact)];
-        let mut known: Vec<f64> = self.load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
+        let load = self.mesh.load.all(space.nodes.len());
+        let parts = vec![sum.of(&load), sum.of(&contact)];
+        let mut known: Vec<f64> = load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
         let mut springs = Vec::new();
         for blocks in &self.mesh.springs {
             let mut pull = vec![0.0; u.len()];
@@ -199,7 +190,9 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     fn approach(&self, v: &[f64]) -> Vec<f64> {
-        self.products_with(&self.mesh.approach, v)
+        let (u, rows) = (self.nodal(v), &self.mesh.approach);
+        let own = |row: usize| rows.row(row).filter(|(dof, _)| self.own[dof / D]);
+        (0..rows.rows()).map(|row| own(row).map(|(dof, weight)| weight * u[dof]).sum()).collect()
     }
 
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]> {

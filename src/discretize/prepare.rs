@@ -16,6 +16,7 @@ use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
+use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
 use crate::problem::BodySpec;
 use crate::scene::Scene;
@@ -27,8 +28,6 @@ use serde::{Deserialize, Serialize};
 pub struct ReplicatedProblem<const D: usize, P> {
     /// Bodies in the order of the scene: arrays of the model, and facts for reports.
     pub bodies: Vec<(BodySlot, BodyInfo)>,
-    /// Trace of each body of the rigid motion that its supports impose.
-    pub imposed: Vec<Vec<f64>>,
     /// Arrays on which the method works.
     pub pairs: Vec<ContactPair>,
     /// Origin of each pair.
@@ -98,8 +97,10 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let lack = chords::lack(&parts, mesh)?;
     let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
     let mechanisms = mechanism::fix(&mut bodies, &pairs, lack);
-    bodies.iter_mut().for_each(WholeBody::support);
-    let plan = plan(&bodies, factory)?;
+    for body in &mut bodies {
+        body.part.mesh.prescribed = body.part.mesh.prescribed_sorted();
+    }
+    let plan = plan(&bodies, &verified.checked, factory)?;
     let partitions = partitions(&bodies, &pairs, factory, ranks);
     for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
         let body = &mut bodies[index];
@@ -110,8 +111,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let imposed = bodies.iter().map(WholeBody::imposed_trace).collect();
-    let shared = ReplicatedProblem { bodies: shared, imposed, pairs, contacts, mechanisms, fine, plan };
+    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, fine, plan };
     Ok((shared, WholeProblem { bodies, partitions, keep }))
 }
 
@@ -119,9 +119,11 @@ pub fn prepare<'a, const D: usize, F: Factory>(
 ///
 /// # Errors
 /// See [`Factory::plan`].
-fn plan<const D: usize, F: Factory>(bodies: &[WholeBody<D>], factory: &mut F) -> Result<F::SolverPlan> {
-    // Facts of a body are computed when they are requested.
-    let graphs: Vec<_> = bodies.iter().map(|body| move || body.part.mesh.graph()).collect();
+fn plan<const D: usize, F: Factory>(
+    bodies: &[WholeBody<D>],
+    checked: &[BodyCheck],
+    factory: &mut F,
+) -> Result<F::SolverPlan> {
     let at: Vec<_> =
         bodies.iter().map(|body| move |k: usize, dof: usize| body.part.mesh.dof_of(&body.free[k], dof)).collect();
     let outline = |index: usize| {
@@ -130,10 +132,11 @@ fn plan<const D: usize, F: Factory>(bodies: &[WholeBody<D>], factory: &mut F) ->
             name: &part.spec.name.value,
             dimension: D,
             order: part.mesh.space.order,
+            cells: part.mesh.space.cell_count(),
+            facets: checked[index].outer,
             rows: &part.mesh.rows,
             prescribed: &part.mesh.prescribed,
             motions: AtDofs { count: free.len(), at: &at[index] },
-            graph: &graphs[index],
         }
     };
     factory.plan(&(0..bodies.len()).map(outline).collect::<Vec<_>>())

@@ -114,12 +114,6 @@ pub struct AtDofs<'a> {
     pub at: &'a dyn Fn(usize, usize) -> f64,
 }
 
-impl AtDofs<'_> {
-    /// No motions.
-    #[cfg(test)]
-    pub const NONE: AtDofs<'static> = AtDofs { count: 0, at: &|_, _| 0.0 };
-}
-
 /// Return the rigid motions of a body. A body of revolution has only the translation along its axis.
 pub fn of<const D: usize>(extent: &PointExtent, axisymmetric: bool) -> Vec<RigidMotion<D>> {
     let mut all = modes(extent);

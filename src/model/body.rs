@@ -1,9 +1,16 @@
-//! The interface of a body for the methods.
+//! A body as this rank has it: K, f and contact rows B on its dofs, and a solver for G = K + B' diag(d) B.
 
-use super::states::States;
-use crate::error::Result;
-use crate::linalg::Csr;
-use serde::{Deserialize, Serialize};
+use super::states::{Distribution, States};
+use crate::error::{Error, Kind, Result};
+use crate::fem::{Couplings, ElasticBody};
+use crate::file::available_memory;
+use crate::linalg::{Csr, dot};
+use crate::petsc::{Rows, Schur, Session};
+use crate::solver::options::Chosen;
+use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, RobinMatrix, Solved, rows_of};
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Instant;
 
 /// The terms of one body in the functional F1 (25).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -14,68 +21,13 @@ pub struct Energy {
     pub potential: f64,
 }
 
-/// The outcome of a solve G z = r.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Solved {
-    /// Krylov iterations; 0 for a direct solver.
-    pub iterations: usize,
-    /// Why the inner solver gave up, in its own message; `None` if it reached its tolerance.
-    pub failure: Option<String>,
-}
-
 /// A load on all dofs of a body, as the dofs of a state see it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReducedLoad {
     /// The right-hand side of [`Body::solve`] with the same effect.
     pub force: Vec<f64>,
-    /// Work of the load while the state does not change: r_I' K_II^-1 r_I with the load r_I on eliminated dofs I; zero if there are none.
+    /// Work of the load while the interface dofs do not move: r_I' K_II^-1 r_I with the load r_I on eliminated dofs I; zero if there are none.
     pub work: f64,
-}
-
-/// Counters of the work of a body so far.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-pub struct BodyCounts {
-    /// Number of numeric factorisations or preconditioner set-ups.
-    pub factorizations: usize,
-    /// Number of dense factorisations of the Robin matrices of condensed bodies.
-    pub dense_factorizations: usize,
-    /// Number of local corrections (exact solves near the contact) that were set up in place of preconditioners.
-    pub patches: usize,
-    /// Number of symbolic factorisations.
-    pub symbolic: usize,
-    /// Number of numeric factorisations of K that were reused from an earlier run.
-    pub factorizations_avoided: usize,
-    /// Number of solves G z = r.
-    pub solves: usize,
-    /// Number of Krylov iterations in these solves.
-    pub inner_iterations: usize,
-    /// Number of changes of the Robin term that changed the matrix.
-    pub robin_updates: usize,
-    /// Number of requested changes that left the Robin term as it was.
-    pub robin_skipped: usize,
-    /// Wall seconds in factorisations or preconditioner set-ups.
-    pub factor_seconds: f64,
-    /// Wall seconds of the first one, which contains the symbolic factorisation. They are included in `factor_seconds`.
-    pub first_seconds: f64,
-    /// Wall seconds in solves, without set-ups.
-    pub solve_seconds: f64,
-}
-
-impl std::ops::AddAssign for BodyCounts {
-    fn add_assign(&mut self, other: Self) {
-        self.factorizations += other.factorizations;
-        self.dense_factorizations += other.dense_factorizations;
-        self.patches += other.patches;
-        self.symbolic += other.symbolic;
-        self.factorizations_avoided += other.factorizations_avoided;
-        self.solves += other.solves;
-        self.inner_iterations += other.inner_iterations;
-        self.robin_updates += other.robin_updates;
-        self.robin_skipped += other.robin_skipped;
-        self.factor_seconds += other.factor_seconds;
-        self.first_seconds += other.first_seconds;
-        self.solve_seconds += other.solve_seconds;
-    }
 }
 
 /// New loads of a body whose K stays.
@@ -85,148 +37,353 @@ pub struct Loads {
     pub force: Vec<f64>,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
-    /// The rigid motion by which supports move the body, one entry a dof; empty for none.
-    pub imposed: Vec<f64>,
-    /// Work of f on each rigid motion that supports leave free.
-    pub work: Vec<f64>,
 }
 
 /// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
-/// Its [`States`] describe a state. Solves may be inexact, but [`Body::residual`] is exact. For a body that is distributed over ranks
-/// `residual` and `recover` are collective. Errors are failures of the solver library.
-pub trait Body {
-    /// Return what a state of the body is. Only [`Body::reload`] changes it.
-    fn states(&self) -> &States;
+/// If the body is distributed over ranks, K has the dofs that this rank owns, and its columns are those of the distributed matrix that has its rows. A condensed
+/// body has its interface dofs; its displacements stand for those of the whole body with its interior in equilibrium, so that residual, energies and all
+/// output have the values of the whole body. Solves may be inexact, but [`Body::residual`] is exact. Errors are failures of the solver library.
+pub struct Body {
+    states: States,
+    /// K and the loads. K is empty if a solver stores it, or if it was given away.
+    elastic: ElasticBody,
+    /// The diagonal of K, if K itself is in a solver or was given away; else empty.
+    diagonal: Vec<f64>,
+    /// G, which is made when something is first solved. A body that is only measured, or joined with others, needs none.
+    robin: Option<RobinMatrix>,
+    /// The function that makes the solver of G; `None` once it was used.
+    make: Option<MakeSolver>,
+    /// Description of the solver to be made, for reports.
+    words: String,
+    interior: Option<Interior>,
+}
+
+/// The interior of a condensed body.
+struct Interior {
+    session: Session,
+    /// PETSc options of the body. Those for MUMPS apply.
+    chosen: Chosen,
+    /// Number of dofs of a node.
+    dimension: usize,
+    interface: InterfaceDofs,
+    /// The loads on all dofs of the body, and K until it is eliminated.
+    whole: ElasticBody,
+    /// f of all dofs, in the turned axes.
+    load: Vec<f64>,
+    /// The factor, once the interior is eliminated.
+    schur: Option<RefCell<Schur>>,
+    /// Whether it was eliminated in an earlier run.
+    is_reused: bool,
+    /// Wall seconds of the elimination.
+    seconds: f64,
+}
+
+impl Body {
+    /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them prescribed), and the rigid motions
+    /// `free` that its supports leave, one vector over the dofs each. `make` makes a solver of K when something is first solved, and `words` describe that solver.
+    ///
+    /// A distributed body has the dofs that this rank owns, while `rows` and `free` have those of its owned and ghost nodes. If the body gets a matrix of its
+    /// own, that is distributed over all ranks.
+    pub fn new(
+        mut elastic: ElasticBody,
+        rows: Csr,
+        free: Vec<Vec<f64>>,
+        distribution: Option<Distribution>,
+        make: MakeSolver,
+        words: String,
+    ) -> Self {
+        elastic.held = Couplings::default();
+        let prescribed = std::mem::take(&mut elastic.prescribed);
+        let states = States::new(elastic.load.len(), prescribed, rows, free, distribution.map(Rc::new));
+        Self { states, elastic, diagonal: Vec::new(), robin: None, make: Some(make), words, interior: None }
+    }
+
+    /// Return a body that is to be condensed to its interface dofs. `whole` and `free` are on all dofs.
+    pub fn to_condense(
+        session: Session,
+        chosen: Chosen,
+        dimension: usize,
+        whole: ElasticBody,
+        free: &[Vec<f64>],
+        interface: InterfaceDofs,
+    ) -> Self {
+        let on_interface = |motion: &Vec<f64>| {
+            let turned = interface.turn(motion);
+            interface.dofs.iter().map(|&dof| turned[dof]).collect()
+        };
+        let free = free.iter().map(on_interface).collect();
+        let states = States::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), free, None);
+        let (load, words) = (interface.turn(&whole.load), interface.in_words());
+        let interior = Interior {
+            session,
+            chosen,
+            dimension,
+            interface,
+            whole,
+            load,
+            schur: None,
+            is_reused: false,
+            seconds: 0.0,
+        };
+        let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
+        let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
+        Self { states, elastic, diagonal, robin: None, make: Some(make), words, interior: Some(interior) }
+    }
+
+    /// Eliminate the interior, if the body is to be condensed and is not yet.
+    ///
+    /// # Errors
+    /// Failures of MUMPS, and a factorisation that needs more memory than is free.
+    pub fn condense(&mut self) -> Result<()> {
+        if let Some(interior) = self.interior.as_mut().filter(|interior| interior.schur.is_none()) {
+            self.elastic = interior.eliminate()?;
+        }
+        Ok(())
+    }
+
+    /// Return the dofs.
+    pub fn states(&self) -> &States {
+        &self.states
+    }
 
     /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each row. Return the
     /// energies of u.
-    fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy;
+    pub fn residual(&self, u: &[f64], product: &[f64], force: &[f64], r: &mut [f64]) -> Energy {
+        let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &self.elastic;
+        for (r, (load, product)) in r.iter_mut().zip(load.iter().zip(product)) {
+            *r = load - product;
+        }
+        self.states.rows.add_transpose(-1.0, force, r);
+        let quadratic = dot(u, product);
+        Energy {
+            strain: quadratic + 2.0 * dot(lifting, u) + strain_constant,
+            potential: 0.5 * quadratic - dot(load, u) + energy_constant,
+        }
+    }
 
-    /// Return the squared energy norm of forces r at the dofs of a state, taken for each dof alone: r'D^-1 r with the diagonal D of
+    /// Return the squared energy norm of forces r at the dofs, taken for each dof alone: r'D^-1 r with the diagonal D of
     /// K + B' diag(`springs`) B, for `springs` at each row.
-    fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64;
+    pub fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64 {
+        let mut diagonal = match self.diagonal.is_empty() {
+            true => (0..self.states.dofs).map(|i| self.elastic.stiffness.diagonal(i)).collect(),
+            false => self.diagonal.clone(),
+        };
+        for (q, spring) in springs.iter().enumerate().filter(|(_, spring)| **spring > 0.0) {
+            self.states.rows.row(q).for_each(|(i, b)| diagonal[i] += spring * b * b);
+        }
+        let squared = |(r, diagonal): (&f64, &f64)| if *r == 0.0 { 0.0 } else { r * r / diagonal };
+        r.iter().zip(&diagonal).map(squared).sum()
+    }
+
+    /// Return K on the dofs; it is empty if the inner solver stores K, or if it was given away.
+    pub fn stiffness(&self) -> &Csr {
+        &self.elastic.stiffness
+    }
 
     /// Compute y = K u, for a body that has not given its K away.
-    fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]);
+    pub fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
+        match &mut self.robin {
+            Some(robin) if self.elastic.stiffness.rows() == 0 => {
+                robin.multiply_stiffness(self.states.matrix_rows(), u, y)
+            }
+            _ => self.elastic.stiffness.multiply(u, y),
+        }
+    }
 
-    /// Return K on the dofs of a state; it is empty if the inner solver stores K, or if it was given away.
-    fn stiffness(&self) -> &Csr;
+    /// Give K away to a matrix of all bodies, and keep its diagonal. Return `None` if the body needs it itself.
+    pub fn give_stiffness(&mut self) -> Option<Csr> {
+        (self.robin.is_none() && self.interior.is_none()).then(|| self.take_stiffness())
+    }
 
-    /// Give K away to a matrix of all bodies ([`Joint`]). Return `None` if the body needs it itself.
-    fn give_stiffness(&mut self) -> Option<Csr> {
-        None
+    fn take_stiffness(&mut self) -> Csr {
+        let k = std::mem::replace(&mut self.elastic.stiffness, Csr::new(0));
+        let first = self.states.distribution.as_ref().map_or(0, |distribution| distribution.first);
+        let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
+        self.diagonal = (0..k.rows()).map(diagonal).collect();
+        k
+    }
+
+    /// Return G, which is made of K first if it does not exist.
+    fn robin_matrix(&mut self) -> Result<&mut RobinMatrix> {
+        if let Some(make) = self.make.take() {
+            let stiffness =
+                if self.interior.is_none() { self.take_stiffness() } else { self.elastic.stiffness.clone() };
+            let diagonal = |i: usize| self.diagonal.get(i).map_or_else(|| stiffness.diagonal(i), |value| *value);
+            let square = |q: usize| self.states.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
+            let mut row_stiffness: Vec<f64> = (0..self.states.rows.rows()).map(square).collect();
+            if let Some(distribution) = &self.states.distribution {
+                distribution.exchange.sum(&mut row_stiffness);
+            }
+            let start = self.states.distribution.as_ref().map(|distribution| distribution.start);
+            let rows = self.states.matrix_rows();
+            self.robin = Some(RobinMatrix::new(rows_of(stiffness, start)?, rows, row_stiffness, None, make)?);
+        }
+        self.robin.as_mut().ok_or_else(|| Error::new(Kind::Solver, "an inner solver could not be made"))
     }
 
     /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing happens if the weights
     /// are those of the last call.
-    fn robin(&mut self, weight: &[f64]) -> Result<()>;
+    pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
+        self.robin_matrix()?;
+        let rows = self.states.matrix_rows();
+        self.robin.as_mut().map_or(Ok(()), |robin| robin.update(rows, weight))
+    }
 
     /// Factor G, or set up its preconditioner, if that has not been done since G changed.
-    fn set_up(&mut self) -> Result<()>;
-
-    /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`Solved`].
-    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
-
-    /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
-    /// a solve, and for an iterative inner solver only one application of its preconditioner.
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
-        self.solve(r, z)
+    pub fn set_up(&mut self) -> Result<()> {
+        self.robin_matrix()?.set_up()
     }
 
     /// Set the relative tolerance of iterative solves, unless the user has set one. Return false if solves do not depend on
     /// it.
-    fn precision(&mut self, _rtol: f64) -> Result<bool> {
-        Ok(false)
+    pub fn precision(&mut self, rtol: f64) -> Result<bool> {
+        self.robin_matrix()?.solver_mut().precision(rtol)
     }
 
-    /// Return a load on all dofs as a force on a state. What acts on supports is left out.
-    fn reduce(&mut self, load: &[f64]) -> Result<ReducedLoad> {
-        Ok(ReducedLoad { force: self.states().reduce(load), work: 0.0 })
+    /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`Solved`].
+    pub fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.robin_matrix()?.apply(|solver| solver.solve(r, z))
     }
 
-    /// Return the displacements of the owned and ghost nodes of this rank for a state, without the motion that supports impose.
-    fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        Ok(self.states().recover(u))
+    /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
+    /// a solve, and for an iterative inner solver only one application of its preconditioner.
+    pub fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+        self.robin_matrix()?.apply(|solver| solver.precondition(r, z))
+    }
+
+    /// Return a load on all dofs as a force on those of the body. What acts on supports is left out.
+    pub fn reduce(&mut self, load: &[f64]) -> Result<ReducedLoad> {
+        match &mut self.interior {
+            None => Ok(ReducedLoad { force: self.states.reduce(load), work: 0.0 }),
+            Some(interior) => interior.reduce(load),
+        }
+    }
+
+    /// Return the displacements of the owned and ghost nodes of this rank from those of the dofs. Collective for a distributed body.
+    pub fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
+        self.interior.as_ref().map_or_else(|| Ok(self.states.recover(u)), |interior| interior.recover(u))
     }
 
     /// Return the counters of the work so far.
-    fn counts(&self) -> BodyCounts;
+    pub fn counts(&self) -> BodyCounts {
+        let counts = self.robin.as_ref().map_or_else(BodyCounts::default, RobinMatrix::counts);
+        self.interior.as_ref().map_or(counts, |interior| interior.count(counts))
+    }
 
     /// Set the counters to zero for another run with the same K and f. Work that need not be repeated counts as avoided.
-    fn begin_anew(&mut self);
+    pub fn begin_anew(&mut self) {
+        self.interior.iter_mut().for_each(|interior| interior.is_reused = true);
+        self.robin.iter_mut().for_each(RobinMatrix::begin_anew);
+    }
 
-    /// Replace the loads and keep what was made of K. Return false, with nothing changed, if other dofs are prescribed or K is needed
-    /// again.
-    fn reload(&mut self, _loads: &Loads) -> Result<bool> {
-        Ok(false)
+    /// Replace the loads of a condensed body and keep what was made of K. Return false, with nothing changed, if the body is not condensed, or other dofs are
+    /// prescribed.
+    pub fn reload(&mut self, loads: &Loads) -> Result<bool> {
+        let Some(interior) = &mut self.interior else { return Ok(false) };
+        let dofs = |prescribed: &[(usize, f64)]| prescribed.iter().map(|entry| entry.0).collect::<Vec<_>>();
+        let fits = interior.schur.is_some() && dofs(&interior.whole.prescribed) == dofs(&loads.prescribed);
+        if fits {
+            interior.whole.reload(loads.force.clone(), loads.prescribed.clone());
+            interior.load = interior.interface.turn(&interior.whole.load);
+            let stiffness = std::mem::take(&mut self.elastic.stiffness);
+            self.elastic = ElasticBody { stiffness, ..interior.loads()? };
+        }
+        Ok(fits)
     }
 
     /// Return one line about the inner solver.
-    fn describe(&self) -> String;
-}
-
-/// A body as this rank has it.
-#[derive(Default)]
-pub enum Local {
-    /// The body lives on other ranks.
-    #[default]
-    Elsewhere,
-    /// The body will be condensed when solvers are set up.
-    Uncondensed {
-        /// What the condensed body says of its inner solver.
-        words: String,
-        /// The elimination of the interior.
-        condense: Condensation,
-    },
-    /// The body, or the part of it that this rank owns.
-    Ready(Box<dyn Body>),
-}
-
-/// The elimination of the interior of a body, which returns the condensed body.
-pub type Condensation = Box<dyn FnOnce() -> Result<Box<dyn Body>>>;
-
-impl Local {
-    /// Return the body, if it is ready. A body that is still to be condensed gives `None`, as one of another rank does.
-    pub fn as_ref(&self) -> Option<&dyn Body> {
-        match self {
-            Self::Ready(body) => Some(&**body),
-            _ => None,
-        }
-    }
-
-    /// Return the body for changes, if it is ready.
-    pub fn as_mut(&mut self) -> Option<&mut (dyn Body + 'static)> {
-        match self {
-            Self::Ready(body) => Some(&mut **body),
-            _ => None,
-        }
-    }
-
-    /// Return one line about the inner solver; it is empty on ranks that do not own the body.
     pub fn describe(&self) -> String {
-        match self {
-            Self::Uncondensed { words, .. } => words.clone(),
-            Self::Ready(body) if body.states().leads() => body.describe(),
-            Self::Elsewhere | Self::Ready(_) => String::new(),
+        match &self.robin {
+            Some(robin) if self.interior.is_none() => robin.solver().describe(),
+            _ => self.words.clone(),
         }
-    }
-
-    /// Condense the body, if it is still to be condensed.
-    ///
-    /// # Errors
-    /// Failures of the solver library.
-    pub fn condense(&mut self) -> Result<()> {
-        *self = match std::mem::take(self) {
-            Self::Uncondensed { condense, .. } => Self::Ready(condense()?),
-            local => local,
-        };
-        Ok(())
     }
 }
 
-/// K of all bodies, in the matrix that serves the linear step. The bodies then have no K of their own.
-pub trait Joint {
-    /// Return K v for every local body, from their states. Rigid motions contribute nothing, because they cause no strain. Collective.
-    fn multiply(&mut self, states: &[Vec<f64>]) -> Vec<Vec<f64>>;
+impl Interior {
+    /// Factor the interior and return the body on its interface dofs.
+    fn eliminate(&mut self) -> Result<ElasticBody> {
+        let (began, name) = (Instant::now(), self.chosen.prefix());
+        let lower = self.interface.lower_triangle(&self.whole.stiffness);
+        self.whole.stiffness = Csr::new(0);
+        let (dofs, interface) = (self.load.len(), &self.interface.dofs);
+        let controls = self.chosen.controls_of_mumps(&self.session);
+        let mut schur = Schur::analyse(&self.session, &controls, self.dimension, dofs, &lower, interface)?;
+        drop(lower);
+        let (needed, available) = (schur.expected_megabytes(), available_memory() / 1_000_000);
+        if needed > available {
+            let message =
+                format!("body `{name}`: its factorisation needs {needed} MB of memory, {available} MB are free");
+            return Err(Error::new(Kind::Solver, message).help("take multigrid: --set solver=hypre"));
+        }
+        schur.factor()?;
+        let stiffness = Csr::full(interface.len(), schur.take_complement());
+        self.schur = Some(RefCell::new(schur));
+        let body = ElasticBody { stiffness, ..self.loads()? };
+        self.seconds = began.elapsed().as_secs_f64();
+        Ok(body)
+    }
+
+    /// Do some work with the factor.
+    fn with_factor<T>(&self, work: impl FnOnce(&mut Schur) -> Result<T>) -> Result<T> {
+        let missing = || Error::new(Kind::Solver, "the interior of a body is not eliminated yet");
+        work(&mut self.schur.as_ref().ok_or_else(missing)?.borrow_mut())
+    }
+
+    /// Return the body on the interface dofs, with its loads and without K. None of these dofs is prescribed.
+    fn loads(&self) -> Result<ElasticBody> {
+        let Self { interface, whole, load, .. } = self;
+        let at_rest = vec![0.0; interface.dofs.len()];
+        self.with_factor(|schur| {
+            let (mut whole_lifting, mut lifting) = (Vec::new(), Vec::new());
+            if !whole.lifting.is_empty() {
+                whole_lifting = interface.turn(&whole.lifting);
+                lifting = schur.condense(&whole_lifting)?;
+            }
+            let reduced = schur.condense(load)?;
+            // displacement of the interior under the loads alone, with the interface dofs at rest
+            let interior = schur.expand_condensed(load, &at_rest)?;
+            let work = dot(load, &interior);
+            Ok(ElasticBody {
+                load: reduced,
+                lifting,
+                energy_constant: whole.energy_constant - 0.5 * work,
+                strain_constant: whole.strain_constant + work + 2.0 * dot(&whole_lifting, &interior),
+                ..ElasticBody::default()
+            })
+        })
+    }
+
+    /// See [`Body::reduce`].
+    fn reduce(&self, load: &[f64]) -> Result<ReducedLoad> {
+        let mut load = load.to_vec();
+        self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
+        let load = self.interface.turn(&load);
+        self.with_factor(|schur| {
+            let force = schur.condense(&load)?;
+            let interior = schur.expand_condensed(&load, &vec![0.0; force.len()])?;
+            Ok(ReducedLoad { work: dot(&load, &interior), force })
+        })
+    }
+
+    /// See [`Body::recover`].
+    fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
+        let turned = self.with_factor(|schur| schur.expand(&self.load, u))?;
+        Ok(self.interface.turn_back(&turned))
+    }
+
+    /// Add the elimination to the counters of the body.
+    fn count(&self, counts: BodyCounts) -> BodyCounts {
+        let eliminations = usize::from(self.schur.is_some() && !self.is_reused);
+        let seconds = eliminations as f64 * self.seconds;
+        BodyCounts {
+            factorizations: eliminations,
+            factorizations_avoided: usize::from(self.is_reused),
+            symbolic: eliminations,
+            first_seconds: seconds,
+            factor_seconds: counts.factor_seconds + seconds,
+            ..counts
+        }
+    }
 }

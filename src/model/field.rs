@@ -1,57 +1,106 @@
 //! Vectors over all bodies (iterates, corrections, search directions), and the functional F1 along a line with an exact line search. F1
 //! is convex.
 
-use super::body::Energy;
+use super::body::{Body, Energy};
 use super::layer::Layer;
-use super::{BodySlot, Model};
+use super::{BodySlot, Model, rigid};
 use crate::linalg::{axpy, dot};
 
-/// A displacement of all bodies: the states of the local bodies and the traces of all bodies.
+/// Displacements v + E a of all bodies, with rigid motions E that supports and springs leave free.
+///
+/// Steps and directions have all of B (v + E a) in their traces. Iterates have only B v: the closings B E a are in the gap of the model ([`Field::advance`]), which
+/// then has the digits of compressions, however far bodies fall.
 #[derive(Debug, Clone, Default)]
 pub struct Field {
-    /// State of each body; empty for a body of another rank.
+    /// v, the displacements of each local body without their rigid parts; empty for a body of another rank.
     pub states: Vec<Vec<f64>>,
-    /// B u of all contact rows (see [`model`](crate::model) for the layout).
+    /// a, the amounts of the motions of each body, on all ranks.
+    pub rigid: Vec<Vec<f64>>,
+    /// B (v + E a) or B v of all contact rows (see [`model`](crate::model) for the layout).
     pub trace: Vec<f64>,
 }
 
 impl Field {
     /// Return the field of all bodies at rest.
     pub fn rest(model: &Model) -> Field {
-        let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), |body| body.states().rest());
-        Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
+        Self::of(model, |body| body.states().rest())
     }
 
     /// Return the field without displacement of any body.
     pub fn zero(model: &Model) -> Field {
-        let state = |slot: &BodySlot| vec![0.0; slot.local.as_ref().map_or(0, |body| body.states().size())];
-        Field { states: model.bodies.iter().map(state).collect(), trace: vec![0.0; 2 * model.points()] }
+        Self::of(model, |body| vec![0.0; body.states().dofs])
+    }
+
+    fn of(model: &Model, displacements: impl Fn(&Body) -> Vec<f64>) -> Field {
+        let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), &displacements);
+        Field {
+            states: model.bodies.iter().map(state).collect(),
+            rigid: model.bodies.iter().map(|slot| vec![0.0; slot.motions.len()]).collect(),
+            trace: vec![0.0; 2 * model.points()],
+        }
+    }
+
+    /// Return the step with the displacements u + E a of the local bodies, and the sums over ranks of `more` numbers. u may have rigid parts; a are the amounts
+    /// `apart` of the motions of each local body, or empty where all is in u. One message, so that all ranks have the same numbers although their processors may
+    /// round differently.
+    pub fn of_step(model: &Model, states: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
+        let (mut field, mut fallen) = (Field { states, ..Self::zero(model) }, Self::zero(model).rigid);
+        field.trace_here(model);
+        for (index, slot) in model.bodies.iter().enumerate() {
+            if let Some(body) = slot.local.as_ref() {
+                field.rigid[index] = body.states().amounts(&field.states[index]);
+                fallen[index].iter_mut().zip(&apart[index]).for_each(|(sum, a)| *sum = *a);
+            }
+        }
+        let mut message = [&field.trace[..], &field.rigid.concat(), &fallen.concat(), more].concat();
+        model.exchange.sum(&mut message);
+        let mut numbers = message.into_iter();
+        let rigid = field.rigid.iter_mut().chain(&mut fallen).flatten();
+        field.trace.iter_mut().chain(rigid).zip(&mut numbers).for_each(|(to, sum)| *to = sum);
+        for ((slot, state), rigid) in model.bodies.iter().zip(&mut field.states).zip(&field.rigid) {
+            if let Some(body) = slot.local.as_ref() {
+                body.states().add_motions(-1.0, rigid, state);
+            }
+        }
+        axpy(1.0, &rigid::trace(model, &fallen), &mut field.trace);
+        field.rigid.iter_mut().zip(&fallen).for_each(|(rigid, a)| axpy(1.0, a, rigid));
+        (field, numbers.collect())
     }
 
     /// Add t `other`.
     pub fn add(&mut self, t: f64, other: &Field) {
-        for (u, z) in self.states.iter_mut().zip(&other.states) {
-            axpy(t, z, u);
-        }
-        axpy(t, &other.trace, &mut self.trace);
+        self.parts_with(other).for_each(|(u, z)| axpy(t, z, u));
     }
 
     /// Multiply by t.
     pub fn scale(&mut self, t: f64) {
         if t != 1.0 {
-            self.states.iter_mut().flatten().chain(&mut self.trace).for_each(|x| *x *= t);
+            let Self { states, rigid, trace } = self;
+            states.iter_mut().chain(rigid).flatten().chain(trace).for_each(|x| *x *= t);
         }
     }
 
     /// Multiply by t, then add `other`.
     pub fn add_to(&mut self, t: f64, other: &Field) {
-        let all = self.states.iter_mut().zip(&other.states).chain([(&mut self.trace, &other.trace)]);
-        for (own, other) in all {
-            own.iter_mut().zip(other).for_each(|(x, y)| *x = y + t * *x);
-        }
+        self.parts_with(other).for_each(|(own, other)| own.iter_mut().zip(other).for_each(|(x, y)| *x = y + t * *x));
     }
 
-    /// Recompute the traces from the states. Steps are added to both separately, so that they come to differ by the rounding of large steps.
+    /// Return all vectors of this field with those of the `other` one.
+    fn parts_with<'f>(&'f mut self, other: &'f Field) -> impl Iterator<Item = (&'f mut Vec<f64>, &'f Vec<f64>)> {
+        let states = self.states.iter_mut().zip(&other.states);
+        states.chain(self.rigid.iter_mut().zip(&other.rigid)).chain([(&mut self.trace, &other.trace)])
+    }
+
+    /// Add t `step` to an iterate, whose rigid part goes into the gap of the model.
+    pub fn advance(&mut self, model: &mut Model, t: f64, step: &Field) {
+        let fall: Vec<Vec<f64>> = step.rigid.iter().map(|amounts| amounts.iter().map(|a| t * a).collect()).collect();
+        let falling = rigid::trace(model, &fall);
+        self.add(t, step);
+        axpy(-1.0, &falling, &mut self.trace);
+        model.close_gap(&falling);
+    }
+
+    /// Recompute the traces B v from the displacements. Steps are added to both separately, so that they come to differ by the rounding of large steps.
     /// Collective.
     pub fn retrace(&mut self, model: &Model) {
         self.trace_here(model);
@@ -59,12 +108,12 @@ impl Field {
     }
 
     /// Set the traces to those of the local bodies, and to zero for other bodies.
-    pub fn trace_here(&mut self, model: &Model) {
+    fn trace_here(&mut self, model: &Model) {
         let mut trace = vec![0.0; self.trace.len()];
         for (index, slot) in model.bodies.iter().enumerate() {
             if let Some(body) = slot.local.as_ref() {
                 let mut rows = vec![0.0; slot.row_stiffness.len()];
-                body.states().trace(&self.states[index], &mut rows);
+                body.states().rows.multiply(&self.states[index], &mut rows);
                 model.put(index, &rows, &mut trace);
             }
         }
@@ -83,43 +132,24 @@ pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
     x.iter().zip(y).map(|(x, y)| dot(x, y)).sum()
 }
 
-/// Return K v for every local body. Collective where bodies have joined their matrices.
-pub fn apply_stiffness(model: &mut Model, v: &Field) -> Vec<Vec<f64>> {
-    if let Some(joint) = &model.joint {
-        return joint.borrow_mut().multiply(&v.states);
-    }
-    let apply = |(slot, v): (&mut BodySlot, &Vec<f64>)| {
-        let mut y = vec![0.0; v.len()];
-        if let Some(body) = slot.local.as_mut() {
-            body.apply_stiffness(v, &mut y);
-        }
-        y
-    };
-    model.bodies.iter_mut().zip(&v.states).map(apply).collect()
-}
-
-/// Return the residual r = f - K u - B' `force` (26) of every local body, for forces at the points (n), and the sum of the energies of u.
-pub fn residual(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
-    let (all, energies) = residuals(model, u, force);
+/// Return the residual r = f - K u - B' `force` (26) of every local body, for forces at the points (n), and the sum of the energies of u. `products` are K u.
+pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
     let mut sum = Energy::default();
-    for energy in energies {
+    let of_body = |(index, product): (usize, Vec<f64>)| {
+        let (slot, state, rows) = (&model.bodies[index], &u.states[index], model.at_rows(index, force));
+        let mut r = vec![0.0; state.len()];
+        let Some(body) = slot.local.as_ref() else { return r };
+        let energy = body.residual(state, &product, &rows, &mut r);
+        body.states().balance(&mut r, &slot.works(&rows));
         sum.strain += energy.strain;
         sum.potential += energy.potential;
-    }
-    (all, sum)
-}
-
-/// Return the residual r = f - K u - B' `force` (26) and the energies of u for every local body, for forces at the points (n).
-pub fn residuals(model: &mut Model, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Vec<Energy>) {
-    let products = apply_stiffness(model, u);
-    let of_body = |(index, product): (usize, Vec<f64>)| {
-        let (state, rows) = (&u.states[index], model.at_rows(index, force));
-        let mut r = vec![0.0; state.len()];
-        let body = model.bodies[index].local.as_ref();
-        let energy = body.map_or_else(Energy::default, |body| body.residual(state, &product, &rows, &mut r));
-        (r, energy)
+        if body.states().leads() {
+            sum.potential -= slot.motions.iter().zip(&u.rigid[index]).map(|(motion, a)| motion.work * a).sum::<f64>();
+        }
+        r
     };
-    products.into_iter().enumerate().map(of_body).unzip()
+    let all = products.into_iter().enumerate().map(of_body).collect();
+    (all, sum)
 }
 
 /// Return the squared energy norm of unbalanced forces r of the local bodies, taken for each dof alone: r'D^-1 r with the diagonal D of
@@ -135,7 +165,7 @@ pub fn unbalanced(model: &Model, r: &[Vec<f64>], springs: &[f64]) -> f64 {
 pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
     for (index, y) in y.iter_mut().enumerate() {
         if let Some(body) = model.bodies[index].local.as_ref() {
-            body.states().add_rows(1.0, &model.at_rows(index, force), y);
+            body.states().rows.add_transpose(1.0, &model.at_rows(index, force), y);
         }
     }
 }
@@ -158,13 +188,16 @@ pub struct LineEnergy<'a> {
 pub struct Unbounded;
 
 impl<'a> LineEnergy<'a> {
-    /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`. One message.
-    pub fn new(model: &'a mut Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field) -> Self {
-        let kv = apply_stiffness(model, v);
-        let mut sums = [local_dot(r, &v.states), local_dot(&kv, &v.states)];
+    /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`, with the products `kv` = K v. One message.
+    pub fn new(model: &'a Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field, kv: &[Vec<f64>]) -> Self {
+        let mut sums = [local_dot(r, &v.states), local_dot(kv, &v.states)];
         model.exchange.sum(&mut sums);
         let closing = v.closing();
-        let slope = -sums[0] - dot(&layer.force, &closing);
+        let works = (0..model.bodies.len()).map(|body| {
+            let works = model.bodies[body].works(&model.at_rows(body, &layer.force));
+            dot(&works, &v.rigid[body])
+        });
+        let slope = -sums[0] - works.sum::<f64>() - dot(&layer.force, &closing);
         Self { model, compression: &layer.compression, closing, slope, curvature: sums[1] }
     }
 

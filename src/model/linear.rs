@@ -5,10 +5,10 @@
 //! file with an implementation of [`LinearStep`].
 
 use super::Model;
-use super::body::BodyCounts;
 use super::field::Field;
 use super::layer::Layer;
 use crate::error::Result;
+use crate::solver::BodyCounts;
 
 /// A linear system to be solved.
 pub struct System<'a> {
@@ -81,6 +81,11 @@ pub trait LinearStep {
     /// Failures of the solver library.
     fn set_up(&mut self, _springs: &[f64]) -> Result<()> {
         Ok(())
+    }
+
+    /// Return K v for the displacements v of every local body. Collective.
+    fn multiply(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        model.multiply(v)
     }
 
     /// Solve a system. Collective.

@@ -1,29 +1,33 @@
-//! The discrete problem as the methods see it: bodies behind the interface [`Body`], and arrays over contact points.
+//! The discrete problem as the methods see it: bodies, and arrays over contact points.
 //!
 //! Contact points of all pairs are numbered consecutively: point q of pair i has the number `offset[i] + q`. An array with one entry for each point is marked
 //! n. A trace vector (2n) has two entries a point, first all of side a, then all of side b: `trace[side * points + offset[pair] + q]`.
 //! A body is local if it lives on this rank, wholly or in part.
 
 pub mod body;
+mod coarse;
 pub mod field;
+pub mod joint;
 pub mod layer;
 pub mod linear;
 pub mod rigid;
 pub mod states;
 
-pub use body::{Body, BodyCounts, Energy, Joint, Loads, Local, ReducedLoad, Solved};
+pub use crate::solver::BodyCounts;
+pub use body::{Body, Loads};
 pub use field::Field;
+pub use joint::Joint;
 pub use layer::Layer;
 pub use linear::LinearStep;
 pub use rigid::{Motions, Moved};
-pub use states::{Distribution, FreeMotion, States};
+pub use states::{Distribution, States};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::exchange::Exchange;
+use crate::linalg::dot;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use std::cell::RefCell;
 use std::ops::Range;
 use std::rc::Rc;
 
@@ -80,11 +84,7 @@ pub struct BodySlot {
     pub name: String,
     /// The body, on the rank that owns it, or on every rank that may own a part of it.
     #[serde(skip)]
-    pub local: Local,
-    /// The rigid motion by which supports move the body, one entry a dof of the owned and ghost nodes of this rank; empty for none. It is not
-    /// part of states.
-    #[serde(skip)]
-    pub imposed: Vec<f64>,
+    pub local: Option<Body>,
     /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,
     /// Rigid motions that neither supports nor springs constrain.
@@ -102,6 +102,11 @@ pub struct BodySlot {
 }
 
 impl BodySlot {
+    /// Return the work of the loads and of forces at the contact rows, which push the body away, on each of its free motions.
+    pub fn works(&self, force: &[f64]) -> Vec<f64> {
+        self.motions.iter().map(|motion| motion.work - dot(&motion.trace, force)).collect()
+    }
+
     /// Return how the dofs of the body are distributed over the ranks; `None` for a body of one rank, and for one that does not live here.
     pub fn distribution(&self) -> Option<&Distribution> {
         self.local.as_ref()?.states().distribution.as_deref()
@@ -122,8 +127,6 @@ pub struct Model {
     pub gap: Vec<f64>,
     /// The mechanism because of which there is no solution, if one is known beforehand.
     pub mechanism: Option<Mechanism>,
-    /// K of all bodies, if they have given their own away.
-    pub joint: Option<Rc<RefCell<dyn Joint>>>,
     /// Connection to the other ranks.
     pub exchange: Rc<dyn Exchange>,
 }
@@ -136,8 +139,7 @@ impl Model {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
-        let (gap, mechanism, joint) = (Vec::new(), None, None);
-        let mut model = Self { bodies, pairs, offset, weight, gap, mechanism, joint, exchange };
+        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), mechanism: None, exchange };
         model.scale_gaps(1.0);
         model
     }
@@ -148,17 +150,10 @@ impl Model {
         self.gap = gaps.collect();
     }
 
-    /// Count a displacement with the trace `trace` (2n) as prescribed by supports. From now on states are relative to it.
-    pub fn impose(&mut self, trace: &[f64]) {
+    /// Subtract the closings of a trace vector (2n) from the gaps.
+    pub fn close_gap(&mut self, trace: &[f64]) {
         let points = self.points();
-        for i in 0..self.pairs.len() {
-            for q in self.range(i) {
-                let (pair, local) = (&mut self.pairs[i], q - self.offset[i]);
-                pair.prescribed[0][local] += trace[q];
-                pair.prescribed[1][local] += trace[points + q];
-                self.gap[q] = free_gap(pair, local, 1.0);
-            }
-        }
+        self.gap.iter_mut().enumerate().for_each(|(q, gap)| *gap -= trace[q] + trace[points + q]);
     }
 
     /// Return c = B u - d at the points (n), for a trace vector (2n).
@@ -242,7 +237,19 @@ impl Model {
     /// # Errors
     /// Failures of the solver library.
     pub fn condense(&mut self) -> Result<()> {
-        self.bodies.iter_mut().try_for_each(|slot| slot.local.condense())
+        self.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).try_for_each(Body::condense)
+    }
+
+    /// Return K v for the displacements v of every local body, where bodies have not given their K away.
+    pub fn multiply(&mut self, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let product = |(slot, v): (&mut BodySlot, &Vec<f64>)| {
+            let mut y = vec![0.0; v.len()];
+            if let Some(body) = slot.local.as_mut() {
+                body.apply_stiffness(v, &mut y);
+            }
+            y
+        };
+        self.bodies.iter_mut().zip(v).map(product).collect()
     }
 
     /// Set the relative tolerance of solves in every body. Return whether the solves of some body depend on it.
@@ -324,8 +331,7 @@ pub(crate) mod sample {
         };
         let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
             name: side.to_string(),
-            local: Local::Elsewhere,
-            imposed: Vec::new(),
+            local: None,
             segments: (0..2).map(|pair| Segment { pair, side }).collect(),
             motions: Vec::new(),
             sprung: None,

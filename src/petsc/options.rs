@@ -152,5 +152,5 @@ pub fn is_global(name: &str) -> bool {
 
 /// Return whether options of PETSc begin with this word.
 pub fn begins_options(word: &str) -> bool {
-    is_family(word) || is_global(word)
+    is_family(word) || GLOBAL.contains(&word) || ["snes", "ts", "tao", "dm", "is", "hypre", "mumps"].contains(&word)
 }

@@ -49,7 +49,7 @@ pub enum MeshSource {
         /// Limits and settings of Gmsh.
         guard: Guard,
     },
-    /// A mesh file: Gmsh's format 4.1, text or binary, or a format that Gmsh converts.
+    /// A mesh file: Gmsh's format 4.1 or 2.2, text or binary, a deck (`.inp`), or a format that Gmsh converts.
     Msh {
         /// The mesh file.
         file: Located<PathBuf>,

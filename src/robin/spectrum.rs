@@ -67,7 +67,7 @@ fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
     let rows: Vec<f64> = (0..2 * points).map(force).collect();
     for (index, load) in load.iter_mut().enumerate() {
         let body = model.bodies[index].local.as_ref();
-        body.into_iter().for_each(|body| body.states().add_rows(1.0, &model.of_body(index, &rows), load));
+        body.into_iter().for_each(|body| body.states().rows.add_transpose(1.0, &model.of_body(index, &rows), load));
     }
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(LANCZOS.1);
     let found = gradients(model, &mut Sweeper::default(), springs, &load, (&mut enough, LANCZOS.0), f64::INFINITY)?;

@@ -3,13 +3,13 @@
 
 use crate::error::{Error, Result};
 use crate::exchange::{self, ASKS, asks};
-use crate::linalg::{Blocks, dot};
+use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::body::Energy;
 use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
-use crate::model::rigid::{Moved, TOLERANCE, combined};
+use crate::model::rigid::{self, Moved, TOLERANCE, combined};
 use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
@@ -52,7 +52,8 @@ impl Sweeper {
     /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`, with the Robin term that the model carries. The requests `asked` of this rank go with
     /// the message.
     pub fn sweep(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, asked: u8) -> Result<Sweep> {
-        let (residual, energy) = residual(model, iterate, &layer.force);
+        let products = model.multiply(&iterate.states);
+        let (residual, energy) = residual(model, products, iterate, &layer.force);
         self.solve(model, residual, energy, None, asked)
     }
 
@@ -71,12 +72,12 @@ impl Sweeper {
         asked: u8,
     ) -> Result<Sweep> {
         let (bodies, mut reasons) = (model.bodies.len(), vec![String::new(); model.bodies.len()]);
-        let mut correction = Field::zero(model);
+        let mut corrections: Vec<Vec<f64>> = residual.iter().map(|r| vec![0.0; r.len()]).collect();
         let (mut sums, mut failed) = ([0.0; SUMS], vec![0.0; bodies]);
         (sums[1], sums[2]) = (energy.strain, energy.potential);
         for index in 0..bodies {
             let Some(body) = model.bodies[index].local.as_mut() else { continue };
-            let (r, z) = (&residual[index], &mut correction.states[index]);
+            let (r, z) = (&residual[index], &mut corrections[index]);
             let solved = if other.is_some() { body.precondition(r, z)? } else { body.solve(r, z)? };
             if let Some(failure) = solved.failure {
                 (failed[index], reasons[index]) = (1.0, failure);
@@ -90,12 +91,9 @@ impl Sweeper {
                 sums[5] += counts.inner_iterations as f64;
             }
         }
-        correction.trace_here(model);
-        let mut message = [&correction.trace[..], &sums, &failed, &asks(asked)].concat();
-        model.exchange.sum(&mut message);
-        let rest = message.split_off(correction.trace.len());
-        correction.trace = message;
-        let (sums, rest) = rest.split_at(SUMS);
+        let (correction, numbers) =
+            Field::of_step(model, corrections, &vec![Vec::new(); bodies], &[&sums[..], &failed, &asks(asked)].concat());
+        let (sums, rest) = numbers.split_at(SUMS);
         let (failed, asked) = rest.split_at(bodies);
         let failed = failed.iter().position(|&failed| failed != 0.0);
         self.sweeps += 1;
@@ -253,23 +251,27 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
     let (mut iterate, without_contact) = (Field::rest(model), vec![0.0; model.points()]);
     let mut multiplier = vec![0.0; trace.len()];
     for _ in 0..STEPS {
-        let (mut r, energy) = residual(model, &iterate, &without_contact);
+        let products = model.multiply(&iterate.states);
+        let (mut r, energy) = residual(model, products, &iterate, &without_contact);
         let apart = trace.iter().zip(&iterate.trace).map(|(target, trace)| target - trace);
         let pull: Vec<f64> =
             apart.zip(&springs).zip(&multiplier).map(|((apart, spring), held)| spring * apart + held).collect();
         for (index, r) in r.iter_mut().enumerate() {
             let Some(body) = model.bodies[index].local.as_ref() else { continue };
-            body.states().add_rows(1.0, &model.of_body(index, &pull), r);
-            body.states().balance(r);
+            body.states().rows.add_transpose(1.0, &model.of_body(index, &pull), r);
         }
         let sweep = Sweeper::default().solve(model, r, energy, None, 0)?;
         if let Some(failure) = sweep.failed {
             return Ok(Err(failure));
         }
+        // with the traces of the rigid parts, which go into the gap at the end
         iterate.add(1.0, &sweep.correction);
         for (q, held) in multiplier.iter_mut().enumerate() {
             *held += springs[q] * (trace[q] - iterate.trace[q]);
         }
     }
+    let fallen = rigid::trace(model, &iterate.rigid);
+    axpy(-1.0, &fallen, &mut iterate.trace);
+    model.close_gap(&fallen);
     Ok(Ok(iterate))
 }

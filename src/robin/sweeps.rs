@@ -1,18 +1,17 @@
 //! The linear step by conjugate gradients preconditioned by the Robin sweep: every iteration solves each body once, independently.
 //!
 //! One iteration carries information from a body to its neighbours only, so the rigid motions Z that supports leave free are deflated
-//! ([`CoarseOperator`]). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
+//! (balancing: Mandel, Comm. Numer. Meth. Engng 9, 1993). With the matrix H of (35), a correction z = G^-1 r becomes (I - Z (Z'HZ)^- Z'H) z: what is left of z after whole bodies have
 //! moved until they are in balance again. Every rank has all contact points, so this needs no message and no solve.
 
 use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
-use crate::linalg::{axpy, dot};
+use crate::linalg::{Factor, axpy, dot};
 use crate::model::Model;
-use crate::model::field::{Field, add_forces, apply_stiffness, local_dot};
+use crate::model::field::{Field, add_forces, local_dot};
 use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
-use crate::model::rigid::{CoarseOperator, CoarseSpace, Motions};
+use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-use std::rc::Rc;
 
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
 const MOST: usize = 400;
@@ -134,9 +133,12 @@ pub(super) fn gradients(
 struct Gradients<'a> {
     /// omega kappa, n.
     springs: &'a [f64],
-    coarse: CoarseOperator,
-    /// The residual, a state of each body that lives on this rank.
+    /// Z'HZ.
+    coarse: Factor,
+    /// The residual, on the dofs of each body that lives on this rank.
     r: Vec<Vec<f64>>,
+    /// Its work on the free motions of all bodies.
+    work: DVector<f64>,
     x: Field,
     lanczos: Lanczos,
     previous: Option<Previous>,
@@ -153,22 +155,25 @@ struct Previous {
 impl<'a> Gradients<'a> {
     /// Start with the solution in the space of rigid motions.
     fn new(model: &Model, springs: &'a [f64], residual: &[Vec<f64>], least: f64) -> Self {
-        let coarse = CoarseOperator::new(Rc::new(CoarseSpace::of(model, None)), springs);
-        let (y, energy) = coarse.solve(residual);
-        let (x, r) = (Field::zero(model), residual.to_vec());
-        let lanczos = Lanczos { energy, least, ..Lanczos::default() };
-        let mut state = Self { springs, coarse, r, x, lanczos, previous: None };
-        add_motions(&state.coarse, model, 1.0, &y, &mut state.x);
-        let push: Vec<f64> = state.coarse.forces(&y).iter().map(|force| -force).collect();
-        add_forces(model, &push, &mut state.r);
-        state
+        let motions = Motions::of(model);
+        let coarse = motions.springs(springs).factor();
+        let work = motions.work_of(model, residual);
+        let y = coarse.solve(&work);
+        let lanczos = Lanczos { energy: y.dot(&work), least, ..Lanczos::default() };
+        let (mut x, mut r) = (Field::zero(model), residual.to_vec());
+        add_motions(model, 1.0, &y, &mut x);
+        let push: Vec<f64> = springs.iter().zip(motions.closing(&y)).map(|(spring, s)| -spring * s).collect();
+        add_forces(model, &push, &mut r);
+        let work = work + motions.work(&push);
+        Self { springs, coarse, r, work, x, lanczos, previous: None }
     }
 
     /// Return the next direction: the deflated correction, conjugate to the previous direction. `change` is z'(r - r_previous): with this
     /// flexible rule, the preconditioner may be an inexact solve.
     fn direction(&mut self, model: &Model, mut correction: Field, change: f64) -> Field {
-        let y = self.coarse.part(&correction.closing());
-        add_motions(&self.coarse, model, -1.0, &y, &mut correction);
+        let force: Vec<f64> = self.springs.iter().zip(correction.closing()).map(|(spring, s)| spring * s).collect();
+        let y = self.coarse.solve(&Motions::of(model).work(&force));
+        add_motions(model, -1.0, &y, &mut correction);
         match self.previous.take() {
             None => correction,
             Some(Previous { mut direction, decrement, .. }) => {
@@ -182,13 +187,14 @@ impl<'a> Gradients<'a> {
 
     /// Go along a direction p to the least energy. Return false if only rounding is left of p; `rz` is r'G^-1 r.
     fn advance(&mut self, model: &mut Model, p: &Field, rz: f64) -> bool {
-        let mut image = apply_stiffness(model, p);
+        let mut image = model.multiply(&p.states);
         let closing = p.closing();
         let spring: Vec<f64> = self.springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
         // r'p, not r'z: rounding leaves rigid motions in r that p does not have
         let mut sums = [local_dot(&image, &p.states), local_dot(&self.r, &p.states)];
         model.exchange.sum(&mut sums);
-        let (curvature, slope) = (sums[0] + dot(&spring, &closing), sums[1]);
+        let rigid = DVector::from_vec(p.rigid.concat());
+        let (curvature, slope) = (sums[0] + dot(&spring, &closing), sums[1] + self.work.dot(&rigid));
         // p'Gp is at least r'z, so if deflation leaves only rounding of p, its curvature is negligible compared with r'z
         if !(slope > 0.0 && curvature > f64::EPSILON * rz) {
             return false;
@@ -198,14 +204,16 @@ impl<'a> Gradients<'a> {
         self.x.add(alpha, p);
         self.lanczos.gain(alpha, alpha * slope);
         self.r.iter_mut().zip(&image).for_each(|(r, y)| axpy(-alpha, y, r));
+        self.work.axpy(-alpha, &Motions::of(model).work(&spring), 1.0);
         true
     }
 }
 
-/// v += s Z y, states and traces.
-fn add_motions(coarse: &CoarseOperator, model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
-    coarse.add(s, y, &mut v.states);
-    axpy(s, &Motions::of(model).trace(model, y), &mut v.trace);
+/// v += s Z y.
+fn add_motions(model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
+    let motions = Motions::of(model);
+    v.rigid.iter_mut().zip(motions.of_bodies(y)).for_each(|(rigid, y)| axpy(s, &y, rigid));
+    axpy(s, &motions.trace(model, y), &mut v.trace);
 }
 
 /// The coefficients of conjugate gradients, from which the spectrum and the error are estimated.

@@ -5,6 +5,7 @@
 
 pub mod inner;
 pub mod phases;
+mod plan;
 pub mod recorder;
 pub mod report;
 pub mod results;
@@ -13,7 +14,7 @@ pub mod steps;
 pub mod verdict;
 mod warnings;
 
-pub use phases::{build, build_after, estimate, iterate, refuse_other_scenes, set_up, targets};
+pub use phases::{build, build_after, estimate, iterate, set_up, targets};
 pub use recorder::{Recorder, Requests};
 pub use stages::{All, Begin, Built, Clock, Done, Prepared, Recovered};
 pub use warnings::{in_parts, made_straight};

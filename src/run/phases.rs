@@ -1,5 +1,5 @@
 //! The steps from a scene to a solved problem, by the [`stages`](super::stages): mesh, discretisation, inner solvers, options, method,
-//! iteration. All ranks must read the same scene, and a problem takes over what the run of another scene before it has left.
+//! iteration. A problem takes over what the run of another scene before it has left.
 
 use super::inner::SolverFactory;
 use super::recorder::{self, Recorder};
@@ -9,24 +9,21 @@ use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
 use crate::discretize::{self, Verified, point};
-use crate::error::{Error, Kind, Result, few};
+use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
-use crate::file::digest;
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
-use crate::model::{BodySlot, LinearStep};
-use crate::parallel::{Ranks, collectively, differences};
+use crate::model::{BodySlot, Joint, LinearStep};
+use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
 use crate::setting::remove;
-use crate::solver::{Dense, Krylov, Monolithic, Union, options};
+use crate::solver::{Dense, Krylov, MakeSolver, options};
 use serde_json::Value;
-use std::borrow::Borrow;
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::rc::Rc;
 
@@ -143,7 +140,7 @@ where
         let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
         let gains = D == 3 && verified.points * D >= LARGE_FRONTS && inner.factors();
         session.set_blas_threads(if gains { cores / session.size() } else { 1 });
-        clock.estimate = inner.seconds;
+        clock.estimate = inner.plan.seconds;
         clock.phase("discretize");
         drop(stage);
         let mut warnings = warnings::of_problem(session, &discrete);
@@ -155,7 +152,7 @@ where
             splits: verified.splits(),
             mesh: read.as_ref().map(|read| read.digest.clone()),
             mesh_file: read.as_ref().map(|read| read.path.clone()),
-            linear: inner.linear,
+            linear: inner.plan.linear,
             interpolation: inner.interpolation.take(),
             choice: inner.reason(),
             condensed: inner.condensed(),
@@ -309,43 +306,6 @@ fn settings(scene: &Scene) -> Value {
     settings
 }
 
-/// Refuse, on all ranks, scenes that differ between ranks, data and tables included. Files of the mesh are not compared, as only the
-/// first rank reads them. Collective.
-///
-/// # Errors
-/// [`Kind::Scene`] with the ranks, and the keys whose values differ.
-pub fn refuse_other_scenes(session: &Session, scenes: &[impl Borrow<Scene>]) -> Result<()> {
-    if session.size() == 1 {
-        return Ok(());
-    }
-    let mut values: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    for scene in scenes {
-        for (key, value) in keys_and_values(scene.borrow().contents()) {
-            values.entry(key).or_default().push(value);
-        }
-    }
-    let digests = values.into_iter().map(|(key, values)| (key, digest(&values))).collect();
-    let differences = differences(session, &digests);
-    if differences.is_empty() {
-        return Ok(());
-    }
-    let ranks: BTreeSet<usize> = differences.iter().map(|difference| difference.rank).collect();
-    let keys: BTreeSet<String> = differences.into_iter().map(|difference| format!("`{}`", difference.what)).collect();
-    let (word, reads) = if ranks.len() == 1 { ("rank", "reads") } else { ("ranks", "read") };
-    let (ranks, keys) = (few(ranks).join(", "), few(keys).join(", "));
-    let message = format!("{word} {ranks} {reads} another scene than rank 0: other values of {keys}");
-    let help = "start all ranks in the same folder, where they find the same scene, data and tables";
-    Err(Error::new(Kind::Scene, message).help(help).common())
-}
-
-/// Return the values of the keys of a scene as text. Each table of data has a key of its own.
-fn keys_and_values(mut contents: Value) -> Vec<(String, String)> {
-    let data = contents["data"].take();
-    let data = data.as_object().into_iter().flatten().map(|(name, table)| (format!("data.{name}"), table.to_string()));
-    let keys = contents.as_object().into_iter().flatten().map(|(key, value)| (key.clone(), value.to_string()));
-    data.chain(keys).collect()
-}
-
 /// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
 /// automatic start, it is stored in `start`.
 fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
@@ -370,22 +330,17 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         crate::robin::prepare(model)?;
         return Ok(Box::new(Sweeps::new(coefficient_of(scene))));
     }
-    // Multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows.
-    let nodes = linear == Linear::Multigrid || model.is_distributed();
-    let union = if nodes { Union::of_nodes(model)? } else { Union::of(model)? };
-    let Some(union) = union else {
-        return Err(Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin"));
+    // multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows
+    let of_nodes = linear == Linear::Multigrid || model.is_distributed();
+    let is_dense = linear == Linear::Dense;
+    let make: MakeSolver = if is_dense {
+        Box::new(|stiffness| Ok(Box::new(Dense::new(stiffness))))
+    } else {
+        let (session, chosen) = (session.clone(), options[0].clone());
+        let block = if of_nodes { scene.dimension.value } else { 1 };
+        Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &[], interpolation)?)))
     };
-    let block = if nodes { scene.dimension.value } else { 1 };
-    let mut step: Box<dyn LinearStep> = match linear {
-        Linear::Dense => Box::new(Monolithic::new(union.without_zeros(), |stiffness| Ok(Dense::new(stiffness)))?),
-        _ => {
-            let krylov = |stiffness| Krylov::new(session, options[0].clone(), block, stiffness, &[], interpolation);
-            let monolithic = Monolithic::new(union, krylov)?;
-            model.joint = nodes.then(|| monolithic.joint());
-            Box::new(monolithic)
-        }
-    };
+    let mut step: Box<dyn LinearStep> = Box::new(Joint::new(model, of_nodes, is_dense, make)?);
     if let Some(springs) = first_springs(model, start) {
         step.set_up(&springs)?;
     }

@@ -9,7 +9,7 @@ use crate::discretize::{BodyInfo, Discrete};
 use crate::error::few;
 use crate::estimate::Estimate;
 use crate::exchange::all_gather;
-use crate::model::{BodyCounts, Model};
+use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
     UnstructuredGrid,
@@ -191,7 +191,7 @@ impl GatheredCounters {
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in &discrete.model.bodies {
             let owned = slot.local.as_ref().filter(|body| body.states().leads());
-            mine.solvers.push(slot.local.describe());
+            mine.solvers.push(owned.map_or_else(String::new, Body::describe));
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
         }
         all_gather(&*discrete.model.exchange, mine).into_iter().reduce(Self::merged).unwrap_or_default()

@@ -10,7 +10,7 @@ use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{length, minus};
 use crate::linalg::{around, bounds};
-use crate::model::{Body, BodySlot};
+use crate::model::{Body, BodySlot, Field};
 use crate::output::report::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ReactionReport, StepPairReport, StepReport, sci,
@@ -23,25 +23,22 @@ use std::rc::Rc;
 /// Collective.
 pub fn recover(done: &Done) -> Rc<All> {
     done.recovered.clone().unwrap_or_else(|| {
-        let bodies = done.model().bodies.iter().zip(&done.outcome.iterate.states);
-        let local = |(slot, state): (&BodySlot, &Vec<f64>)| {
-            slot.local.as_ref().map(|body| recover_body(slot, body, state, done.share))
+        let local = |(index, slot): (usize, &BodySlot)| {
+            slot.local.as_ref().map(|body| recover_body(slot, body, &done.outcome.iterate, index, done.share))
         };
-        Rc::new(bodies.map(local).collect())
+        Rc::new(done.model().bodies.iter().enumerate().map(local).collect())
     })
 }
 
-/// Return the displacements of a body from its state at a share of the loads. Collective.
-fn recover_body(slot: &BodySlot, body: &dyn Body, state: &[f64], share: f64) -> Result<Recovered> {
-    // A motion that springs resist counts as deformation, too.
-    let rigid = if slot.sprung.is_some() { 0 } else { body.states().rigid() };
-    // bodies expect states at the full load
-    let state: Vec<f64> = state.iter().map(|u| u / share).collect();
-    let (deformation, motion) = state.split_at(state.len() - rigid);
-    let mut bent = body.recover(&[deformation, &vec![0.0; rigid]].concat())?;
-    // The rigid motion is the same on all ranks, so all of them take the same branch.
-    let mut state = if motion.iter().all(|a| *a == 0.0) { bent.clone() } else { body.recover(&state)? };
-    state.iter_mut().zip(&slot.imposed).for_each(|(u, imposed)| *u += imposed);
+/// Return the displacements of a body at a share of the loads. Collective.
+fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize, share: f64) -> Result<Recovered> {
+    // bodies expect displacements at the full load
+    let at_full_load = |values: &[f64]| values.iter().map(|u| u / share).collect::<Vec<f64>>();
+    let (bent, amounts) = (at_full_load(&iterate.states[index]), at_full_load(&iterate.rigid[index]));
+    let mut state = body.recover(&body.states().join(&bent, &amounts))?;
+    // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take the same branch
+    let is_whole = slot.sprung.is_some() || amounts.iter().all(|a| *a == 0.0);
+    let mut bent = if is_whole { state.clone() } else { body.recover(&bent)? };
     bent.iter_mut().chain(&mut state).for_each(|u| *u *= share);
     Ok(Recovered::new(state, bent))
 }

@@ -29,10 +29,10 @@ use std::sync::Arc;
 /// # Errors
 /// Refusals point at the text of the scene or of the override. A file that cannot be read is [`Kind::File`].
 pub fn load(path: &Path, overrides: &[String]) -> Result<Scene> {
-    parse(path, read_text(path)?, overrides)
+    parse(path, text(path)?, overrides)
 }
 
-/// Check the text of a scene file like [`load`], which reads it from `path`.
+/// Check the [`text`] of a scene file like [`load`], which reads it from `path`.
 ///
 /// # Errors
 /// Those of [`load`], but for reading the file.
@@ -53,7 +53,11 @@ pub fn examples() -> Option<PathBuf> {
     folder.is_dir().then_some(folder)
 }
 
-fn read_text(path: &Path) -> Result<String> {
+/// Read the text of a scene file.
+///
+/// # Errors
+/// [`Kind::File`] if the file cannot be read or is no text.
+pub fn text(path: &Path) -> Result<String> {
     if path.is_dir() {
         let error = Error::new(Kind::File, format!("{} is a folder, not a scene file", path.display()));
         let inside = path.join("scene.toml");

@@ -1,8 +1,7 @@
 //! Dense Cholesky factorisation by the LAPACK that PETSc uses, for matrices without zeros.
 
-use super::{Change, InnerSolver};
+use super::{Change, InnerSolver, Solved};
 use crate::error::Result;
-use crate::model::Solved;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
 
 /// G as a dense matrix, which is factored when it is first needed after a change.

@@ -1,12 +1,11 @@
 //! Any KSP and PC of PETSc as inner solver.
 
 use super::options::{Chosen, Group};
-use super::{Change, InnerSolver};
+use super::{Change, InnerSolver, Solved};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::linalg::Csr;
 use crate::linalg::portable::log10;
-use crate::model::Solved;
 use crate::petsc::{ConvergenceTest, Ksp, Matrix, Rows, Session};
 use std::rc::Rc;
 
@@ -76,7 +75,9 @@ impl Krylov {
         matrix.set_spd()?;
         let group = chosen.group(session)?;
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", group.prefix))?;
-        ksp.set_name(chosen.prefix())?;
+        if group.prefix != chosen.prefix() {
+            ksp.set_name(chosen.prefix())?;
+        }
         ksp.set_operator(&matrix)?;
         if let Some(interpolation) = interpolation {
             let Prolongation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
@@ -187,8 +188,6 @@ impl Krylov {
 }
 
 impl InnerSolver for Krylov {
-    const HAS_ROWS: bool = true;
-
     fn matrix_mut(&mut self) -> Option<&mut Matrix> {
         Some(&mut self.matrix)
     }

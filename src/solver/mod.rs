@@ -1,38 +1,31 @@
-//! Inner solvers: how a body solves G z = r, where G is its stiffness K plus springs at contact points.
+//! Inner solvers: how G z = r is solved, where G is the stiffness K of one body, or of all bodies, plus springs at contact points.
 //!
-//! [`SparseBody`] holds the stiffness K, the load f and the contact rows B of a body and implements [`Body`](crate::model::Body). A
-//! [`RobinMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]. [`CondensedBody`] is a `SparseBody` whose dofs are only those at its
-//! contact. A new way to solve is a new file with an implementation of `InnerSolver`.
+//! A [`RobinMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]: [`Krylov`] or [`Dense`]. [`InterfaceDofs`] are those of a body that is
+//! condensed to its contact. A new way to solve is a new file with an implementation of `InnerSolver`.
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
 
-mod coarse;
-mod condensed;
 pub mod cost;
 mod dense;
+mod interface;
 mod krylov;
-mod monolithic;
 pub mod names;
 pub mod options;
 pub mod preset;
 mod robin;
-mod sparse;
 
-pub use coarse::RigidSpace;
-pub use condensed::{InterfaceDofs, Uncondensed};
 pub use dense::Dense;
+pub use interface::InterfaceDofs;
 pub use krylov::Krylov;
-pub use monolithic::{Monolithic, Union};
-pub use robin::RobinMatrix;
-pub use sparse::SparseBody;
+pub use robin::{MakeSolver, MakeSubspace, RobinMatrix};
 
 use crate::error::Result;
 use crate::linalg::Csr;
-use crate::model::Solved;
 use crate::petsc::{ConvergenceTest, Int, Matrix, Rows, Subspace};
+use serde::{Deserialize, Serialize};
 
 /// Turn a whole matrix into PETSc's rows, or the rows of this rank, which begin with number `start`.
-fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
+pub fn rows_of(matrix: Csr, start: Option<usize>) -> Result<Rows> {
     let Csr { columns, ptr, col, values } = matrix;
     match start {
         None => Rows::all(integers(ptr), integers(col), values),
@@ -44,6 +37,61 @@ fn rows(matrix: Csr, start: Option<usize>) -> Result<Rows> {
 #[allow(clippy::useless_conversion)]
 fn integers(part: Vec<i32>) -> Vec<Int> {
     part.into_iter().map(Int::from).collect()
+}
+
+/// The outcome of a solve G z = r.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Solved {
+    /// Krylov iterations; 0 for a direct solver.
+    pub iterations: usize,
+    /// Why the inner solver gave up, in its own message; `None` if it reached its tolerance.
+    pub failure: Option<String>,
+}
+
+/// Counters of the work of a body so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct BodyCounts {
+    /// Number of numeric factorisations or preconditioner set-ups.
+    pub factorizations: usize,
+    /// Number of dense factorisations of the Robin matrices of condensed bodies.
+    pub dense_factorizations: usize,
+    /// Number of local corrections (exact solves near the contact) that were set up in place of preconditioners.
+    pub patches: usize,
+    /// Number of symbolic factorisations.
+    pub symbolic: usize,
+    /// Number of numeric factorisations of K that were reused from an earlier run.
+    pub factorizations_avoided: usize,
+    /// Number of solves G z = r.
+    pub solves: usize,
+    /// Number of Krylov iterations in these solves.
+    pub inner_iterations: usize,
+    /// Number of changes of the Robin term that changed the matrix.
+    pub robin_updates: usize,
+    /// Number of requested changes that left the Robin term as it was.
+    pub robin_skipped: usize,
+    /// Wall seconds in factorisations or preconditioner set-ups.
+    pub factor_seconds: f64,
+    /// Wall seconds of the first one, which contains the symbolic factorisation. They are included in `factor_seconds`.
+    pub first_seconds: f64,
+    /// Wall seconds in solves, without set-ups.
+    pub solve_seconds: f64,
+}
+
+impl std::ops::AddAssign for BodyCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.factorizations += other.factorizations;
+        self.dense_factorizations += other.dense_factorizations;
+        self.patches += other.patches;
+        self.symbolic += other.symbolic;
+        self.factorizations_avoided += other.factorizations_avoided;
+        self.solves += other.solves;
+        self.inner_iterations += other.inner_iterations;
+        self.robin_updates += other.robin_updates;
+        self.robin_skipped += other.robin_skipped;
+        self.factor_seconds += other.factor_seconds;
+        self.first_seconds += other.first_seconds;
+        self.solve_seconds += other.solve_seconds;
+    }
 }
 
 /// A change of G = K + B' diag(d) B. An iterative solver may keep the preconditioner of an earlier G and correct it by exact solves on a few dofs.
@@ -62,10 +110,7 @@ pub struct Change<'a> {
 
 /// An owner of the matrix G with a way to solve G z = r.
 pub trait InnerSolver {
-    /// Whether the solver stores G in rows. Then K can be applied through it, and nobody else has to store K.
-    const HAS_ROWS: bool = false;
-
-    /// Return G for products that leave it unchanged, if the solver stores it in rows.
+    /// Return G for products that leave it unchanged, if the solver stores it in rows. Then nobody else has to store K.
     fn matrix_mut(&mut self) -> Option<&mut Matrix> {
         None
     }

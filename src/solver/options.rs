@@ -128,7 +128,7 @@ impl Chosen {
     }
 
     /// Return the controls of MUMPS that the user wrote, and mark them as read.
-    pub(super) fn controls_of_mumps(&self, session: &Session) -> Vec<(&str, &str)> {
+    pub fn controls_of_mumps(&self, session: &Session) -> Vec<(&str, &str)> {
         let is_control = |name: &str| name.starts_with("mat_mumps_icntl_") || name.starts_with("mat_mumps_cntl_");
         let controls: Vec<_> = self.all_typed().filter(|(name, _)| is_control(name)).collect();
         for (name, _) in &controls {
@@ -287,7 +287,8 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     for option in &typed {
         let bare = names::bare(option, bodies);
         // a solve reads this one
-        let is_read = read.contains(option) || (has_solvers && bare.ends_with("ksp_converged_reason"));
+        let is_read =
+            read.contains(option) || (has_solvers && is_of_family(bare) && bare.ends_with("ksp_converged_reason"));
         if is_read || !is_listed {
             options.has(option);
         }

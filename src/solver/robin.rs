@@ -1,41 +1,45 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{Change, InnerSolver, RigidSpace};
+use super::{BodyCounts, Change, InnerSolver, Solved};
 use crate::error::Result;
 use crate::linalg::Csr;
-use crate::model::{BodyCounts, Solved};
-use crate::petsc::Rows;
+use crate::petsc::{Rows, Subspace};
 use std::ops::Range;
-use std::rc::Rc;
 use std::time::Instant;
+
+/// A function that makes a solver of K.
+pub type MakeSolver = Box<dyn FnOnce(Rows) -> Result<Box<dyn InnerSolver>>>;
+
+/// A function that returns a coarse space around a preconditioner, for spring stiffnesses, one a row of B.
+pub type MakeSubspace = Box<dyn Fn(&[f64]) -> Box<dyn Subspace>>;
 
 /// G of one body, or of all bodies together.
 ///
 /// Only the entries of K that differ from G are stored here; the others are in the solver alone. The rows B stay with the owner, who passes the same rows
 /// to every call that needs them.
-pub struct RobinMatrix<S> {
-    solver: S,
+pub struct RobinMatrix {
+    solver: Box<dyn InnerSolver>,
     /// Spring stiffnesses d of G, one a row of B.
     weight: Vec<f64>,
     /// Spring stiffnesses that double the stiffness under a row.
     soft: Vec<f64>,
     coupling: Coupling,
     /// Rigid motions that are put around the preconditioner, if G is of several bodies.
-    coarse: Option<Rc<RigidSpace>>,
+    coarse: Option<MakeSubspace>,
     counts: BodyCounts,
     /// Factorisations of the solver before the counters were last set to zero.
     before: [usize; 3],
 }
 
-impl<S: InnerSolver> RobinMatrix<S> {
+impl RobinMatrix {
     /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
     /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
     pub fn new(
         stiffness: Rows,
         rows: &Csr,
         row_stiffness: Vec<f64>,
-        coarse: Option<RigidSpace>,
-        make: impl FnOnce(Rows) -> Result<S>,
+        coarse: Option<MakeSubspace>,
+        make: MakeSolver,
     ) -> Result<Self> {
         let weight = vec![0.0; rows.rows()];
         let square = |q| rows.row(q).map(|(_, b)| b * b).sum::<f64>();
@@ -44,7 +48,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             weight,
             soft,
             coupling: Coupling::new(&stiffness, rows),
-            coarse: coarse.map(Rc::new),
+            coarse,
             counts: BodyCounts::default(),
             before: [0; 3],
             solver: make(stiffness)?,
@@ -64,7 +68,7 @@ impl<S: InnerSolver> RobinMatrix<S> {
             rows,
             springs: weight,
             soft: &self.soft,
-            coarse: &|| self.coarse.as_ref().map(|coarse| coarse.with(weight)),
+            coarse: &|| self.coarse.as_ref().map(|coarse| coarse(weight)),
         };
         let began = Instant::now();
         self.solver.update(change)?;
@@ -89,11 +93,11 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 
     /// Make one solve, or one application of the preconditioner. It is counted and timed apart from the set-up that it may need.
-    pub fn apply(&mut self, solve: impl FnOnce(&mut S) -> Result<Solved>) -> Result<Solved> {
+    pub fn apply(&mut self, solve: impl FnOnce(&mut dyn InnerSolver) -> Result<Solved>) -> Result<Solved> {
         self.set_up()?;
         self.counts.solves += 1;
         let began = Instant::now();
-        let mut solved = solve(&mut self.solver)?;
+        let mut solved = solve(&mut *self.solver)?;
         if let (Some(reason), Some(ratio)) = (&mut solved.failure, self.steepest()) {
             *reason +=
                 &format!(": springs of the contact are up to {ratio:.0e} times as stiff as the bodies under them");
@@ -140,13 +144,13 @@ impl<S: InnerSolver> RobinMatrix<S> {
     }
 
     /// Return the solver.
-    pub fn solver(&self) -> &S {
-        &self.solver
+    pub fn solver(&self) -> &dyn InnerSolver {
+        &*self.solver
     }
 
     /// Return the solver, for calls that do not change G.
-    pub fn solver_mut(&mut self) -> &mut S {
-        &mut self.solver
+    pub fn solver_mut(&mut self) -> &mut dyn InnerSolver {
+        &mut *self.solver
     }
 }
 

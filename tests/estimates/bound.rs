@@ -7,7 +7,7 @@ use winkler::api::load as load_scene;
 use winkler::error::Result;
 use winkler::internals::Interrupt;
 use winkler::internals::ddm::Outcome;
-use winkler::internals::model::field::{apply_stiffness, local_dot, residual};
+use winkler::internals::model::field::{local_dot, residual};
 use winkler::internals::model::{Field, Model};
 use winkler::internals::run;
 use winkler::internals::run::stages::{Begin, Clock};
@@ -68,7 +68,8 @@ fn newton(session: &Session, case: &str, more: &[&str], law: Option<&str>, stop:
 /// u'Ku.
 fn strain(model: &mut Model, u: &Field) -> f64 {
     let open = vec![0.0; model.points()];
-    residual(model, u, &open).1.strain
+    let products = model.multiply(&u.states);
+    residual(model, products, u, &open).1.strain
 }
 
 /// The integral of p(.) - p(c0) from c0 to c, over the points: what the layers add to the energy norm of a difference.
@@ -120,7 +121,7 @@ fn steps(session: &Session, case: &str, more: &[&str], law: Option<&str>) -> Vec
         let row = &outcome.rows[number - 1];
         let mut difference = outcome.iterate.clone();
         difference.add(-1.0, &exact.iterate);
-        let image = apply_stiffness(&mut model, &difference);
+        let image = model.multiply(&difference.states);
         let bodies = local_dot(&image, &difference.states).max(0.0);
         let between = layers(&model, &compression, &model.compression(&outcome.iterate.trace));
         let [reported, truth, distance] =

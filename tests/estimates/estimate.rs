@@ -401,7 +401,8 @@ fn adapted_meshes_of_a_flange() {
     );
     // the loads lack the squared energy error of their work
     assert!(rounds.iter().all(|round| number(round, "displacement") >= number(round, "energy").powi(2)));
-    assert_eq!(run["settings"]["method"]["stop"]["balanced"], true, "{}", run.said());
+    // a tenth of the error asked for
+    assert!(run.number("residual") <= 3e-3, "{}", run.said());
     let own = sets(&["method.stop.residual=1e-8", "adapt.rounds=1"]);
     let args: Vec<&str> = own.iter().flat_map(|set| ["--set", set]).collect();
     let exact = solve(case("flange"), &args);

@@ -1,8 +1,6 @@
 //! Data of files as functions of a scene, through the whole program.
 
 use crate::common::{Run, Scene, solve, solve_on, text_of, winkler};
-use serde_json::Value;
-use std::f64::consts::PI;
 use std::fs;
 use winkler::api::load;
 
@@ -156,33 +154,4 @@ fn slips_in_data_are_pointed_at() {
         assert_eq!(run.code, 3, "{}", run.said());
         assert!(run.stderr.contains(words), "{words}: {}", run.said());
     }
-}
-
-/// What `check` says as JSON.
-fn checked(scene: &Scene, args: &[&str]) -> Value {
-    let run = winkler(&[&["check", &scene.path.display().to_string(), "--json"], args].concat());
-    assert_eq!(run.code, 0, "{}", run.said());
-    serde_json::from_str(&run.stdout).expect("JSON")
-}
-
-/// `check` tells the range of data and draws them where a folder is given.
-#[test]
-fn data_are_described_and_drawn() {
-    let text = text_of("patch").replace("layer =", "gap = \"1e-6*wave(x)\"\nlayer =");
-    let data = "[data.wave]\nfile = \"wave.csv\"\nspacing = 1.25e-3\noutside = \"periodic\"\ninterpolate = \"cubic\"\n";
-    let scene = Scene::new(text.replace("[[contact]]", &format!("{data}\n[[contact]]")));
-    let wave: String = (0..200).map(|k| format!("{}\n", (2.0 * PI * f64::from(k) / 200.0).cos())).collect();
-    fs::write(scene.path.parent().expect("a folder").join("wave.csv"), wave).expect("a file");
-    let found = checked(&scene, &["--set", "mesh.set={nl=20,nu=20}"]);
-    let number =
-        |path: &str| found.pointer(path).and_then(Value::as_f64).unwrap_or_else(|| panic!("{path}: {found:#}"));
-    let near = |ours: f64, exact: f64, within: f64| assert!((ours / exact - 1.0).abs() < within, "{ours} {exact}");
-    near(number("/data/wave/range/1"), 1.0, 1e-12);
-    // nothing is drawn that nobody asked for
-    let folder = scene.path.parent().expect("a folder").join("pictures");
-    let run = winkler(&["check", &scene.path.display().to_string(), "-o", &folder.display().to_string()]);
-    assert!(run.stdout.contains("data wave: ") && run.stdout.contains("heights -1.000e+00"), "{}", run.said());
-    let drawn: Vec<_> = fs::read_dir(&folder).expect("pictures").flatten().map(|file| file.file_name()).collect();
-    assert_eq!(drawn, ["data-wave.svg"]);
-    assert!(fs::read_to_string(folder.join("data-wave.svg")).expect("a picture").contains("</svg>"));
 }

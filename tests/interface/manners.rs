@@ -249,6 +249,7 @@ fn what_cannot_be_done_is_refused() {
         (&["plot", "results/x", "stress"], 2, "bodies.pvd"),
         (&["bench", &scene, "--resume"], 2, "all of its runs"),
         (&["mesh", &scene, "--adapted"], 2, "adapted.msh"),
+        (&["check", &scene, "-o", "x"], 2, "draws nothing"),
         (&["check", &scene, "--set", "output.compress=false"], 3, "precision = "),
     ] {
         let run = winkler(words);

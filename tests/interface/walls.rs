@@ -6,13 +6,14 @@ use std::fs;
 use std::path::Path;
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: &str = "error exchange file interrupt linalg petsc data expression setting problem mesh fem contact model parallel \
-    solver robin ddm output report scene discretize estimate run api commands internals cli main";
+const MODULES: &str = "error exchange file interrupt linalg petsc data expression setting problem mesh fem contact parallel \
+    solver model robin ddm output report scene discretize estimate run api commands internals cli main";
 
 /// Modules that may use less than what lies below them.
-const NARROW: [(&str, &str); 6] = [
+const NARROW: [(&str, &str); 7] = [
     ("petsc", "error"),
-    ("model", "error exchange linalg contact"),
+    ("solver", "error exchange linalg petsc problem fem parallel"),
+    ("model", "error exchange file linalg petsc fem contact solver"),
     ("robin", "error exchange linalg contact problem model"),
     ("ddm", "error exchange linalg contact problem model robin"),
     ("output", "error file ddm"),

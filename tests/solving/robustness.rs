@@ -160,7 +160,7 @@ fn ends_of_gamma() {
     for gamma in ["0.01", "1.2"] {
         let run = |kappa: f64| {
             let layer = format!("linear = {{ stiffness = {kappa:e} }}");
-            let method = format!("method={{gamma={gamma}, stop={{residual=1e-7, iterations=1700}}}}");
+            let method = format!("method={{gamma={gamma}, stop={{residual=1e-7, iterations=2200}}}}");
             solve(blocks([1.0; 2], [3, 2], &pressed(1e-3), "0", &layer), &["--set", &method])
         };
         assert_pressure(&run(1e-3).converged(), shared([1.0; 2], 1e3, 1.0, 1e-3), 1e-5);

@@ -1,0 +1,395 @@
+//! The Newton matrix (35) of all bodies together: K + B' diag(omega kappa) B with B = [B_a B_b], factored as one. omega is the area of a contact
+//! point, kappa the tangent of its layer's law.
+//!
+//! With whole bodies it is the reference for methods that decompose: the same functional with one big sparse factorisation. With
+//! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Where bodies are distributed over ranks, each
+//! rank owns some rows. Where whole bodies live on several ranks, as condensed ones do, every rank has the whole matrix and solves for itself.
+
+use super::coarse::RigidSpace;
+use super::linear::{Failure, LinearResult, LinearSolution, LinearStep, System, Trial};
+use super::{BodySlot, Distribution, Field, Model, States};
+use crate::error::{Error, Kind, Result};
+use crate::exchange::all_gather;
+use crate::linalg::{Csr, axpy, countable, dot};
+use crate::petsc::KspIterate;
+use crate::solver::{BodyCounts, MakeSolver, RobinMatrix, rows_of};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// The linear step with one matrix of all bodies.
+///
+/// Layers may be far softer than the rounding of K, which resists rigid motions E of a free body by that. So where a matrix is factored, some dofs of each body
+/// are *pins*, as many as it has free motions. Its displacements are v + E a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the
+/// rows of K for a are zero, exactly, and a contact row has B E there.
+pub struct Joint {
+    matrix: RobinMatrix,
+    /// B of all bodies: one row [B_a B_b] for each contact point, also for those of other ranks.
+    rows: Csr,
+    /// First entry of each body in a vector of this rank, and the length of that vector.
+    offset: Vec<usize>,
+    /// Pins of each body.
+    pins: Vec<Vec<usize>>,
+    /// Number of the first row that this rank owns.
+    first: usize,
+    /// Whether every rank has the whole matrix and some of the bodies.
+    is_redundant: bool,
+    /// Whether the bodies have given their K away.
+    has_stiffness: bool,
+}
+
+impl Joint {
+    /// Join the bodies of a model. `make` makes a solver of their K; with `is_dense` it gets all entries of K, row by row.
+    ///
+    /// With `of_nodes` the bodies give their K away, and the unknowns are the displacements of nodes, as multigrid and distributed bodies need them. Otherwise
+    /// there are pins, and every rank has the whole matrix. Collective.
+    ///
+    /// # Errors
+    /// More entries than 32 bits can count, a body that needs its K, and failures of the solver library.
+    pub fn new(model: &mut Model, of_nodes: bool, is_dense: bool, make: MakeSolver) -> Result<Self> {
+        let given: Option<Vec<Csr>> = of_nodes.then(|| given(model)).transpose()?;
+        let model = &*model;
+        let parts = match given {
+            Some(given) => given.into_iter().zip(&model.bodies).map(BodyMatrices::of_nodes).collect(),
+            None => copies(model)?,
+        };
+        let layout = Layout::new(model, &parts);
+        let (rows, coupled) = layout.contact_rows();
+        let mut stiffness = layout.stiffness(coupled)?;
+        let Layout { offset, pins, start, .. } = layout;
+        drop(parts);
+        if is_dense {
+            stiffness = without_zeros(&stiffness);
+        }
+        let first = start.unwrap_or(0);
+        let coarse = if of_nodes { RigidSpace::of(model, &offset, &rows, first) } else { None };
+        let sides = model.row_stiffness();
+        let (side_a, side_b) = sides.split_at(model.points());
+        let row_stiffness = side_a.iter().zip(side_b).map(|(a, b)| a + b).collect();
+        let matrix = RobinMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
+        let is_redundant = !of_nodes && model.exchange.ranks() > 1;
+        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness: of_nodes })
+    }
+
+    /// Return the range of each body in a vector of all bodies.
+    fn parts(&self) -> impl Iterator<Item = Range<usize>> + '_ {
+        self.offset.windows(2).map(|part| part[0]..part[1])
+    }
+
+    /// Return a load of the local bodies on the unknowns of the matrix; it is zero for bodies of other ranks.
+    fn load(&self, model: &Model, r: &[Vec<f64>]) -> Vec<f64> {
+        let mut load = self.whole(r);
+        for (body, (r, pins)) in r.iter().zip(&self.pins).enumerate() {
+            let motions = model.bodies[body].local.as_ref().into_iter().flat_map(|body| &body.states().motions);
+            pins.iter().zip(motions).for_each(|(pin, motion)| load[self.offset[body] + pin] = dot(motion, r));
+        }
+        load
+    }
+
+    /// Return v and the amounts a of each local body from the unknowns of the matrix, for its displacements v + E a. `like` has a vector of each local body.
+    fn displacements(&self, x: &[f64], like: &[Vec<f64>]) -> [Vec<Vec<f64>>; 2] {
+        let mut all = self.apart(x, like);
+        let amounts = all.iter_mut().zip(&self.pins).map(|(u, pins)| match u.is_empty() {
+            true => Vec::new(),
+            false => pins.iter().map(|&pin| std::mem::take(&mut u[pin])).collect(),
+        });
+        let amounts = amounts.collect();
+        [all, amounts]
+    }
+
+    /// Return vectors of the local bodies as one vector; it is zero for bodies of other ranks.
+    fn whole(&self, states: &[Vec<f64>]) -> Vec<f64> {
+        let mut whole = vec![0.0; self.offset[self.offset.len() - 1]];
+        for (part, state) in self.parts().zip(states).filter(|(_, state)| !state.is_empty()) {
+            whole[part].copy_from_slice(state);
+        }
+        whole
+    }
+
+    /// Return the vector of each local body from a vector of all bodies. `like` has a vector of each local body.
+    fn apart(&self, x: &[f64], like: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let of_body =
+            |(part, like): (Range<usize>, &Vec<f64>)| if like.is_empty() { Vec::new() } else { x[part].to_vec() };
+        self.parts().zip(like).map(of_body).collect()
+    }
+}
+
+impl LinearStep for Joint {
+    fn name(&self) -> &'static str {
+        "newton"
+    }
+
+    fn set_up(&mut self, springs: &[f64]) -> Result<()> {
+        self.matrix.update(&self.rows, springs)?;
+        self.matrix.set_up()
+    }
+
+    fn multiply(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        if !self.has_stiffness {
+            return model.multiply(v);
+        }
+        let x = self.whole(v);
+        let mut y = vec![0.0; x.len()];
+        self.matrix.multiply_stiffness(&self.rows, &x, &mut y);
+        self.apart(&y, v)
+    }
+
+    fn solve(&mut self, system: System) -> Result<LinearResult> {
+        let System { model, springs, residual, enough, .. } = system;
+        let mut r = self.load(model, residual);
+        if self.is_redundant {
+            model.exchange.sum(&mut r);
+        }
+        let mut x = vec![0.0; r.len()];
+        self.matrix.update(&self.rows, springs)?;
+        let (rows, first) = (&self.rows, self.first);
+        let mut last_error = None;
+        let mut enough = |iterate: &KspIterate| {
+            let (closing, energy) = closing_and_energy(model, rows, first, iterate.x, &r);
+            let error = estimated_error(iterate, energy);
+            last_error = Some(error);
+            enough(model, &Trial { closing: &closing, energy, error })
+        };
+        let failure = self.matrix.apply(|solver| solver.solve_until(&r, &mut x, &mut enough))?.failure;
+        if let (false, Some(reason)) = (self.is_redundant, &failure) {
+            return Ok(Err(Failure { body: None, reason: reason.clone() }));
+        }
+        let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
+        let energy: f64 = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum();
+        let [states, apart] = self.displacements(&x, residual);
+        let (field, sums) = Field::of_step(model, states, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
+        let (energy, failures) = (sums[0], sums[1]);
+        if failures > 0.0 {
+            let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
+            return Ok(Err(Failure { body: None, reason: failure.unwrap_or_else(elsewhere) }));
+        }
+        let accuracy = self.matrix.solver().accuracy();
+        let error = last_error.unwrap_or(accuracy * energy.max(0.0).sqrt());
+        Ok(Ok(LinearSolution { field, energy, error, is_exact: accuracy == 0.0 }))
+    }
+
+    fn counts(&self) -> BodyCounts {
+        self.matrix.counts()
+    }
+
+    fn describe(&self) -> String {
+        self.matrix.solver().describe()
+    }
+}
+
+/// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this rank, from number `first` on. One message.
+fn closing_and_energy(model: &Model, rows: &Csr, first: usize, x: &[f64], r: &[f64]) -> (Vec<f64>, f64) {
+    let owned = |q: usize| rows.row(q).filter_map(|(i, b)| Some(b * x.get(i.checked_sub(first)?)?)).sum();
+    let mut closing: Vec<f64> = (0..model.points()).map(owned).collect();
+    closing.push(dot(x, r));
+    model.exchange.sum(&mut closing);
+    let energy = closing.pop().unwrap_or_default().max(0.0);
+    (closing, energy)
+}
+
+/// Return the estimated energy norm of the error of an iterate with this squared energy norm.
+fn estimated_error(iterate: &KspIterate, energy: f64) -> f64 {
+    match iterate.least {
+        // r'A^-1 r is at most r'M^-1 r over the least eigenvalue of M^-1 A
+        Some(least) => iterate.residual / least.sqrt(),
+        None => iterate.residual / iterate.first * energy.sqrt(),
+    }
+}
+
+/// Return the matrix with all entries stored, row by row.
+fn without_zeros(matrix: &Csr) -> Csr {
+    let n = matrix.rows();
+    let mut values = vec![0.0; n * n];
+    for i in 0..n {
+        matrix.row(i).for_each(|(j, value)| values[i * n + j] = value);
+    }
+    Csr::full(n, values)
+}
+
+/// The matrices of a body.
+#[derive(Serialize, Deserialize)]
+struct BodyMatrices<'a> {
+    stiffness: Cow<'a, Csr>,
+    /// B.
+    rows: Cow<'a, Csr>,
+    /// E, if amounts of motions are to stand in the place of pins.
+    motions: Cow<'a, [Vec<f64>]>,
+}
+
+impl<'a> BodyMatrices<'a> {
+    fn of_nodes((stiffness, slot): (Csr, &'a BodySlot)) -> Self {
+        let rows = slot.local.as_ref().map_or_else(Cow::default, |body| Cow::Borrowed(&body.states().rows));
+        Self { stiffness: Cow::Owned(stiffness), rows, motions: Cow::Borrowed(&[]) }
+    }
+
+    fn copy(slot: &'a BodySlot) -> Option<Self> {
+        let body = slot.local.as_ref()?;
+        let States { rows, motions, .. } = body.states();
+        let [stiffness, rows] = [body.stiffness(), rows].map(Cow::Borrowed);
+        Some(Self { stiffness, rows, motions: Cow::Borrowed(motions) })
+    }
+}
+
+fn no_matrices() -> Error {
+    Error::new(Kind::Solver, "a body has no matrices to be joined").help("choose newton-robin")
+}
+
+/// Return the K that each body gives away.
+fn given(model: &mut Model) -> Result<Vec<Csr>> {
+    let give = |slot: &mut BodySlot| slot.local.as_mut()?.give_stiffness();
+    model.bodies.iter_mut().map(give).collect::<Option<_>>().ok_or_else(no_matrices)
+}
+
+/// Return the matrices of all bodies. Of several ranks each owns some of them, and sends them to all. One message.
+fn copies(model: &Model) -> Result<Vec<BodyMatrices<'_>>> {
+    let mut all = all_gather(&*model.exchange, model.bodies.iter().map(BodyMatrices::copy).collect::<Vec<_>>());
+    let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
+    (0..model.bodies.len()).map(of).collect::<Option<_>>().ok_or_else(no_matrices)
+}
+
+/// The places of all bodies in one matrix.
+struct Layout<'a> {
+    model: &'a Model,
+    parts: &'a [BodyMatrices<'a>],
+    /// How each body is distributed over the ranks, if it is.
+    distributions: Vec<Option<&'a Distribution>>,
+    /// First row of each body on this rank, and the number of rows of this rank.
+    offset: Vec<usize>,
+    /// Pins of each body.
+    pins: Vec<Vec<usize>>,
+    /// Number of the first row that this rank owns, if other ranks own the others.
+    start: Option<usize>,
+    /// Number of columns, which is that of the rows of all ranks.
+    total: usize,
+}
+
+/// Columns, sorted, that a row of the matrix gets besides those of K, by the number of the row on this rank.
+type Coupled = HashMap<usize, Vec<i32>>;
+
+/// A contact row of a body.
+#[derive(Clone, Copy, Default)]
+struct BodyRow {
+    body: usize,
+    row: usize,
+}
+
+impl<'a> Layout<'a> {
+    fn new(model: &'a Model, parts: &'a [BodyMatrices<'a>]) -> Self {
+        let distribution = |slot: &'a BodySlot| slot.distribution();
+        let distributions: Vec<_> = model.bodies.iter().map(distribution).collect();
+        let mut offset = vec![0];
+        for part in parts {
+            offset.push(offset[offset.len() - 1] + part.stiffness.rows());
+        }
+        let shared = distributions.iter().copied().flatten().next();
+        let total = shared.map_or(offset[parts.len()], |shared| shared.total);
+        let pins = parts.iter().map(|part| pins(&part.motions)).collect();
+        Self { model, parts, distributions, offset, pins, start: shared.map(|shared| shared.start), total }
+    }
+
+    /// Return B of all bodies together, and the columns that its products couple in the rows of this rank.
+    fn contact_rows(&self) -> (Csr, Coupled) {
+        let first = self.start.unwrap_or(0);
+        let owned = first..first + self.offset[self.parts.len()];
+        let (mut rows, mut coupled) = (Csr::new(self.total), Coupled::new());
+        for sides in self.rows_of_points() {
+            let entries: Vec<(usize, f64)> = sides.into_iter().flat_map(|side| self.entries(side)).collect();
+            for &(i, _) in entries.iter().filter(|(i, _)| owned.contains(i)) {
+                coupled.entry(i - first).or_default().extend(entries.iter().map(|&(j, _)| j as i32));
+            }
+            rows.push_row(entries);
+        }
+        for columns in coupled.values_mut() {
+            columns.sort_unstable();
+            columns.dedup();
+        }
+        (rows, coupled)
+    }
+
+    /// Return the row of each of the two bodies for each contact point.
+    fn rows_of_points(&self) -> Vec<[BodyRow; 2]> {
+        let points = self.model.points();
+        let mut rows = vec![[BodyRow::default(); 2]; points];
+        for body in 0..self.parts.len() {
+            for (row, place) in self.model.trace_ranges(body).flatten().enumerate() {
+                rows[place % points][place / points] = BodyRow { body, row };
+            }
+        }
+        rows
+    }
+
+    /// Return the entries (column of the whole matrix, value) of a contact row.
+    fn entries(&self, BodyRow { body, row }: BodyRow) -> Vec<(usize, f64)> {
+        if let Some(distribution) = self.distributions[body] {
+            return distribution.rows.row(row).collect();
+        }
+        let (offset, pins) = (self.offset[body], &self.pins[body]);
+        let rows = self.parts[body].rows.row(row).filter(|(i, _)| !pins.contains(i));
+        let closings = self.model.bodies[body].motions.iter().map(|motion| motion.trace[row]);
+        let mut entries: Vec<(usize, f64)> = rows.chain(pins.iter().copied().zip(closings)).collect();
+        entries.sort_unstable_by_key(|entry| entry.0);
+        entries.into_iter().map(|(i, value)| (offset + i, value)).collect()
+    }
+
+    /// Return K of all bodies, in the rows of this rank, with zeros at the `coupled` columns that K does not have.
+    fn stiffness(&self, mut coupled: Coupled) -> Result<Csr> {
+        let stored: usize = self.parts.iter().map(|part| part.stiffness.values.len()).sum();
+        let room = stored + coupled.values().map(Vec::len).sum::<usize>();
+        countable("the matrix of all bodies together", room)?;
+        let mut stiffness = Csr { columns: self.total, ptr: vec![0], ..Csr::default() };
+        stiffness.ptr.reserve_exact(self.offset[self.parts.len()]);
+        stiffness.col.reserve_exact(room);
+        stiffness.values.reserve_exact(room);
+        for ((&begin, part), pins) in self.offset.iter().zip(self.parts).zip(&self.pins) {
+            let own = &*part.stiffness;
+            let is_pin = |i: usize| pins.contains(&i);
+            // K of a distributed body has the columns of the whole matrix already
+            let shift = if self.start.is_some() { 0 } else { begin as i32 };
+            for i in 0..own.rows() {
+                let mut columns = coupled.remove(&(begin + i)).unwrap_or_default();
+                if is_pin(i) && columns.is_empty() {
+                    // a motion that no contact row sees has only its diagonal
+                    columns.push((begin + i) as i32);
+                }
+                let known = own.range(i).filter(|&k| !is_pin(i) && !is_pin(own.col[k] as usize));
+                push_merged(&mut stiffness, known.map(|k| (shift + own.col[k], own.values[k])), &columns);
+            }
+        }
+        stiffness.col.shrink_to_fit();
+        stiffness.values.shrink_to_fit();
+        Ok(stiffness)
+    }
+}
+
+/// Append a row with the entries (column, value) `known` and with zeros at the other ones of `columns`. Both are sorted by column.
+fn push_merged(matrix: &mut Csr, known: impl Iterator<Item = (i32, f64)>, columns: &[i32]) {
+    let mut known = known.peekable();
+    let mut push = |column: i32, value: f64| {
+        matrix.col.push(column);
+        matrix.values.push(value);
+    };
+    for &column in columns {
+        while let Some((before, value)) = known.next_if(|entry| entry.0 < column) {
+            push(before, value);
+        }
+        push(column, known.next_if(|entry| entry.0 == column).map_or(0.0, |entry| entry.1));
+    }
+    known.for_each(|(column, value)| push(column, value));
+    matrix.ptr.push(matrix.col.len() as i32);
+}
+
+/// Return as many dofs as there are motions, such that no combination of the motions leaves all these dofs at rest. They are the pivots of an
+/// elimination.
+fn pins(motions: &[Vec<f64>]) -> Vec<usize> {
+    let mut remaining = motions.to_vec();
+    let mut pins = Vec::new();
+    while let Some(mut motion) = remaining.pop() {
+        let Some(pin) = (0..motion.len()).max_by(|&i, &j| motion[i].abs().total_cmp(&motion[j].abs())) else { break };
+        let pivot = motion[pin];
+        motion.iter_mut().for_each(|u| *u /= pivot);
+        remaining.iter_mut().for_each(|other| axpy(-other[pin], &motion, other));
+        pins.push(pin);
+    }
+    pins
+}
