@@ -117,20 +117,18 @@ impl<const D: usize> Facet<D> {
         Ok(found.map(|(l, _)| l))
     }
 
-    /// Solve equations in a point of the facet and a distance t by Newton's method, from the middle of the facet and, if that fails, from its
-    /// corners. `distance` gives the start of t from a point and its normal.
+    /// Solve equations in a point of the facet and a distance t by Newton's method from the middle of the facet: from elsewhere it may find
+    /// points that lie on another branch, far from the facet. `distance` gives the start of t from the point and its normal.
     ///
     /// # Errors
-    /// [`Lost`] if no search converges.
+    /// [`Lost`] if the search does not converge.
     fn search(
         &self,
         distance: impl Fn([f64; D], [f64; D]) -> f64,
         equations: impl Fn(&[f64; D], f64) -> Equations<D>,
     ) -> Result<Option<([f64; D], f64)>, Lost> {
-        let corners = (0..D).map(|k| std::array::from_fn(|c| if c == k { 1.0 } else { 0.0 }));
-        let starts = std::iter::once([1.0 / D as f64; D]).chain(corners);
-        let from = |l: [f64; D]| newton(l, distance(self.at(&l), self.normal(&l)), &equations);
-        starts.map(from).find(Result::is_ok).unwrap_or(Err(Lost))
+        let middle = [1.0 / D as f64; D];
+        newton(middle, distance(self.at(&middle), self.normal(&middle)), equations)
     }
 }
 
