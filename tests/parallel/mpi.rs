@@ -20,7 +20,8 @@ fn two_ranks_give_the_serial_history_and_files() {
     assert_eq!(history(&serial), history(&parallel));
     assert_eq!(history(&serial).len(), 1 + 8);
     for name in ["contact-lower-upper.csv", "lower.vtu", "upper.vtu", "bodies.pvd", "pressure.svg"] {
-        assert_eq!(lines(&serial, name), lines(&parallel, name), "{name}");
+        let [one, two] = [&serial, &parallel].map(|run| fs::read(run.folder.join(name)).expect("a result"));
+        assert!(one == two, "{name}");
     }
     assert_eq!(serial.report["files"], parallel.report["files"]);
     let names = |run: &crate::common::Run| {
