@@ -1,11 +1,29 @@
 //! Relaxation rules of the paper's iteration u <- u + gamma z: gamma of (42), from the sweeps so far.
 
-use super::robin::Iterate;
 use crate::error::Result;
 use crate::linalg::dot;
+use crate::model::Model;
 use crate::model::field::{LineEnergy, Unbounded};
+use crate::model::layer::Layer;
 use crate::problem::Own;
 use crate::problem::method::Gamma;
+use crate::robin::Sweep;
+
+/// The present iterate.
+pub struct Iterate<'a> {
+    /// The problem. Its bodies carry the Robin term of this iterate.
+    pub model: &'a mut Model,
+    /// Number of the iterate.
+    pub k: usize,
+    /// The layers at the iterate.
+    pub layer: &'a Layer,
+    /// The Robin term, omega psi kappa of each contact row (2n).
+    pub weight: &'a [f64],
+    /// The sweep at the iterate: r and z = G^-1 r.
+    pub sweep: &'a Sweep,
+    /// Relative residual.
+    pub residual: f64,
+}
 
 /// A rule that chooses gamma^k after the sweep of iteration k. Iteration 0 begins a run.
 pub trait GammaRule {

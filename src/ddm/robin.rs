@@ -7,32 +7,15 @@
 //! update      u <- u + gamma z                                                (42)
 //! ```
 
-use super::gamma::GammaRule;
+use super::gamma::{GammaRule, Iterate};
 use super::run::{LoopEnd, Row, Run};
 use super::stop::Status;
 use crate::error::Result;
-use crate::model::Model;
 use crate::model::field::{Field, unbalanced};
 use crate::model::layer::Layer;
 use crate::robin::Sweep;
 use crate::robin::spectrum::{Interval, interval};
 use crate::robin::sweep::{Coefficient, Sweeper, underconstrained};
-
-/// The present iterate.
-pub struct Iterate<'a> {
-    /// The problem. Its bodies carry the Robin term of this iterate.
-    pub model: &'a mut Model,
-    /// Number of the iterate.
-    pub k: usize,
-    /// The layers at the iterate.
-    pub layer: &'a Layer,
-    /// The Robin term, omega psi kappa of each contact row (2n).
-    pub weight: &'a [f64],
-    /// The sweep at the iterate: r and z = G^-1 r.
-    pub sweep: &'a Sweep,
-    /// Relative residual.
-    pub residual: f64,
-}
 
 /// The step that led to an iterate.
 struct LastStep {

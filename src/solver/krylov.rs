@@ -75,7 +75,9 @@ impl Krylov {
         matrix.set_spd()?;
         let group = chosen.group(session)?;
         let mut ksp = Ksp::of(session, matrix.scope(), &format!("{}_", group.prefix))?;
-        ksp.set_name(chosen.prefix())?;
+        if group.prefix != chosen.prefix() {
+            ksp.set_name(chosen.prefix())?;
+        }
         ksp.set_operator(&matrix)?;
         if let Some(interpolation) = interpolation {
             let Prolongation { rows: Csr { ptr, col, values, .. }, own } = interpolation;

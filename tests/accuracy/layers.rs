@@ -1,7 +1,7 @@
 //! Every law of a layer, through the whole program, against closed forms.
 
 use crate::common::here::solve_here;
-use crate::common::{Report, Scene, case, winkler};
+use crate::common::{Report, Scene, case};
 
 /// Solves the patch under q = 10 with a layer and further settings.
 fn patch(layer: &str, more: &[&str]) -> Report {
@@ -119,23 +119,4 @@ fn laws_that_a_run_leaves() {
     let alone = patch("{table=[[5e-5,2],[6e-5,4]]}", &[]);
     assert!(alone.warnings().contains("by 9.00e-05, under a pressure"), "{}", alone.warnings());
     assert!((alone.number("pairs/0/peak_compression") / 9e-5 - 1.0).abs() < 1e-9);
-}
-
-/// A table written as (p, c) is named with both numbers; tables that fit their loads are not, however soft.
-#[test]
-fn swapped_tables_are_named() {
-    let swapped = |layer: &str| {
-        let (scene, layer) = (case("patch").display().to_string(), format!("contact.0.layer={layer}"));
-        let run = winkler(&["check", &scene, "--set", "mesh.set={nl=2,nu=3}", "--set", &layer]);
-        assert_eq!(run.code, 0, "{}", run.said());
-        let said = run.said();
-        said.lines().find(|line| line.contains("swap the columns")).map(str::to_owned)
-    };
-    let found = swapped("{table=[[2,5e-5],[10,1e-4]]}").expect("a warning");
-    let words = "ends at a compression of 1.00e+01 with a pressure of 1.00e-04: its stiffness is 1.00e-05";
-    assert!(found.contains(words) && found.contains("mean pressure of 1.00e+01"), "{found}");
-    // as it should be; with loads beyond its end; and as soft as foam
-    for layer in ["[[5e-5,2],[1e-4,10]]", "[[5e-5,2],[6e-5,4]]", "[[5,0.1],[20,12]]"] {
-        assert_eq!(swapped(&format!("{{table={layer}}}")), None, "{layer}");
-    }
 }
