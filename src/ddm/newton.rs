@@ -25,6 +25,7 @@ use crate::model::body::Energy;
 use crate::model::field::{Field, LineEnergy, residual, unbalanced};
 use crate::model::layer::Layer;
 use crate::model::linear::{LinearResult, LinearSolution, LinearStep, System, Trial};
+use crate::model::rigid::Motions;
 
 /// Relative error of the linear system that shows what is left of equilibrium: only its size is wanted.
 const HALF: f64 = 0.5;
@@ -60,7 +61,7 @@ pub(super) fn iterate(
             Err(failure) => return Ok(newton.end_without_step(Status::InnerSolver(failure))),
         };
         let part = newton.step_length(&step);
-        if part.is_lost && newton.descend()? {
+        if (part.is_lost || newton.falls()) && newton.descend()? {
             continue;
         }
         let iterate = newton.advance(step, part);
@@ -160,6 +161,12 @@ impl Newton<'_, '_> {
         let pressure = &self.states.linear(&whole)[..];
         let step = WholeStep { from: &before, roundoff: &roundoff, compression: &whole, pressure };
         self.progress.step_length(model, &self.states, &step)
+    }
+
+    /// Return whether free bodies fall: no point is closed that could hold them. Then the length of the step is that of the springs which resist their
+    /// motions in its place, and says nothing of where they meet.
+    fn falls(&self) -> bool {
+        self.states.closed == 0 && Motions::of(self.run.model).count() > 0
     }
 
     /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
