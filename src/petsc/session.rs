@@ -54,8 +54,9 @@ impl Session {
     ///
     /// # Errors
     /// `Kind::Solver` when a session was started before in this process, when MPI runs already, or when PETSc refuses an option; PETSc's
-    /// message is among the causes.
+    /// message is among the causes. `Kind::File` when `-options_file` names no regular file.
     pub fn start(words: &[String]) -> Result<Session> {
+        refuse_odd_files(words)?;
         start_once()?;
         let universe = with_quick_start(mpi::initialize)
             .ok_or_else(|| Error::new(Kind::Solver, "MPI was already started in this process by other code"))?;
@@ -193,6 +194,18 @@ pub(super) fn left() -> Result<Vec<Entry>> {
     };
     entries.sort();
     Ok(entries)
+}
+
+/// Refuse a folder, a pipe or a device as a file of options: PETSc would wait for ever at a pipe.
+fn refuse_odd_files(words: &[String]) -> Result<()> {
+    for pair in words.windows(2).filter(|pair| pair[0].eq_ignore_ascii_case("-options_file")) {
+        // a file that is not there is PETSc's to report
+        if std::fs::metadata(&pair[1]).is_ok_and(|data| !data.is_file()) {
+            let message = format!("{} is a folder, a pipe or a device", pair[1]);
+            return Err(Error::new(Kind::File, message).help("-options_file names a regular file"));
+        }
+    }
+    Ok(())
 }
 
 /// Note the start of a session.

@@ -379,6 +379,7 @@ fn devices_and_pipes_are_no_input() {
     refused(&solve("/dev/zero", &[]), 6, ["/dev/zero", "a device"]);
     refused(&solve(&pipe, &[]), 6, [&name, "a pipe"]);
     refused(&solve(case("groove"), &["--set", &format!("mesh=\"{name}\"")]), 3, [&name, "not a file"]);
+    refused(&solve(case("groove"), &["-options_file", &name]), 6, [&name, "a pipe"]);
     let bench = crate::common::winkler(&["bench", &case("groove").display().to_string(), "--against", &name]);
     refused(&bench, 6, [&name, "a pipe"]);
 }
