@@ -16,7 +16,7 @@ pub struct Folder {
     /// Names of the files written so far.
     files: RefCell<BTreeSet<String>>,
     /// The open folder, locked for the process that writes the tables of a run.
-    _lock: Option<File>,
+    _lock: Option<Lock>,
 }
 
 /// The name of the report in the folder.
@@ -24,6 +24,16 @@ pub const REPORT: &str = "report.json";
 
 /// The folder of the fields of load steps in that of the results.
 pub const STEPS: &str = "steps";
+
+/// A locked folder. A child of the process that has not begun its own program yet has the file, too, and closing it would leave the lock to the child.
+struct Lock(File);
+
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // a lock that cannot be released ends with the process
+        let _ = self.0.unlock();
+    }
+}
 
 impl Folder {
     /// Open the folder, which is created with its parents if needed.
@@ -48,7 +58,7 @@ impl Folder {
             return Err(Error::new(Kind::File, message)
                 .help("name another folder with `-o FOLDER`, or wait until it has ended"));
         }
-        Ok(Self { _lock: Some(file), ..folder })
+        Ok(Self { _lock: Some(Lock(file)), ..folder })
     }
 
     /// Remove the files that the report of an earlier run lists, then the report, and nothing else.
