@@ -26,6 +26,7 @@ pub const REPORT: &str = "report.json";
 pub const STEPS: &str = "steps";
 
 /// A locked folder. A child of the process that has not begun its own program yet has the file, too, and closing it would leave the lock to the child.
+#[derive(Debug)]
 struct Lock(File);
 
 impl Drop for Lock {
