@@ -143,6 +143,8 @@ impl Reached {
 pub struct Scale {
     /// Energy: u'Ku + sum omega p c.
     energy: f64,
+    /// Energy of [`PART`] of the last displacements of the surfaces, as deflections.
+    moved: f64,
     pressure: f64,
     /// Sum of contact forces.
     force: f64,
@@ -168,9 +170,20 @@ impl Scale {
         scale
     }
 
+    /// Take note of displacements of the surfaces (trace, 2n): [`PART`] of them, as deflections, are a reference too. Supports may move a body as a rigid one
+    /// without any contact, so that all else is the rounding of zero.
+    pub fn note_displacements(&mut self, model: &Model, trace: &[f64]) {
+        let points = model.points();
+        let deflection = |q: usize| trace[q].powi(2) + trace[points + q].powi(2);
+        let slopes = surface_slopes(model);
+        let energy: f64 =
+            (0..points).filter(|&q| slopes[q].is_finite()).map(|q| model.weight[q] * slopes[q] * deflection(q)).sum();
+        self.moved = PART * PART * energy;
+    }
+
     /// Return the energy by which an error is measured where the iterate has this `energy`.
     pub fn energy(&self, energy: f64) -> f64 {
-        energy.max(self.energy)
+        energy.max(self.energy).max(self.moved)
     }
 
     /// Whether an energy is infinite, or so small that its rounding, eps^2 of it, is below the range of numbers. A zero energy is out of range if the

@@ -247,6 +247,7 @@ impl Newton<'_, '_> {
         let run = &mut *self.run;
         let layer = Layer::new(run.model, iterate.compression.clone());
         let strain = sums[0];
+        run.scale.note_displacements(run.model, &self.u.trace);
         let mut reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
         let unbalanced = run.scale.relative(sums[2], strain + resolved.work);
         reached.verify(unbalanced);

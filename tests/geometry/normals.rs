@@ -2,7 +2,6 @@
 
 use crate::common::Scene;
 use crate::common::here::solve_here;
-use std::collections::HashMap;
 use std::fs;
 
 /// A scene beside its script.
@@ -189,109 +188,4 @@ spring = [{{ on = \"skin\", stiffness = 1e-4 }}]
         peaks.push(run.number("pairs/0/peak_pressure"));
     }
     assert!((peaks[0] / peaks[1] - 1.0).abs() < 1e-6, "{peaks:?}");
-}
-
-/// Concentric spherical shells of tetrahedra, one octant or all eight as its mirror images, as a `.msh` file. The faces of an octahedron are cut into
-/// triangles, moved onto the spheres, and extruded between them.
-fn shells(octants: usize) -> String {
-    let (mut nodes, mut elements, mut number) = (String::new(), String::new(), HashMap::new());
-    let mut count = 0;
-    for (body, (n, radii)) in [(3, [0.5, 0.75, 1.0]), (4, [1.0, 1.3, 1.6])].into_iter().enumerate() {
-        for octant in 0..octants {
-            let sign: [f64; 3] = std::array::from_fn(|c| if octant >> c & 1 == 0 { 1.0 } else { -1.0 });
-            let mut node = |at: [i32; 2], layer: usize| -> (usize, [f64; 3]) {
-                let x = [at[0], at[1], n - at[0] - at[1]].map(f64::from);
-                let scale = radii[layer] / x.iter().map(|x| x * x).sum::<f64>().sqrt();
-                let x: [f64; 3] = std::array::from_fn(|c| if x[c] == 0.0 { 0.0 } else { sign[c] * scale * x[c] });
-                let key = (body, layer, x.map(|x| (1e6 * x).round() as i64));
-                let next = number.len() + 1;
-                let id = *number.entry(key).or_insert_with(|| {
-                    nodes += &format!("{next} {:e} {:e} {:e}\n", x[0], x[1], x[2]);
-                    next
-                });
-                (id, x)
-            };
-            let mut add = |kind: usize, group: usize, on: &[usize]| {
-                count += 1;
-                let on: Vec<String> = on.iter().map(ToString::to_string).collect();
-                elements += &format!("{count} {kind} 2 {group} {group} {}\n", on.join(" "));
-            };
-            for (i, j) in (0..n).flat_map(|i| (0..n - i).map(move |j| (i, j))) {
-                let mut triangles = vec![[[i, j], [i + 1, j], [i, j + 1]]];
-                if i + j + 2 <= n {
-                    triangles.push([[i + 1, j], [i + 1, j + 1], [i, j + 1]]);
-                }
-                for mut corners in triangles {
-                    // diagonals begin at the same corners on both sides of a plane of symmetry
-                    corners.sort_unstable();
-                    for layer in 0..2 {
-                        let [floor, roof] = [layer, layer + 1].map(|layer| corners.map(|at| node(at, layer)));
-                        for cell in [
-                            [floor[0], floor[1], floor[2], roof[2]],
-                            [floor[0], floor[1], roof[1], roof[2]],
-                            [floor[0], roof[0], roof[1], roof[2]],
-                        ] {
-                            let arm = |k: usize| -> [f64; 3] { std::array::from_fn(|c| cell[k].1[c] - cell[0].1[c]) };
-                            let [p, q, r] = [arm(1), arm(2), arm(3)];
-                            let turned: f64 = (0..3)
-                                .map(|c| r[c] * (p[(c + 1) % 3] * q[(c + 2) % 3] - p[(c + 2) % 3] * q[(c + 1) % 3]))
-                                .sum();
-                            let [a, b, c, d] = cell.map(|corner| corner.0);
-                            add(4, body + 1, &if turned > 0.0 { [a, b, c, d] } else { [a, c, b, d] });
-                            for face in [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]] {
-                                let on = face.map(|k| cell[k]);
-                                // a face between two octants is that of the first
-                                let is_in = |c: usize| sign[c] > 0.0 && on.iter().all(|corner| corner.1[c] == 0.0);
-                                let plane = (0..3).find(|&c| is_in(c));
-                                plane.into_iter().for_each(|c| add(2, 10 * (body + 1) + c, &on.map(|corner| corner.0)));
-                            }
-                        }
-                    }
-                    add(2, 15 + 10 * body, &corners.map(|at| node(at, if body == 0 { 2 } else { 0 }).0));
-                    if body == 1 {
-                        add(2, 26, &corners.map(|at| node(at, 2).0));
-                    }
-                }
-            }
-        }
-    }
-    let names = "3 1 \"inner\"\n3 2 \"outer\"\n2 10 \"inner_x\"\n2 11 \"inner_y\"\n2 12 \"inner_z\"\n2 20 \"outer_x\"\n2 21 \"outer_y\"
-2 22 \"outer_z\"\n2 15 \"inner_out\"\n2 25 \"outer_in\"\n2 26 \"outer_out\"";
-    format!(
-        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n11\n{names}\n$EndPhysicalNames\n$Nodes\n{}\n{nodes}$EndNodes\n\
-         $Elements\n{count}\n{elements}$EndElements\n",
-        number.len()
-    )
-}
-
-/// An eighth of two spherical shells, between three planes of symmetry, has the pressures of the whole that its mirror images make.
-#[test]
-fn an_eighth_has_the_pressures_of_the_whole() {
-    let pressures = |octants: usize| {
-        let fix =
-            |body: &str| ["x", "y", "z"].map(|axis| format!("{{ on = \"{body}_{axis}\", {axis} = 0 }}")).join(", ");
-        let text = format!(
-            "dimension = 3\nmesh = \"part.msh\"
-[[body]]\nname = \"inner\"\nyoung = 7e4\npoisson = 0.33\nfix = [{}]
-[[body]]\nname = \"outer\"\nyoung = 2.1e5\npoisson = 0.3\nfix = [{}]
-load = [{{ on = \"outer_out\", pressure = \"40 + 12*(x^2 - z^2)/(x^2 + y^2 + z^2)\" }}]
-[[contact]]\nbetween = [\"inner_out\", \"outer_in\"]\ntouching = true\nlayer = {{ linear = {{ stiffness = 5e5 }} }}\n",
-            fix("inner"),
-            fix("outer")
-        );
-        let scene = Scene::new(text);
-        fs::write(scene.path.with_file_name("part.msh"), shells(octants)).expect("a mesh");
-        let run = solve_here(scene, &[]).converged();
-        let table = run.contact();
-        let place = |q: usize| ["x", "y", "z"].map(|axis| (1e6 * table[axis][q]).round() as i64);
-        let mut all: Vec<([i64; 3], f64)> = (0..table.rows()).map(|q| (place(q), table["pressure"][q])).collect();
-        all.retain(|(place, _)| place.iter().all(|&x| x >= 0));
-        all.sort_by_key(|point| point.0);
-        all
-    };
-    let (eighth, whole) = (pressures(1), pressures(8));
-    assert!(eighth.len() == whole.len() && eighth.len() >= 10, "{} {}", eighth.len(), whole.len());
-    for (ours, theirs) in eighth.iter().zip(&whole) {
-        assert!(ours.0 == theirs.0 && (ours.1 / theirs.1 - 1.0).abs() < 1e-6, "{ours:?} {theirs:?}");
-    }
 }

@@ -90,6 +90,13 @@ impl Surface {
                 cells.push(cell);
             }
         }
+        // of positive volume, as the readers of meshes leave them
+        for cell in &mut cells {
+            let edge = |c: usize, k: usize| points[cell[k + 1] as usize][c] - points[cell[0] as usize][c];
+            if DMatrix::from_fn(D, D, edge).determinant() < 0.0 {
+                cell.swap(0, 1);
+            }
+        }
         if self.order == Order::P2 {
             let mut middles = HashMap::new();
             for simplex in cells.iter_mut().chain(&mut facets) {
