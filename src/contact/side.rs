@@ -232,7 +232,8 @@ fn smooth<const D: usize>(around: &[(usize, [f64; D])], least: f64) -> Vec<Vec<(
     faces
 }
 
-/// Compression at which laws at two places are compared, as a share of the size of a facet: layers are thinner than facets.
+/// Compression at which laws at two places are compared, as a share of the size of a facet. Laws that differ by a factor differ at any compression, and
+/// the layers of the theory are thin beside facets.
 const SLIGHT: f64 = 1e-3;
 
 /// Number of halvings of a line after which the difference of a smooth function at its ends is a thousandth of what it was.

@@ -21,7 +21,7 @@ use crate::model::layer::{Layer, in_series, surface_slopes};
 use crate::model::linear::LinearSolution;
 use crate::model::rigid::PART;
 
-/// Energy norm of the unbalanced forces, relative to bodies and layers, up to which a linear step is exact: half of the digits. An inexact factorisation
+/// Energy norm of the unbalanced forces, relative to bodies and layers, up to which a linear step is exact: half of the digits, the root of epsilon. An inexact factorisation
 /// leaves more, and no bound holds then.
 pub(super) const EXACT: f64 = 1.5e-8;
 
@@ -152,6 +152,8 @@ pub struct Scale {
     area: f64,
     /// Energy that a unit pressure gives all surfaces, sum omega/rho0.
     compliance: f64,
+    /// Stiffness of the surfaces at each point, omega rho0, n; zero where supports hold both sides.
+    foundation: Vec<f64>,
 }
 
 impl Scale {
@@ -159,7 +161,9 @@ impl Scale {
     pub fn new(model: &Model, traces: &[&[f64]]) -> Self {
         let slopes = surface_slopes(model);
         let compliance = slopes.iter().zip(&model.weight).map(|(slope, weight)| weight / slope).sum();
-        let mut scale = Self { area: model.weight.iter().sum(), compliance, ..Self::default() };
+        let stiffness = |(slope, weight): (&f64, &f64)| if slope.is_finite() { slope * weight } else { 0.0 };
+        let foundation = slopes.iter().zip(&model.weight).map(stiffness).collect();
+        let mut scale = Self { area: model.weight.iter().sum(), compliance, foundation, ..Self::default() };
         for trace in traces {
             let layer = start::at(model, trace);
             let approach = model.compression(trace);
@@ -170,15 +174,13 @@ impl Scale {
         scale
     }
 
-    /// Take note of displacements of the surfaces (trace, 2n): [`PART`] of them, as deflections, are a reference too. Supports may move a body as a rigid one
-    /// without any contact, so that all else is the rounding of zero.
-    pub fn note_displacements(&mut self, model: &Model, trace: &[f64]) {
-        let points = model.points();
-        let deflection = |q: usize| trace[q].powi(2) + trace[points + q].powi(2);
-        let slopes = surface_slopes(model);
-        let energy: f64 =
-            (0..points).filter(|&q| slopes[q].is_finite()).map(|q| model.weight[q] * slopes[q] * deflection(q)).sum();
-        self.moved = PART * PART * energy;
+    /// Take note of displacements of the surfaces (trace, 2n): [`PART`] of them, as deflections, are a reference, too. Supports may move a body as a whole
+    /// and without contact, so that strains are the rounding of zero.
+    pub fn note_displacements(&mut self, trace: &[f64]) {
+        let (one, other) = trace.split_at(self.foundation.len());
+        let energy =
+            self.foundation.iter().enumerate().map(|(q, stiffness)| stiffness * (one[q].powi(2) + other[q].powi(2)));
+        self.moved = PART * PART * energy.sum::<f64>();
     }
 
     /// Return the energy by which an error is measured where the iterate has this `energy`.

@@ -25,7 +25,6 @@ use crate::model::body::Energy;
 use crate::model::field::{Field, LineEnergy, residual, unbalanced};
 use crate::model::layer::Layer;
 use crate::model::linear::{LinearResult, LinearSolution, LinearStep, System, Trial};
-use crate::model::rigid::Motions;
 
 /// Relative error of the linear system that shows what is left of equilibrium: only its size is wanted.
 const HALF: f64 = 0.5;
@@ -61,7 +60,7 @@ pub(super) fn iterate(
             Err(failure) => return Ok(newton.end_without_step(Status::InnerSolver(failure))),
         };
         let part = newton.step_length(&step);
-        if (part.is_lost || newton.falls()) && newton.descend()? {
+        if (part.is_lost || newton.leads_apart(&step, &part)) && newton.descend()? {
             continue;
         }
         let iterate = newton.advance(step, part);
@@ -163,10 +162,14 @@ impl Newton<'_, '_> {
         self.progress.step_length(model, &self.states, &step)
     }
 
-    /// Return whether free bodies fall: no point is closed that could hold them. Then the length of the step is that of the springs which resist their
-    /// motions in its place, and says nothing of where they meet.
-    fn falls(&self) -> bool {
-        self.states.closed == 0 && Motions::of(self.run.model).count() > 0
+    /// Return whether a step opens every point, though loads work on free bodies. All states are on the laws then, but nothing holds the bodies: the length of
+    /// the step is that of the springs which resist their motions in place of the contact, and says nothing of where they meet.
+    fn leads_apart(&self, step: &LinearSolution, part: &StepLength) -> bool {
+        let model = &*self.run.model;
+        let is_pushed = model.bodies.iter().any(|slot| slot.motions.iter().any(|motion| motion.work != 0.0));
+        let closing = step.field.closing();
+        let before = model.compression(&self.u.trace);
+        is_pushed && before.iter().zip(&closing).all(|(c, closing)| c + part.length * closing <= 0.0)
     }
 
     /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
@@ -176,8 +179,8 @@ impl Newton<'_, '_> {
     /// and a step of Newton's method always descends. The least F1 may be at a tiny part of the step, which halving would not find.
     fn descend(&mut self) -> Result<bool> {
         let (start, gap) = (self.u.clone(), self.run.model.gap.clone());
-        for _ in 0..self.run.stop.iterations {
-            let Some(length) = self.descent_step()? else {
+        for step in 0..self.run.stop.iterations {
+            let Some(length) = self.descent_step()?.filter(|length| step > 0 || *length > 0.0) else {
                 (self.u, self.run.model.gap) = (start, gap);
                 return Ok(false);
             };
@@ -247,7 +250,7 @@ impl Newton<'_, '_> {
         let run = &mut *self.run;
         let layer = Layer::new(run.model, iterate.compression.clone());
         let strain = sums[0];
-        run.scale.note_displacements(run.model, &self.u.trace);
+        run.scale.note_displacements(&self.u.trace);
         let mut reached = Reached::new(run.model, &run.scale, strain, step, &iterate.equilibrium(), resolved);
         let unbalanced = run.scale.relative(sums[2], strain + resolved.work);
         reached.verify(unbalanced);

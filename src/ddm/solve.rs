@@ -226,7 +226,8 @@ fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
     a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
 }
 
-/// Number of tolerances above which unbalanced forces, or the roundoff of pressures, are told: norms differ by less than a digit.
+/// A run reports unbalanced forces, or the roundoff of pressures, if they are larger than this number of tolerances. The norms in which the two are measured
+/// differ by less than a factor of ten.
 const TIMES: f64 = 10.0;
 
 /// Default relative tolerance of an inner solver: roundoff below it is not told.

@@ -107,15 +107,16 @@ impl BodyField {
     pub fn grid(&self) -> UnstructuredGrid {
         let (displacement, stress) = (self.displacement.as_flattened(), self.stress.as_flattened());
         let values = [displacement, stress, &self.von_mises, self.principal.as_flattened()];
-        let arrays = Self::ARRAYS.into_iter().zip(values);
+        let array = |k: usize| {
+            let (name, components) = Self::ARRAYS[k];
+            FieldArray::new(name, components, values[k].to_vec())
+        };
         UnstructuredGrid {
             title: self.name.clone(),
             points: self.points.clone(),
             cell: self.cell,
             connectivity: self.connectivity.clone(),
-            at_points: arrays
-                .map(|((name, components), values)| FieldArray::new(name, components, values.to_vec()))
-                .collect(),
+            at_points: (0..values.len()).map(array).collect(),
             at_cells: Vec::new(),
         }
     }

@@ -173,7 +173,7 @@ fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> 
         Ok(file)
     };
     write().map_err(|cause| {
-        // the first failure is told; the temporary file may not even exist
+        // The error reports why writing failed. Removing the temporary file may fail as well, for example because it was never created.
         let _ = fs::remove_file(&part);
         failed(path, &cause)
     })

@@ -4,12 +4,14 @@ use super::blas;
 use super::call::{self, petsc, string, text};
 use super::launch::{is_launched, with_quick_start};
 use crate::error::{Error, Kind, Result};
+use crate::file;
 use mpi::environment::Universe;
 use mpi::topology::{Communicator, SimpleCommunicator};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::env;
 use std::io::Write;
+use std::path::Path;
 use std::ptr::null_mut;
 use std::rc::Rc;
 use std::sync::Once;
@@ -199,10 +201,9 @@ pub(super) fn left() -> Result<Vec<Entry>> {
 /// Refuse a folder, a pipe or a device as a file of options: PETSc would wait for ever at a pipe.
 fn refuse_odd_files(words: &[String]) -> Result<()> {
     for pair in words.windows(2).filter(|pair| pair[0].eq_ignore_ascii_case("-options_file")) {
-        // a file that is not there is PETSc's to report
-        if std::fs::metadata(&pair[1]).is_ok_and(|data| !data.is_file()) {
-            let message = format!("{} is a folder, a pipe or a device", pair[1]);
-            return Err(Error::new(Kind::File, message).help("-options_file names a regular file"));
+        // PETSc itself reports a file that does not exist.
+        if Path::new(&pair[1]).exists() {
+            file::open(Path::new(&pair[1]))?;
         }
     }
     Ok(())

@@ -253,9 +253,8 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
     for _ in 0..STEPS {
         let products = model.multiply(&iterate.states);
         let (mut r, energy) = residual(model, products, &iterate, &without_contact);
-        let apart = trace.iter().zip(&iterate.trace).map(|(target, trace)| target - trace);
-        let pull: Vec<f64> =
-            apart.zip(&springs).zip(&multiplier).map(|((apart, spring), held)| spring * apart + held).collect();
+        let pull = |q: usize| springs[q] * (trace[q] - iterate.trace[q]) + multiplier[q];
+        let pull: Vec<f64> = (0..trace.len()).map(pull).collect();
         for (index, r) in r.iter_mut().enumerate() {
             let Some(body) = model.bodies[index].local.as_ref() else { continue };
             body.states().rows.add_transpose(1.0, &model.of_body(index, &pull), r);

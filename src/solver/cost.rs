@@ -29,8 +29,8 @@ const STEPS: f64 = 5.0;
 /// the levels are those of the vertices. For two cubes of 48^3 this gives 890 MB. The run took 1153 MB, with 50 for the process and 180 for mesh, spaces and vectors.
 const LEVELS: f64 = 42.0 * 30.0;
 
-/// Operations of a factorisation of quadratic elements over those of linear ones with as many dofs, of which a row has half as many entries. Cubes of 12^3 took
-/// 1.2 times as long as those of 24^3 with linear elements.
+/// Operations of a factorisation with quadratic elements, relative to linear elements with the same number of dofs. A row of the matrix of quadratic elements has
+/// about twice as many entries. Cubes of 12^3 with quadratic elements took 1.2 times as long as cubes of 24^3 with linear elements.
 const FILL_P2: f64 = 1.2;
 
 /// A body in space that is not assembled yet.

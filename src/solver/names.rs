@@ -1,4 +1,4 @@
-//! Common names of the options of PETSc's solvers, without dash and prefix. A mistyped option is told the nearest of them.
+//! Common names of the options of PETSc's solvers, without dash and prefix. The refusal of a mistyped option suggests the nearest of them.
 
 use crate::error::nearest;
 

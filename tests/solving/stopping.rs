@@ -381,5 +381,5 @@ fn devices_and_pipes_are_no_input() {
     refused(&solve(case("groove"), &["--set", &format!("mesh=\"{name}\"")]), 3, [&name, "not a file"]);
     refused(&solve(case("groove"), &["-options_file", &name]), 6, [&name, "a pipe"]);
     let bench = crate::common::winkler(&["bench", &case("groove").display().to_string(), "--against", &name]);
-    refused(&bench, 6, [&name, "a pipe"]);
+    refused(&bench, 6, [&name, "Not a directory"]);
 }

@@ -6,6 +6,7 @@ use crate::commands::rows::Row;
 use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
+use crate::linalg::range;
 use crate::output::safe_name;
 use crate::petsc::launcher;
 use nix::sys::signal::{Signal, kill};
@@ -82,9 +83,9 @@ impl Runner {
         }
         let of = |number: fn(&Row) -> Option<f64>| median(rows.iter().filter_map(number).collect());
         let times: Vec<f64> = rows.iter().filter_map(|row| row.seconds).collect();
-        let longest = times.iter().copied().reduce(f64::max).zip(times.iter().copied().reduce(f64::min));
         let seconds = of(|row| row.seconds);
-        let spread = longest.zip(seconds).map(|((most, least), middle)| (most - least) / middle);
+        let [least, most] = range(times.iter().copied());
+        let spread = seconds.map(|middle| (most - least) / middle);
         Ok(Row {
             runs: rows.len(),
             seconds,

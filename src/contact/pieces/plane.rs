@@ -7,7 +7,8 @@ use crate::fem::{element, length, minus};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 
-/// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end exactly where facets do.
+/// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end exactly where facets
+/// do. It is far above the rounding of a search and far below the spacing of integration points, so that it decides only at ends.
 const ON_FACET: f64 = 1e-6;
 
 /// Return the common pieces of two plane curves.
