@@ -2,7 +2,7 @@
 
 use super::pieces::IntegrationPoint;
 use crate::fem::Facets;
-use crate::fem::element::{self, EDGES};
+use crate::fem::element::{self, EDGES, Values};
 use crate::linalg::DisjointSets;
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
@@ -23,14 +23,12 @@ pub enum Carriers {
 impl Carriers {
     /// Return the functions that interpolate values at the carriers, at barycentric point `l` of the facet, one entry a local
     /// node. Nodes that carry nothing have zero. Between mid-edges the interpolation is linear on each facet.
-    pub fn interpolation<const D: usize>(self, order: Order, l: &[f64; D]) -> [f64; element::MOST] {
+    pub fn interpolation<const D: usize>(self, order: Order, l: &[f64; D]) -> Values {
         match self {
             Self::Nodes => element::values(order, l),
             Self::Vertices => element::values(Order::P1, l),
             Self::MidEdges => {
-                let mut shape = [0.0; element::MOST];
-                (0..D).for_each(|edge| shape[D + edge] = 1.0 - 2.0 * l[opposite(edge)]);
-                shape
+                (0..D).map(|_| 0.0).chain((0..D).map(|edge| 1.0 - 2.0 * l[opposite(edge)])).collect()
             }
         }
     }
@@ -94,7 +92,7 @@ impl PressureBasis {
 
     /// Return this basis if the functions of these nodes have steady means on the covered part, otherwise the hat functions.
     fn or_hats<const D: usize>(self, order: Order, nodes: Range<usize>, chunk: &[IntegrationPoint<D>]) -> Self {
-        let (mut integral, mut size) = ([0.0; element::MOST], [0.0; element::MOST]);
+        let [mut integral, mut size] = [(); 2].map(|()| vec![0.0; nodes.end]);
         for point in chunk {
             let phi = element::values(order, &point.at_a);
             for i in nodes.clone() {

@@ -152,7 +152,7 @@ impl FinePoints {
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
             let nodes = a.on_facet(chunk[0].facet_a);
             let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets);
-            let row = |values: [f64; element::MOST]| {
+            let row = |values: element::Values| {
                 let of_point = |(node, value): (&u32, f64)| point_of[*node as usize].map(|q| (q, value));
                 let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
                 let mut row: Vec<(usize, f64)> = entries.collect();
@@ -161,8 +161,8 @@ impl FinePoints {
             };
             for (point, fine) in chunk.iter().zip(&mut each) {
                 let phi = element::values(self.order, &point.at_a);
-                let mu = |i| if i < nodes.len() { basis.value(i, &phi, &point.at_a) } else { 0.0 };
-                self.pressing.push_row(row(std::array::from_fn(mu)));
+                let mu = (0..nodes.len()).map(|i| basis.value(i, &phi, &point.at_a));
+                self.pressing.push_row(row(mu.collect()));
                 let interpolation = row(basis.carriers().interpolation(self.order, &point.at_a));
                 let nearest = interpolation.iter().max_by(|p, q| p.1.total_cmp(&q.1));
                 fine.nearest = nearest.map_or(0, |entry| entry.0);

@@ -175,7 +175,7 @@ fn missed(order: Order, is_quadratic: bool) -> f64 {
     match order {
         Order::P1 => 2.8,
         Order::P2 if is_quadratic => 1.69,
-        Order::P2 => 0.97,
+        _ => 0.97,
     }
 }
 

@@ -19,7 +19,7 @@ pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity,
     let mut volume = vec![0.0; space.nodes.len()];
     for index in 0..space.cell_count() {
         for (place, &node) in space.cell(index).iter().enumerate() {
-            let l = &element::place(D + 1, place)[..=D];
+            let l = &element::place(space.order, D + 1, place)[..=D];
             let Some((measure, stress)) = stress_in_cell(space, elasticity, u, index, l) else { continue };
             volume[node as usize] += measure;
             for (sum, stress) in sum[node as usize].iter_mut().zip(stress) {
@@ -188,7 +188,8 @@ pub struct Exact<const D: usize> {
     pub gradient: [[f64; D]; D],
 }
 
-/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five.
+/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five, or that of products of
+/// two displacements and one more.
 ///
 /// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u. Points without
 /// elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not finite.
@@ -199,7 +200,7 @@ pub fn norms_of_error<const D: usize>(
     u: &[f64],
     exact: &dyn Fn([f64; D]) -> Exact<D>,
 ) -> [Norms; 2] {
-    let rule = element::rule(D + 1, 5);
+    let rule = element::rule(D + 1, (2 * space.order.degree() + 1).max(5));
     let mut squares = [Norms::default(); 2];
     for index in cells {
         for point in space.points(index, &rule).flatten() {

@@ -10,7 +10,7 @@ use crate::problem::body::{SPELLING, fault, is_in_name};
 use crate::problem::pattern::is_pattern;
 use crate::problem::{
     AutoContact, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, LayerSpec, Load, LoadKind, MeshSource,
-    MethodName, MethodSpec, Plane, RobinRule, SpringKind, SpringSpec, StopRule, Support,
+    MethodName, MethodSpec, Order, Plane, RobinRule, SpringKind, SpringSpec, StopRule, Support,
 };
 use std::collections::HashSet;
 use std::fmt::Display;
@@ -137,6 +137,10 @@ impl Scene {
     }
 
     fn check_body(&self, at: &CheckedKey, body: &BodySpec) -> CheckResult {
+        if body.order > Order::P2 && !self.is_plane() {
+            let message = format!("order {} in space", body.order.degree());
+            return at.below("order").refuse(message, "", "bodies in space are of order 1 or 2, in the plane from 1 to 8");
+        }
         check_elasticity(at, &body.elasticity)?;
         for (number, region) in body.regions.iter().enumerate() {
             check_elasticity(&at.item("region", number, &region.on.place), &region.elasticity)?;
