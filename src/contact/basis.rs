@@ -27,9 +27,7 @@ impl Carriers {
         match self {
             Self::Nodes => element::values(order, l),
             Self::Vertices => element::values(Order::P1, l),
-            Self::MidEdges => {
-                (0..D).map(|_| 0.0).chain((0..D).map(|edge| 1.0 - 2.0 * l[opposite(edge)])).collect()
-            }
+            Self::MidEdges => (0..D).map(|_| 0.0).chain((0..D).map(|edge| 1.0 - 2.0 * l[opposite(edge)])).collect(),
         }
     }
 }

@@ -231,7 +231,7 @@ pub struct Rules {
 impl Rules {
     /// Make the rules for elements of this order.
     pub fn new<const D: usize>(order: Order) -> Self {
-        let of_degree = |degree: usize| element::rule(D + 1, degree);
+        let of_degree = |degree: usize| element::rule(D + 1, degree).with_shapes(order);
         let degree = order.degree();
         let varying = if order == Order::P1 { 2 } else { 2 * degree + 1 };
         Self { affine: of_degree(2 * degree - 2), curved: of_degree(2 * degree + 1), varying: of_degree(varying) }
@@ -314,7 +314,8 @@ fn affine<const D: usize>(
 ) -> Result<(), Defect> {
     let corners = &space.cell_nodes(cell)[..=D];
     let centre = [1.0 / (D + 1) as f64; 4];
-    let (gradient, measure) = element::gradients(Order::P1, corners, &centre[..=D]).ok_or(Defect::Inverted(cell))?;
+    let (gradient, measure) =
+        element::gradients(corners, &element::derivatives(Order::P1, &centre[..=D])).ok_or(Defect::Inverted(cell))?;
     let at = space.in_scene(element::interpolate(corners, &centre));
     let material = elasticity.at(cell, at).map_err(|flaw| Defect::Elasticity(elasticity.region(cell), at, flaw))?;
     let pairs = material.blocks_of(&gradient[1..], measure);
@@ -434,7 +435,7 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
 /// Return the quadrature rule of body forces.
 pub fn load_rule<const D: usize>(space: &Space<D>) -> Rule {
     let low = space.order == Order::P1 && !space.axisymmetric;
-    element::rule(D + 1, if low { 2 } else { (2 * space.order.degree() + 1).max(5) })
+    element::rule(D + 1, if low { 2 } else { (2 * space.order.degree() + 1).max(5) }).with_shapes(space.order)
 }
 
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.

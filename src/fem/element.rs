@@ -100,13 +100,12 @@ pub fn nodes<const N: usize>(order: Order) -> Vec<[f64; N]> {
 /// The gradients in space of the shape functions of a cell, one entry a node.
 pub type Gradients<const D: usize> = SmallVec<[[f64; D]; 10]>;
 
-/// Return the gradients in space of the shape functions of a cell at barycentric point `l`, and the measure there. The measure is
+/// Return the gradients in space of the shape functions of a cell at a point, and the measure there. The measure is
 /// the area or volume of the affine simplex with the same Jacobian. The result is `None` if the map is singular or inverted there.
 ///
-/// `l` has D + 1 entries, and `x` are the coordinates of the element's nodes (isoparametric).
-pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Option<(Gradients<D>, f64)> {
-    let d = derivatives(order, l);
-    let (inverse, det) = invert(&jacobian(x, &d))?;
+/// `d` are the [`derivatives`] there, and `x` are the coordinates of the element's nodes (isoparametric).
+pub fn gradients<const D: usize>(x: &[[f64; D]], d: &Slopes) -> Option<(Gradients<D>, f64)> {
+    let (inverse, det) = invert(&jacobian(x, d))?;
     let gradient = |slope: &[f64; 4]| -> [f64; D] {
         std::array::from_fn(|i| (0..D).map(|c| inverse[c][i] * (slope[c + 1] - slope[0])).sum())
     };
@@ -181,9 +180,31 @@ pub struct Rule {
     pub points: Vec<Vec<f64>>,
     /// Weight of each point.
     pub weights: Vec<f64>,
+    /// Values and derivatives of the shape functions at each point, once they were tabulated.
+    shapes: Vec<(Values, Slopes)>,
 }
 
 impl Rule {
+    /// Return the nodes of an element with so many vertices as points of weight one.
+    pub fn at_nodes(order: Order, vertices: usize) -> Self {
+        let mut nodes = Self::default();
+        (0..node_count(vertices, order)).for_each(|k| nodes.add(&place(order, vertices, k)[..vertices], 1.0));
+        nodes.with_shapes(order)
+    }
+
+    /// Return the rule with a table of the shape functions of this order, which saves the evaluation of orders above two in each cell.
+    pub fn with_shapes(mut self, order: Order) -> Self {
+        let shape = |l: &Vec<f64>| (values(order, l), derivatives(order, l));
+        self.shapes = self.points.iter().filter(|_| order > Order::P2).map(shape).collect();
+        self
+    }
+
+    /// Return the values and derivatives of the shape functions of an order at a point, which are those of the table, if there is one.
+    pub fn shape(&self, point: usize, order: Order) -> (Values, Slopes) {
+        let compute = || (values(order, &self.points[point]), derivatives(order, &self.points[point]));
+        self.shapes.get(point).cloned().unwrap_or_else(compute)
+    }
+
     fn add(&mut self, point: &[f64], weight: f64) {
         self.points.push(point.to_vec());
         self.weights.push(weight);
@@ -333,7 +354,7 @@ mod tests {
             .collect();
         let field = |x: &[f64; 3]| x[0] * x[1] - 2.0 * x[2] * x[2] + x[0];
         let l = [0.2, 0.3, 0.1, 0.4];
-        let (gradient, measure) = gradients(Order::P2, &x, &l).expect("positive volume");
+        let (gradient, measure) = gradients(&x, &derivatives(Order::P2, &l)).expect("positive volume");
         let at: [f64; 3] = std::array::from_fn(|i| (0..4).map(|v| l[v] * corner[v][i]).sum());
         let exact = [at[1] + 1.0, at[0], -4.0 * at[2]];
         for i in 0..3 {
@@ -344,11 +365,11 @@ mod tests {
         swapped.swap(0, 1);
         swapped.swap(5, 6);
         swapped.swap(7, 8);
-        assert!(gradients(Order::P2, &swapped, &l).is_none(), "inverted: {measure}");
+        assert!(gradients(&swapped, &derivatives(Order::P2, &l)).is_none(), "inverted: {measure}");
         let flat = x.iter().map(|x| [x[0], x[1], 0.0]).collect::<Vec<_>>();
-        assert!(gradients(Order::P2, &flat, &l).is_none(), "flat");
+        assert!(gradients(&flat, &derivatives(Order::P2, &l)).is_none(), "flat");
         let far = x.iter().map(|x| x.map(|x| 1e150 * x)).collect::<Vec<_>>();
-        assert!(gradients(Order::P2, &far, &l).is_none(), "beyond the range of numbers");
+        assert!(gradients(&far, &derivatives(Order::P2, &l)).is_none(), "beyond the range of numbers");
     }
 
     #[test]

@@ -122,7 +122,8 @@ fn orthogonal(degree: usize, vertices: usize, l: &[f64]) -> Vec<Jet> {
             let next = slope.times(jacobi).plus(-2.0 * (m + a) * m * (sum + 1.0), last).scaled(first.recip());
             (last, jacobi) = (jacobi, next);
         }
-        let next = across.times(scaled).scaled(a).plus(-of, level.times(level).times(before)).scaled((of + 1.0).recip());
+        let next =
+            across.times(scaled).scaled(a).plus(-of, level.times(level).times(before)).scaled((of + 1.0).recip());
         (before, scaled) = (scaled, next);
     }
     all
@@ -131,7 +132,8 @@ fn orthogonal(degree: usize, vertices: usize, l: &[f64]) -> Vec<Jet> {
 /// Return the nodes on a line or a triangle. Those inside a triangle are means of the nodes on lines, by the recursion of Isaac (2020): they need no
 /// table, and their Lebesgue constant is near the least known (5.3 at order 8).
 fn nodes(degree: usize, vertices: usize) -> Vec<[f64; 3]> {
-    let mut nodes: Vec<[f64; 3]> = (0..vertices).map(|k| std::array::from_fn(|i| f64::from(u8::from(i == k)))).collect();
+    let mut nodes: Vec<[f64; 3]> =
+        (0..vertices).map(|k| std::array::from_fn(|i| f64::from(u8::from(i == k)))).collect();
     let lobatto = gauss_lobatto(degree);
     for (i, j) in &EDGES[..vertices * (vertices - 1) / 2] {
         for k in 1..degree {
@@ -223,7 +225,8 @@ pub fn gauss(count: usize) -> Vec<(f64, f64)> {
 /// [`Lagrange::nodes`], inside in triangles that lie in each other, each with its vertices, then its edges 01 12 20.
 pub fn equally_spaced(order: Order, vertices: usize) -> Vec<[f64; 3]> {
     let degree = order.degree();
-    let mut places: Vec<[f64; 3]> = (0..vertices).map(|k| std::array::from_fn(|i| f64::from(u8::from(i == k)))).collect();
+    let mut places: Vec<[f64; 3]> =
+        (0..vertices).map(|k| std::array::from_fn(|i| f64::from(u8::from(i == k)))).collect();
     let between = |[i, j]: [usize; 2], k: usize, degree: usize| {
         let mut l = [0.0; 3];
         l[i] += (degree - k) as f64 / degree as f64;
@@ -332,7 +335,8 @@ mod tests {
                 let [ours, theirs] = [table.values(l), element::values(order, l)];
                 assert!(ours.iter().zip(&theirs).all(|(a, b)| (a - b).abs() < 1e-14), "{order:?}");
                 let [ours, theirs] = [table.slopes(l), element::derivatives(order, l)];
-                let differ = |(a, b): (&[f64; 4], &[f64; 4])| (1..vertices).all(|k| (a[k] - a[0] - b[k] + b[0]).abs() < 1e-13);
+                let differ =
+                    |(a, b): (&[f64; 4], &[f64; 4])| (1..vertices).all(|k| (a[k] - a[0] - b[k] + b[0]).abs() < 1e-13);
                 assert!(ours.iter().zip(&theirs).all(differ), "{order:?}");
             }
         }
@@ -347,7 +351,8 @@ mod tests {
             assert!((line * (degree + 1) as f64 - 1.0).abs() < 1e-13, "{degree}");
             for b in 0..=degree {
                 let (p, q) = (degree / 3, b.min(degree - degree / 3));
-                let sum: f64 = element::rule(3, degree).iter().map(|(l, w)| w * l[1].powi(p as i32) * l[2].powi(q as i32)).sum();
+                let sum: f64 =
+                    element::rule(3, degree).iter().map(|(l, w)| w * l[1].powi(p as i32) * l[2].powi(q as i32)).sum();
                 let exact = 2.0 * factorial(p) * factorial(q) / factorial(p + q + 2);
                 assert!((sum / exact - 1.0).abs() < 1e-12, "{degree} {p} {q}");
             }

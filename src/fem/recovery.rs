@@ -364,7 +364,7 @@ mod tests {
             let cell = space.cell(index);
             let bubble = recovery.missed(cell, &l);
             for c in 0..D {
-                let interpolated: f64 = cell.iter().zip(phi).map(|(&n, phi)| phi * u[D * n as usize + c]).sum();
+                let interpolated: f64 = cell.iter().zip(&phi).map(|(&n, phi)| phi * u[D * n as usize + c]).sum();
                 let error = field::<D>(degree, &at)[c] - interpolated;
                 largest = largest.max(error.abs());
                 assert!((bubble[c] - error).abs() < 1e-10, "{D} {order:?} cell {index}: {} {error}", bubble[c]);
@@ -405,7 +405,7 @@ mod tests {
                 let phi = element::values(order, l);
                 let (exact, seen) = (wave(&element::interpolate(&x, &phi)), recovery.missed(cell, l));
                 for c in 0..3 {
-                    let interpolated: f64 = cell.iter().zip(phi).map(|(&n, phi)| phi * u[3 * n as usize + c]).sum();
+                    let interpolated: f64 = cell.iter().zip(&phi).map(|(&n, phi)| phi * u[3 * n as usize + c]).sum();
                     product += weight * seen[c] * (exact[c] - interpolated);
                     square += weight * (exact[c] - interpolated).powi(2);
                 }

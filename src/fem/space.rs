@@ -1,6 +1,6 @@
 //! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of cells.
 
-use super::element::{self, EDGES, Gradients, Rule, Values};
+use super::element::{self, EDGES, Gradients, Rule, Slopes, Values};
 use super::{cross, lagrange, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
@@ -231,8 +231,20 @@ impl<const D: usize> Space<D> {
     /// over the body is that of a quadrature point with this `weight`. The result is `None` if the map of the cell is singular or
     /// inverted there.
     pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<CellPoint<'a, D>> {
-        let (gradient, measure) = element::gradients(self.order, x, l)?;
-        let phi = element::values(self.order, l);
+        let shape = (element::values(self.order, l), element::derivatives(self.order, l));
+        self.point_of(i, x, l, weight, shape)
+    }
+
+    /// Return the point of a cell as [`Space::point`] does, with the values and derivatives of the shape functions there.
+    fn point_of<'a>(
+        &'a self,
+        i: usize,
+        x: &[[f64; D]],
+        l: &'a [f64],
+        weight: f64,
+        (phi, derivatives): (Values, Slopes),
+    ) -> Option<CellPoint<'a, D>> {
+        let (gradient, measure) = element::gradients(x, &derivatives)?;
         let at = element::interpolate(x, &phi);
         let weight = weight * measure * self.circle(&at);
         Some(CellPoint { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })
@@ -241,7 +253,8 @@ impl<const D: usize> Space<D> {
     /// Return the points of a quadrature rule in cell `i`; `None` for those where the map of the cell is singular or inverted.
     pub fn points<'a>(&'a self, i: usize, rule: &'a Rule) -> impl Iterator<Item = Option<CellPoint<'a, D>>> {
         let x = self.cell_nodes(i);
-        rule.iter().map(move |(l, weight)| self.point(i, &x, l, weight))
+        let shape = |k: usize| rule.shape(k, self.order);
+        rule.iter().enumerate().map(move |(k, (l, weight))| self.point_of(i, &x, l, weight, shape(k)))
     }
 
     /// Return the mean of the corners of cell `i`.

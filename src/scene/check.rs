@@ -139,7 +139,11 @@ impl Scene {
     fn check_body(&self, at: &CheckedKey, body: &BodySpec) -> CheckResult {
         if body.order > Order::P2 && !self.is_plane() {
             let message = format!("order {} in space", body.order.degree());
-            return at.below("order").refuse(message, "", "bodies in space are of order 1 or 2, in the plane from 1 to 8");
+            return at.below("order").refuse(
+                message,
+                "",
+                "bodies in space are of order 1 or 2, in the plane from 1 to 8",
+            );
         }
         check_elasticity(at, &body.elasticity)?;
         for (number, region) in body.regions.iter().enumerate() {

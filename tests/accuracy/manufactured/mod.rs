@@ -279,6 +279,29 @@ fn graded_and_anisotropic() {
     flat(graded(fibres(0.5)), Solid::isotropic(3.0, 0.2)).converges("fibres", 2, [4, 8, 16], [2.9, 1.95], 0.01);
 }
 
+/// Orders k + 1 and k up to 8 where the solution is smooth: contact is closed everywhere.
+#[test]
+fn high_orders() {
+    let problem = || Problem {
+        compression: number(0.7) + number(0.5) * cosine([1.0, 0.0, 0.0]),
+        ..flat(steel(), graded(fibres(-1.1)))
+    };
+    for (order, sizes) in
+        [(3, [4, 6, 8]), (4, [4, 6, 8]), (5, [2, 4, 6]), (6, [2, 4, 6]), (7, [2, 4, 6]), (8, [2, 4, 6])]
+    {
+        let k = order as f64;
+        problem().converges("smooth", order, sizes, [k + 0.85, k - 0.15], 1e-4);
+    }
+}
+
+/// The shape of a quadratic mesh is nearer to a circle than to its elements by h^3; the errors of orders above two fall like that or faster.
+#[test]
+fn high_orders_on_curves() {
+    for order in [3, 5, 8] {
+        curved(steel(), fibres(0.5)).converges("curved", order, [4, 8, 16], [2.9, 2.4], 1e-3);
+    }
+}
+
 #[test]
 fn curved_surfaces() {
     curved(steel(), fibres(0.5)).converges("curved", 1, [16, 24, 32], [1.9, 0.95], 0.15);
