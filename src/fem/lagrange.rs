@@ -270,7 +270,11 @@ pub fn at_equally_spaced<const D: usize, const N: usize>(space: &Space<D>, value
         return values;
     }
     let places = equally_spaced(space.order, D + 1);
-    let shapes: Vec<Values> = places.iter().map(|l| element::values(space.order, l)).collect();
+    // rounding leaves the points of an edge on that edge
+    let exact = |l: &[f64; 3]| -> Values {
+        element::values(space.order, l).iter().map(|phi| if phi.abs() < 1e-12 { 0.0 } else { *phi }).collect()
+    };
+    let shapes: Vec<Values> = places.iter().map(exact).collect();
     let mut moved = values.clone();
     for cell in space.cells.chunks_exact(space.stride) {
         for (node, phi) in cell.iter().zip(&shapes).skip(D + 1) {
