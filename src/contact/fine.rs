@@ -33,9 +33,9 @@ pub struct FinePoint {
     pub at_rim: bool,
     /// Whether the contact points of this facet are at mid-edges.
     pub at_edges: bool,
-    /// Whether the pressure on this facet is a polynomial of second degree. It is on quadratic elements in the plane where facets are
-    /// fully covered; on a part of a facet three values do not show more than a mean.
-    pub is_quadratic: bool,
+    /// Degree of the pressure on this facet as a polynomial. It is that of the elements in the plane where facets are
+    /// fully covered; on a part of a facet, and in space, its values do not show more than a mean, which counts as one.
+    pub degree: usize,
     /// Contact point nearest to the point, for laws that differ from point to point.
     pub nearest: usize,
 }
@@ -119,7 +119,7 @@ impl<const D: usize> Fine<D> {
             size: size_under(a, point),
             at_rim: at_rim[point.facet_a],
             at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
-            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].is_whole(),
+            degree: if D == 2 && pair.cover[point.facet_a].is_whole() { a.facets.order.degree() } else { 1 },
             nearest: 0,
         };
         let mut points = FinePoints {

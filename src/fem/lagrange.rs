@@ -72,6 +72,11 @@ impl Lagrange {
         (0..psi.len()).map(value).collect()
     }
 
+    /// Return the coefficient of the highest power in each function of a line, up to a common factor.
+    pub fn highest(&self) -> Vec<f64> {
+        (0..self.nodes.len()).map(|i| self.coefficients[(i, self.degree)]).collect()
+    }
+
     /// Return the derivatives by the barycentric coordinates at `l`, as differences from that by l_0.
     pub fn slopes(&self, l: &[f64]) -> Slopes {
         let psi = orthogonal(self.degree, self.vertices, l);

@@ -349,6 +349,11 @@ pub struct CellPoint<'a, const D: usize> {
 }
 
 impl<const D: usize> CellPoint<'_, D> {
+    /// Return the order of the shape functions.
+    pub fn order(&self) -> Order {
+        self.space.order
+    }
+
     /// Return the gradient here of a displacement `u`, one entry a dof.
     pub fn slope(&self, u: &[f64]) -> Slope<D> {
         let mut h = [[0.0; D]; D];

@@ -137,11 +137,6 @@ impl Scene {
     }
 
     fn check_body(&self, at: &CheckedKey, body: &BodySpec) -> CheckResult {
-        if body.order > Order::P2 && (self.estimate || self.adapt.is_some()) {
-            let help = "estimates of the error, and --tolerance, are for orders 1 and 2";
-            let message = format!("an estimate of the error with order {}", body.order.degree());
-            return at.below("order").refuse(message, "", help);
-        }
         if body.order > Order::P2 && !self.is_plane() {
             let message = format!("order {} in space", body.order.degree());
             return at.below("order").refuse(
