@@ -17,7 +17,7 @@ use super::forcing::{Forcing, resisting};
 use super::run::{LoopEnd, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength, WholeStep};
-use super::stop::{Stagnation, Status};
+use super::stop::{Attained, Stagnation, Status};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -313,7 +313,8 @@ impl Newton<'_, '_> {
         let is_smoothed = !self.states.smoothing.is_empty();
         let is_enough = |error: f64| self.run.stop.residual.is_some_and(|tolerance| error <= tolerance);
         let seems_enough = is_enough(measured.reached.worst());
-        let stagnates = self.stagnation.note(measured.reached.worst(), iterate.part.fall, is_smoothed);
+        let (error, fall) = (measured.reached.worst(), iterate.part.fall);
+        let stagnates = self.stagnation.note(Attained { error, energy: measured.f1, fall, is_smoothed });
         if seems_enough || stagnates {
             self.look(iterate, measured)?;
         }
