@@ -13,7 +13,7 @@
 //! Any slope leads to the same solution. The bodies answer with dp = -S dc between states in equilibrium: the longest waves as stiffly as in the last
 //! step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like single nodes. The laws themselves are best resolved with the slopes of the last step. Where
 //! they are smoothed, many points move at once, some of which are hardly pressed and some nearly fixed. There the slope is the geometric mean of
-//! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself (docs/methods.md).
+//! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself.
 
 use crate::model::Model;
 use crate::model::layer::{Layer, meeting_slopes};
@@ -32,8 +32,7 @@ pub(super) struct Progress {
     pub path: Path,
 }
 
-/// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent
-/// (docs/methods.md).
+/// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent.
 const HALVINGS: i32 = 7;
 
 /// Length of a step that comes nearer to the laws at no tried length, where F1 cannot fall either: half of the least tried one.
@@ -94,13 +93,14 @@ impl Progress {
         slopes
     }
 
-    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
-    fn observe(&mut self, model: &Model, dc: &[f64], dp: &[f64]) {
+    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium. Points whose dc may be the
+    /// `roundoff` of c, n, show nothing.
+    fn observe(&mut self, model: &Model, dc: &[f64], dp: &[f64], roundoff: &[f64]) {
         let unit = &self.unit;
         self.answer.resize(model.pairs.len(), 1.0);
         for (pair, answer) in self.answer.iter_mut().enumerate() {
             let (mut pressures, mut compressions) = (0.0, 0.0);
-            for q in model.range(pair).filter(|&q| unit[q] < f64::INFINITY) {
+            for q in model.range(pair).filter(|&q| unit[q] < f64::INFINITY && dc[q].abs() > 2.0 * roundoff[q]) {
                 pressures += model.weight[q] * dp[q].powi(2) / unit[q];
                 compressions += model.weight[q] * dc[q].powi(2) * unit[q];
             }
@@ -119,7 +119,7 @@ impl Progress {
             return StepLength { length: 1.0, fall: 1.0, is_lost: false };
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
-        self.observe(model, &change(from, c), &change(&self.pressure, p));
+        self.observe(model, &change(from, c), &change(&self.pressure, p), roundoff);
         let rho = &self.slopes(model, states)[..];
         let off = |t: f64| {
             let (compression, pressure) = (&between(from, c, t)[..], &between(&self.pressure, p, t)[..]);
@@ -161,7 +161,7 @@ const SHORTENED: usize = 2;
 
 /// Ratio of mu at the beginning to the mean squared distance D of the states, and of D to mu where the path is lost. D counts the mismatch of
 /// few points, while the contact is far from its final place. With ratios from 30 to 300, peeling beams with linear layers took the same number of steps within one; with 1 they took nine
-/// times as many. Without the way back a block that leans on its edge runs in a cycle of whole steps, with D from 20 to 3e5 mu (docs/methods.md).
+/// times as many. Without the way back a block that leans on its edge runs in a cycle of whole steps, with D from 20 to 3e5 mu.
 const AHEAD: f64 = 100.0;
 
 /// The state of a run's paths.
@@ -290,7 +290,7 @@ mod tests {
         let [w, v] = [model.weight[0], model.weight[1]];
         let times = ((w * 36.0 / 2.0 + v * 144.0 / 8.0) / (w * 2.0 + v * 0.25 * 8.0)).sqrt();
         let mut progress = Progress { unit: unit.to_vec(), ..Progress::default() };
-        progress.observe(&model, &dc, &dp);
+        progress.observe(&model, &dc, &dp, &[0.0; 4]);
         let smoothed = Layer { tangent: vec![27.0, 0.0, 1.0, 1e-3], smoothing: vec![1.0; 4], ..Layer::default() };
         let expected = [
             (Layer::default(), [2.0 * times, 8.0 * times, 1e-6, 1e-6]),
