@@ -81,22 +81,20 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// polynomial has a lower degree in a body or plate of so few cells that its nodes determine no more.
     fn fit(&self, node: usize, is_outer: bool, rings: &mut Rings<D>) -> Option<Patch<D>> {
         let (space, u) = (self.space, &*self.displacement);
-        let fit = |[nodes, vertices]: &[Vec<u32>; 2], monomials| {
-            Patch::fit(space, u, space.nodes[node], nodes, vertices, monomials)
-        };
+        let fit = |nodes: &[u32], monomials| Patch::fit(space, u, space.nodes[node], nodes, monomials);
         rings.begin(node);
         if is_outer {
             rings.widen();
         }
         for _ in 0..MORE_RINGS {
-            let fitted = fit(&rings.nodes(), &self.monomials[0]);
+            let fitted = fit(rings.nodes(), &self.monomials[0]);
             if fitted.is_some() {
                 return fitted;
             }
             rings.widen();
         }
         let nodes = rings.nodes();
-        self.monomials.iter().find_map(|monomials| fit(&nodes, monomials))
+        self.monomials.iter().find_map(|monomials| fit(nodes, monomials))
     }
 
     /// Return the values of the blend at all nodes, one entry per dof. At a vertex it is the value of the polynomial, elsewhere

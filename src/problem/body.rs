@@ -24,7 +24,7 @@ keys! {
         optional {
             /// whether each connected part of the group is a body, NAME_1, NAME_2, ...
             pub split: bool = false,
-            /// linear or quadratic elements
+            /// order of the elements, in space 1 or 2
             pub order: Order = Order::P1,
             /// supports: fix = [{ on = "base", x = 0, y = 0 }]
             ///
@@ -71,7 +71,7 @@ impl BodySpec {
         Self { split: true, ..self }
     }
 
-    /// Set the order of the elements, which must not exceed that of the mesh.
+    /// Set the order of the elements. Orders above one take their shape from a mesh of order two.
     pub fn order(self, order: Order) -> Self {
         Self { order, ..self }
     }

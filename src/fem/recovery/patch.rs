@@ -62,16 +62,10 @@ impl<const D: usize> Patch<D> {
     ///
     /// The error of the polynomial is the next term of Taylor's series. It grows with the distance to the power of the degree
     /// plus one, and squared differences are divided by its square. So all nodes are weighted by what they determine, and distant
-    /// ones do not spoil the derivatives at the centre. A node in the centre is weighted like the nearest other one, above order two like the nearest other
-    /// vertex, since the nodes inside of a cell are many and near each other.
-    pub fn fit(
-        space: &Space<D>,
-        u: &[f64],
-        centre: [f64; D],
-        nodes: &[u32],
-        vertices: &[u32],
-        monomials: &Monomials,
-    ) -> Option<Self> {
+    /// ones do not spoil the derivatives at the centre. A node in the centre is weighted like the nearest other one. Polynomials of a degree above three
+    /// are to be good on all of the cells that they are blended over, some of which may be much larger than others: there the farthest node counts
+    /// as near.
+    pub fn fit(space: &Space<D>, u: &[f64], centre: [f64; D], nodes: &[u32], monomials: &Monomials) -> Option<Self> {
         let n = monomials.made.len();
         if nodes.len() < n {
             return None;
@@ -80,7 +74,9 @@ impl<const D: usize> Patch<D> {
         let distance = |node: u32| length(minus(at(node), centre));
         let size = nodes.iter().map(|&node| distance(node)).fold(f64::MIN_POSITIVE, f64::max);
         let near = match space.order {
-            Order::P1 | Order::P2 => nodes.iter().map(|&node| distance(node)).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min),
+            Order::P1 | Order::P2 => {
+                nodes.iter().map(|&node| distance(node)).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min)
+            }
             _ => size,
         };
         let (mut gram, mut right) = (DMatrix::<f64>::zeros(n, n), vec![[0.0; D]; n]);
@@ -176,15 +172,13 @@ impl<'a, const D: usize> Rings<'a, D> {
         self.nodes.list.iter().for_each(|&vertex| self.cells.extend(&self.around[vertex as usize]));
     }
 
-    /// Return the nodes of the selected cells, and their vertices.
-    pub fn nodes(&mut self) -> [Vec<u32>; 2] {
-        [self.space.stride, D + 1].map(|count| {
-            self.nodes.clear();
-            for &cell in &self.cells.list {
-                self.nodes.extend(&self.space.cell(cell as usize)[..count]);
-            }
-            self.nodes.list.clone()
-        })
+    /// Return the nodes of the selected cells.
+    pub fn nodes(&mut self) -> &[u32] {
+        self.nodes.clear();
+        for &cell in &self.cells.list {
+            self.nodes.extend(self.space.cell(cell as usize));
+        }
+        &self.nodes.list
     }
 }
 
