@@ -35,6 +35,10 @@ pub struct Sizes {
 /// same number of meshes, the last ones of the same size within 7 %.
 const RANGE: (f64, f64) = (0.25, 2.0);
 
+/// Largest power p with which the error h^p of a cell is taken to fall. Where contact ends under a layer, and where a gap begins, displacements have a kink in
+/// the second derivative, so that orders above two gain nothing in cells at these places. Elsewhere their cells have hardly any error.
+const KINK: f64 = 2.0;
+
 /// The requirements on the next mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Aim {
@@ -50,7 +54,7 @@ pub struct Aim {
 ///
 /// Let p be the degree of the elements and D the dimension. With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2,
 /// and s^-D cells take its place. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the
-/// new mesh then has nearly the same error.
+/// new mesh then has nearly the same error. For p above two see [`KINK`].
 pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
     let bodies = model.bodies.len();
@@ -67,11 +71,14 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     let degrees = (0..bodies).flat_map(|body| std::iter::repeat_n(meshes.degree(body) as f64, counts[body]));
     let all: Vec<(f64, f64)> = errors.iter().copied().zip(degrees).collect();
     let goal = share * errors.iter().sum::<f64>();
-    let ratio = |level: f64, (error, p): (f64, f64)| {
-        let free = (level / error.max(f64::MIN_POSITIVE)).powf(1.0 / (2.0 * p + dimension));
+    // smaller cells are taken to have errors that a kink limits, larger ones those of a smooth solution
+    let power = |level: f64, (error, p): (f64, f64)| 2.0 * if error > level { p.min(KINK) } else { p };
+    let ratio = |level: f64, cell: (f64, f64)| {
+        let free = (level / cell.0.max(f64::MIN_POSITIVE)).powf(1.0 / (power(level, cell) + dimension));
         free.clamp(RANGE.0, RANGE.1)
     };
-    let left = |level: f64| -> f64 { all.iter().map(|&cell| cell.0 * ratio(level, cell).powf(2.0 * cell.1)).sum() };
+    let left =
+        |level: f64| -> f64 { all.iter().map(|&cell| cell.0 * ratio(level, cell).powf(power(level, cell))).sum() };
     let cells = |level: f64| -> f64 { all.iter().map(|&cell| ratio(level, cell).powf(-dimension)).sum() };
     // Remaining error and cell sizes increase with the level, so its logarithm is bisected.
     let largest = errors.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

@@ -201,29 +201,39 @@ fn gauss_lobatto(degree: usize) -> Vec<f64> {
 
 /// Return Gauss-Legendre points and weights on \[0, 1\], exact to degree `2 count - 1`.
 pub fn gauss(count: usize) -> Vec<(f64, f64)> {
+    // numbers of up to five points are known to all digits
+    let mut half: Vec<(f64, f64)> = match count {
+        1 => vec![(0.0, 2.0)],
+        2 => vec![(0.577_350_269_189_625_8, 1.0)],
+        3 => vec![(0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)],
+        4 => vec![
+            (0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
+            (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
+        ],
+        5 => vec![
+            (0.0, 128.0 / 225.0),
+            (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+            (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+        ],
+        _ => (0..count.div_ceil(2)).map(|k| zero_of_legendre(count, k)).collect(),
+    };
+    half.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let above = half.iter().map(|&(x, w)| ((1.0 + x) / 2.0, w / 2.0));
+    let below = half.iter().rev().filter(|(x, _)| *x != 0.0).map(|&(x, w)| ((1.0 - x) / 2.0, w / 2.0));
+    below.chain(above).collect()
+}
+
+/// Return the zero `k` of a Legendre polynomial, counted from the largest one, and its weight in the rule of Gauss.
+fn zero_of_legendre(count: usize, k: usize) -> (f64, f64) {
     let n = count as f64;
-    let point = |k: usize| {
-        let mut x = -(PI * (k as f64 + 0.75) / (n + 0.5)).cos();
-        let mut slope = 1.0;
-        for _ in 0..STEPS {
-            let [value, before] = legendre(count, x);
-            slope = n * (before - x * value) / (1.0 - x * x);
-            x -= value / slope;
-        }
-        (x, 1.0 / ((1.0 - x * x) * slope * slope))
-    };
-    let at = |k: usize| match 2 * k + 1 {
-        twice if twice == count => (0.5, point(k).1),
-        twice if twice > count => {
-            let (x, weight) = point(count - 1 - k);
-            (0.5 - 0.5 * x, weight)
-        }
-        _ => {
-            let (x, weight) = point(k);
-            (0.5 + 0.5 * x, weight)
-        }
-    };
-    (0..count).map(at).collect()
+    let mut x = if 2 * k + 1 == count { 0.0 } else { (PI * (k as f64 + 0.75) / (n + 0.5)).cos() };
+    let mut slope = 1.0;
+    for _ in 0..STEPS {
+        let [value, before] = legendre(count, x);
+        slope = n * (before - x * value) / (1.0 - x * x);
+        x -= value / slope;
+    }
+    (x, 2.0 / ((1.0 - x * x) * slope * slope))
 }
 
 /// Return the places of equally spaced points of a line or triangle, as ParaView and Gmsh have them: vertices, inside the edges as in
