@@ -222,11 +222,12 @@ fn names(done: &Done) -> Vec<String> {
 /// writes the contact surfaces and the files that join parts.
 pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) -> Result<()> {
     let (output, step, steps) = (&done.built.scene.output, done.steps.len(), done.built.scene.method.steps.steps.len());
-    if !output.vtu && !(ended && output.msh) {
+    let has_views = ended && output.msh;
+    if !output.vtu && !has_views {
         return Ok(());
     }
     let displacement = report::surface_displacements(done, recovered)?;
-    if ended && output.msh {
+    if has_views {
         views(done, recovered, folder, &displacement)?;
     }
     if !output.vtu {

@@ -34,11 +34,14 @@ fn lines_of_pairs_name_surfaces_bodies_and_units() {
 /// Each adapted mesh has its line also in a pipe, and from the third one on another line says what the error asked for will take.
 #[test]
 fn adapted_meshes_have_lines() {
-    let run = solve(case("groove-held"), &["--tolerance", "5e-4", "--set", "method={}"]).converged();
+    let run = {
+        let quadratic = ["--set", "body.0.order=2", "--set", "body.1.order=2", "--set", "method={}"];
+        solve(case("groove-held"), &[&["--tolerance", "2e-5"][..], &quadratic].concat()).converged()
+    };
     let rounds = run.report["rounds"].as_array().expect("meshes").len();
     assert!(rounds > 3, "{rounds} meshes: {}", run.said());
     let lines: Vec<&str> = run.stdout.lines().collect();
-    let forecasts = lines.iter().filter(|line| line.starts_with("  an error of 5e-4 takes about ")).count();
+    let forecasts = lines.iter().filter(|line| line.starts_with("  an error of 2e-5 takes about ")).count();
     assert_eq!(forecasts, rounds - 3, "{}", run.said());
     assert!(lines[0].starts_with("  mesh      cells"), "{}", run.said());
     let numbers: Vec<usize> = lines.iter().filter_map(|line| line.get(..6)?.trim().parse().ok()).collect();
