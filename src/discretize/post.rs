@@ -122,7 +122,7 @@ impl<const D: usize> Post for OnPart<D> {
         let bent = split.values(&nodal);
         let stress = displacement::nodal_stresses(&split.space, &self.elasticity, &bent);
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
-        let stress = lagrange::at_equally_spaced(&owned, stress);
+        let stress = lagrange::at_equally_spaced(&owned, stress.into()).into_owned();
         let von_mises: Vec<f64> = stress.iter().map(displacement::von_mises).collect();
         let largest = (0..shown.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j]));
         let change =
@@ -131,14 +131,14 @@ impl<const D: usize> Post for OnPart<D> {
             let first = D * split.origin(node) as usize;
             pad(std::array::from_fn::<f64, D, _>(|c| u[first + c]))
         };
-        let displacement = lagrange::at_equally_spaced(&owned, shown.iter().map(displacement).collect());
-        let points = lagrange::at_equally_spaced(&owned, owned.nodes.clone());
+        let displacement = lagrange::at_equally_spaced(&owned, shown.iter().map(displacement).collect()).into_owned();
+        let points = lagrange::at_equally_spaced(&owned, owned.nodes.clone().into());
         // files have the edge 20 in this direction
         let inside = (D + 1) + 2 * (owned.order.degree() - 1)..(D + 1) + 3 * (owned.order.degree() - 1);
         owned.cells.chunks_exact_mut(owned.stride).filter(|_| D == 2).for_each(|cell| cell[inside.clone()].reverse());
         BodyField {
             name: self.name.clone(),
-            points: points.into_iter().map(|x| owned.in_scene(x)).collect(),
+            points: points.iter().map(|&x| owned.in_scene(x)).collect(),
             cell: CellKind::simplex(D, self.mesh.space.order.degree()),
             connectivity: owned.cells,
             displacement,

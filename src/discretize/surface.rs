@@ -5,6 +5,7 @@ use crate::fem::{element, lagrange};
 use crate::output::{CellKind, FieldArray, UnstructuredGrid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
 /// The facets of the side that carries the contact points.
@@ -36,6 +37,8 @@ impl ContactSurface {
             sources: Vec::new(),
             cover: Vec::new(),
         };
+        // the same points as in the fields of the body
+        let points = lagrange::at_equally_spaced(a.space, Cow::Borrowed(&a.space.nodes));
         let mut number: HashMap<u32, u32> = HashMap::new();
         let mut at_node = Vec::new();
         let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();
@@ -46,12 +49,9 @@ impl ContactSurface {
                 let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
                 if at as usize == surface.points.len() {
+                    surface.points.push(a.space.in_scene(points[a.nodes[*node as usize].node as usize]));
                     // the points of higher orders are not at the nodes
-                    let of_node = || a.space.nodes[a.nodes[*node as usize].node as usize];
-                    let is_at_node = k < D || order <= Order::P2;
-                    let x = if is_at_node { of_node() } else { a.facets.point(facet, a.space, place) };
-                    surface.points.push(a.space.in_scene(x));
-                    at_node.push(is_at_node);
+                    at_node.push(k < D || order <= Order::P2);
                     sums.push((0.0, BTreeMap::new()));
                 }
                 let Some(carriers) = cover.carriers else { continue };

@@ -289,7 +289,7 @@ fn triangle(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
 fn collapsed(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
     let across = gauss(degree / 2 + 1);
     // the area shrinks towards the vertex, which is one more degree
-    for (height, weight) in gauss((degree + 1) / 2 + 1) {
+    for (height, weight) in gauss(degree.div_ceil(2) + 1) {
         let rest = 1.0 - height;
         across.iter().for_each(|(x, w)| add(&[rest * (1.0 - x), rest * x, height], 2.0 * rest * weight * w));
     }

@@ -11,6 +11,7 @@ use super::element::{self, EDGES, Slopes, Values};
 use super::space::Space;
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
+use std::borrow::Cow;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
@@ -47,8 +48,8 @@ impl Jet {
 
 /// Return the functions of an order on the line (two vertices) or the triangle (three), which are computed once.
 pub fn of(order: Order, vertices: usize) -> &'static Lagrange {
-    const NONE: OnceLock<Lagrange> = OnceLock::new();
-    static TABLES: [[OnceLock<Lagrange>; 2]; Order::HIGHEST] = [const { [NONE; 2] }; Order::HIGHEST];
+    static TABLES: [[OnceLock<Lagrange>; 2]; Order::HIGHEST] =
+        [const { [const { OnceLock::new() }; 2] }; Order::HIGHEST];
     TABLES[order.degree() - 1][vertices - 2].get_or_init(|| Lagrange::new(order.degree(), vertices))
 }
 
@@ -280,7 +281,10 @@ fn nested(whole: usize, degree: usize, margin: usize) -> Vec<[f64; 3]> {
 
 /// Return, from values at the nodes of a space, those at equally spaced points in place of the nodes, with which files are written. Up to order two they are
 /// the same.
-pub fn at_equally_spaced<const D: usize, const N: usize>(space: &Space<D>, values: Vec<[f64; N]>) -> Vec<[f64; N]> {
+pub fn at_equally_spaced<'v, const D: usize, const N: usize>(
+    space: &Space<D>,
+    values: Cow<'v, [[f64; N]]>,
+) -> Cow<'v, [[f64; N]]> {
     if space.order <= Order::P2 {
         return values;
     }
@@ -290,14 +294,14 @@ pub fn at_equally_spaced<const D: usize, const N: usize>(space: &Space<D>, value
         element::values(space.order, l).iter().map(|phi| if phi.abs() < 1e-12 { 0.0 } else { *phi }).collect()
     };
     let shapes: Vec<Values> = places.iter().map(exact).collect();
-    let mut moved = values.clone();
+    let mut moved = values.to_vec();
     for cell in space.cells.chunks_exact(space.stride) {
         for (node, phi) in cell.iter().zip(&shapes).skip(D + 1) {
             let at = |c: usize| cell.iter().zip(phi).map(|(&other, phi)| phi * values[other as usize][c]).sum();
             moved[*node as usize] = std::array::from_fn(at);
         }
     }
-    moved
+    moved.into()
 }
 
 #[cfg(test)]
