@@ -423,7 +423,7 @@ pub fn schema() -> Json {
     schema
 }
 
-/// Remove null from the types of a schema, which TOML does not have, and the names of structs in Rust.
+/// Remove null from a schema, which TOML does not have.
 fn tidy(schema: &mut Json) {
     match schema {
         Json::Object(entries) => {
