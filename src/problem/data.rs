@@ -69,8 +69,10 @@ impl DataKeys {
             let error = Error::scene(&self.spacing.place, format!("the spacing is {wrong}"));
             return Err(error.label("must be greater than 0"));
         }
-        if let Some(unit) = self.unit.as_ref().filter(|unit| unit.value == 0.0) {
-            return Err(Error::scene(&unit.place, "the unit is 0").label("all heights would be 0"));
+        if let Some(unit) = self.unit.as_ref().filter(|unit| unit.value == 0.0 || !unit.value.is_finite()) {
+            return Err(
+                Error::scene(&unit.place, format!("the unit is {}", unit.value)).label("must be finite and not 0")
+            );
         }
         let file = file(self.file)?;
         Ok(DataSpec {

@@ -1,7 +1,7 @@
 //! Where meshes come from.
 
 use super::order::Order;
-use super::read::{Check, Either, Flaw, Form, Geometry, file, kept, only_one, place, place_of, positive, some};
+use super::read::{Check, Either, Flaw, Form, Geometry, at_least_one, file, kept, only_one, place, place_of, positive};
 use crate::error::{Error, Kind, Located, Place, Result as Checked};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
@@ -152,7 +152,7 @@ impl MeshKeys {
         let (mut set, mut places) = (Vec::new(), Vec::new());
         for (name, number) in numbers {
             let place = place_of(name.span());
-            check_number(name.get_ref(), &place)?;
+            check_number(name.get_ref(), number, &place)?;
             set.push((name.into_inner(), number));
             places.push(place);
         }
@@ -166,8 +166,11 @@ impl MeshKeys {
     }
 }
 
-/// Refuse what cannot be the name of a number of Gmsh.
-fn check_number(name: &str, place: &Place) -> Checked<()> {
+/// Refuse what cannot be a number of Gmsh, or its name.
+fn check_number(name: &str, number: f64, place: &Place) -> Checked<()> {
+    if !number.is_finite() {
+        return Err(Error::scene(place, format!("`{name}` is not a finite number")));
+    }
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     match name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) && !name.is_empty() {
         true => Ok(()),
@@ -179,7 +182,7 @@ impl Check for MeshSource {
     fn check(&self, _: Geometry) -> Result<(), Flaw> {
         let Self::Geo { guard, .. } = self else { return Ok(()) };
         positive("timeout", "the timeout", guard.seconds)?;
-        guard.threads.map_or(Ok(()), |threads| some("threads", threads))?;
+        guard.threads.map_or(Ok(()), |threads| at_least_one("threads", threads))?;
         guard.size.map_or(Ok(()), |size| positive("size", "the size", size))
     }
 }

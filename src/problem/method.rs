@@ -1,7 +1,9 @@
 //! The outer iteration, its rules, and inner solvers by name.
 
 use super::history::History;
-use super::read::{Check, Either, Flaw, Form, Geometry, checked, condition, kept, of_word, positive, some, word};
+use super::read::{
+    Check, Either, Flaw, Form, Geometry, at_least_one, checked, condition, kept, of_word, positive, word,
+};
 use crate::error::{Error, Located};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -180,7 +182,10 @@ pub enum Start {
     /// Zero normal displacement.
     Zero,
     /// Outer normal displacement on every contact surface.
-    Normal(Field),
+    Normal(
+        /// outer normal displacement on every contact surface
+        Field,
+    ),
 }
 
 /// The rule for the Robin coefficient kappa on the zone. p is the law of the layer and c^k the compression at iterate k.
@@ -192,7 +197,10 @@ pub enum RobinRule {
     /// The coefficient of the start in every iteration, made safe as in `Auto`. It needs one factorisation in a run. Theorem 3 allows it.
     Frozen,
     /// kappa = max(p'(c^k), F) everywhere on the contact surfaces; F > 0 is this number.
-    Floor(f64),
+    Floor(
+        /// least coefficient everywhere on the contact
+        f64,
+    ),
     /// The tangent on the zone, and more for a body that the tangent does not constrain safely.
     #[default]
     Auto,
@@ -260,7 +268,7 @@ impl StopRule {
 
 impl Check for StopRule {
     fn check(&self, _: Geometry) -> Result<(), Flaw> {
-        some("iterations", self.iterations)?;
+        at_least_one("iterations", self.iterations)?;
         if self.residual.or(self.increment).is_none() {
             return Err(Flaw::new("", "a stop rule has a tolerance", "", "stop = { residual = 1e-8 }"));
         }

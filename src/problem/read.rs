@@ -17,7 +17,7 @@ use std::borrow::Cow;
 use std::cell::RefCell;
 use std::fmt;
 use std::marker::PhantomData;
-use std::ops::{Deref, DerefMut, Range};
+use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
@@ -194,6 +194,13 @@ pub trait Check {
     }
 }
 
+/// A table that need not be there.
+impl<T: Check> Check for Option<T> {
+    fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
+        self.as_ref().map_or(Ok(()), |table| table.check(geometry))
+    }
+}
+
 /// Refuse a number that is not finite and > 0.
 ///
 /// # Errors
@@ -209,7 +216,7 @@ pub fn positive(key: &str, what: &str, value: f64) -> Result<(), Flaw> {
 ///
 /// # Errors
 /// The flaw of the key.
-pub fn some(key: &str, count: usize) -> Result<(), Flaw> {
+pub fn at_least_one(key: &str, count: usize) -> Result<(), Flaw> {
     if count > 0 { Ok(()) } else { Err(Flaw::new(key, format!("`{key}` is 0"), "must be 1 or more", "")) }
 }
 
@@ -242,16 +249,6 @@ pub fn checked<'de, T: Deserialize<'de> + Check, D: Deserializer<'de>>(deseriali
         Ok(()) => Ok(table.into_inner()),
         Err(flaw) => Err(keep(flaw, Some(table.span()))),
     }
-}
-
-/// Read a table that need not be there.
-///
-/// # Errors
-/// Those of [`checked`].
-pub fn optional<'de, T: Deserialize<'de> + Check, D: Deserializer<'de>>(
-    deserializer: D,
-) -> Result<Option<T>, D::Error> {
-    checked(deserializer).map(Some)
 }
 
 /// Read a list of tables and check each.
@@ -504,12 +501,6 @@ impl Deref for Vector {
 
     fn deref(&self) -> &[Field; 3] {
         &self.0
-    }
-}
-
-impl DerefMut for Vector {
-    fn deref_mut(&mut self) -> &mut [Field; 3] {
-        &mut self.0
     }
 }
 

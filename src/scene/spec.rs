@@ -8,7 +8,7 @@ use crate::file::digest;
 use crate::problem::contact::Carrier;
 use crate::problem::data::DataKeys;
 use crate::problem::read::{
-    self, Check, Context, Either, Flaw, Form, Geometry, all, checked, of_word, optional, positive, some, within,
+    self, Check, Context, Either, Flaw, Form, Geometry, all, checked, of_word, positive, within,
 };
 use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use schemars::JsonSchema;
@@ -66,10 +66,10 @@ pub struct Scene {
     #[serde(default)]
     pub estimate: bool,
     /// adapts the mesh to an error: adapt = { error = 1e-2 }
-    #[serde(default, deserialize_with = "optional")]
+    #[serde(default, deserialize_with = "checked")]
     pub adapt: Option<AdaptSpec>,
     /// what is written, and where
-    #[serde(default)]
+    #[serde(default, deserialize_with = "checked")]
     pub output: OutputSpec,
     /// Path of the scene file, as given.
     #[serde(skip)]
@@ -121,8 +121,8 @@ impl Check for AdaptSpec {
             let message = format!("the error is {}", shown(self.error.value));
             return Err(Flaw::new("error", message, "must be less than 1", "it is a share: 0.01 is one per cent"));
         }
-        some("cells", self.cells)?;
-        some("rounds", self.rounds)
+        at_least_one("cells", self.cells)?;
+        at_least_one("rounds", self.rounds)
     }
 }
 
@@ -160,6 +160,15 @@ impl Default for OutputSpec {
             precision: Precision::Double,
             plots: true,
             pairs: None,
+        }
+    }
+}
+
+impl Check for OutputSpec {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        match &self.dir {
+            Some(dir) if dir.as_os_str().is_empty() => Err(Flaw::new("dir", "the name is empty", "", "")),
+            _ => Ok(()),
         }
     }
 }
@@ -307,7 +316,8 @@ impl Scene {
         self.method.refuse(geometry, place)?;
         self.method.steps.refuse(geometry, place)?;
         self.method.stop.refuse(geometry, place)?;
-        self.adapt.iter().try_for_each(|adapt| adapt.refuse(geometry, place))
+        self.adapt.refuse(geometry, place)?;
+        self.output.refuse(geometry, place)
     }
 
     /// Refuse bodies with one name, and contacts of one pair or rule.
@@ -436,7 +446,10 @@ fn tidy(schema: &mut Json) {
             {
                 entries["type"] = only.clone();
             }
-            entries.retain(|key, value| key != "default" || !value.is_null());
+            entries.retain(|key, value| key != "default" || !(value.is_null() || value == ""));
+            if let Some(whole) = entries.get("default").and_then(Json::as_f64).filter(|number| number.fract() == 0.0) {
+                entries.insert("default".to_owned(), json!(whole as i64));
+            }
             entries.values_mut().for_each(tidy);
         }
         Json::Array(items) => items.iter_mut().for_each(tidy),
