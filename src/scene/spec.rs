@@ -8,7 +8,7 @@ use crate::file::digest;
 use crate::problem::contact::Carrier;
 use crate::problem::data::DataKeys;
 use crate::problem::read::{
-    self, Check, Context, Either, Flaw, Form, Geometry, all, checked, of_word, positive, within,
+    self, Check, Context, Either, Flaw, Form, Geometry, all, at_least_one, checked, of_word, positive, within,
 };
 use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use schemars::JsonSchema;
