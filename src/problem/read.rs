@@ -227,8 +227,8 @@ pub fn at_least_one(key: &str, count: usize) -> Result<(), Flaw> {
 pub fn only_one(table: &str, keys: &[(&str, Option<&Place>)]) -> Checked<()> {
     let mut given = keys.iter().filter_map(|(key, place)| Some((*key, (*place)?)));
     let (Some((first, a)), Some((second, b))) = (given.next(), given.next()) else { return Ok(()) };
-    let in_scene = |place: &Place| !place.source.name.starts_with("--");
-    let later = if (in_scene(a), b.span.start) < (in_scene(b), a.span.start) { a } else { b };
+    let rank = |place: &Place| (place.source.name.starts_with("--"), place.span.start);
+    let later = if rank(b) < rank(a) { a } else { b };
     Err(Error::scene(later, format!("{table} has both `{first}` and `{second}`"))
         .label("only one of them can hold")
         .help(format!("remove `{first}` or `{second}`")))

@@ -291,6 +291,7 @@ fn scene(settings: &Value) -> String {
     let row = |body: &Value| {
         let mut material = body.as_object().cloned().unwrap_or_default();
         ["name", "fix", "load", "spring"].iter().for_each(|key| drop(material.remove(*key)));
+        material.retain(|_, value| *value != false && value.as_array().is_none_or(|list| !list.is_empty()));
         vec![
             escape(body["name"].as_str().unwrap_or_default()),
             escape(&words(&Value::Object(material))),
