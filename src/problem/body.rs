@@ -1,10 +1,11 @@
 //! Bodies: their names, elements, and what acts on them.
 
 use super::elasticity::{AxesSpec, ElasticitySpec, Material, Orthotropic, RegionSpec};
+use super::geometry::Geometry;
 use super::load::{Load, LoadKind, SpringSpec, Support};
 use super::order::Order;
 use super::pattern::{self, is_pattern};
-use super::read::{Check, Flaw, Geometry, Vector, all, kept};
+use super::read::{Check, Flaw, Vector, all, kept};
 use crate::error::{Error, Located, Place, Result as Checked};
 use crate::expression::{Expression, Field};
 use crate::petsc::{begins_options, is_family};

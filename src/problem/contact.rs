@@ -1,9 +1,10 @@
 //! Pairs of contact surfaces: two that the scene names, or rules that find pairs.
 
 use super::body::{check_name, plain_pattern};
+use super::geometry::Geometry;
 use super::layer::LayerSpec;
 use super::pattern;
-use super::read::{Check, Either, Flaw, Form, Geometry, checked, kept, positive};
+use super::read::{Check, Either, Flaw, Form, checked, kept, positive};
 use crate::error::{Error, Located, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;

@@ -1,7 +1,8 @@
 //! Elastic constants of bodies and regions, and the axes that they refer to.
 
+use super::geometry::Geometry;
 use super::pattern;
-use super::read::{Check, Direction, Flaw, Geometry, Refused, geometry, only_one, place, positive};
+use super::read::{Check, Direction, Flaw, Refused, geometry, only_one, place, positive};
 use crate::error::{Error, Kind, Located, Place, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -159,19 +160,6 @@ impl ElasticitySpec {
     pub fn is_constant(&self) -> bool {
         self.fields().iter().all(|(_, field)| field.is_constant())
     }
-}
-
-/// What a plane problem stands for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum Plane {
-    /// No out-of-plane strain.
-    #[default]
-    Strain,
-    /// No out-of-plane stress.
-    Stress,
-    /// A meridian of bodies of revolution: x is the radius, y runs along the axis.
-    Axisymmetric,
 }
 
 /// The keys of the elasticity of a body or a region.

@@ -6,8 +6,9 @@
 //! In a scene they are `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
 use super::body::BodySpec;
+use super::geometry::Geometry;
 use super::load::LoadKind;
-use super::read::{Check, Either, Flaw, Form, Geometry, file, kept, positive};
+use super::read::{Check, Either, Flaw, Form, file, kept, positive};
 use crate::error::{Error, Located, Result as Checked, joined};
 use crate::expression::Field;
 use crate::file::{other_encoding, with_unix_lines};

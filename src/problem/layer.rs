@@ -1,6 +1,7 @@
 //! Laws of layers p(c), pressure p over compression c, and their parameters.
 
-use super::read::{Check, Flaw, Geometry, Refused, expression, only_one, place, positive};
+use super::geometry::Geometry;
+use super::read::{Check, Flaw, Refused, expression, only_one, place, positive};
 use crate::error::{Error, Kind, Located, shown};
 use crate::expression::{Expression, Field};
 use schemars::JsonSchema;

@@ -1,9 +1,9 @@
 //! What acts on a body from outside: supports, springs and loads. Each is read from a table of keys, `...Keys`, some of which exclude each other, and
 //! written as one.
 
-use super::elasticity::Plane;
+use super::geometry::{Geometry, Plane};
 use super::pattern;
-use super::read::{Check, Flaw, Geometry, OneOrVector, Refused, Vector, constant, geometry, only_one, place, positive};
+use super::read::{Check, Flaw, OneOrVector, Refused, Vector, constant, geometry, only_one, place, positive};
 use crate::error::{Error, Kind, Located, Result as Checked};
 use crate::expression::Field;
 use schemars::JsonSchema;

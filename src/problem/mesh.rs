@@ -1,7 +1,8 @@
 //! Where meshes come from.
 
+use super::geometry::Geometry;
 use super::order::Order;
-use super::read::{Check, Either, Flaw, Form, Geometry, at_least_one, file, kept, only_one, place, place_of, positive};
+use super::read::{Check, Either, Flaw, Form, at_least_one, file, kept, only_one, place, place_of, positive};
 use crate::error::{Error, Kind, Located, Place, Result as Checked};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;

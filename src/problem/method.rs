@@ -1,9 +1,8 @@
 //! The outer iteration, its rules, and inner solvers by name.
 
+use super::geometry::Geometry;
 use super::history::History;
-use super::read::{
-    Check, Either, Flaw, Form, Geometry, at_least_one, checked, condition, kept, of_word, positive, word,
-};
+use super::read::{Check, Either, Flaw, Form, at_least_one, checked, condition, kept, of_word, positive, word};
 use crate::error::{Error, Located};
 use crate::expression::Field;
 use schemars::JsonSchema;

@@ -12,6 +12,7 @@ pub mod body;
 pub mod contact;
 pub mod data;
 pub mod elasticity;
+pub mod geometry;
 pub mod history;
 pub mod layer;
 pub mod load;
@@ -24,7 +25,8 @@ pub mod units;
 
 pub use body::BodySpec;
 pub use contact::{ContactSpec, Overlap};
-pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Orthotropic, Plane, RegionSpec};
+pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Orthotropic, RegionSpec};
+pub use geometry::Plane;
 pub use history::{History, LoadStep};
 pub use layer::LayerSpec;
 pub use load::{Load, LoadKind, SpringKind, SpringSpec, Support};

@@ -5,7 +5,7 @@
 //! ([`within`]): the texts that places point into, the folder of the scene, its dimension, and its data. So expressions are compiled as
 //! they are read. A refusal that has more to say than an error of serde can hold is kept aside, too, and [`refusal`] takes it back.
 
-use super::elasticity::Plane;
+use super::geometry::{Geometry, Plane};
 use crate::data::Library;
 use crate::error::{Error, Kind, Located, Place, Result as Checked, Source, shown};
 use crate::expression::{Expression, Field, KnownNames};
@@ -21,22 +21,6 @@ use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
-
-/// Space dimension, 2 or 3, and what a plane problem stands for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Geometry {
-    /// Space dimension.
-    pub dimension: usize,
-    /// What a plane problem stands for.
-    pub plane: Plane,
-}
-
-impl Geometry {
-    /// Return whether the problem is one in the plane.
-    pub fn is_plane(self) -> bool {
-        self.dimension == 2
-    }
-}
 
 /// The texts that a scene is read from: its file and the options that change it. The spans of all values count through one after the other.
 #[derive(Debug, Clone, Default)]
@@ -334,6 +318,17 @@ impl<L, T> Form<L, T> {
     pub fn unexpected<E: de::Error>(&self) -> E {
         E::invalid_type(Unexpected::Other("another form"), &"a form of the schema")
     }
+
+    /// Return the refusal of a form where a number or an expression belongs. It has a place, which serde does not know for items of lists.
+    fn instead_of_field(&self, place: &Place) -> Error {
+        let found = match self {
+            Self::Flag => "true or false",
+            Self::List(_) => "a list",
+            _ => "a table",
+        };
+        let error = Error::scene(place, format!("expected a number or an expression, found {found}"));
+        error.label("not a number or an expression")
+    }
 }
 
 impl<'de, L: Deserialize<'de>, T: Deserialize<'de>> Deserialize<'de> for Form<L, T> {
@@ -397,7 +392,7 @@ fn field<E: de::Error, L, T>(value: Form<L, T>, place: &Place) -> Result<Field, 
         Form::Integer(value) => Field::Constant(value as f64),
         Form::Number(value) => Field::Constant(value),
         Form::Text(text) => condition(&text, place, false).map_err(kept)?,
-        other => return Err(other.unexpected()),
+        other => return Err(kept(other.instead_of_field(place))),
     };
     let number = if let Field::Constant(value) = field { value } else { 0.0 };
     let refuse = |message: String| Error::scene(place, message);
@@ -569,7 +564,7 @@ impl<'de> Deserialize<'de> for Expression {
             Form::Integer(value) => value.to_string(),
             Form::Number(value) => value.to_string(),
             Form::Text(text) => text,
-            other => return Err(other.unexpected()),
+            other => return Err(kept(other.instead_of_field(&place))),
         };
         expression(&text, &place, &[]).map_err(kept)
     }

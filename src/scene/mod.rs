@@ -14,9 +14,9 @@ pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Scene, remove, schema};
 
 use crate::error::{Error, Kind, Located, Result, Source};
 use crate::problem::data::{DataKeys, library};
-use crate::problem::elasticity::Plane;
+use crate::problem::geometry::{Geometry, Plane};
 use crate::problem::method;
-use crate::problem::read::{Context, Geometry, Sources, within};
+use crate::problem::read::{Context, Sources, within};
 use overrides::Typed;
 use refuse::Reader;
 use serde::Deserialize;

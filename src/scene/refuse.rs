@@ -222,7 +222,7 @@ fn at<'p>(path: impl Iterator<Item = &'p str>) -> Vec<Json> {
 
 /// Return a schema and those of the forms that its value may have.
 fn forms(schema: &Json) -> Vec<Json> {
-    let inner = ["anyOf", "oneOf"].into_iter().filter_map(|key| schema[key].as_array()).flatten().flat_map(forms);
+    let inner = schema["anyOf"].as_array().into_iter().flatten().flat_map(forms);
     std::iter::once(schema.clone()).chain(inner).collect()
 }
 

@@ -7,8 +7,9 @@ use crate::error::{Error, Located, Place, Result, shown};
 use crate::file::digest;
 use crate::problem::contact::Carrier;
 use crate::problem::data::DataKeys;
+use crate::problem::geometry::Geometry;
 use crate::problem::read::{
-    self, Check, Context, Either, Flaw, Form, Geometry, all, at_least_one, checked, of_word, positive, within,
+    self, Check, Context, Either, Flaw, Form, all, at_least_one, checked, of_word, positive, within,
 };
 use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
 use schemars::JsonSchema;
@@ -433,10 +434,13 @@ pub fn schema() -> Json {
     schema
 }
 
-/// Remove null from a schema, which TOML does not have.
+/// Remove null from a schema, which TOML does not have, and call forms of a value `anyOf`.
 fn tidy(schema: &mut Json) {
     match schema {
         Json::Object(entries) => {
+            if let Some(forms) = entries.remove("oneOf") {
+                entries.insert("anyOf".to_owned(), forms);
+            }
             for key in ["type", "enum", "anyOf"] {
                 let Some(Json::Array(forms)) = entries.get_mut(key) else { continue };
                 forms.retain(|form| !form.is_null() && form != "null" && *form != json!({ "type": "null" }));
