@@ -11,7 +11,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use toml::Spanned;
 
+/// write [data.rough], and below it file = "surface.csv" and the other keys
+///
 /// The keys of `[data.NAME]`.
+// the description has the name of a table in brackets, which is no link
+#[allow(rustdoc::broken_intra_doc_links)]
 #[derive(Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataKeys {

@@ -246,24 +246,26 @@ fn read_table(file: Located<PathBuf>) -> Checked<History> {
     if let Some(other) = other_encoding(&bytes) {
         return Err(Error::scene(&file.place, format!("{name} {other}")).help("save it as CSV in UTF-8"));
     }
-    let refuse = |line: u64, message: String| Error::scene(&file.place, format!("{name}:{line}: {message}"));
     let bytes = with_unix_lines(bytes);
-    let mut lines = csv::ReaderBuilder::new();
-    lines.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
+    let mut format = csv::ReaderBuilder::new();
+    format.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
+    let (mut reader, mut record) = (format.from_reader(&bytes[..]), csv::StringRecord::new());
     let mut history = History::default();
     let mut names: Vec<String> = Vec::new();
-    for record in lines.from_reader(&bytes[..]).records() {
-        let record = record.map_err(|cause| {
-            let error = Error::scene(&file.place, format!("{name} is not a table"));
-            error.because(cause.to_string()).help("save it as CSV in UTF-8")
-        })?;
-        let line = record.position().map_or(1, csv::Position::line);
+    while reader.read_record(&mut record).map_err(|cause| {
+        let error = Error::scene(&file.place, format!("{name} is not a table"));
+        error.because(cause.to_string()).help("save it as CSV in UTF-8")
+    })? {
+        let end = reader.position().byte() as usize;
+        let refuse = |message: String| {
+            let line = 1 + bytes[..end].trim_ascii_end().iter().filter(|byte| **byte == b'\n').count();
+            Error::scene(&file.place, format!("{name}:{line}: {message}"))
+        };
         if names.is_empty() {
             names = record.iter().map(str::to_owned).collect();
-            check_names(&names).map_err(|(message, help)| refuse(line, message).help(help))?;
+            check_names(&names).map_err(|(message, help)| refuse(message).help(help))?;
         } else {
-            let step = step(&names, &record, history.steps.last()).map_err(|message| refuse(line, message))?;
-            history.steps.push(step);
+            history.steps.push(step(&names, &record, history.steps.last()).map_err(refuse)?);
         }
     }
     if history.is_empty() {
