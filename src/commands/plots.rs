@@ -114,8 +114,13 @@ fn pressure_plot(done: &Done, i: usize) -> Plot {
         _ => format!("{}: {}", scene.title, done.built.discrete.surfaces(i).join(" - ")),
     };
     let units = scene.units.as_ref();
-    let along = label(["x", "y", "z"][main_axis(&pairs[i])], units.map(|units| units.length));
-    Plot::pressure(&title, &along, &label("contact pressure", units.map(|units| units.stress)), Vec::new())
+    let along = label(["x", "y", "z"][main_axis(&pairs[i])], units.as_ref().map(|units| units.length.as_str()));
+    Plot::pressure(
+        &title,
+        &along,
+        &label("contact pressure", units.as_ref().map(|units| units.stress.as_str())),
+        Vec::new(),
+    )
 }
 
 /// Return the pressure of pair `i` along its surface, against the coordinate that varies most.

@@ -73,9 +73,10 @@ impl ContactInfo {
 impl ContactEntry {
     /// Return the scene's description of a pair of this table. `between` has the names of the pair.
     fn spec(self, scene: &Scene, names: [String; 2]) -> ContactSpec {
+        let rules: Vec<&ContactSpec> = scene.rules().collect();
         let mut spec = match self {
             ContactEntry::Named(number) => scene.contacts[number].clone(),
-            ContactEntry::Found(rule) => scene.auto[rule].contact.clone(),
+            ContactEntry::Found(rule) => rules[rule].clone(),
         };
         spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value = own);
         spec
@@ -94,19 +95,20 @@ pub fn all<const D: usize>(
     parts: &[SceneBody<D>],
     fine: bool,
 ) -> Result<Vec<Contact<D>>> {
-    let points = parts.iter().zip(0..).filter(|_| !scene.contacts.is_empty());
+    let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
-    let named = scene.contacts.iter().enumerate();
+    let rules: Vec<&ContactSpec> = scene.rules().collect();
+    let named = scene.contacts.iter().enumerate().filter(|(_, spec)| !spec.is_rule());
     let mut found = named.map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
-    found.extend(auto::find(&scene.auto, cut, parts, &taken)?);
+    found.extend(auto::find(&rules, cut, parts, &taken)?);
     let mut contacts: Vec<Contact<D>> = Vec::new();
     for pair in found {
         contacts.extend(Opposite::new(scene, parts, pair).assemble(&scene.laws, parts, cut, fine)?);
     }
-    auto::all_find_some(&scene.auto, contacts.iter().map(|contact| contact.facts.entry))?;
+    auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.entry))?;
     Ok(contacts)
 }
 

@@ -1,86 +1,117 @@
 //! Pairs of contact surfaces: two that the scene names, or rules that find pairs.
 
-use super::body::body_name;
+use super::body::{check_name, plain_pattern};
+use super::geometry::Geometry;
 use super::layer::LayerSpec;
-use crate::error::{Error, Located, Result};
+use super::pattern;
+use super::read::{Check, Either, Flaw, Form, checked, kept, positive};
+use crate::error::{Error, Located, shown};
 use crate::expression::Field;
-use crate::setting::{Context, Keys, Node, Setting, TableShape, Value, ValueKind, keys, words};
-use serde_json::{Value as Json, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-keys! {
-    /// A pair of contact surfaces and the layer between them.
-    #[derive(Debug, Clone)]
-    pub struct ContactSpec "[[contact]]" {
-        required {
-            /// write between = ["one", "other"], or between = "auto" with a distance
-            ///
-            /// The two physical groups. In a rule that finds pairs both are the word "auto".
-            pub between: [Located<String>; 2],
-            /// give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }
-            ///
-            /// Law of the layer.
-            pub layer: LayerSpec,
-        }
-        optional {
-            /// how far apart facets of a pair may be; required with "auto"
-            ///
-            /// Largest distance (a length, > 0) of facets that face each other; any distance if `None`.
-            pub distance: Option<f64> = None,
-            /// gap besides the distance of the meshes
-            ///
-            /// Gap (a length) that is added to the distance of the meshes.
-            pub gap: Field = Field::Constant(0.0),
-            /// largest angle in degrees between normals that face each other
-            ///
-            /// Largest angle between the normal of one facet and minus that of the other, > 0 and at most 90.
-            ///
-            /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most twice its own
-            /// area there. Both tend to infinity as the angle grows to a right one.
-            pub angle: f64 = 60.0,
-            /// angle in degrees beyond which facets meet at an edge, with a normal for each side
-            ///
-            /// It is > 0 and at most 180.
-            ///
-            /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45 degrees. The
-            /// default is in between.
-            pub edge: f64 = 40.0,
-            /// whether the distance of the meshes counts as zero
-            ///
-            /// Then the surfaces are assumed to touch wherever they face each other, and only [`ContactSpec::gap`] counts.
-            pub touching: bool = false,
-            /// what to do where bodies overlap before loading
-            pub overlap: Overlap = Overlap::Compress,
-            /// known contact pressure to draw and to compare with
-            pub reference: Option<Field> = None,
-        }
-        initially {
-            /// Number of the table in the scene, from 0.
-            pub table: usize = 0,
-        }
-    }
+/// A pair of contact surfaces and the layer between them, or a rule that finds such pairs: contact of all bodies that lie near each other. A pair
+/// of named surfaces of two bodies, and a later rule, take precedence.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactSpec {
+    /// write between = ["one", "other"], or between = "auto" with a distance
+    ///
+    /// The two physical groups. In a rule that finds pairs both are the word "auto".
+    #[serde(serialize_with = "write_between", deserialize_with = "between")]
+    #[schemars(with = "Either<String, [String; 2]>")]
+    pub between: [Located<String>; 2],
+    /// bodies of pairs found by "auto", or patterns: of = ["one_*", "other_*"]
+    ///
+    /// A body that matches the first name and one that matches the second form a pair. All bodies if `None`.
+    #[serde(default, deserialize_with = "of")]
+    #[schemars(with = "Option<Vec<String>>")]
+    pub of: Option<[Located<String>; 2]>,
+    /// give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }
+    ///
+    /// Law of the layer.
+    #[serde(deserialize_with = "checked")]
+    pub layer: LayerSpec,
+    /// how far apart facets of a pair may be; required with "auto"
+    ///
+    /// Largest distance (a length, > 0) of facets that face each other; any distance if `None`.
+    pub distance: Option<f64>,
+    /// gap besides the distance of the meshes
+    ///
+    /// Gap (a length) that is added to the distance of the meshes.
+    #[serde(default = "no_gap")]
+    pub gap: Field,
+    /// largest angle in degrees between normals that face each other
+    ///
+    /// Largest angle between the normal of one facet and minus that of the other, > 0 and at most 90.
+    ///
+    /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most twice its own
+    /// area there. Both tend to infinity as the angle grows to a right one.
+    #[serde(default = "angle")]
+    pub angle: f64,
+    /// angle in degrees beyond which facets meet at an edge, with a normal for each side
+    ///
+    /// It is > 0 and at most 180.
+    ///
+    /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45 degrees. The
+    /// default is in between.
+    #[serde(default = "edge")]
+    pub edge: f64,
+    /// whether the distance of the meshes counts as zero
+    ///
+    /// Then the surfaces are assumed to touch wherever they face each other, and only [`ContactSpec::gap`] counts.
+    #[serde(default)]
+    pub touching: bool,
+    /// what to do where bodies overlap before loading
+    #[serde(default)]
+    pub overlap: Overlap,
+    /// known contact pressure to draw and to compare with
+    pub reference: Option<Field>,
+    /// Number of the table in the scene, from 0.
+    #[serde(skip)]
+    pub table: usize,
+}
+
+fn no_gap() -> Field {
+    Field::Constant(0.0)
+}
+
+fn angle() -> f64 {
+    60.0
+}
+
+fn edge() -> f64 {
+    40.0
 }
 
 impl ContactSpec {
     /// Return a pair of named surfaces of different bodies, with a layer between them. The gap is the distance of the meshes.
     #[track_caller]
     pub fn new(first: &str, second: &str, layer: LayerSpec) -> Self {
-        Self::with_defaults([Located::here(first), Located::here(second)], layer)
+        Self {
+            between: [Located::here(first), Located::here(second)],
+            of: None,
+            layer,
+            distance: None,
+            gap: Field::Constant(0.0),
+            angle: angle(),
+            edge: edge(),
+            touching: false,
+            overlap: Overlap::default(),
+            reference: None,
+            table: 0,
+        }
     }
 
     /// Set the gap (a length) that is added to the distance of the meshes, a number or a function of the coordinates.
     pub fn gap(self, gap: impl Into<Field>) -> Self {
         Self { gap: gap.into(), ..self }
     }
-}
 
-/// A rule that finds pairs: contact of all bodies that lie near each other. A [`ContactSpec`] that names surfaces of two bodies, and a
-/// later rule, take precedence.
-#[derive(Debug, Clone)]
-pub struct AutoContact {
-    /// Names or patterns of bodies. A body that matches the first and one that matches the second form a pair. All bodies if `None`.
-    pub of: Option<[Located<String>; 2]>,
-    /// The settings of each pair. Its `between` is a stand-in for the names of the two bodies.
-    pub contact: ContactSpec,
+    /// Return whether it is a rule that finds pairs, and names no surfaces: `between = "auto"`.
+    pub fn is_rule(&self) -> bool {
+        self.between.iter().all(|name| name.value == AUTO)
+    }
 }
 
 /// Which of two surfaces carries the contact points of their pairs.
@@ -94,69 +125,69 @@ pub struct Carrier {
     pub is_second: bool,
 }
 
-words! {
-    /// What to do about surfaces that overlap before loading.
-    pub enum Overlap "overlap" {
-        /// The overlap compresses the layer, and the run warns.
-        Compress = "compress",
-        /// The scene is refused.
-        Refuse = "error",
-    }
+/// What to do about surfaces that overlap before loading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+pub enum Overlap {
+    /// The overlap compresses the layer, and the run warns.
+    #[default]
+    #[serde(rename = "compress")]
+    Compress,
+    /// The scene is refused.
+    #[serde(rename = "error")]
+    Refuse,
 }
 
-/// Return the shape of `[[contact]]`.
-pub fn shape() -> TableShape {
-    let about = "bodies of pairs found by \"auto\", or patterns: of = [\"one_*\", \"other_*\"]";
-    ContactSpec::shape().optional("of", ValueKind::Text.list(), about)
-}
-
-/// Read the pairs of contact surfaces that a scene names, and the rules that find further pairs.
-///
-/// # Errors
-/// Tables and values that are no contact.
-pub fn read(items: &[Node], context: &Context) -> Result<(Vec<ContactSpec>, Vec<AutoContact>)> {
-    let (mut contacts, mut auto) = (Vec::new(), Vec::new());
-    for (table, item) in items.iter().enumerate() {
-        let keys = Keys::open(item, &shape())?;
-        let is_rule = is_rule(&keys)?;
-        let of = keys.read("of", |node| of(node, context))?;
-        let contact = ContactSpec { table, ..ContactSpec::decode(&keys, context)? };
-        match is_rule {
-            true => auto.push(AutoContact { of, contact }),
-            false => contacts.push(contact),
+impl Check for ContactSpec {
+    /// Check all but the layer, which is checked by itself.
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        match self.is_rule() {
+            true => self.check_rule()?,
+            false => self.check_pair()?,
         }
-    }
-    Ok((contacts, auto))
-}
-
-/// Return the echo of named pairs and of rules, in the order of the file.
-pub fn echo(contacts: &[ContactSpec], rules: &[AutoContact], dimension: usize) -> Json {
-    let named = contacts.iter().map(|contact| (contact.table, contact.entries(dimension)));
-    let found = rules.iter().map(|AutoContact { of, contact }| {
-        let mut entries = contact.entries(dimension);
-        if let Some(of) = of {
-            entries.insert("of".to_owned(), of.each_ref().map(|name| name.value.as_str()).into_iter().collect());
+        positive("angle", "the angle", self.angle)?;
+        if self.angle > 90.0 {
+            let message = format!("the angle is {} degrees", shown(self.angle));
+            return Err(Flaw::new("angle", message, "must be at most 90", ""));
         }
-        (contact.table, entries)
-    });
-    let mut tables: Vec<_> = named.chain(found).collect();
-    tables.sort_by_key(|(table, _)| *table);
-    tables.into_iter().map(|(_, entries)| Json::from(entries)).collect()
+        positive("edge", "the angle of edges", self.edge)?;
+        if self.edge > 180.0 {
+            let message = format!("the angle of edges is {} degrees", shown(self.edge));
+            return Err(Flaw::new("edge", message, "must be at most 180", "at 180 no surface is split"));
+        }
+        self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
+    }
 }
 
-/// Return whether an open table is a rule that finds pairs: `between = "auto"`.
-fn is_rule(keys: &Keys) -> Result<bool> {
-    let is_rule = matches!(keys.require("between")?.value, Value::String(_));
-    if let (Some(entry), false) = (keys.entry("of"), is_rule) {
-        return Err(Error::scene(&entry.key_place, "`of` for surfaces with names")
-            .help("it says which bodies form pairs with between = \"auto\""));
+impl ContactSpec {
+    /// Check a rule that finds pairs.
+    fn check_rule(&self) -> Result<(), Flaw> {
+        if self.distance.is_none() {
+            let help = "facets of different bodies that face each other at most that far apart form pairs";
+            return Err(Flaw::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
+        }
+        self.of.iter().flatten().try_for_each(check_name)?;
+        Ok(())
     }
-    if is_rule && keys.require("between")?.string()? == AUTO {
-        keys.require("distance").map_err(|error| {
-            error.help("facets of different bodies that face each other at most that far apart form pairs")
-        })?;
+
+    /// Check a pair of surfaces: two plain names.
+    fn check_pair(&self) -> Result<(), Flaw> {
+        let [a, b] = &self.between;
+        if a == b {
+            let error = Error::scene(&b.place, format!("a contact between `{}` and itself", b.value));
+            return Err(error.help("name one surface of each of two bodies").into());
+        }
+        if self.of.is_some() {
+            let help = "it says which bodies form pairs with between = \"auto\"";
+            return Err(Flaw::new("of", "`of` for surfaces with names", "", help));
+        }
+        if let Some(name) = self.between.iter().find(|name| name.contains(['*', '?'])) {
+            let help =
+                "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D";
+            let error = Error::scene(&name.place, format!("the pattern `{}` for one surface", name.value));
+            return Err(error.label("one name belongs here").help(help).into());
+        }
+        Ok(())
     }
-    Ok(is_rule)
 }
 
 /// The value of `between` in rules that find pairs, and the name of both surfaces there.
@@ -164,35 +195,34 @@ const AUTO: &str = "auto";
 
 const EXAMPLE: &str = "write between = [\"one\", \"other\"], or between = \"auto\" with a distance";
 
-/// The two surfaces of a contact. With `between = "auto"` both are the word "auto".
-impl Setting for [Located<String>; 2] {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Text, ValueKind::Text.list()])
-    }
-
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        match &node.value {
-            Value::String(word) if word == AUTO => Ok([node.name()?, node.name()?]),
-            Value::String(word) => Err(node.refuse(format!("a contact between `{word}` alone")).help(EXAMPLE)),
-            _ => match node.list()? {
-                [a, b] => Ok([a.name()?, b.name()?]),
-                _ => Err(node.refuse("a contact is between two surfaces").help(EXAMPLE)),
-            },
+/// Read the two surfaces of a contact. With `between = "auto"` both are the word "auto".
+fn between<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Located<String>; 2], D::Error> {
+    let Located { value, place } = Located::<Form<Located<String>>>::deserialize(deserializer)?;
+    match value {
+        Form::Text(word) if word == AUTO => Ok([(); 2].map(|()| Located::new(word.clone(), place.clone()))),
+        Form::Text(word) => Err(kept(Error::scene(&place, format!("a contact between `{word}` alone")).help(EXAMPLE))),
+        Form::List(names) => {
+            names.iter().try_for_each(pattern::check).map_err(kept)?;
+            let count = |_| kept(Error::scene(&place, "a contact is between two surfaces").help(EXAMPLE));
+            names.try_into().map_err(count)
         }
-    }
-
-    fn echo(&self, _: usize) -> Json {
-        match self.each_ref().map(|name| name.value.as_str()) {
-            [AUTO, AUTO] => json!(AUTO),
-            names => json!(names),
-        }
+        other => Err(other.unexpected()),
     }
 }
 
-/// Return two names of bodies, or patterns of names.
-fn of(node: &Node, context: &Context) -> Result<[Located<String>; 2]> {
-    let [a, b] = node.list()? else {
-        return Err(node.refuse("pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"));
-    };
-    Ok([body_name(a, context)?, body_name(b, context)?])
+fn write_between<S: Serializer>(between: &[Located<String>; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    match between.each_ref().map(|name| name.value.as_str()) {
+        [AUTO, AUTO] => AUTO.serialize(serializer),
+        names => names.serialize(serializer),
+    }
+}
+
+/// Read two names of bodies, or patterns of names.
+fn of<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
+    let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
+    let names: [Located<String>; 2] = names.try_into().map_err(|_| {
+        kept(Error::scene(&place, "pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"))
+    })?;
+    names.iter().try_for_each(pattern::check).map_err(kept)?;
+    Ok(Some(names.map(|name| Located { value: plain_pattern(&name.value), ..name })))
 }

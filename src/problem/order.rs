@@ -1,12 +1,12 @@
 //! The order of finite elements.
 
-use crate::error::Result;
-use crate::setting::{Context, Node, Setting, ValueKind};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value as Json;
 
-/// The polynomial order of the displacements, from 1 to 8; in space 1 or 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// The polynomial order of the displacements, from 1 to 8; in space 1 or 2. In a scene it is a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[schemars(with = "usize", extend("enum" = [1, 2, 3, 4, 5, 6, 7, 8]))]
+#[serde(try_from = "usize", into = "usize")]
 pub struct Order(u8);
 
 impl Order {
@@ -33,17 +33,22 @@ impl Order {
     }
 }
 
-impl Setting for Order {
-    fn kind() -> ValueKind {
-        ValueKind::OneOf(&[1, 2, 3, 4, 5, 6, 7, 8])
+impl Default for Order {
+    fn default() -> Self {
+        Self::P1
     }
+}
 
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        let degree = node.count()?;
-        Self::new(degree).ok_or_else(|| node.refuse("orders are from 1 to 8"))
+impl TryFrom<usize> for Order {
+    type Error = &'static str;
+
+    fn try_from(degree: usize) -> Result<Self, Self::Error> {
+        Self::new(degree).ok_or("must be from 1 to 8")
     }
+}
 
-    fn echo(&self, _: usize) -> Json {
-        self.degree().into()
+impl From<Order> for usize {
+    fn from(order: Order) -> Self {
+        order.degree()
     }
 }

@@ -183,11 +183,11 @@ impl Page<'_> {
     /// Return the choice of fields of the view.
     fn fields(&self) -> String {
         let mut options = vec![
-            ("stress", self.label("von Mises stress", |units| units.stress)),
-            ("travel", self.label("displacement", |units| units.length)),
+            ("stress", self.label("von Mises stress", |units| &units.stress)),
+            ("travel", self.label("displacement", |units| &units.length)),
         ];
         if !self.contacts.is_empty() {
-            options.push(("pressure", self.label("contact pressure", |units| units.stress)));
+            options.push(("pressure", self.label("contact pressure", |units| &units.stress)));
         }
         options.iter().map(|(value, text)| format!("<option value=\"{value}\">{}</option>", escape(text))).collect()
     }
@@ -202,8 +202,8 @@ impl Page<'_> {
             "layer".to_owned(),
             "#points".to_owned(),
             self.label("force on the first", |units| &units.force),
-            self.label("#peak pressure", |units| units.stress),
-            self.label("at", |units| units.length),
+            self.label("#peak pressure", |units| &units.stress),
+            self.label("at", |units| &units.length),
             label(if is_area { "#area in contact" } else { "#length in contact" }, unit.as_deref()),
             label("#open", unit.as_deref()),
         ];
@@ -243,8 +243,8 @@ impl Page<'_> {
     }
 
     fn body_table(&self) -> String {
-        let displacement = self.label("#largest displacement", |units| units.length);
-        let stress = self.label("#von Mises stress", |units| units.stress);
+        let displacement = self.label("#largest displacement", |units| &units.length);
+        let stress = self.label("#von Mises stress", |units| &units.stress);
         let columns =
             ["body", "#cells", "#dofs", "inner solver", &displacement, &stress, "#imbalance of forces", "#of moments"];
         let row = |body: &BodyReport| {
@@ -307,6 +307,7 @@ fn scene(settings: &Value) -> String {
     let row = |body: &Value| {
         let mut material = body.as_object().cloned().unwrap_or_default();
         ["name", "fix", "load", "spring"].iter().for_each(|key| drop(material.remove(*key)));
+        material.retain(|_, value| *value != false && value.as_array().is_none_or(|list| !list.is_empty()));
         vec![
             escape(body["name"].as_str().unwrap_or_default()),
             escape(&words(&Value::Object(material))),

@@ -21,7 +21,7 @@ use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, Sweeps};
 use crate::scene::Scene;
-use crate::setting::remove;
+use crate::scene::remove;
 use crate::solver::{Dense, Krylov, MakeSolver, options};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -313,7 +313,7 @@ fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Resul
     if scene.method.name != MethodName::Robin {
         return linear_step(session, built, start).map(Method::Newton);
     }
-    let rule = gamma::rule(&scene.method.gamma, &scene.rules)?;
+    let rule = gamma::rule(&scene.method.gamma, &scene.own_rules)?;
     crate::robin::prepare(&mut built.discrete.model)?;
     Ok(Method::Robin { rule, coefficient: coefficient_of(&scene), linear: Box::new(Sweeps::with_robin_term()) })
 }

@@ -62,7 +62,7 @@ fn a_plane_run_has_a_page_of_its_own() {
             "--set",
             "mesh.set.n=4",
             "--set",
-            "units=MPa, cm",
+            "units=cm, MPa",
             "--set",
             "title=<b>A</b> & </script><script>boom()</script>",
             "-ksp_type",

@@ -78,8 +78,8 @@ impl Benchmark {
         let Some(folder) = &request.against else { return Ok(None) };
         let [scene] = &self.scenes[..] else { return Err(usage("`--against` goes with one scene")) };
         let found = compare::tables(folder)?;
-        let (tables, pairs) = (found.len(), scene.contacts.len());
-        if found.is_empty() || (scene.auto.is_empty() && tables != pairs) {
+        let (tables, pairs) = (found.len(), scene.pairs().count());
+        if found.is_empty() || (scene.rules().next().is_none() && tables != pairs) {
             let message = format!("{} has {tables} contact tables, the scene {pairs} pairs", folder.display());
             return Err(usage(message).help("give the folder of results of the same scene"));
         }

@@ -18,7 +18,6 @@ use std::rc::Rc;
 /// Parameters out of their range at a point, and expressions or the program's own laws that are not the law of a layer.
 pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
     match spec {
-        LayerSpec::Form { form, values } => forms::make(form, values, position),
         LayerSpec::Own(name) => own(laws, name, position, extent(position)),
         LayerSpec::Table(points) => Ok(Rc::new(Table::new(points))),
         LayerSpec::Pressure { law, up_to } => {
@@ -29,6 +28,7 @@ pub fn make(spec: &LayerSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<R
                 false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
             }
         }
+        form => forms::make(form, position),
     }
 }
 
