@@ -94,7 +94,7 @@ pub fn respond(
         work[0] += reduced.work;
     }
     model.exchange.sum(&mut work);
-    let springs = resisting(model, places.springs(model));
+    let springs = resisting(model, places);
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(share);
     let system = System { model, places, springs: &springs, residual: &residual, enough: &mut enough };
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy + work[0])))
@@ -104,14 +104,14 @@ pub fn respond(
 /// without end.
 const PROXIMAL: f64 = 1e-3;
 
-/// Return the springs omega kappa of a linear step, n, with one more for every rigid motion of the bodies together that is otherwise unresisted: a
-/// contact that is still open may stop it.
+/// Return the springs omega kappa of a linear step from `places`, n, with one more for every rigid motion of the bodies together that is otherwise
+/// unresisted: a contact that is still open may stop it.
 ///
-/// The additional spring is at the point that the motion closes most, and nowhere else. Forces may be in balance on the motion, for example where
-/// bodies rest and could turn about the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry
-/// forces.
-pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
-    let motions = Motions::of(model);
+/// The additional spring is at one point, and nowhere else. Forces may be in balance on the motion, for example where bodies rest and could turn about
+/// the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry forces. Of the points that the motion closes
+/// at least half as much as any, it is that of the least gap: over a wide one it would tie the body to another that a support carries along.
+pub fn resisting(model: &Model, places: &Layer) -> Vec<f64> {
+    let (motions, mut springs) = (Motions::of(model), places.springs(model));
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
         let mut free = motions.springs(&springs).factor().kernel();
@@ -122,14 +122,16 @@ pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
             surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
         while let Some(motion) = free.pop() {
             let closing = motions.closing(&motion);
-            let Some(most) = (0..closing.len()).max_by(|&p, &q| closing[p].abs().total_cmp(&closing[q].abs())) else {
+            let half = 0.5 * closing.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
+            let near = |p: &usize, q: &usize| places.compression[*p].total_cmp(&places.compression[*q]);
+            let Some(at) = (0..closing.len()).filter(|&q| closing[q].abs() >= half).max_by(near) else {
                 break;
             };
-            let shares = closing.iter().map(|s| (s / closing[most]).powi(2));
-            springs[most] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            let shares = closing.iter().map(|s| (s / closing[at]).powi(2));
+            springs[at] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
             // take this motion out of the others, so that they close nothing at that point
             for other in &mut free {
-                let share = motions.closing(other)[most] / closing[most];
+                let share = motions.closing(other)[at] / closing[at];
                 other.axpy(-share, &motion, 1.0);
             }
         }

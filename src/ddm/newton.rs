@@ -138,7 +138,7 @@ impl Newton<'_, '_> {
     /// Solve the linear step from the states.
     fn linear_step(&mut self) -> Result<LinearResult> {
         let (model, states) = (&mut *self.run.model, &self.states);
-        let springs = resisting(model, states.springs(model));
+        let springs = resisting(model, states);
         let compression = model.compression(&self.u.trace);
         let products = self.linear.multiply(model, &self.u.states);
         let (residual, _) = residual(model, products, &self.u, &model.forces(&states.linear(&compression)));
@@ -207,7 +207,7 @@ impl Newton<'_, '_> {
     fn descent_step(&mut self) -> Result<Option<f64>> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
-        let springs = resisting(model, layer.springs(model));
+        let springs = resisting(model, &layer);
         let products = self.linear.multiply(model, &self.u.states);
         let (residual, _) = residual(model, products, &self.u, &layer.force);
         let roughest = self.linear.roughest();
@@ -292,7 +292,7 @@ impl Newton<'_, '_> {
     /// its solution to the errors, since roundoff may do as much again. Return the solution, none if the system is not solved.
     fn look(&mut self, iterate: &StepResult, measured: &mut Measured) -> Result<Option<LinearSolution>> {
         let (run, places) = (&mut *self.run, &self.states);
-        let springs = resisting(run.model, places.springs(run.model));
+        let springs = resisting(run.model, places);
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
         let before = self.linear.counts();
         let system =
