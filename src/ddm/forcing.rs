@@ -96,7 +96,7 @@ pub fn respond(
     model.exchange.sum(&mut work);
     let springs = resisting(model, places);
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(share);
-    let system = System { model, places, springs: &springs, residual: &residual, enough: &mut enough };
+    let system = System { model, places, springs: &springs.all, residual: &residual, enough: &mut enough };
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy + work[0])))
 }
 
@@ -104,17 +104,33 @@ pub fn respond(
 /// without end.
 const PROXIMAL: f64 = 1e-3;
 
+/// The springs of a linear step.
+pub struct Springs {
+    /// omega kappa, with those that were added, n.
+    pub all: Vec<f64>,
+    /// Those that stand in for a contact, which resists the motions of bodies together only when it has closed.
+    pub added: Vec<Spring>,
+}
+
+/// A spring at a contact point.
+pub struct Spring {
+    /// Number of the point.
+    pub at: usize,
+    /// Force over closing.
+    pub stiffness: f64,
+}
+
 /// Return the springs omega kappa of a linear step from `places`, n, with one more for every rigid motion of the bodies together that is otherwise
 /// unresisted: a contact that is still open may stop it.
 ///
 /// The additional spring is at one point, and nowhere else. Forces may be in balance on the motion, for example where bodies rest and could turn about
 /// the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry forces. Of the points that the motion closes
 /// at least half as much as any, it is that of the least gap: over a wide one it would tie the body to another that a support carries along.
-pub fn resisting(model: &Model, places: &Layer) -> Vec<f64> {
-    let (motions, mut springs) = (Motions::of(model), places.springs(model));
+pub fn resisting(model: &Model, places: &Layer) -> Springs {
+    let (motions, mut all, mut added) = (Motions::of(model), places.springs(model), Vec::new());
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
-        let mut free = motions.springs(&springs).factor().kernel();
+        let mut free = motions.springs(&all).factor().kernel();
         if free.is_empty() {
             break;
         }
@@ -128,7 +144,9 @@ pub fn resisting(model: &Model, places: &Layer) -> Vec<f64> {
                 break;
             };
             let shares = closing.iter().map(|s| (s / closing[at]).powi(2));
-            springs[at] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            let spring = PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            all[at] += spring;
+            added.push(Spring { at, stiffness: spring });
             // take this motion out of the others, so that they close nothing at that point
             for other in &mut free {
                 let share = motions.closing(other)[at] / closing[at];
@@ -136,7 +154,7 @@ pub fn resisting(model: &Model, places: &Layer) -> Vec<f64> {
             }
         }
     }
-    springs
+    Springs { all, added }
 }
 
 #[cfg(test)]

@@ -271,7 +271,7 @@ impl From<Option<Vec<f64>>> for InitialGuess {
 /// the one that is found.
 pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>> {
     let rigid = find_start(model).ok()?;
-    let springs = resisting(model, &first_states(model, begin, &rigid).states);
+    let springs = resisting(model, &first_states(model, begin, &rigid).states).all;
     if let InitialGuess::Automatic = begin {
         *begin = InitialGuess::Found(Box::new(rigid));
     }
