@@ -18,7 +18,7 @@ use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
-use crate::problem::BodySpec;
+use crate::problem::{BodySpec, ContactSpec};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +30,8 @@ pub struct ReplicatedProblem<const D: usize, P> {
     pub bodies: Vec<(BodySlot, BodyInfo)>,
     /// Arrays on which the method works.
     pub pairs: Vec<ContactPair>,
+    /// Rigid parts, which follow the bodies.
+    pub rigid: Vec<BodySlot>,
     /// Origin of each pair.
     pub contacts: Vec<ContactFacts>,
     /// Motions that nothing resists.
@@ -81,6 +83,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     scene: &Scene,
     verified: &Verified<D>,
     specs: &'a [BodySpec],
+    named: &[ContactSpec],
     cut: Cut<D>,
     keep: bool,
     ranks: usize,
@@ -89,7 +92,8 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let mesh = &verified.mesh;
     let parts = parts(scene, verified, specs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
+    let (all, rigid) = pairs::all(scene, named, mesh, cut, &parts, keep)?;
+    for found in all {
         pairs.push(found.pair);
         contacts.push(found.facts);
         fine.extend(found.fine);
@@ -111,7 +115,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, fine, plan };
+    let shared = ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan };
     Ok((shared, WholeProblem { bodies, partitions, keep }))
 }
 

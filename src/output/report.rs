@@ -282,6 +282,27 @@ pub struct PairReport {
     pub extent: Extent,
     /// Plane problems: points where contact begins or ends. They are zeros of c, interpolated linearly between contact points.
     pub contact_ends: Vec<[f64; 3]>,
+    /// The obstacle before the surface, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<ObstacleReport>,
+    /// Closing of the gap (a length) that was found for the force or preload of the pair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+}
+
+/// The report of an obstacle.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObstacleReport {
+    /// How far it has moved towards the surface, along its mean normal.
+    pub approach: f64,
+    /// How far it has turned, in radians (x, y, z).
+    pub tilt: [f64; 3],
+    /// The force with which it presses along the mean normal.
+    pub force: f64,
+    /// The moment about `at` that it needs beside this force (x, y, z).
+    pub moment: [f64; 3],
+    /// The point about which it turns (x, y, z).
+    pub at: [f64; 3],
 }
 
 /// The report of a load step.
@@ -321,6 +342,12 @@ pub struct StepPairReport {
     pub peak_compression: f64,
     /// Number of points with c > 0.
     pub closed: usize,
+    /// The obstacle before the surface, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<ObstacleReport>,
+    /// Closing of the gap that was found for the force or preload of the pair, or that the step keeps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
 }
 
 /// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are lengths in

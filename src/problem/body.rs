@@ -254,7 +254,7 @@ pub fn fault(name: &str) -> Option<[&'static str; 2]> {
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Return the kind of value that is a number or an expression, or a list with one for each component.
-fn one_or_components() -> ValueKind {
+pub(super) fn one_or_components() -> ValueKind {
     ValueKind::Either(vec![ValueKind::Field, ValueKind::Field.list()])
 }
 
@@ -448,12 +448,12 @@ fn load_shape() -> TableShape {
 }
 
 /// Return a moment (x, y, z): a number in the plane, a vector in space.
-fn moment_of(node: &Node, context: &Context) -> Result<[f64; 3]> {
+pub(super) fn moment_of(node: &Node, context: &Context) -> Result<[f64; 3]> {
     if context.dimension == 2 { Ok([0.0, 0.0, node.number()?]) } else { numbers(node, context) }
 }
 
 /// Return a moment as [`moment_of`] reads it.
-fn echo_of_moment(moment: &[f64; 3], dimension: usize) -> Json {
+pub(super) fn echo_of_moment(moment: &[f64; 3], dimension: usize) -> Json {
     if dimension == 2 { json!(moment[2]) } else { json!(moment) }
 }
 

@@ -1,6 +1,6 @@
 //! Pairs of contact surfaces: two that the scene names, or rules that find pairs.
 
-use super::body::body_name;
+use super::body::{body_name, echo_of_moment, moment_of, one_or_components};
 use super::layer::LayerSpec;
 use crate::error::{Error, Located, Result};
 use crate::expression::Field;
@@ -12,10 +12,6 @@ keys! {
     #[derive(Debug, Clone)]
     pub struct ContactSpec "[[contact]]" {
         required {
-            /// write between = ["one", "other"], or between = "auto" with a distance
-            ///
-            /// The two physical groups. In a rule that finds pairs both are the word "auto".
-            pub between: [Located<String>; 2],
             /// give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }
             ///
             /// Law of the layer.
@@ -48,14 +44,42 @@ keys! {
             ///
             /// Then the surfaces are assumed to touch wherever they face each other, and only [`ContactSpec::gap`] counts.
             pub touching: bool = false,
+            /// whether the layer also pulls where it is stretched, by the same law unless `tension` gives another
+            ///
+            /// A bond fills the gap of the meshes, so that only [`ContactSpec::gap`] counts.
+            pub bond: bool = false,
+            /// law of a bonded layer where it is stretched: tension over stretch
+            pub tension: Option<LayerSpec> = None,
+            /// whether the surface `on` is before a rigid obstacle, which is given by the gap
+            pub obstacle: bool = false,
+            /// how far an obstacle moves towards the surface, along its mean normal; 0 without `force`
+            pub approach: Option<f64> = None,
+            /// how far an obstacle turns, in radians: about z in the plane, in space a vector; 0 without `moment`
+            pub tilt: Option<Axial> = None,
+            /// total of the normal forces, for which the gap changes by an offset; force on an obstacle along the mean normal
+            pub force: Option<f64> = None,
+            /// moment on an obstacle about `at`, under which it turns: a number in the plane, in space a vector
+            pub moment: Option<Axial> = None,
+            /// point about which an obstacle turns; the middle of its surface without this key
+            pub at: Option<Point> = None,
+            /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the pair is bonded
+            pub preload: Option<f64> = None,
+            /// column of the table of load steps with the factor of these forces and motions
+            pub path: Option<Located<String>> = None,
             /// what to do where bodies overlap before loading
             pub overlap: Overlap = Overlap::Compress,
             /// known contact pressure to draw and to compare with
             pub reference: Option<Field> = None,
         }
+        besides {
+            /// The two physical groups. In a rule that finds pairs both are the word "auto"; before an obstacle the second is "obstacle".
+            pub between: [Located<String>; 2],
+        }
         initially {
             /// Number of the table in the scene, from 0.
             pub table: usize = 0,
+            /// Factor of forces and motions at the present load step; 1 without load steps.
+            pub factor: f64 = 1.0,
         }
     }
 }
@@ -64,12 +88,75 @@ impl ContactSpec {
     /// Return a pair of named surfaces of different bodies, with a layer between them. The gap is the distance of the meshes.
     #[track_caller]
     pub fn new(first: &str, second: &str, layer: LayerSpec) -> Self {
-        Self::with_defaults([Located::here(first), Located::here(second)], layer)
+        Self::with_defaults(layer, [Located::here(first), Located::here(second)])
+    }
+
+    /// Return a surface before a rigid obstacle, whose distance is the `gap`.
+    #[track_caller]
+    pub fn obstacle(on: &str, gap: impl Into<Field>, layer: LayerSpec) -> Self {
+        let spec = Self::with_defaults(layer, [Located::here(on), Located::here(OBSTACLE)]);
+        Self { obstacle: true, gap: gap.into(), ..spec }
+    }
+
+    /// Bond the surfaces: the layer also pulls where it is stretched, by its own law.
+    pub fn bonded(self) -> Self {
+        Self { bond: true, ..self }
+    }
+
+    /// Return whether the distance of the meshes counts as zero.
+    pub fn is_touching(&self) -> bool {
+        self.touching || self.bond || self.obstacle
+    }
+
+    /// Return whether forces or prescribed motions of the pair act without a path.
+    pub fn acts(&self) -> bool {
+        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(|axial| axial.0);
+        self.path.is_none() && [self.approach, self.force].into_iter().flatten().chain(turns).any(|value| value != 0.0)
     }
 
     /// Set the gap (a length) that is added to the distance of the meshes, a number or a function of the coordinates.
     pub fn gap(self, gap: impl Into<Field>) -> Self {
         Self { gap: gap.into(), ..self }
+    }
+}
+
+/// A rotation or a moment: about z in the plane, a vector in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Axial(pub [f64; 3]);
+
+impl Setting for Axial {
+    fn kind() -> ValueKind {
+        one_or_components()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        moment_of(node, context).map(Self)
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        echo_of_moment(&self.0, dimension)
+    }
+}
+
+/// A point of the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point(pub [f64; 3]);
+
+impl Setting for Point {
+    fn kind() -> ValueKind {
+        ValueKind::Number.list()
+    }
+
+    fn read(node: &Node, context: &Context) -> Result<Self> {
+        let mut point = [0.0; 3];
+        for (x, item) in point.iter_mut().zip(context.components(node)?) {
+            *x = item.number()?;
+        }
+        Ok(Self(point))
+    }
+
+    fn echo(&self, dimension: usize) -> Json {
+        json!(self.0[..dimension])
     }
 }
 
@@ -107,7 +194,13 @@ words! {
 /// Return the shape of `[[contact]]`.
 pub fn shape() -> TableShape {
     let about = "bodies of pairs found by \"auto\", or patterns: of = [\"one_*\", \"other_*\"]";
-    ContactSpec::shape().optional("of", ValueKind::Text.list(), about)
+    ContactSpec::shape()
+        .optional("between", <[Located<String>; 2]>::kind(), EXAMPLE)
+        .optional("on", ValueKind::Text, "the surface before an obstacle, with obstacle = true")
+        .optional("of", ValueKind::Text.list(), about)
+        .at_most_one(&["between", "on"])
+        .at_most_one(&["approach", "force", "preload"])
+        .at_most_one(&["tilt", "moment"])
 }
 
 /// Read the pairs of contact surfaces that a scene names, and the rules that find further pairs.
@@ -118,9 +211,14 @@ pub fn read(items: &[Node], context: &Context) -> Result<(Vec<ContactSpec>, Vec<
     let (mut contacts, mut auto) = (Vec::new(), Vec::new());
     for (table, item) in items.iter().enumerate() {
         let keys = Keys::open(item, &shape())?;
-        let is_rule = is_rule(&keys)?;
+        let on = on(&keys)?;
+        let is_rule = on.is_none() && is_rule(&keys)?;
         let of = keys.read("of", |node| of(node, context))?;
-        let contact = ContactSpec { table, ..ContactSpec::decode(&keys, context)? };
+        let between = match on {
+            Some(on) => [on.clone(), Located { value: OBSTACLE.to_owned(), ..on }],
+            None => <[Located<String>; 2]>::read(keys.require("between")?, context)?,
+        };
+        let contact = ContactSpec { table, ..ContactSpec::decode(&keys, context, between)? };
         match is_rule {
             true => auto.push(AutoContact { of, contact }),
             false => contacts.push(contact),
@@ -131,9 +229,17 @@ pub fn read(items: &[Node], context: &Context) -> Result<(Vec<ContactSpec>, Vec<
 
 /// Return the echo of named pairs and of rules, in the order of the file.
 pub fn echo(contacts: &[ContactSpec], rules: &[AutoContact], dimension: usize) -> Json {
-    let named = contacts.iter().map(|contact| (contact.table, contact.entries(dimension)));
-    let found = rules.iter().map(|AutoContact { of, contact }| {
+    let entries = |contact: &ContactSpec| {
         let mut entries = contact.entries(dimension);
+        match contact.obstacle {
+            true => entries.insert("on".to_owned(), json!(contact.between[0].value)),
+            false => entries.insert("between".to_owned(), contact.between.echo(dimension)),
+        };
+        entries
+    };
+    let named = contacts.iter().map(|contact| (contact.table, entries(contact)));
+    let found = rules.iter().map(|AutoContact { of, contact }| {
+        let mut entries = entries(contact);
         if let Some(of) = of {
             entries.insert("of".to_owned(), of.each_ref().map(|name| name.value.as_str()).into_iter().collect());
         }
@@ -142,6 +248,21 @@ pub fn echo(contacts: &[ContactSpec], rules: &[AutoContact], dimension: usize) -
     let mut tables: Vec<_> = named.chain(found).collect();
     tables.sort_by_key(|(table, _)| *table);
     tables.into_iter().map(|(_, entries)| Json::from(entries)).collect()
+}
+
+/// Return the surface before an obstacle, if an open table has one.
+fn on(keys: &Keys) -> Result<Option<Located<String>>> {
+    match (keys.entry("on"), keys.flag("obstacle", false)?) {
+        (Some(entry), true) => entry.node.name().map(Some),
+        (Some(entry), false) => Err(Error::scene(&entry.key_place, "`on` without an obstacle").help(
+            "one surface before a rigid obstacle has obstacle = true, two surfaces have between = [\"one\", \"other\"]",
+        )),
+        (None, true) => keys
+            .require("on")
+            .map(|_| None)
+            .map_err(|error| error.help("an obstacle is before one surface: on = \"top\"")),
+        (None, false) => Ok(None),
+    }
 }
 
 /// Return whether an open table is a rule that finds pairs: `between = "auto"`.
@@ -158,6 +279,9 @@ fn is_rule(keys: &Keys) -> Result<bool> {
     }
     Ok(is_rule)
 }
+
+/// The name of an obstacle, where a pair has that of the second surface.
+pub const OBSTACLE: &str = "obstacle";
 
 /// The value of `between` in rules that find pairs, and the name of both surfaces there.
 const AUTO: &str = "auto";

@@ -125,14 +125,15 @@ where
 {
     /// Build the problem under the loads of a step of the scene's history, or under the full loads. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, scene, verified, read, cut } = self;
+        let Self { session, verified, read, cut, .. } = self;
         let stage = session.stage("discretize");
-        let mut bodies = verified.bodies.clone();
-        scene.method.steps.apply(step, &mut bodies);
+        let (mut bodies, mut contacts) = (verified.bodies.clone(), self.scene.contacts.clone());
+        self.scene.method.steps.apply(step, &mut bodies, &mut contacts);
+        let scene = &self.scene;
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.adapt.is_some();
-        let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
+        let discrete = discretize::discretize(scene, verified, &bodies, &contacts, *cut, keep, exchange, &mut inner);
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
         // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
@@ -211,6 +212,11 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
     let Begin { start, steps } = begin;
+    for (i, pair) in steps.last().iter().flat_map(|step| step.pairs.iter().enumerate()) {
+        if scene.method.steps.locks(steps.len(), &built.discrete.contacts[i].spec) {
+            built.discrete.lock(i, pair.offset.unwrap_or(0.0));
+        }
+    }
     let mut start = match start {
         Some(start) => start,
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),

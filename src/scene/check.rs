@@ -100,6 +100,7 @@ impl Scene {
         check_rules(&self.auto)?;
         for contact in self.contacts.iter().chain(self.auto.iter().map(|auto| &auto.contact)) {
             check_contact(&at_contact(contact), contact)?;
+            self.check_rigid(&at_contact(contact), contact)?;
         }
         check_method(&at("method"), &self.method)?;
         self.check_adapt(&at("adapt"))
@@ -145,6 +146,53 @@ impl Scene {
             return at.below("force").refuse("a body force in z in a plane problem", "", "");
         }
         self.check_lines(at, body)
+    }
+
+    /// Check the forces and motions of obstacles and offsets.
+    fn check_rigid(&self, at: &CheckedKey, contact: &ContactSpec) -> CheckResult {
+        let ContactSpec { obstacle, approach, tilt, force, moment, preload, .. } = contact;
+        let turns = [("tilt", tilt), ("moment", moment)];
+        let given = [
+            ("approach", approach.is_some()),
+            ("tilt", tilt.is_some()),
+            ("moment", moment.is_some()),
+            ("at", contact.at.is_some()),
+        ];
+        if let (false, Some((key, _))) = (obstacle, given.iter().find(|(_, given)| *given)) {
+            let help = "on = \"top\", obstacle = true";
+            return at.below(key).refuse(format!("`{key}` of a contact without an obstacle"), "", help);
+        }
+        if let (Some((key, _)), true) =
+            (turns.iter().find(|(_, turn)| turn.is_some()), self.plane == Plane::Axisymmetric)
+        {
+            return at.below(key).refuse(
+                "an obstacle that turns in an axisymmetric scene",
+                "it moves along the axis alone",
+                "",
+            );
+        }
+        let numbers = [("approach", approach), ("force", force), ("preload", preload)];
+        let all = numbers.into_iter().filter_map(|(key, value)| Some((key, value.as_ref().copied()?)));
+        let all = all.chain(
+            turns
+                .into_iter()
+                .flat_map(|(key, turn)| turn.iter().flat_map(move |turn| turn.0.map(|value| (key, value)))),
+        );
+        if let Some((key, value)) = all.clone().find(|(_, value)| !value.is_finite()) {
+            return at.below(key).refuse(format!("`{key}` is {value}"), "", "");
+        }
+        if let Some((key, _)) =
+            all.clone().find(|(key, value)| *value < 0.0 && (*key == "preload" || *key == "force" && !contact.bond))
+        {
+            let help = "a force > 0 presses; only a bonded pair can be pulled";
+            return at.below(key).refuse(format!("a negative `{key}`"), "", help);
+        }
+        match &contact.path {
+            Some(_) if all.count() == 0 => {
+                at.below("path").refuse("`path` without a force or motion of this contact", "", "")
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_adapt(&self, at: &CheckedKey) -> CheckResult {
@@ -207,6 +255,13 @@ fn check_pairs(contacts: &[ContactSpec]) -> CheckResult {
         if !pairs.insert([a.min(b), a.max(b)]) {
             return at.below(0).refuse(format!("a second contact of `{a}` and `{b}`"), "", "remove one of the two");
         }
+        if contact.preload.is_some() && contact.obstacle {
+            return at_contact(contact).below("preload").refuse(
+                "a preload of an obstacle",
+                "",
+                "it has a force in each load step: force = F",
+            );
+        }
         let is_plural = |name: &String| name.contains(['*', '?']);
         if let Some((side, name)) = [a, b].into_iter().enumerate().find(|(_, name)| is_plural(name)) {
             let help =
@@ -223,6 +278,15 @@ fn check_rules(rules: &[AutoContact]) -> CheckResult {
     let mut known = HashSet::new();
     for AutoContact { of, contact } in rules {
         let at = at_contact(contact);
+        if let Some((key, _)) =
+            [("force", contact.force), ("preload", contact.preload)].iter().find(|(_, value)| value.is_some())
+        {
+            return at.below(key).refuse(
+                format!("`{key}` for pairs that are found"),
+                "",
+                "name the two surfaces: between = [\"one\", \"other\"]",
+            );
+        }
         let names = of.as_ref().map(|of| of.each_ref().map(|name| &name.value));
         for (side, name) in names.iter().flatten().enumerate() {
             at.below(format_args!("of.{side}")).name(name)?;
@@ -259,6 +323,12 @@ fn check_contact(at: &CheckedKey, contact: &ContactSpec) -> CheckResult {
     if let Some(distance) = contact.distance {
         at.positive_in("distance", "the distance", distance)?;
     }
+    if let (Some(tension), false) = (&contact.tension, contact.bond) {
+        let help = "write bond = true, or leave `tension` away";
+        check_layer(&at.below("tension"), tension)?;
+        return at.below("tension").refuse("only a bonded layer has a law in tension", "", help);
+    }
+    contact.tension.as_ref().map_or(Ok(()), |tension| check_layer(&at.below("tension"), tension))?;
     check_layer(&at.below("layer"), &contact.layer)
 }
 

@@ -52,7 +52,7 @@ pub(super) fn scene(tree: &Node, path: &Path) -> Result<Scene> {
     if let (Some(adapt), false) = (&scene.adapt, has_stop) {
         scene.method.stop.residual = Some(0.1 * adapt.error.value);
     }
-    scene.method.steps.join(&scene.bodies)?;
+    scene.method.steps.join(&scene.bodies, &scene.contacts)?;
     Ok(scene)
 }
 
