@@ -506,11 +506,20 @@ impl Report {
         let is_only = self.pairs.iter().filter(|other| other.bodies == pair.bodies).count() == 1;
         let [a, b] = if is_only { &pair.bodies } else { &pair.surfaces };
         let names = format!("  {a} - {b}");
-        if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
+        // a bonded pair may pull everywhere
+        let is_pulled = pair.force[0] != [0.0; 3];
+        if pair.peak_pressure <= 0.0 && !is_pulled || pair.peak_pressure.is_nan() {
             return format!("{names}: no contact");
         }
+        let turned = |obstacle: &ObstacleReport| match obstacle.tilt == [0.0; 3] {
+            true => String::new(),
+            false => format!(", tilt {}, moment {}", vector(obstacle.tilt), vector(obstacle.moment)),
+        };
+        let moved = |obstacle: &ObstacleReport| format!(", approach {}{}", sci(obstacle.approach, 5), turned(obstacle));
+        let offset = pair.offset.map(|offset| format!(", offset {}", sci(offset, 5)));
+        let more = pair.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
         format!(
-            "{names}: force {}, peak pressure {} at {}, contact {}, open {}",
+            "{names}: force {}{more}, peak pressure {} at {}, contact {}, open {}",
             vector(pair.force[0]),
             readable(pair.peak_pressure, 6),
             point(pair.peak_at),
