@@ -63,12 +63,21 @@ pub struct Discrete {
     pub assemblies_avoided: usize,
 }
 
+/// The bodies and the named contacts of a scene, with the factors of a load step.
+#[derive(Clone, Copy)]
+pub struct StepSpecs<'a> {
+    /// The bodies of the mesh.
+    pub bodies: &'a [BodySpec],
+    /// The contacts that name their surfaces.
+    pub contacts: &'a [ContactSpec],
+}
+
 /// Turn a scene and its mesh into a model. Collective.
 ///
 /// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
 /// assembles it.
 ///
-/// `bodies` are those of `verified`, and `named` the named contacts of the scene, under the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
+/// `specs` are the bodies of `verified` and the contacts of the scene under the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
 /// `factory` turns each body of this rank into one with a solver. `keep` requests that the meshes are kept for an estimate of the
 /// error.
 ///
@@ -78,8 +87,7 @@ pub struct Discrete {
 pub fn discretize<const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
-    bodies: &[BodySpec],
-    named: &[ContactSpec],
+    specs: StepSpecs,
     cut: contact::pieces::Cut<D>,
     keep: bool,
     exchange: Rc<dyn Exchange>,
@@ -91,12 +99,12 @@ where
 {
     let mut prepared = None;
     let shared = broadcast(&*exchange, || {
-        let (shared, whole) = prepare(scene, verified, bodies, named, cut, keep, exchange.ranks(), factory)?;
+        let (shared, whole) = prepare(scene, verified, specs, cut, keep, exchange.ranks(), factory)?;
         prepared = Some(whole);
         Ok(shared)
     })?;
     let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
-    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene, named)).collect();
+    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene, specs.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
         factory.adopt(plan)?;
@@ -109,7 +117,7 @@ where
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
     for (body, local) in locals.into_iter().enumerate() {
         if let Some(local) = local {
-            assembler.make(&bodies[body], local, &mut slots[body], &mut infos[body])?;
+            assembler.make(&specs.bodies[body], local, &mut slots[body], &mut infos[body])?;
         }
     }
     let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;

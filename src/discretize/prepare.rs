@@ -10,7 +10,7 @@ use super::pairs::{self, ContactFacts};
 use super::partition::Partition;
 use super::verify::Verified;
 use super::whole::WholeBody;
-use super::{chords, mechanism};
+use super::{StepSpecs, chords, mechanism};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
@@ -18,7 +18,6 @@ use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
-use crate::problem::{BodySpec, ContactSpec};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 
@@ -82,17 +81,16 @@ fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)
 pub fn prepare<'a, const D: usize, F: Factory>(
     scene: &Scene,
     verified: &Verified<D>,
-    specs: &'a [BodySpec],
-    named: &[ContactSpec],
+    specs: StepSpecs<'a>,
     cut: Cut<D>,
     keep: bool,
     ranks: usize,
     factory: &mut F,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let mesh = &verified.mesh;
-    let parts = parts(scene, verified, specs)?;
+    let parts = parts(scene, verified, specs.bodies)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    let (all, rigid) = pairs::all(scene, named, mesh, cut, &parts, keep)?;
+    let (all, rigid) = pairs::all(scene, specs.contacts, mesh, cut, &parts, keep)?;
     for found in all {
         pairs.push(found.pair);
         contacts.push(found.facts);

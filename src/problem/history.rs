@@ -131,7 +131,7 @@ impl History {
 impl History {
     /// Return the factor of the preload of a contact at a step. Without a path it is 1 in every step.
     fn preload_factor(&self, step: usize, contact: &ContactSpec) -> f64 {
-        contact.path.as_ref().map_or(1.0, |path| self.factor(step, Some(path)))
+        contact.path.as_ref().filter(|_| self.is_table()).map_or(1.0, |path| self.factor(step, Some(path)))
     }
 
     /// Return whether a contact keeps in a step what the step before has found: its preload has the same factor in both.
@@ -216,7 +216,6 @@ impl History {
     /// # Errors
     /// A path that is no column, and a column that no line names.
     pub fn join(&mut self, bodies: &[BodySpec], contacts: &[ContactSpec]) -> Result<()> {
-        self.apart = contacts.iter().any(|contact| contact.preload.is_some());
         let Some(table) = &self.table else { return Ok(()) };
         let all = || bodies.iter().flat_map(paths).chain(contacts.iter().filter_map(|contact| contact.path.as_ref()));
         let columns = || self.names.iter().map(String::as_str).filter(|name| *name != COMMON);

@@ -8,7 +8,7 @@ use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, Verified, point};
+use crate::discretize::{self, StepSpecs, Verified, point};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
@@ -47,11 +47,15 @@ pub fn build(
 /// problem if linear steps are solved alike. Collective.
 pub fn build_after(
     session: &Session,
-    scene: Rc<Scene>,
+    mut scene: Rc<Scene>,
     before: Option<Done>,
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
+    if scene.contacts.iter().any(|contact| contact.preload.is_some()) {
+        // a step keeps offsets in its gaps, which are those of one leg
+        Rc::make_mut(&mut scene).method.steps.apart = true;
+    }
     let mut kept = Vec::new();
     if let Some(Done { built: mut last, .. }) = before.filter(|done| settings(&done.built.scene) == settings(&scene)) {
         if serves(&last, &scene) {
@@ -129,11 +133,11 @@ where
         let stage = session.stage("discretize");
         let (mut bodies, mut contacts) = (verified.bodies.clone(), self.scene.contacts.clone());
         self.scene.method.steps.apply(step, &mut bodies, &mut contacts);
-        let scene = &self.scene;
+        let (scene, specs) = (&self.scene, StepSpecs { bodies: &bodies, contacts: &contacts });
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.adapt.is_some();
-        let discrete = discretize::discretize(scene, verified, &bodies, &contacts, *cut, keep, exchange, &mut inner);
+        let discrete = discretize::discretize(scene, verified, specs, *cut, keep, exchange, &mut inner);
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
         // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
