@@ -13,7 +13,7 @@
 //! Any slope leads to the same solution. The bodies answer with dp = -S dc between states in equilibrium: the longest waves as stiffly as in the last
 //! step, where sum omega dp^2/rho = sum omega dc^2 rho over a pair, the shortest like single nodes. The laws themselves are best resolved with the slopes of the last step. Where
 //! they are smoothed, many points move at once, some of which are hardly pressed and some nearly fixed. There the slope is the geometric mean of
-//! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself (docs/methods.md).
+//! three stiffnesses: of single nodes, of the bodies in the last step, and of the layer of the point itself.
 
 use crate::model::Model;
 use crate::model::layer::{Layer, meeting_slopes};
@@ -32,8 +32,7 @@ pub(super) struct Progress {
     pub path: Path,
 }
 
-/// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent
-/// (docs/methods.md).
+/// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent.
 const HALVINGS: i32 = 7;
 
 /// Length of a step that comes nearer to the laws at no tried length, where F1 cannot fall either: half of the least tried one.
@@ -161,7 +160,7 @@ const SHORTENED: usize = 2;
 
 /// Ratio of mu at the beginning to the mean squared distance D of the states, and of D to mu where the path is lost. D counts the mismatch of
 /// few points, while the contact is far from its final place. With ratios from 30 to 300, peeling beams with linear layers took the same number of steps within one; with 1 they took nine
-/// times as many. Without the way back a block that leans on its edge runs in a cycle of whole steps, with D from 20 to 3e5 mu (docs/methods.md).
+/// times as many. Without the way back a block that leans on its edge runs in a cycle of whole steps, with D from 20 to 3e5 mu.
 const AHEAD: f64 = 100.0;
 
 /// The state of a run's paths.

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Factor on the errors of nodal values. Where a solution has a kink, recovery smooths it and underestimates the error. The same
-/// factor is usual for errors extrapolated from three meshes (Roache 1994). With it, most estimates on the parts of docs/theory.md are 0.7 to 2
+/// factor is usual for errors extrapolated from three meshes (Roache 1994). With it, most estimates on machine parts are 0.7 to 2
 /// times the true errors; without it they would be 0.56 to 1.6 times.
 pub(super) const SAFETY: f64 = 1.25;
 
@@ -37,7 +37,7 @@ pub enum Cause {
 const UNFINISHED: f64 = 1e-6;
 
 /// Least share of the squared pressure that facets in contact as a whole carry where a mesh resolves the contact. With p^2 = 1 - r^2 of a contact of
-/// Hertz with the radius one, those within 1 - h carry 1 - (1 - (1 - h)^2)^2, a half for a radius of 2.2 facets. On the parts of docs/theory.md,
+/// Hertz with the radius one, those within 1 - h carry 1 - (1 - (1 - h)^2)^2, a half for a radius of 2.2 facets. On machine parts,
 /// the estimates of contacts with less were 0.6 to 4.6 times the true error.
 const RESOLVED: f64 = 0.5;
 

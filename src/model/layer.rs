@@ -108,7 +108,7 @@ impl Layer {
 const FOUNDATION: [f64; 2] = [1.18, 1.70];
 
 /// Factor on that stiffness. The contact of spheres is then an eighth wider than that of Hertz, because steps that open points are better than
-/// steps that close them. Spheres and cylinders took the fewest steps at this factor, among 0.3 to 1.2 (docs/methods.md).
+/// steps that close them. Spheres and cylinders took the fewest steps at this factor, among 0.3 to 1.2.
 const LARGER: f64 = 0.7;
 
 /// Return rho0, n: the stiffness per area of the two bodies in series, for contact all over their surfaces.
@@ -151,8 +151,7 @@ pub fn in_series(a: f64, b: f64) -> f64 {
 }
 
 /// Factor on the stiffness of the nodes under a point that gives the slope rho of the resolvents in Newton's method. Any slope leads to the same solution.
-/// With this factor random scenes took the fewest steps; with 0.003 to 1 they took three per cent more at most, and with 3 some came into cycles
-/// (docs/methods.md).
+/// With this factor random scenes took the fewest steps; with 0.003 to 1 they took three per cent more at most, and with 3 some came into cycles.
 const SLOPE: f64 = 0.1;
 
 /// Return rho, n: `SLOPE` times the stiffness per area of the softer of the two surfaces, as their elements have it.

@@ -249,7 +249,7 @@ fn agree(facts: &[Facts], bodies: &mut [BodyPlan]) {
 }
 
 /// Dofs for which a rank could solve in the time of the messages of a distributed body. An iteration of conjugate gradients with
-/// multigrid takes 0.5 us per dof (docs/scaling.md, 48^3: 42 s, 116 iterations, 705 894 dofs). It has some 50 messages of 10 us:
+/// multigrid takes 0.5 us per dof (docs/parallel.md, 48^3: 42 s, 116 iterations, 705 894 dofs). It has some 50 messages of 10 us:
 /// four exchanges with neighbours on each of eight levels, and a few sums.
 ///
 /// Measurements on two ranks of one machine (`patch-3d`, nu = 2, `ncg`, hypre) had 3993, 10 125 and 27 783 dofs. An iteration

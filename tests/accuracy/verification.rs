@@ -1,4 +1,4 @@
-//! Cases with known answers, through the whole program; docs/cases.md names their sources.
+//! Cases with known answers, through the whole program; docs/verification.md names their sources.
 
 use crate::common::here::solve_here;
 use crate::common::{Report, Scene, case, distance};

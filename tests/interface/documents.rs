@@ -126,6 +126,79 @@ fn every_command_in_the_documents_works() {
     assert!(failed.is_empty(), "{} of {} commands fail:\n{}", failed.len(), seen.len(), failed.join("\n"));
 }
 
+/// The anchor that a heading has: its words in small letters, joined by hyphens, without other signs.
+fn anchor(heading: &str) -> String {
+    let bare: String =
+        heading.trim().to_lowercase().chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c)).collect();
+    bare.replace(' ', "-")
+}
+
+/// The lines of a document outside its blocks of code, with their numbers.
+fn prose(text: &str) -> Vec<(usize, &str)> {
+    let mut inside = false;
+    let mut is_prose = |line: &str| {
+        inside ^= line.trim_start().starts_with("```");
+        !inside
+    };
+    text.lines().enumerate().filter(|(_, line)| is_prose(line)).map(|(at, line)| (at + 1, line)).collect()
+}
+
+/// The links of a document to other files and headings that lead nowhere.
+fn lost_links(document: &Path) -> Vec<String> {
+    let text = fs::read_to_string(document).expect("a document");
+    // a link may go over the end of a line
+    let joined: String = prose(&text).into_iter().map(|(_, line)| format!("{line}\n")).collect();
+    let targets = joined.split("](").skip(1).filter_map(|rest| rest.split_once(')')).map(|(target, _)| target);
+    let is_lost = |target: &&str| {
+        let (file, heading) = target.split_once('#').unwrap_or((target, ""));
+        let path = if file.is_empty() { document.to_owned() } else { document.with_file_name("").join(file) };
+        if heading.is_empty() {
+            return !path.exists();
+        }
+        let there = fs::read_to_string(&path).unwrap_or_default();
+        !prose(&there).iter().any(|(_, line)| line.starts_with('#') && anchor(line.trim_start_matches('#')) == heading)
+    };
+    let local = targets.filter(|target| !target.contains("://"));
+    local.filter(is_lost).map(|target| format!("{}: {target}", document.display())).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    let others = ["CONTRIBUTING.md", "CHANGELOG.md"].map(|name| root().join(name));
+    let lost: Vec<String> = documents().iter().chain(&others).flat_map(|document| lost_links(document)).collect();
+    assert!(lost.is_empty(), "links lead nowhere:\n{}", lost.join("\n"));
+}
+
+/// A page that the sources name, for readers of a message or a comment, exists.
+#[test]
+fn pages_that_sources_name_exist() {
+    let mut folders = ["src", "scripts", "tests"].map(|name| root().join(name)).to_vec();
+    let mut lost = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for path in fs::read_dir(&folder).expect("a folder").flatten().map(|entry| entry.path()) {
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let text = fs::read_to_string(&path).unwrap_or_default();
+            let pages = text.split("docs/").skip(1).filter_map(|rest| rest.split_once(".md")).map(|(page, _)| page);
+            let is_name = |page: &&str| !page.is_empty() && page.chars().all(|c| c.is_ascii_lowercase() || c == '-');
+            let missing = pages.filter(is_name).filter(|page| !root().join(format!("docs/{page}.md")).exists());
+            lost.extend(missing.map(|page| format!("{}: docs/{page}.md", path.display())));
+        }
+    }
+    assert!(lost.is_empty(), "pages that do not exist:\n{}", lost.join("\n"));
+}
+
+/// The tables of keys and options are those that the program prints.
+#[test]
+fn the_reference_is_up_to_date() {
+    let mut script = Command::new(root().join("scripts/reference"));
+    script.args(["--check", WINKLER]);
+    let (status, _, complaint) = output(script, Duration::from_secs(60));
+    assert!(status.success(), "{complaint}");
+}
+
 /// A command that fails is reported with its place.
 #[test]
 fn a_wrong_command_fails() {

@@ -221,7 +221,7 @@ fn scenes_that_contradict_themselves_are_refused() {
     assert!(scene.check().expect_err("a capital").to_string().contains(&place), "{place}");
 }
 
-/// The script of docs/library.md reads the files of a run to the same numbers, where Python has numpy.
+/// The script of docs/results.md reads the files of a run to the same numbers, where Python has numpy.
 #[test]
 fn python_reads_the_results() {
     let python = |words: &[&str]| {

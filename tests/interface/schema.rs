@@ -53,3 +53,29 @@ fn every_key_of_every_scene_is_in_the_schema() {
     let wrong: toml::Table = "[[body]]\nyoug = 1".parse().expect("TOML");
     assert_eq!(unknown(&wrong.into(), &forms(&schema), ""), Some("/body/youg".to_owned()));
 }
+
+/// The `toml` blocks of the manual, whole scenes and pieces of a body, a contact or a method, have only keys of a scene.
+#[test]
+fn every_key_of_the_manual_is_in_the_schema() {
+    let schema = winkler::internals::scene::schema();
+    let top = forms(&schema);
+    let below = |key: &str| -> Vec<&Value> {
+        let found: Vec<&Value> = top.iter().filter_map(|form| form["properties"].get(key)).flat_map(forms).collect();
+        found.iter().filter_map(|form| form.get("items")).flat_map(forms).chain(found.clone()).collect()
+    };
+    let places = [top.clone(), below("body"), below("contact"), below("method")];
+    let pages = fs::read_dir(root().join("docs")).expect("a folder").flatten().map(|entry| entry.path());
+    let is_page = |path: &PathBuf| path.extension().is_some_and(|end| end == "md");
+    let mut tried = 0;
+    for page in pages.filter(is_page).chain([root().join("README.md")]) {
+        let text = fs::read_to_string(&page).expect("a page");
+        for block in text.split("```toml\n").skip(1).filter_map(|rest| rest.split_once("```")) {
+            let table: toml::Table = block.0.parse().unwrap_or_else(|cause| panic!("{}: {cause}", page.display()));
+            let table = toml::Value::from(table);
+            let lost: Vec<String> = places.iter().filter_map(|place| unknown(&table, place, "")).collect();
+            assert!(lost.len() < places.len(), "{}: {} in\n{}", page.display(), lost.join(", "), block.0);
+            tried += 1;
+        }
+    }
+    assert!(tried > 15, "{tried} blocks");
+}

@@ -2,7 +2,7 @@
 
 use super::judge::Case;
 
-/// The cases of docs/cases.md, with the numbers that make their meshes coarse.
+/// The cases of docs/verification.md, with the numbers that make their meshes coarse.
 pub const CASES: [Case; 38] = [
     case("anisotropic/scene.toml", &[]),
     case("anisotropic-3d/scene.toml", &[]),

@@ -1,4 +1,4 @@
-//! The cases of `meshes/` with their known answers (docs/cases.md), on meshes so coarse that this is quick.
+//! The cases of `meshes/` with their known answers (docs/verification.md), on meshes so coarse that this is quick.
 
 mod bearing;
 mod flange;
