@@ -75,3 +75,33 @@ fn tightened_in_steps() {
     close("whole", forces[2], 100.0, 1e-6);
     assert!(forces[3] < 95.0 && offsets[2] == offsets[3] && offsets[2] < offsets[1], "{forces:?} {offsets:?}");
 }
+
+/// A clamp of one body, the faces of whose slit are drawn together: all methods find the same offset, and the faces carry the preload.
+#[test]
+fn a_clamp_is_one_body() {
+    const SCRIPT: &str = "Point(1)={0,0,0}; Point(2)={4,0,0}; Point(3)={4,1,0}; Point(4)={1,1,0}; Point(5)={1,1.2,0}; Point(6)={4,1.2,0};
+        Point(7)={4,2.2,0}; Point(8)={0,2.2,0}; Point(9)={3,1,0}; Point(10)={3,1.2,0};
+        Line(1)={1,2}; Line(2)={2,3}; Line(3)={3,9}; Line(4)={9,4}; Line(5)={4,5}; Line(6)={5,10}; Line(7)={10,6}; Line(8)={6,7}; Line(9)={7,8}; Line(10)={8,1};
+        Curve Loop(1)={1,2,3,4,5,6,7,8,9,10}; Plane Surface(1)={1}; Mesh.MeshSizeMax=0.3;
+        Physical Surface(\"clamp\")={1}; Physical Curve(\"lower\")={3}; Physical Curve(\"upper\")={7}; Physical Curve(\"back\")={10};\n";
+    let scene = Scene::new(
+        "dimension = 2\nmesh = \"clamp.geo\"\n[[body]]\nname = \"clamp\"\nyoung = 1e5\npoisson = 0.3\nfix = [{ on = \"back\", x = 0, y = 0 }]\n\
+         [[contact]]\nbetween = [\"lower\", \"upper\"]\nbond = true\npreload = 10\nlayer = { linear = { stiffness = 1e4 } }\n",
+    );
+    std::fs::write(scene.path.with_file_name("clamp.geo"), SCRIPT).expect("a script");
+    let methods = [
+        "{}",
+        "{linear='direct'}",
+        "{linear='multigrid'}",
+        "{name='newton-robin'}",
+        "{name='robin',robin='auto',gamma='aitken'}",
+    ];
+    let offset = |method: &&str| {
+        let run = solve_here(&scene.path, &[&format!("method={method}")]).converged();
+        close(method, run.number("pairs/0/force/0/1"), 10.0, 1e-6);
+        run.number("pairs/0/offset")
+    };
+    let offsets: Vec<f64> = methods.iter().map(offset).collect();
+    assert!(offsets[0] < -10.0 / 1e4, "{offsets:?}");
+    offsets.iter().for_each(|other| close("offset", *other, offsets[0], 1e-6));
+}
