@@ -29,6 +29,7 @@ pub use facts::BodyInfo;
 pub use groups::point;
 pub use pairs::ContactInfo;
 pub use post::ForceBalance;
+pub use prepare::StepSpecs;
 pub use rigid::Obstacle;
 pub use verify::{Verified, verify};
 
@@ -36,8 +37,8 @@ use crate::contact::{self, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::model::{Body, BodySlot, Mechanism, Model};
+use crate::problem::Start;
 use crate::problem::contact::Carrier;
-use crate::problem::{BodySpec, ContactSpec, Start};
 use crate::scene::Scene;
 use assembly::Assembler;
 use body::BodyMesh;
@@ -61,15 +62,6 @@ pub struct Discrete {
     pub assemblies: usize,
     /// Number of stiffness matrices reused from an earlier scene.
     pub assemblies_avoided: usize,
-}
-
-/// The bodies and the named contacts of a scene, with the factors of a load step.
-#[derive(Clone, Copy)]
-pub struct StepSpecs<'a> {
-    /// The bodies of the mesh.
-    pub bodies: &'a [BodySpec],
-    /// The contacts that name their surfaces.
-    pub contacts: &'a [ContactSpec],
 }
 
 /// Turn a scene and its mesh into a model. Collective.

@@ -10,7 +10,7 @@ use super::pairs::{self, ContactFacts};
 use super::partition::Partition;
 use super::verify::Verified;
 use super::whole::WholeBody;
-use super::{StepSpecs, chords, mechanism};
+use super::{chords, mechanism};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
@@ -18,8 +18,18 @@ use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
+use crate::problem::{BodySpec, ContactSpec};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
+
+/// The bodies and the named contacts of a scene, with the factors of a load step.
+#[derive(Clone, Copy)]
+pub struct StepSpecs<'a> {
+    /// The bodies of the mesh.
+    pub bodies: &'a [BodySpec],
+    /// The contacts that name their surfaces.
+    pub contacts: &'a [ContactSpec],
+}
 
 /// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]

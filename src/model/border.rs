@@ -16,7 +16,7 @@ use crate::linalg::{axpy, dot};
 use nalgebra::{DMatrix, DVector};
 
 /// Relative error of the columns of X, in the energy norm. The error of a step by them is that share of the part of the step that moves the rigid parts.
-pub(super) const ACCURACY: f64 = 1e-2;
+pub(super) const ACCURACY: f64 = 1e-4;
 
 /// A motion of a rigid part.
 pub(super) struct BorderMotion {

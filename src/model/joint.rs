@@ -93,27 +93,44 @@ impl Joint {
         Ok(Solution { x, last_error, failure })
     }
 
+    /// Return B' `force` in the rows of this rank, for forces at the points, n.
+    fn pull(&self, force: &[f64], length: usize) -> Vec<f64> {
+        let mut pull = vec![0.0; length];
+        for (q, force) in force.iter().enumerate() {
+            let owned = self.rows.row(q).filter_map(|(i, b)| Some((i.checked_sub(self.first)?, b)));
+            owned.filter(|(i, _)| *i < length).for_each(|(i, b)| pull[i] += force * b);
+        }
+        pull
+    }
+
     /// Eliminate the rigid parts around the matrix, which has these springs. Return why the solver gave up, if it did.
     fn make_border(&mut self, model: &Model, springs: &[f64]) -> Result<Option<String>> {
         if self.motions.is_empty() || self.border.as_ref().is_some_and(|border| border.springs == springs) {
             return Ok(None);
         }
         let (motions, length) = (std::mem::take(&mut self.motions), self.offset[self.offset.len() - 1]);
+        let mut before = self.border.take().map_or(Vec::new(), |border| border.columns).into_iter();
         let mut border = Border::new(&motions, springs);
         for (k, motion) in motions.iter().enumerate() {
-            let mut load = vec![0.0; length];
-            for (q, force) in border.forces[k].iter().enumerate() {
-                let owned = self.rows.row(q).filter_map(|(i, b)| Some((i.checked_sub(self.first)?, b)));
-                owned.filter(|(i, _)| *i < length).for_each(|(i, b)| load[i] += force * b);
-            }
-            let solution = self.solve_matrix(model, &load, &mut |_, trial| trial.is_within(border::ACCURACY))?;
+            let load = self.pull(&border.forces[k], length);
+            // the column for the springs before is near
+            let mut column = before.next().unwrap_or_else(|| vec![0.0; length]);
+            let (closing, known) = closing_and_energy(model, &self.rows, self.first, &column, &load);
+            let held: Vec<f64> = closing.iter().zip(springs).map(|(closing, spring)| closing * spring).collect();
+            let (mut rest, mut product) = (load.clone(), self.pull(&held, length));
+            axpy(-1.0, &product, &mut rest);
+            self.matrix.multiply_stiffness(&self.rows, &column, &mut product);
+            axpy(-1.0, &product, &mut rest);
+            let is_enough = |trial: &Trial| trial.error <= border::ACCURACY * (known + trial.energy).sqrt();
+            let solution = self.solve_matrix(model, &rest, &mut |_, trial| is_enough(trial))?;
             if solution.failure.is_some() {
                 self.motions = motions;
                 return Ok(solution.failure);
             }
-            let (closing, energy) = closing_and_energy(model, &self.rows, self.first, &solution.x, &load);
+            axpy(1.0, &solution.x, &mut column);
+            let (closing, energy) = closing_and_energy(model, &self.rows, self.first, &column, &load);
             let error = solution.last_error.unwrap_or(self.matrix.solver().accuracy() * energy.sqrt());
-            border.push(motion, solution.x, &closing, error);
+            border.push(motion, column, &closing, error);
         }
         (self.motions, self.border) = (motions, Some(border));
         Ok(None)

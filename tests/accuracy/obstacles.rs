@@ -132,8 +132,8 @@ fn a_footing_lifts_off_biaxially() {
         close(method, run.number("pairs/0/contact_area"), 0.5 * 1.6 * 1.8, 0.06);
         let tilt = [0, 1].map(|c| run.number(&format!("pairs/0/obstacle/tilt/{c}")));
         // the peak pressure over a and over b
-        close(method, tilt[0], 6.0 * force / (1.6 * 1.8) / 1e3 / 1.8, 0.01);
-        close(method, -tilt[1], 6.0 * force / (1.6 * 1.8) / 1e3 / 1.6, 0.01);
+        close(method, tilt[0], 6.0 * force / (1.6 * 1.8) / 1e3 / 1.8, 0.02);
+        close(method, -tilt[1], 6.0 * force / (1.6 * 1.8) / 1e3 / 1.6, 0.02);
         // turned as far, it needs the same force and moment
         let reached = run.number("pairs/0/obstacle/approach");
         let turned = footing(&format!("approach = {reached}\ntilt = [{}, {}, 0]", tilt[0], tilt[1]));
