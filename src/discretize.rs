@@ -166,6 +166,11 @@ impl Discrete {
         if self.contacts[i].swapped { [1, 0] } else { [0, 1] }
     }
 
+    /// Return the names of the surfaces of pair `i` in the order of the scene.
+    pub fn surfaces(&self, i: usize) -> [&str; 2] {
+        self.sides(i).map(|side| self.model.pairs[i].surfaces[side].as_str())
+    }
+
     /// Send every rank what only the owner rank of a body has: its largest stiffness and the stiffness at its contact rows.
     /// Collective, after all ranks have made their problem.
     pub fn share(&mut self) {

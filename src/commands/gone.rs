@@ -8,6 +8,7 @@ pub const GONE: &[(&str, &str)] = &[
     ("--color", "messages have colours on a terminal, and none where NO_COLOR is set"),
     ("--linear", "`winkler solve --method robin --set method.stop.iterations=1` factors and solves each body"),
     ("--resume", "every benchmark makes all of its runs"),
+    ("--tolerance", "`winkler solve --tolerance E` adapts meshes and writes the last one as adapted.msh"),
     (
         "--trust-geo",
         "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",

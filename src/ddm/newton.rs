@@ -17,7 +17,7 @@ use super::forcing::{Forcing, resisting};
 use super::run::{LoopEnd, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength, WholeStep};
-use super::stop::{Stagnation, Status};
+use super::stop::{Attained, Stagnation, Status};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -162,15 +162,17 @@ impl Newton<'_, '_> {
         self.progress.step_length(model, &self.states, &step)
     }
 
-    /// Return whether a step opens every point, though loads work on free bodies. All states are on the laws then, but nothing holds the bodies: the length of
-    /// the step is that of the springs which resist their motions in place of the contact, and says nothing of where they meet.
+    /// Return whether a step from states on the laws opens every point, though loads work on free bodies. Its end is on the laws, too, but nothing holds the
+    /// bodies there: the length of the step is that of the springs which resist their motions in place of the contact, and says nothing of where they meet.
     fn leads_apart(&self, step: &LinearSolution, part: &StepLength) -> bool {
         let model = &*self.run.model;
+        let is_smoothed = !self.states.smoothing.is_empty();
         let is_pushed = model.bodies.iter().any(|slot| slot.motions.iter().any(|motion| motion.work != 0.0));
         let closing = step.field.closing();
         let before = model.compression(&self.u.trace);
         let is_bonded = model.pairs.iter().any(|pair| pair.law.is_bonded());
-        is_pushed && !is_bonded && before.iter().zip(&closing).all(|(c, closing)| c + part.length * closing <= 0.0)
+        let opens = || before.iter().zip(&closing).all(|(c, closing)| c + part.length * closing <= 0.0);
+        !is_smoothed && is_pushed && !is_bonded && opens()
     }
 
     /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
@@ -313,7 +315,8 @@ impl Newton<'_, '_> {
         let is_smoothed = !self.states.smoothing.is_empty();
         let is_enough = |error: f64| self.run.stop.residual.is_some_and(|tolerance| error <= tolerance);
         let seems_enough = is_enough(measured.reached.worst());
-        let stagnates = self.stagnation.note(measured.reached.worst(), iterate.part.fall, is_smoothed);
+        let (error, fall) = (measured.reached.worst(), iterate.part.fall);
+        let stagnates = self.stagnation.note(Attained { error, energy: measured.f1, fall, is_smoothed });
         if seems_enough || stagnates {
             self.look(iterate, measured)?;
         }

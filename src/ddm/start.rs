@@ -47,17 +47,15 @@ const STEPS: usize = 200;
 /// Accuracy of line searches, relative to the first slope. A step is only a way to the next, and the energy falls with any accuracy below one.
 pub(super) const SEARCH: f64 = 1e-3;
 
-/// Return the start of a model. If a trace is `given` (2n), the surfaces of the rigid bodies are displaced by it. These displacements count as
-/// shapes, not as motions.
+/// Return the start of a model. The surfaces of the rigid bodies are displaced by the `given` trace (2n) or, without one, as the moved supports of
+/// their bodies impose it. These displacements count as shapes, not as motions.
 ///
 /// # Errors
 /// The bodies and their motions along which the energy falls for ever, if there are such motions.
 pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Moved>> {
     let motions = Motions::with_springs(model);
-    let mut gap = model.gap.clone();
-    if let Some(given) = given {
-        gap = model.compression(given).into_iter().map(|c| -c).collect();
-    }
+    let given = given.map_or_else(|| model.imposed(), <[f64]>::to_vec);
+    let gap = model.compression(&given).into_iter().map(|c| -c).collect();
     let (work, slope) = (motions.loads(), surface_slopes(model));
     let mut ground = motions.blocks();
     let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
@@ -73,7 +71,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     }
     let places = rigid.states(&amounts);
     let mut trace = motions.trace(model, &amounts);
-    given.into_iter().for_each(|given| axpy(1.0, given, &mut trace));
+    axpy(1.0, &given, &mut trace);
     let (points, rows) = (model.points(), model.row_stiffness());
     for q in 0..points {
         // the points belong to side a, so its surface can deflect at each of them independently

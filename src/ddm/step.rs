@@ -93,13 +93,14 @@ impl Progress {
         slopes
     }
 
-    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium.
-    fn observe(&mut self, model: &Model, dc: &[f64], dp: &[f64]) {
+    /// Keep how the bodies answered a step that changed compressions and pressures by dc and dp, n each, of equilibrium. Points whose dc may be the
+    /// `roundoff` of c, n, show nothing.
+    fn observe(&mut self, model: &Model, dc: &[f64], dp: &[f64], roundoff: &[f64]) {
         let unit = &self.unit;
         self.answer.resize(model.pairs.len(), 1.0);
         for (pair, answer) in self.answer.iter_mut().enumerate() {
             let (mut pressures, mut compressions) = (0.0, 0.0);
-            for q in model.range(pair).filter(|&q| unit[q] < f64::INFINITY) {
+            for q in model.range(pair).filter(|&q| unit[q] < f64::INFINITY && dc[q].abs() > 2.0 * roundoff[q]) {
                 pressures += model.weight[q] * dp[q].powi(2) / unit[q];
                 compressions += model.weight[q] * dc[q].powi(2) * unit[q];
             }
@@ -118,7 +119,7 @@ impl Progress {
             return StepLength { length: 1.0, fall: 1.0, is_lost: false };
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
-        self.observe(model, &change(from, c), &change(&self.pressure, p));
+        self.observe(model, &change(from, c), &change(&self.pressure, p), roundoff);
         let rho = &self.slopes(model, states)[..];
         let off = |t: f64| {
             let (compression, pressure) = (&between(from, c, t)[..], &between(&self.pressure, p, t)[..]);
@@ -289,7 +290,7 @@ mod tests {
         let [w, v] = [model.weight[0], model.weight[1]];
         let times = ((w * 36.0 / 2.0 + v * 144.0 / 8.0) / (w * 2.0 + v * 0.25 * 8.0)).sqrt();
         let mut progress = Progress { unit: unit.to_vec(), ..Progress::default() };
-        progress.observe(&model, &dc, &dp);
+        progress.observe(&model, &dc, &dp, &[0.0; 4]);
         let smoothed = Layer { tangent: vec![27.0, 0.0, 1.0, 1e-3], smoothing: vec![1.0; 4], ..Layer::default() };
         let expected = [
             (Layer::default(), [2.0 * times, 8.0 * times, 1e-6, 1e-6]),

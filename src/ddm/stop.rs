@@ -74,33 +74,56 @@ const FALLS: f64 = 0.9;
 /// was solved.
 const PATIENCE: usize = 3;
 
+/// Share of F1 by which it must fall to be progress: half of its digits. An error in the energy norm whose square is less leaves F1 no such fall, so that it
+/// is roundoff there.
+const SEEN: f64 = 1.5e-8;
+
 /// A watch for stagnation of Newton's method.
 ///
 /// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning: earlier steps had other slopes. Far from
-/// the solution this distance falls while the error may rise by many orders.
+/// the solution this distance falls while the error may rise by many orders. Where a contact peels point by point, F1 alone falls, and what reaches a new
+/// least F1 cannot repeat itself.
 #[derive(Debug, Clone)]
 pub(super) struct Stagnation {
     /// The error at the last progress in it.
     best: f64,
+    /// The least F1 so far.
+    least: f64,
     /// Steps since the last progress.
     since: usize,
 }
 
 impl Default for Stagnation {
     fn default() -> Self {
-        Self { best: f64::INFINITY, since: 0 }
+        Self { best: f64::INFINITY, least: f64::INFINITY, since: 0 }
     }
 }
 
+/// What a step of Newton's method has reached.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Attained {
+    /// The error after it.
+    pub error: f64,
+    /// F1 after it.
+    pub energy: f64,
+    /// The squared distance from the laws after it over that before it.
+    pub fall: f64,
+    /// Whether the laws were smoothed. The error then falls with mu.
+    pub is_smoothed: bool,
+}
+
 impl Stagnation {
-    /// Note a step: the error after it, the `fall` of the squared distance from the laws in it, and whether the laws were smoothed, in which case the
-    /// error falls with mu. Return whether the run stagnates.
-    pub fn note(&mut self, error: f64, fall: f64, is_smoothed: bool) -> bool {
-        let is_better = error < FALLS * self.best;
+    /// Note a step. Return whether the run stagnates.
+    pub fn note(&mut self, step: Attained) -> bool {
+        let is_better = step.error < FALLS * self.best;
         if is_better {
-            self.best = error;
+            self.best = step.error;
         }
-        self.since = if is_better || is_smoothed || fall < FALLS { 0 } else { self.since + 1 };
+        let can_fall = step.error.powi(2) > SEEN;
+        let is_lower = can_fall && self.least - step.energy > SEEN * step.energy.abs();
+        self.least = self.least.min(step.energy);
+        let is_progress = is_better || is_lower || step.is_smoothed || step.fall < FALLS;
+        self.since = if is_progress { 0 } else { self.since + 1 };
         self.since >= PATIENCE
     }
 }
@@ -117,20 +140,28 @@ mod tests {
 
     #[test]
     fn three_steps_without_progress_are_stagnation() {
-        let noted = |steps: &[(f64, f64, bool)]| {
+        let noted = |steps: &[(f64, f64, bool)], energy: &dyn Fn(usize) -> f64| {
             let mut stagnation = Stagnation::default();
-            steps
-                .iter()
-                .map(|&(error, fall, is_smoothed)| stagnation.note(error, fall, is_smoothed))
-                .collect::<Vec<_>>()
+            let step = |(k, &(error, fall, is_smoothed))| Attained { error, energy: energy(k), fall, is_smoothed };
+            steps.iter().enumerate().map(step).map(|step| stagnation.note(step)).collect::<Vec<_>>()
         };
-        assert_eq!(noted(&[(1.0, 1.0, false); 4]), [false, false, false, true]);
-        // a rising error, while the states come nearer to the laws
-        assert_eq!(noted(&[(1e3, 0.5, false), (1e6, 0.5, false), (1e9, 0.5, false), (1e9, 0.5, false)]), [false; 4]);
-        assert_eq!(noted(&[(1.0, 1.0, true); 5]), [false; 5]);
+        let same = |_| -1.0;
+        assert_eq!(noted(&[(1.0, 1.0, false); 4], &same), [false, false, false, true]);
+        // a rising error, while the states come nearer to the laws, or while F1 falls
+        assert_eq!(
+            noted(&[(1e3, 0.5, false), (1e6, 0.5, false), (1e9, 0.5, false), (1e9, 0.5, false)], &same),
+            [false; 4]
+        );
+        assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -(k as f64)), [false; 4]);
+        assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -1.0 - 1e-9 * k as f64), [false, false, false, true]);
+        assert_eq!(noted(&[(1e-5, 1.0, false); 4], &|k| -(k as f64)), [false, false, false, true]);
+        assert_eq!(noted(&[(1.0, 1.0, true); 5], &same), [false; 5]);
         // less than a tenth of the best error, or of the distance
-        assert!(noted(&[(1.0, 1.0, false), (0.95, 0.95, false), (0.91, 1.0, false), (0.9, 1.0, false)])[3]);
-        assert!(!noted(&[(1.0, 1.0, false), (0.95, 0.95, false), (0.91, 1.0, false), (0.89, 1.0, false)])[3]);
-        assert_eq!(noted(&[(1.0, 1.0, false), (1.0, 1.0, false), (0.8, 1.0, false), (0.8, 1.0, false)]), [false; 4]);
+        assert!(noted(&[(1.0, 1.0, false), (0.95, 0.95, false), (0.91, 1.0, false), (0.9, 1.0, false)], &same)[3]);
+        assert!(!noted(&[(1.0, 1.0, false), (0.95, 0.95, false), (0.91, 1.0, false), (0.89, 1.0, false)], &same)[3]);
+        assert_eq!(
+            noted(&[(1.0, 1.0, false), (1.0, 1.0, false), (0.8, 1.0, false), (0.8, 1.0, false)], &same),
+            [false; 4]
+        );
     }
 }

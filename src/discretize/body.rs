@@ -6,8 +6,8 @@ use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
 use crate::fem::{NodalBlock, NodalForces, NodeGraph, PointExtent, Prolongation, RigidMotion, Space, rigid};
-use crate::linalg::{Csr, dot};
-use nalgebra::DMatrix;
+use crate::linalg::{Blocks, Csr, dot};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -111,6 +111,19 @@ impl<const D: usize> BodyMesh<D> {
         let mut all: Vec<_> = self.held.prescribed.iter().map(|(&dof, &value)| (dof, value)).collect();
         all.sort_unstable_by_key(|entry| entry.0);
         all
+    }
+
+    /// Return the combination of the `free` motions that comes nearest to the prescribed displacements in the sum of squares. Its part along motions that
+    /// supports leave is zero.
+    pub fn imposed_motion(&self, free: &[RigidMotion<D>]) -> RigidMotion<D> {
+        let mut squares = DMatrix::zeros(free.len(), free.len());
+        let mut work = DVector::zeros(free.len());
+        for &(dof, value) in &self.prescribed {
+            let at = DVector::from_iterator(free.len(), free.iter().map(|motion| self.dof_of(motion, dof)));
+            squares.ger(1.0, &at, &at, 1.0);
+            work.axpy(value, &at, 1.0);
+        }
+        rigid::sum(free, &Blocks::single(&squares).factor().solve(&work))
     }
 
     /// Return the combinations of the `free` motions that supports leave.

@@ -77,6 +77,7 @@ impl<const D: usize> WholeBody<'_, D> {
             modulus,
             depth,
             row_stiffness: Vec::new(),
+            imposed: self.trace(&self.part.mesh.imposed_motion(&self.free)),
         };
         (slot, self.info(checked, plane))
     }

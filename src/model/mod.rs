@@ -105,6 +105,8 @@ pub struct BodySlot {
     pub depth: f64,
     /// b diag(K) b' of each contact row b: the stiffness of the nodes under a point.
     pub row_stiffness: Vec<f64>,
+    /// B m on the contact rows, for the rigid motion m that comes nearest to the prescribed displacements.
+    pub imposed: Vec<f64>,
 }
 
 impl BodySlot {
@@ -120,6 +122,7 @@ impl BodySlot {
             scale: 0.0,
             modulus: f64::INFINITY,
             depth: 1.0,
+            imposed: vec![0.0; points],
             row_stiffness: vec![0.0; points],
         }
     }
@@ -227,6 +230,13 @@ impl Model {
             slot.motions.iter().zip(amounts).for_each(|(motion, &a)| axpy(a, &motion.trace, &mut closing));
         }
         closing
+    }
+
+    /// Return the trace vector (2n) of the rigid motions that prescribed displacements impose on the bodies.
+    pub fn imposed(&self) -> Vec<f64> {
+        let mut all = vec![0.0; 2 * self.points()];
+        (0..self.bodies.len()).for_each(|body| self.add(body, &self.bodies[body].imposed, &mut all));
+        all
     }
 
     /// Return whether the dofs of some bodies are distributed over the ranks.
@@ -399,6 +409,7 @@ pub(crate) mod sample {
             modulus: 3.0,
             depth: 1.0,
             row_stiffness: row_stiffness.to_vec(),
+            imposed: vec![0.0; row_stiffness.len()],
         };
         let bodies = vec![body(0, [8.0, 12.0, 0.0, 6.0]), body(1, [4.0, 20.0, 5.0, 7.0])];
         Model::new(bodies, laws.into_iter().enumerate().map(pair).collect(), Rc::new(crate::exchange::Serial))

@@ -18,7 +18,8 @@ pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
-    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, busiest, warning_lines,
+    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, busiest,
+    warning_lines,
 };
 pub use tables::{ContactTable, HistoryWriter, PairColumns, PairRow, RowFile, StepTable};
 pub use terminal::IterationTable;

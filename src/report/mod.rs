@@ -4,7 +4,9 @@ mod surface;
 
 pub use surface::Surface;
 
-use crate::output::{BodyReport, ForceReport, ObstacleReport, PairReport, Plot, Report, UNSETTLED, trimmed};
+use crate::output::{
+    BodyReport, ForceReport, ObstacleReport, PairReport, Plot, Report, RoundReport, UNSETTLED, trimmed,
+};
 use crate::problem::{Units, label};
 use serde_json::Value;
 
@@ -125,6 +127,7 @@ impl Page<'_> {
             pressures = format_args!("<div class=\"figures\">{figures}</div>"),
             contacts = self.contact_table(),
             steps = approach.map_or(String::new(), |figure| format!("<h2>Load steps</h2>{figure}")),
+            meshes = self.mesh_table(),
             convergence = convergence.unwrap_or_else(|| "<p>No iterations.</p>".to_owned()),
             scene = scene(&report.settings),
             bodies = self.body_table(),
@@ -234,6 +237,21 @@ impl Page<'_> {
             all => format!("<p class=\"soft\">The first {ROWS} of {all} pairs; contacts.csv has all.</p>"),
         };
         table(&columns, pairs.iter().take(ROWS).map(row)) + &rest
+    }
+
+    /// Return the table of adapted meshes with their estimated errors, empty without any.
+    fn mesh_table(&self) -> String {
+        if self.report.rounds.is_empty() {
+            return String::new();
+        }
+        let columns =
+            ["#cells", "#dofs", "#error of pressures", "#of displacements", "#in energy", "#iterations", "#seconds"];
+        let row = |round: &RoundReport| {
+            let errors = [round.pressure, round.displacement, round.energy].map(digits);
+            let counts = [round.cells, round.dofs].map(|count| count.to_string());
+            [&counts[..], &errors, &[round.iterations.to_string(), digits(round.seconds)]].concat()
+        };
+        format!("<h2>Meshes</h2>\n{}", table(&columns, self.report.rounds.iter().map(row)))
     }
 
     fn body_table(&self) -> String {

@@ -6,9 +6,10 @@ use super::{results, warnings};
 use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
+use crate::error::Result;
 use crate::error::few;
 use crate::estimate::Estimate;
-use crate::exchange::all_gather;
+use crate::exchange::{all_gather, gather};
 use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
@@ -17,6 +18,7 @@ use crate::output::{
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// Return the report of a run. Collective.
 pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
@@ -291,11 +293,44 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     }
 }
 
-/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
-pub fn contact_surface(name: &str, done: &Done, i: usize) -> UnstructuredGrid {
+/// Return the displacement at the points of the surface of each pair, on the first rank, and none on the others. The points of a distributed body are
+/// known by their coordinates; NaN where the displacement of the body is not known. Collective.
+///
+/// # Errors
+/// A message that cannot be read.
+pub fn surface_displacements(done: &Done, recovered: &All) -> Result<Vec<Vec<[f64; 3]>>> {
+    let (discrete, model) = (&done.built.discrete, done.model());
+    let surface = |i: usize| discrete.contacts[i].surface.points();
+    let mut known: Vec<(usize, usize, [f64; 3])> = Vec::new();
+    for (body, (info, recovered)) in discrete.bodies.iter().zip(recovered).enumerate() {
+        let Some(Ok(recovered)) = recovered else { continue };
+        let mut wanted: HashMap<[u64; 3], Vec<(usize, usize)>> = HashMap::new();
+        for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].bodies[0] == body) {
+            let places = surface(i).iter().map(|x| x.map(f64::to_bits)).enumerate();
+            places.for_each(|(point, place)| wanted.entry(place).or_default().push((i, point)));
+        }
+        let field = recovered.field(info);
+        for (x, u) in field.points.iter().zip(&field.displacement) {
+            let points = wanted.get(&x.map(f64::to_bits));
+            known.extend(points.into_iter().flatten().map(|&(i, point)| (i, point, *u)));
+        }
+    }
+    let all = gather(&*model.exchange, known)?;
+    if all.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut displacement: Vec<Vec<[f64; 3]>> =
+        (0..model.pairs.len()).map(|i| vec![[f64::NAN; 3]; surface(i).len()]).collect();
+    all.into_iter().flatten().for_each(|(i, point, u)| displacement[i][point] = u);
+    Ok(displacement)
+}
+
+/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points, and with the
+/// `displacement` of side a.
+pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 3]]) -> UnstructuredGrid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
-    done.built.discrete.contacts[i].surface.grid(
+    let mut grid = done.built.discrete.contacts[i].surface.grid(
         name.to_owned(),
         vec![
             FieldArray::new("gap", 1, pair.gap.clone()),
@@ -304,5 +339,7 @@ pub fn contact_surface(name: &str, done: &Done, i: usize) -> UnstructuredGrid {
             FieldArray::new("normal", 3, pair.normal.as_flattened().to_vec()),
             FieldArray::new(pair.measure, 1, pair.weight.clone()),
         ],
-    )
+    );
+    grid.at_points.push(FieldArray::new("displacement", 3, displacement.as_flattened().to_vec()));
+    grid
 }

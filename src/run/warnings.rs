@@ -95,8 +95,8 @@ pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<Strin
 /// Return warnings of pressures whose estimated error is a guess.
 pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
-    for (i, pair) in discrete.model.pairs.iter().enumerate() {
-        let [a, b] = &pair.surfaces;
+    for i in 0..discrete.model.pairs.len() {
+        let [a, b] = discrete.surfaces(i);
         if let Some(guess) = estimate.guesses[i] {
             let place = point(guess.place);
             let reason = match guess.cause {
@@ -130,9 +130,10 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
         warnings.extend(lost(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
+            let [a, b] = names(contact);
             warnings.push(format!(
-                "{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
-                pair.surfaces[0], pair.surfaces[1], -overlap
+                "{a} - {b}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
+                -overlap
             ));
         }
     }
@@ -189,11 +190,10 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
         true => format!("would change by about {:.0} % on these", 100.0 * f64::sqrt(changed / whole)),
         false => "would not vanish on these".to_owned(),
     };
+    let [a, b] = names(&done.built.discrete.contacts[i]);
     Some(format!(
-        "{} - {}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
+        "{a} - {b}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
          or a finer mesh; if the true surfaces have one distance everywhere, write touching = true, with that distance as `gap` (negative for an overlap)",
-        pair.surfaces[0],
-        pair.surfaces[1],
         sci(*sagitta, 2),
     ))
 }

@@ -11,7 +11,7 @@ const MODULES: &str = "error exchange file interrupt linalg petsc data expressio
 
 /// Modules that may use less than what lies below them.
 const NARROW: [(&str, &str); 7] = [
-    ("petsc", "error"),
+    ("petsc", "error file"),
     ("solver", "error exchange linalg petsc problem fem parallel"),
     ("model", "error exchange file linalg petsc fem contact solver"),
     ("robin", "error exchange linalg contact problem model"),
