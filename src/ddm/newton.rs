@@ -170,7 +170,9 @@ impl Newton<'_, '_> {
         let is_pushed = model.bodies.iter().any(|slot| slot.motions.iter().any(|motion| motion.work != 0.0));
         let closing = step.field.closing();
         let before = model.compression(&self.u.trace);
-        !is_smoothed && is_pushed && before.iter().zip(&closing).all(|(c, closing)| c + part.length * closing <= 0.0)
+        let is_bonded = model.pairs.iter().any(|pair| pair.law.is_bonded());
+        let opens = || before.iter().zip(&closing).all(|(c, closing)| c + part.length * closing <= 0.0);
+        !is_smoothed && is_pushed && !is_bonded && opens()
     }
 
     /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
