@@ -293,7 +293,10 @@ impl ContactSpec {
             let help = "on = \"top\", obstacle = true";
             return Err(Flaw::new(key, format!("`{key}` of a contact without an obstacle"), "", help));
         }
-        let exclusive = [numbers.map(|(key, value)| given(key, value.is_some())).to_vec(), turns.map(|(key, turn)| given(key, turn.is_some())).to_vec()];
+        let exclusive = [
+            numbers.map(|(key, value)| given(key, value.is_some())).to_vec(),
+            turns.map(|(key, turn)| given(key, turn.is_some())).to_vec(),
+        ];
         for keys in exclusive {
             if let [first, second, ..] = keys.into_iter().flatten().collect::<Vec<_>>()[..] {
                 let message = format!("[[contact]] has both `{first}` and `{second}`");
@@ -301,12 +304,16 @@ impl ContactSpec {
                 return Err(Flaw::new(second, message, "only one of them can hold", &help));
             }
         }
-        if let (Some((key, _)), true) = (turns.iter().find(|(_, turn)| turn.is_some()), geometry.plane == Plane::Axisymmetric) {
+        if let (Some((key, _)), true) =
+            (turns.iter().find(|(_, turn)| turn.is_some()), geometry.plane == Plane::Axisymmetric)
+        {
             let message = "an obstacle that turns in an axisymmetric scene";
             return Err(Flaw::new(*key, message, "it moves along the axis alone", ""));
         }
         let single = numbers.into_iter().filter_map(|(key, value)| Some((key, (*value)?)));
-        let turned = turns.into_iter().flat_map(|(key, turn)| turn.iter().flat_map(move |turn| turn.0.map(|value| (key, value))));
+        let turned = turns
+            .into_iter()
+            .flat_map(|(key, turn)| turn.iter().flat_map(move |turn| turn.0.map(|value| (key, value))));
         let all: Vec<(&str, f64)> = single.chain(turned).collect();
         for &(key, value) in &all {
             if !value.is_finite() {
