@@ -44,9 +44,9 @@ pub use crate::model::field::Unbounded;
 pub use crate::output::{BodyField, CellKind, ContactTable, PairReport, Report};
 pub use crate::petsc::Session;
 pub use crate::problem::{
-    AutoContact, AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LawKind,
-    LayerSpec, Linear, Load, LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Overlap, Plane,
-    Preset, RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Units, Zone,
+    AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Gamma, GroupArrays, History, LayerSpec, Linear, Load,
+    LoadKind, LoadStep, MeshArrays, MeshSource, MethodName, MethodSpec, Order, Orthotropic, Overlap, Plane, Preset,
+    RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Units, Zone,
 };
 pub use crate::run::recorder::Recorder;
 pub use crate::scene::{AdaptSpec, Most, OutputSpec, Precision, Scene, load};

@@ -5,12 +5,12 @@
 
 use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use std::fmt;
-use std::ops::Range;
+use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A text that the user wrote: a scene file, an option of the command line, or a line of a Rust program.
-#[derive(Debug, PartialEq, Eq)]
+#[derive(Debug, Default, PartialEq, Eq)]
 pub struct Source {
     /// Name of the file, or the option of the command line (`--set`).
     pub name: String,
@@ -18,8 +18,8 @@ pub struct Source {
     pub text: String,
 }
 
-/// A place in a [`Source`], to which a caret points.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A place in a [`Source`], to which a caret points. The default is no place.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Place {
     /// The text.
     pub source: Arc<Source>,
@@ -39,8 +39,8 @@ impl Place {
     }
 }
 
-/// A value and the place where the user wrote it.
-#[derive(Debug, Clone, PartialEq)]
+/// A value and the place where the user wrote it, for refusals. It can be used like the value.
+#[derive(Debug, Clone, Default)]
 pub struct Located<T> {
     /// The value.
     pub value: T,
@@ -52,6 +52,28 @@ impl<T> Located<T> {
     /// Join a value with its place.
     pub fn new(value: T, place: Place) -> Self {
         Self { value, place }
+    }
+}
+
+impl<T> Deref for Located<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.value
+    }
+}
+
+/// A value without a place.
+impl<T> From<T> for Located<T> {
+    fn from(value: T) -> Self {
+        Self { value, place: Place::default() }
+    }
+}
+
+/// Values are equal wherever they stand.
+impl<T: PartialEq> PartialEq for Located<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.value == other.value
     }
 }
 
@@ -137,9 +159,7 @@ impl Error {
 
     /// Return an error about something at `place` in the scene.
     pub fn scene(place: &Place, message: impl Into<String>) -> Self {
-        let mut error = Self::new(Kind::Scene, message);
-        error.0.place = Some(place.clone());
-        error
+        Self::new(Kind::Scene, message).at(place)
     }
 
     /// Return an error about a mesh file, with the line if it is known.
@@ -193,8 +213,15 @@ impl Error {
 
     /// Point at a place in the scene.
     pub fn at(mut self, place: &Place) -> Self {
-        self.0.place = Some(place.clone());
+        if *place != Place::default() {
+            self.0.place = Some(place.clone());
+        }
         self
+    }
+
+    /// Point at a place in the scene, unless the error has a place.
+    pub fn or_at(self, place: &Place) -> Self {
+        if self.0.place.is_some() { self } else { self.at(place) }
     }
 
     /// Say next to the caret what is wrong there.

@@ -11,6 +11,7 @@ use crate::data::{Data, Library};
 use crate::error::{Error, Place, Result};
 use grammar::Text;
 use program::{Dual, MOST_VARIABLES, Operation, Program, Values};
+use schemars::JsonSchema;
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -19,7 +20,8 @@ use std::sync::Arc;
 ///
 /// It may have + - * / ^, comparisons, && || !, `pi`, and the functions of docs/scene-file.md. -x^2 is -(x^2), and a^b^c is a^(b^c).
 /// Comparisons give 1 or 0. A value outside the domain of a function is NaN and stays NaN.
-#[derive(Clone)]
+#[derive(Clone, JsonSchema)]
+#[schemars(with = "Field")]
 pub struct Expression {
     program: Arc<Program>,
     /// Names of the variables of its scope.

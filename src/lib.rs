@@ -41,5 +41,4 @@ mod report;
 mod robin;
 mod run;
 mod scene;
-mod setting;
 mod solver;

@@ -60,7 +60,7 @@ pub struct AdaptiveRun {
     /// The solution of the round before with its estimated errors.
     previous: Option<EstimatedSolution>,
     /// The error at sharp ends on the mesh before.
-    last_end: Option<EndError>,
+    last_end: Option<MeshError>,
     /// Sizes that the mesh of the round before follows.
     last_sizes: Option<Arc<str>>,
     /// Number of cells that was predicted for this round from its sizes.
@@ -69,16 +69,16 @@ pub struct AdaptiveRun {
     later_steps: Option<History>,
 }
 
-/// The largest error of pressures at a sharp end of a contact, on a mesh with this number of cells.
+/// An error on a mesh with this number of cells.
 #[derive(Clone, Copy)]
-struct EndError {
+struct MeshError {
     cells: f64,
     error: f64,
 }
 
-impl EndError {
+impl MeshError {
     /// Return the number of cells of a mesh whose error is `asked`, if it goes on falling with the number of cells as it did since the mesh `before`.
-    fn cells_for(&self, before: EndError, asked: f64) -> f64 {
+    fn cells_for(&self, before: MeshError, asked: f64) -> f64 {
         let rate = (before.error / self.error).ln() / (self.cells / before.cells).ln();
         if rate > 0.0 { self.cells * (self.error / asked).powf(1.0 / rate) } else { f64::INFINITY }
     }
@@ -271,7 +271,7 @@ impl AdaptiveRun {
     fn next_sizes(&self, done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> Option<Sizes> {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
-        let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
+        let degree = (0..model.meshed()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error.value / estimate.largest()).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
@@ -292,14 +292,14 @@ impl AdaptiveRun {
     fn has_costly_end(&mut self, done: &Done, estimate: &Estimate, asked: f64) -> bool {
         let Some((pair, error)) = estimate.largest_end() else { return false };
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
-        let own = EndError { cells, error };
+        let own = MeshError { cells, error };
         let beside = estimate.largest_beside_ends();
         let Some(before) = self.last_end.replace(own).filter(|_| beside <= asked && error > 0.0) else { return false };
         let needed = own.cells_for(before, asked);
         if needed <= COSTLY * cells {
             return false;
         }
-        let [a, b] = &done.model().pairs[pair].surfaces;
+        let [a, b] = done.built.discrete.surfaces(pair);
         let meshes = match needed < 1e9 {
             true => format!("takes a mesh of about {needed:.0e} cells"),
             false => "takes more cells than a mesh can have".to_owned(),
@@ -309,6 +309,27 @@ impl AdaptiveRun {
              {asked:.1e} there {meshes}; a rounded edge or a softer layer bounds these pressures"
         ));
         true
+    }
+
+    /// Return what the error asked for will take, as a line for the terminal, once three meshes show how the error falls with the cells; none if it does
+    /// not fall. The seconds are those of the last mesh in proportion to its cells.
+    pub fn forecast(&self) -> Option<String> {
+        let goal = self.goal.as_ref()?;
+        let [.., first, _, last] = &self.rounds[..] else { return None };
+        let error = |round: &RoundReport| MeshError {
+            cells: round.cells as f64,
+            error: round.pressure.max(round.displacement),
+        };
+        let asked = goal.error.value;
+        let cells = error(last).cells_for(error(first), asked).max(GROWTH * last.cells as f64);
+        if !cells.is_finite() {
+            return None;
+        }
+        let limit = match cells > goal.cells as f64 {
+            true => format!(", more than adapt.cells = {} allows", goal.cells),
+            false => format!(" and {:.0} s", last.seconds * cells / last.cells as f64),
+        };
+        Some(format!("  an error of {asked:e} takes about {cells:.0e} cells{limit}"))
     }
 
     fn record(&mut self, done: &Done, estimate: &Estimate, clock: &mut Clock) {

@@ -68,7 +68,7 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
     let pair = &built.discrete.model.pairs[i];
     let [low, high] = range(pair.gap.iter().copied());
     json!({
-        "surfaces": pair.surfaces,
+        "surfaces": built.discrete.surfaces(i),
         "contact": built.discrete.contacts[i].spec.table,
         "carrier": pair.surfaces[0],
         "points": pair.len(),
@@ -147,12 +147,11 @@ fn all_bodies(built: &Built) -> Vec<String> {
 /// Return two lines for each pair.
 fn each_pair(built: &Built) -> Vec<String> {
     let mut lines = Vec::new();
-    for pair in &built.discrete.model.pairs {
+    for (i, pair) in built.discrete.model.pairs.iter().enumerate() {
         let [low, high] = range(pair.gap.iter().copied());
+        let [a, b] = built.discrete.surfaces(i);
         lines.push(format!(
-            "  contact {} - {}: {} points on {}, {} {:.6}, gap {} to {}",
-            pair.surfaces[0],
-            pair.surfaces[1],
+            "  contact {a} - {b}: {} points on {}, {} {:.6}, gap {} to {}",
             pair.len(),
             pair.surfaces[0],
             pair.measure,

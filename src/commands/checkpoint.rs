@@ -12,7 +12,7 @@ use crate::model::Field;
 use crate::output::{RoundReport, StepReport, write_whole};
 use crate::run::stages::{Begin, Built, Done};
 use crate::scene::Scene;
-use crate::setting::remove;
+use crate::scene::remove;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};

@@ -86,11 +86,12 @@ impl Terminal {
         for (body, solver) in discrete.bodies.iter().zip(&solvers).take(LISTED) {
             lines.push(format!("  body {}: {} dofs on rank {}: {solver}", body.name, body.dofs, body.rank));
         }
-        for pair in discrete.model.pairs.iter().take(LISTED) {
-            let [carrier, other] = &pair.surfaces;
+        for (i, pair) in discrete.model.pairs.iter().enumerate().take(LISTED) {
+            let [a, b] = discrete.surfaces(i);
             lines.push(format!(
-                "  {carrier} - {other}: {} points on `{carrier}`, whose mesh is finer or alike",
-                pair.len()
+                "  {a} - {b}: {} points on `{}`, of the softer body or the finer mesh",
+                pair.len(),
+                pair.surfaces[0]
             ));
         }
         for chosen in built.options.iter().take(LISTED) {

@@ -5,7 +5,7 @@ use crate::ddm::Row;
 use crate::error::Result;
 use crate::fem::length;
 use crate::linalg::bounds;
-use crate::output::{Color, ConvergenceSeries, Folder, Plot, Series, StepReport, Style};
+use crate::output::{Color, ConvergenceSeries, Folder, Plot, Series, StepReport, Style, UnitWords};
 use crate::problem::{Plane, Units, force_labels, label};
 use crate::run::{Done, numbered, results};
 use crate::scene::Scene;
@@ -78,6 +78,17 @@ pub fn units(scene: &Scene) -> Option<Units> {
     scene.units.clone().map(|units| if is_whole { units } else { units.per_thickness() })
 }
 
+/// Return the units of a scene as they stand behind the numbers of the closing lines.
+pub fn unit_words(scene: &Scene) -> UnitWords {
+    let is_plane = scene.dimension.value == 2 && scene.plane != Plane::Axisymmetric;
+    units(scene).map_or(UnitWords::default(), |units| UnitWords {
+        length: format!(" {}", units.length),
+        extent: format!(" {}{}", units.length, if is_plane { "" } else { "²" }),
+        stress: format!(" {}", units.stress),
+        force: format!(" {}", units.force),
+    })
+}
+
 /// Return the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps.
 pub fn approaches(done: &Done, shown: &[usize]) -> Option<Plot> {
     let names = results::pair_names(&done.built);
@@ -100,11 +111,16 @@ fn pressure_plot(done: &Done, i: usize) -> Plot {
     let (scene, pairs) = (&done.built.scene, &done.model().pairs);
     let title = match pairs.len() {
         1 => scene.title.clone(),
-        _ => format!("{}: {}", scene.title, pairs[i].surfaces.join(" - ")),
+        _ => format!("{}: {}", scene.title, done.built.discrete.surfaces(i).join(" - ")),
     };
     let units = scene.units.as_ref();
-    let along = label(["x", "y", "z"][main_axis(&pairs[i])], units.map(|units| units.length));
-    Plot::pressure(&title, &along, &label("contact pressure", units.map(|units| units.stress)), Vec::new())
+    let along = label(["x", "y", "z"][main_axis(&pairs[i])], units.as_ref().map(|units| units.length.as_str()));
+    Plot::pressure(
+        &title,
+        &along,
+        &label("contact pressure", units.as_ref().map(|units| units.stress.as_str())),
+        Vec::new(),
+    )
 }
 
 /// Return the pressure of pair `i` along its surface, against the coordinate that varies most.

@@ -140,7 +140,7 @@ impl Row {
             line += &format!(", {dofs} dofs, {iterations} iterations, residual {residual}");
         }
         if let Some(error) = self.error {
-            line += &format!(", error {}", sci(error, 2));
+            line += &format!(", error {} ({})", sci(error, 2), self.error_of);
         }
         line
     }

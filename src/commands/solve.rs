@@ -2,6 +2,7 @@
 
 use super::adapt::AdaptiveRun;
 use super::checkpoint::{self, Checkpoint};
+use super::plots::unit_words;
 use super::write::{ResultFiles, to_json, write_fields};
 use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
 use crate::ddm::{Observer, Row, Status};
@@ -9,7 +10,9 @@ use crate::error::{Error, Result};
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
 use crate::output::terminal::ProgressLine;
-use crate::output::{Folder, HistoryWriter, IterationTable, Report, RowFile, StepTable, say, warning_lines};
+use crate::output::{
+    Folder, HistoryWriter, IterationTable, PairColumns, Report, RoundReport, RowFile, StepTable, say, warning_lines,
+};
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results, verdict};
@@ -73,11 +76,14 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
         tables: Tables::default(),
         has_checkpoint,
         has_tables: false,
+        shown_meshes: 0,
         written: Ok(()),
     };
     let last = loop {
         let round = solver.solve()?;
-        if !solver.plan.advance(&round.done, round.estimate.as_ref(), &mut solver.clock) {
+        let goes_on = solver.plan.advance(&round.done, round.estimate.as_ref(), &mut solver.clock);
+        solver.print_meshes(goes_on)?;
+        if !goes_on {
             break round;
         }
         if solver.plan.adapts() {
@@ -104,6 +110,8 @@ struct Solver<'s> {
     has_checkpoint: bool,
     /// Whether the folder has the tables of this run.
     has_tables: bool,
+    /// Number of adapted meshes that have their line on the terminal.
+    shown_meshes: usize,
     /// The first failure to write a file, with which the run ends: until then it goes on with what it computes.
     written: Result<()>,
 }
@@ -153,6 +161,23 @@ impl Solver<'_> {
         }
         self.tables = Tables::open(&self.folder, ready)?;
         Ok(())
+    }
+
+    /// Print a line for each adapted mesh that has ended, and what the error asked for will take if another one follows.
+    fn print_meshes(&mut self, goes_on: bool) -> Result<()> {
+        let rounds = &self.plan.rounds;
+        if !self.terminal.is_loud() || rounds.is_empty() {
+            return Ok(());
+        }
+        if self.shown_meshes == 0 {
+            say(RoundReport::HEADS)?;
+        }
+        for (number, round) in rounds.iter().enumerate().skip(self.shown_meshes) {
+            say(round.line(number))?;
+        }
+        self.shown_meshes = rounds.len();
+        let forecast = self.plan.forecast().filter(|_| goes_on && !self.plan.is_stepping());
+        forecast.map_or(Ok(()), say)
     }
 
     /// Write the results of a mesh that is not the last, so that they exist whatever happens on the next mesh.
@@ -216,7 +241,10 @@ impl Solver<'_> {
         }
         let solvers: Vec<String> = report.bodies.iter().map(|body| body.solver.clone()).collect();
         let (solvers, choice) = (report::solvers_in_words(&solvers), &done.built.choice);
-        say(format!("{}\n  inner solver: {solvers} ({choice})\n{results}", report.summary()))
+        say(format!(
+            "{}\n  inner solver: {solvers} ({choice})\n{results}",
+            report.summary(&unit_words(&done.built.scene))
+        ))
     }
 }
 
@@ -266,7 +294,9 @@ impl Tables {
         let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
         let mut tables = Self { history: Some(rows), steps: None };
         if !history.is_empty() {
-            let (pairs, reactions) = (results::pair_names(built), results::reaction_names(built));
+            let columns = built.discrete.contacts.iter().map(|contact| results::columns(&contact.spec));
+            let pairs: Vec<(String, PairColumns)> = results::pair_names(built).into_iter().zip(columns).collect();
+            let reactions = results::reaction_names(built);
             let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
             let mut steps = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
             ready.steps.iter().for_each(|step| steps.row(&history.names, step));

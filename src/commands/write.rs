@@ -110,6 +110,7 @@ impl ResultFiles<'_> {
         });
         let parts: Vec<(usize, Surface)> =
             gather(&*done.model().exchange, own.collect::<Vec<_>>())?.into_iter().flatten().collect();
+        let displacement = report::surface_displacements(done, recovered)?;
         if self.session.rank() != 0 {
             return Ok(());
         }
@@ -123,7 +124,9 @@ impl ResultFiles<'_> {
             report,
             units: plots::units(scene),
             bodies: of_bodies.into_iter().map(Surface::join).collect(),
-            contacts: in_space.map(|&i| Surface::of_contact(report::contact_surface(&names[i], done, i))).collect(),
+            contacts: in_space
+                .map(|&i| Surface::of_contact(report::contact_surface(&names[i], done, i, &displacement[i])))
+                .collect(),
             pressures: plots.pressures().collect(),
             approach: plots::approaches(done, shown),
             convergence: (!done.outcome.rows.is_empty()).then(|| plots.convergence()),
@@ -219,8 +222,13 @@ fn names(done: &Done) -> Vec<String> {
 /// writes the contact surfaces and the files that join parts.
 pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) -> Result<()> {
     let (output, step, steps) = (&done.built.scene.output, done.steps.len(), done.built.scene.method.steps.steps.len());
-    if ended && output.msh {
-        views(done, recovered, folder)?;
+    let has_views = ended && output.msh;
+    if !output.vtu && !has_views {
+        return Ok(());
+    }
+    let displacement = report::surface_displacements(done, recovered)?;
+    if has_views {
+        views(done, recovered, folder, &displacement)?;
     }
     if !output.vtu {
         return Ok(());
@@ -229,12 +237,12 @@ pub fn write_fields(done: &Done, recovered: &All, folder: &Folder, ended: bool) 
         folder.make_steps()?;
     }
     let stem = |name: &str| if ended { safe_name(name) } else { stem_of(name, step, steps) };
-    fields(done, recovered, folder, &stem)?;
+    fields(done, recovered, folder, &stem, &displacement)?;
     collection(done, folder, ended)
 }
 
 /// Write bodies and contact surfaces for Gmsh, each file with tags of its own.
-fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
+fn views(done: &Done, recovered: &All, folder: &Folder, displacement: &[Vec<[f64; 3]>]) -> Result<()> {
     let discrete = &done.built.discrete;
     let rank = done.model().exchange.rank();
     let mut tags = Tags::default();
@@ -250,7 +258,7 @@ fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
         }
     }
     for (i, name) in stems(done).into_iter().enumerate().filter(|_| rank == 0) {
-        let grid = report::contact_surface(&name, done, i);
+        let grid = report::contact_surface(&name, done, i, &displacement[i]);
         folder.write(&format!("{name}.msh"), |out| grid.write_msh(tags, out))?;
         let (points, cells) = (grid.points.len(), grid.connectivity.len() / grid.cell.stride());
         tags = Tags { entity: tags.entity + 1, points: tags.points + points, cells: tags.cells + cells };
@@ -259,7 +267,13 @@ fn views(done: &Done, recovered: &All, folder: &Folder) -> Result<()> {
 }
 
 /// Write bodies and contact surfaces for ParaView. `stem` returns the name of a file without its ending.
-fn fields(done: &Done, recovered: &All, folder: &Folder, stem: &dyn Fn(&str) -> String) -> Result<()> {
+fn fields(
+    done: &Done,
+    recovered: &All,
+    folder: &Folder,
+    stem: &dyn Fn(&str) -> String,
+    displacement: &[Vec<[f64; 3]>],
+) -> Result<()> {
     let single = done.built.scene.output.precision == Precision::Single;
     let rank = done.model().exchange.rank();
     for (info, recovered) in done.built.discrete.bodies.iter().zip(recovered) {
@@ -278,7 +292,8 @@ fn fields(done: &Done, recovered: &All, folder: &Folder, stem: &dyn Fn(&str) -> 
     }
     for (i, name) in stems(done).into_iter().enumerate().filter(|_| rank == 0) {
         let file = format!("{}.vtu", stem(&name));
-        folder.write(&file, |out| report::contact_surface(&name, done, i).write(single, out))?;
+        let grid = report::contact_surface(&name, done, i, &displacement[i]);
+        folder.write(&file, |out| grid.write(single, out))?;
     }
     Ok(())
 }

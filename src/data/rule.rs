@@ -1,28 +1,29 @@
 //! The settings of data in a scene, and the values that data give.
 
 use crate::error::{Error, Place};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::fmt::Display;
 use std::path::PathBuf;
 
 /// The interpolation between points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Interpolation {
     /// Continuous, with kinks at the points.
+    #[default]
     Linear,
     /// Cubic convolution of R. Keys (IEEE Trans. Acoust. Speech Signal Process. 29, 1981): the gradient is continuous, the error of third
     /// order in the spacing.
     Cubic,
 }
 
-impl Interpolation {
-    /// All variants with their names in a scene.
-    pub const ALL: [(&str, Self); 2] = [("linear", Self::Linear), ("cubic", Self::Cubic)];
-}
-
 /// The values of data beyond their points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Outside {
     /// No value: an expression that needs one is refused.
+    #[default]
     Error,
     /// The value at the nearest place that has one.
     Clamp,
@@ -30,23 +31,15 @@ pub enum Outside {
     Periodic,
 }
 
-impl Outside {
-    /// All variants with their names in a scene.
-    pub const ALL: [(&str, Self); 3] = [("error", Self::Error), ("clamp", Self::Clamp), ("periodic", Self::Periodic)];
-}
-
 /// The shape that is subtracted from the heights, fitted by least squares.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Detrend {
     /// Nothing.
+    #[default]
     None,
     /// A plane; a straight line for a profile.
     Plane,
-}
-
-impl Detrend {
-    /// All variants with their names in a scene.
-    pub const ALL: [(&str, Self); 2] = [("none", Self::None), ("plane", Self::Plane)];
 }
 
 /// A value and its gradient; NaN where there is no value.

@@ -60,7 +60,7 @@ impl<'a> Forcing<'a> {
             let here = (p[q] - old).abs();
             change += model.weight[q] * here;
             distance += model.weight[q] * (p[q] - resolved.pressure[q]).abs();
-            (largest_change, peak) = (largest_change.max(here), peak.max(resolved.pressure[q]));
+            (largest_change, peak) = (largest_change.max(here), peak.max(resolved.pressure[q].abs()));
         }
         // an error that is small relative to the energy of the bodies may be large for the pressures of stiff layers
         let ends_run = || {
@@ -89,6 +89,11 @@ pub fn respond(
 ) -> Result<std::result::Result<(Field, f64), Failure>> {
     let (mut residual, mut work) = (Vec::new(), [0.0]);
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
+        let count = if slot.is_rigid { slot.local.as_ref().map_or(0, |_| slot.motions.len()) } else { 0 };
+        if count > 0 {
+            residual.push(vec![0.0; count]);
+            continue;
+        }
         let reduced = slot.local.as_mut().map(|body| body.reduce(load)).transpose()?.unwrap_or_default();
         residual.push(reduced.force);
         work[0] += reduced.work;

@@ -12,7 +12,7 @@ use crate::linalg::axpy;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::{self, Motions};
+use crate::model::rigid::{self, Motions, Moved};
 use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
@@ -284,10 +284,18 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
     if let Some(mechanism) = &model.mechanism {
         return Err(Status::Mechanism(mechanism.clone()));
     }
-    if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
+    if let Some(moved) = underconstrained(model, &model.holding_stiffness()).or_else(|| follows(model)) {
         return Err(Status::Underconstrained(moved));
     }
     start::find(model, None).map_err(|moving| Status::Unbounded { moving })
+}
+
+/// Return a motion of a body together with rigid parts that changes no gap, if there is one: the parts follow the body wherever it goes.
+fn follows(model: &Model) -> Option<Moved> {
+    let motions = Motions::of(model);
+    let has_rigid = |all: &Vec<Moved>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
+    let all = motions.springs(&model.weight).factor().kernel();
+    all.iter().map(|motion| motions.names(motion)).find(has_rigid)?.into_iter().next()
 }
 
 /// The states from which Newton's method begins, and the amounts of the free motions of all bodies that belong to them.

@@ -9,7 +9,7 @@ use crate::fem::{NodalForces, assemble, surface, unit};
 use crate::linalg::{Csr, dot, length};
 use crate::mesh::{Group, Mesh};
 use crate::model::Segment;
-use crate::problem::body::SpringKind;
+use crate::problem::SpringKind;
 
 /// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is included.
 /// It belongs to 60 degrees, up to which facets are pairs without the key `angle`.

@@ -6,7 +6,7 @@ use crate::contact::Side;
 use crate::contact::pieces::{BoxTree, Cut, Reach};
 use crate::error::{Error, Located, Place, Result, few};
 use crate::fem::{Facets, unit};
-use crate::problem::contact::AutoContact;
+use crate::problem::ContactSpec;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashSet};
 
@@ -40,7 +40,7 @@ pub struct SurfacePair<'a, const D: usize> {
 /// # Errors
 /// A pattern matches no body.
 pub fn find<'a, const D: usize>(
-    rules: &[AutoContact],
+    rules: &[&ContactSpec],
     cut: Cut<D>,
     parts: &'a [SceneBody<D>],
     named: &HashSet<[usize; 2]>,
@@ -69,13 +69,13 @@ struct Possible<const D: usize> {
 }
 
 fn possible<const D: usize>(
-    rules: &[AutoContact],
+    rules: &[&ContactSpec],
     parts: &[SceneBody<D>],
     whole: &[Side<D>],
     named: &HashSet<[usize; 2]>,
 ) -> Result<Vec<Possible<D>>> {
     let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
-    let farthest = rules.iter().map(distance).fold(0.0, f64::max);
+    let farthest = rules.iter().copied().map(distance).fold(0.0, f64::max);
     let searches: Vec<BoxTree<D>> = whole.iter().map(BoxTree::new).collect();
     let bodies = BoxTree::of_boxes(whole.iter().map(Side::extent));
     let mut all = Vec::new();
@@ -85,7 +85,7 @@ fn possible<const D: usize>(
         others.sort_unstable();
         for b in others {
             let Some(rule) = matches.iter().rposition(|rule| rule.are_for(a, b)) else { continue };
-            let spec = &rules[rule].contact;
+            let spec = rules[rule];
             let reach = Reach::between(&whole[a], &whole[b], spec.angle, spec.distance);
             let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
             if near.iter().all(|facets| facets.count() > 0) {
@@ -98,12 +98,12 @@ fn possible<const D: usize>(
 
 /// Return the pair that two possible bodies form. Its surfaces have no facets if they have no common piece.
 fn meeting<'a, const D: usize>(
-    rules: &[AutoContact],
+    rules: &[&ContactSpec],
     cut: Cut<D>,
     whole: &[Side<'a, D>],
     possible: &Possible<D>,
 ) -> SurfacePair<'a, D> {
-    let spec = &rules[possible.rule].contact;
+    let spec = rules[possible.rule];
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
         Side::new(name, space, possible.near[k].clone(), prescribed, frame, spec.edge)
@@ -127,12 +127,12 @@ fn meeting<'a, const D: usize>(
 ///
 /// # Errors
 /// A rule found no pair; the first such rule is reported.
-pub fn all_find_some(rules: &[AutoContact], found: impl Iterator<Item = ContactEntry>) -> Result<()> {
+pub fn all_find_some(rules: &[&ContactSpec], found: impl Iterator<Item = ContactEntry>) -> Result<()> {
     let of_rule = |entry| if let ContactEntry::Found(rule) = entry { Some(rule) } else { None };
     let fruitful: BTreeSet<usize> = found.filter_map(of_rule).collect();
     let Some(rule) = (0..rules.len()).find(|rule| !fruitful.contains(rule)) else { return Ok(()) };
-    let (bodies, place) = title(&rules[rule]);
-    let message = format!("no facets of {bodies} face each other within {}", distance(&rules[rule]));
+    let (bodies, place) = title(rules[rule]);
+    let message = format!("no facets of {bodies} face each other within {}", distance(rules[rule]));
     let help = match rules.len() {
         1 => "a larger distance may find some",
         _ => "a larger distance may find some, unless later rules or contacts with names have all these pairs",
@@ -144,7 +144,7 @@ pub fn all_find_some(rules: &[AutoContact], found: impl Iterator<Item = ContactE
 struct Matches(Option<[Vec<bool>; 2]>);
 
 impl Matches {
-    fn new<const D: usize>(rule: &AutoContact, parts: &[SceneBody<D>]) -> Result<Self> {
+    fn new<const D: usize>(rule: &ContactSpec, parts: &[SceneBody<D>]) -> Result<Self> {
         let Some(of) = &rule.of else { return Ok(Self(None)) };
         let names = || parts.iter().map(|part| part.spec.name.value.as_str());
         let matching = |name: &Located<String>| {
@@ -165,16 +165,16 @@ impl Matches {
 }
 
 /// Return the name of a rule in an error, and its place in the scene.
-fn title(rule: &AutoContact) -> (String, &Place) {
+fn title(rule: &ContactSpec) -> (String, &Place) {
     match &rule.of {
-        None => ("different bodies".to_owned(), &rule.contact.between[0].place),
+        None => ("different bodies".to_owned(), &rule.between[0].place),
         Some([a, b]) => (format!("{} - {}", a.value, b.value), &a.place),
     }
 }
 
 /// Return how far apart the facets of a pair may be.
-fn distance(rule: &AutoContact) -> f64 {
-    rule.contact.distance.unwrap_or(f64::INFINITY)
+fn distance(rule: &ContactSpec) -> f64 {
+    rule.distance.unwrap_or(f64::INFINITY)
 }
 
 /// Return the facets of two bodies with opposed normals and with boxes within the distance.

@@ -13,8 +13,8 @@ use crate::fem::{
 };
 use crate::linalg::{Csr, Total, axpy, countable};
 use crate::mesh::{self, Group, Mesh};
-use crate::problem::body::{Load, LoadKind};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
+use crate::problem::{Load, LoadKind};
 use crate::scene::Scene;
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -81,7 +81,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
             LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
             LoadKind::Force { .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => true,
         };
-        let mut force = self.spec.force.iter().flatten();
+        let mut force = self.spec.force.iter().flat_map(|force| force.iter());
         if self.spec.load.iter().all(is_constant) && force.all(Field::is_constant) {
             return Ok(Vec::new());
         }
@@ -173,7 +173,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
             return None;
         }
         let places = || self.mesh.space.nodes.iter().map(|&x| self.mesh.space.in_scene(x));
-        let largest = |spec: &ElasticitySpec| match &spec.constants {
+        let largest = |spec: ElasticitySpec| match &spec.constants {
             Constants::Isotropic { poisson, .. } => places().map(|x| poisson.eval(x)).fold(0.0, f64::max),
             _ => 0.0,
         };
@@ -205,7 +205,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
             })?;
         if (0..stiffness.rows()).any(|row| stiffness.row(row).any(|(_, k)| !k.is_finite())) {
             let message = format!("body `{}`: its stiffness is beyond the range of numbers", name.value);
-            return Err(Error::scene(&self.spec.elasticity.place, message).label("far too large"));
+            return Err(Error::scene(&self.spec.elasticity().place, message).label("far too large"));
         }
         let frame = &self.mesh.held.frame;
         self.mesh.springs.iter().for_each(|springs| assemble::add_blocks(graph, frame, springs, &mut stiffness));
@@ -354,19 +354,20 @@ fn elasticity<const D: usize>(spec: &BodySpec, space: &Space<D>, mesh: &Mesh<D>,
 /// # Errors
 /// Constants make no material.
 pub fn elasticity_of(spec: &BodySpec, of_cell: Vec<usize>, dimension: usize, plane: Plane) -> Result<Elasticity> {
-    let constants: Vec<&ElasticitySpec> = constants(spec).collect();
+    let constants: Vec<ElasticitySpec> = constants(spec).collect();
+    let constants: Vec<&ElasticitySpec> = constants.iter().collect();
     Elasticity::new(&constants, of_cell, dimension, plane).map_err(|(number, flaw)| refusal(spec, number, None, &flaw))
 }
 
 /// Return the constants of a body and of its regions.
-fn constants(spec: &BodySpec) -> impl Iterator<Item = &ElasticitySpec> {
-    std::iter::once(&spec.elasticity).chain(spec.regions.iter().map(|region| &region.elasticity))
+fn constants(spec: &BodySpec) -> impl Iterator<Item = ElasticitySpec> {
+    std::iter::once(spec.elasticity()).chain(spec.regions.iter().map(|region| region.elasticity()))
 }
 
 /// Return the error of the constants of a body (`number` 0) or of one of its regions. The point is given if the constants depend
 /// on it.
 fn refusal(spec: &BodySpec, number: usize, x: Option<[f64; 3]>, flaw: &Flaw) -> Error {
-    let elasticity = constants(spec).nth(number).unwrap_or(&spec.elasticity);
+    let elasticity = constants(spec).nth(number).unwrap_or_else(|| spec.elasticity());
     let place = &elasticity.place;
     let fields = elasticity.fields();
     // A value that does not exist causes every other flaw, so it is reported first.

@@ -4,7 +4,7 @@ use crate::error::{Error, Located, Result, few};
 use crate::expression::Field;
 use crate::mesh::{Group, Mesh};
 use crate::problem::RegionSpec;
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringSpec, Support};
+use crate::problem::{BodySpec, Load, LoadKind, SpringSpec, Support};
 use std::cell::RefCell;
 
 /// A line of a body's table that acts on a group of the mesh.

@@ -5,8 +5,9 @@ use super::groups::{Line, Owners};
 use crate::error::{Error, Located, Result, few};
 use crate::mesh::{Group, Mesh};
 use crate::problem::RegionSpec;
-use crate::problem::body::{BodySpec, Load, LoadKind, SpringSpec, Support, fault, plain, plain_pattern};
+use crate::problem::body::{fault, plain, plain_pattern};
 use crate::problem::pattern::{BODY, Pattern, is_pattern};
+use crate::problem::{BodySpec, Load, LoadKind, SpringSpec, Support};
 use crate::scene::Scene;
 use std::collections::{BTreeSet, HashMap};
 

@@ -8,7 +8,7 @@ use crate::expression::Field;
 use crate::fem::{Facets, Frame, NodalBlock, NodalForces, Space, cross, length, minus, place, surface};
 use crate::linalg::{dot, pad};
 use crate::mesh::{Group, Mesh};
-use crate::problem::body::{BodySpec, LoadKind, SpringKind, SpringSpec};
+use crate::problem::{BodySpec, LoadKind, SpringKind, SpringSpec};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};

@@ -72,6 +72,11 @@ impl ContactSurface {
         surface
     }
 
+    /// Return the points of the mesh, before deformation.
+    pub fn points(&self) -> &[[f64; 3]] {
+        &self.points
+    }
+
     /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
     /// come, so that a pressure is never negative nor above its peak.
     pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {

@@ -7,8 +7,9 @@ use crate::error::{Error, Located, Result, few};
 use crate::exchange::{Exchange, broadcast};
 use crate::fem::PointExtent;
 use crate::mesh::{Asked, BodyCheck, Duty, EDGES, Groups, LENGTHS, Mesh};
-use crate::problem::body::{BodySpec, LoadKind, SpringKind, plain};
+use crate::problem::body::plain;
 use crate::problem::pattern::{BODY, Pattern, is_pattern};
+use crate::problem::{BodySpec, LoadKind, SpringKind};
 use crate::problem::{Order, Plane};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -79,8 +80,8 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     let lying = patterns::lying(scene, &mesh)?;
     let bodies = patterns::bodies(scene, &mesh, &lying)?;
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
-    let contacts = scene.contacts.iter().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
-    let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), !scene.auto.is_empty())?;
+    let contacts = scene.pairs().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
+    let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), scene.rules().next().is_some())?;
     Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into(), notes }, lying))
 }
 
@@ -245,7 +246,7 @@ fn of_body(body: &BodySpec) -> Vec<Use<'_>> {
 }
 
 fn of_contacts(scene: &Scene) -> impl Iterator<Item = Use<'_>> {
-    scene.contacts.iter().flat_map(|contact| &contact.between).map(|on| (on, Need::Facets))
+    scene.pairs().flat_map(|contact| &contact.between).map(|on| (on, Need::Facets))
 }
 
 /// Return the facets of the boundaries of all bodies with all their nodes among `points`: nodes per facet, and nodes.

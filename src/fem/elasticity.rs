@@ -4,7 +4,8 @@
 use super::space::{PAIRS, Slope, component};
 use super::{cross, length};
 use crate::linalg::dot;
-use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec, Plane};
+use crate::problem::Plane;
+use crate::problem::elasticity::{AxesSpec, Constants, ElasticitySpec};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Unit, Vector3};
 
 /// The elasticity of a body, cell by cell.

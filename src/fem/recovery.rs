@@ -337,7 +337,7 @@ mod tests {
     use crate::problem::{BodySpec, Plane};
 
     fn steel() -> Elasticity {
-        let spec = BodySpec::new("block", 2.0, 0.3).elasticity;
+        let spec = BodySpec::new("block", 2.0, 0.3).elasticity();
         Elasticity::new(&[&spec], Vec::new(), 3, Plane::Strain).expect("a material")
     }
 

@@ -166,7 +166,7 @@ mod tests {
     fn nodes_at_an_interface_are_one_for_each_material() {
         for (order, upper) in [(Order::P1, 3.0), (Order::P2, 3.0), (Order::P2, 2.0)] {
             let space = Rc::new(block::<3>(2, order));
-            let specs = [2.0, upper].map(|young| BodySpec::new("block", young, 0.3).elasticity);
+            let specs = [2.0, upper].map(|young| BodySpec::new("block", young, 0.3).elasticity());
             let is_upper = |cell: usize| space.cell_nodes(cell)[..4].iter().map(|x| x[2]).sum::<f64>() > 2.0;
             let regions = (0..space.cell_count()).map(|cell| usize::from(is_upper(cell))).collect();
             let elasticity = Elasticity::new(&specs.each_ref(), regions, 3, Plane::Strain).expect("two materials");

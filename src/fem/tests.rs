@@ -34,7 +34,7 @@ fn near(a: f64, b: f64) {
 /// The matrix in the dofs is that of the displacements: v'(T'KT)w = (Tv)'K(Tw).
 fn same_form<const D: usize>(order: Order) {
     let (space, frame) = turning::<D>(order);
-    let spec = BodySpec::new("block", 3.0, 0.3).elasticity;
+    let spec = BodySpec::new("block", 3.0, 0.3).elasticity();
     let elasticity = Elasticity::new(&[&spec], Vec::new(), D, Plane::Strain).expect("a material");
     let form = |frame: &Frame<D>, v: &[f64], w: &[f64]| {
         let graph = NodeGraph::new(&space, &[], frame);

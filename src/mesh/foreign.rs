@@ -3,22 +3,15 @@
 use super::cache::write;
 use super::simplex::THINGS;
 use crate::error::{Error, Located, Result};
+use crate::problem::mesh::is_shape;
 use std::path::{Path, PathBuf};
-
-/// Kinds of file with the shape of bodies.
-const SHAPES: [&str; 6] = ["step", "stp", "iges", "igs", "brep", "stl"];
 
 /// Kinds of file with a mesh that Gmsh reads, whatever their contents.
 const MESHES: [&str; 6] = ["unv", "bdf", "nas", "mesh", "med", "inp"];
 
-/// Return whether a file has the shape of bodies, by its name.
-pub fn is_shape(path: &Path) -> bool {
-    is_kind(path, &SHAPES)
-}
-
 /// Return whether a file has a shape or a mesh, by its name, so that Gmsh reads no script in it.
 pub fn is_data(path: &Path) -> bool {
-    is_kind(path, &SHAPES) || is_kind(path, &MESHES)
+    is_shape(path) || is_kind(path, &MESHES)
 }
 
 /// Return whether a file holds a mesh of another program, or of Gmsh's format 4.0.

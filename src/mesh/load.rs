@@ -9,6 +9,7 @@ use super::{Mesh, abaqus, arrays, foreign};
 use crate::error::{Error, Located, Place, Result};
 use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
+use crate::problem::mesh::is_shape;
 use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -50,7 +51,7 @@ pub enum MeshOrigin {
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
-            if let (true, Some(place)) = (foreign::is_shape(&file.value), places.first()) {
+            if let (true, Some(place)) = (is_shape(&file.value), places.first()) {
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
@@ -262,7 +263,7 @@ impl Meshing<'_> {
     /// last line is not ended.
     fn written<const D: usize>(&self, script: &Script, work: &Path) -> Result<PathBuf> {
         let path = &self.file.value;
-        let own = match foreign::is_shape(path) {
+        let own = match is_shape(path) {
             true => foreign::script(path, &script.files[0], D, self.guard.size, work)?,
             false => path.clone(),
         };

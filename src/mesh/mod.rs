@@ -29,7 +29,6 @@ mod tests;
 
 pub use builder::MeshProducer;
 pub use check::{Asked, BodyCheck, Components, Duty};
-pub use foreign::is_shape;
 pub use groups::{Group, Groups, Numbering};
 pub use load::{Loaded, MeshOrigin, as_msh, load};
 pub use locality::bisect;

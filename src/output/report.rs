@@ -282,6 +282,27 @@ pub struct PairReport {
     pub extent: Extent,
     /// Plane problems: points where contact begins or ends. They are zeros of c, interpolated linearly between contact points.
     pub contact_ends: Vec<[f64; 3]>,
+    /// The obstacle before the surface, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<ObstacleReport>,
+    /// Closing of the gap (a length) that was found for the force or preload of the pair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+}
+
+/// The report of an obstacle.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObstacleReport {
+    /// How far it has moved towards the surface, along its mean normal.
+    pub approach: f64,
+    /// How far it has turned, in radians (x, y, z).
+    pub tilt: [f64; 3],
+    /// The force with which it presses along the mean normal.
+    pub force: f64,
+    /// The moment about `at` that it needs beside this force (x, y, z).
+    pub moment: [f64; 3],
+    /// The point about which it turns (x, y, z).
+    pub at: [f64; 3],
 }
 
 /// The report of a load step.
@@ -321,6 +342,12 @@ pub struct StepPairReport {
     pub peak_compression: f64,
     /// Number of points with c > 0.
     pub closed: usize,
+    /// The obstacle before the surface, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<ObstacleReport>,
+    /// Closing of the gap that was found for the force or preload of the pair, or that the step keeps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
 }
 
 /// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are lengths in
@@ -405,19 +432,47 @@ pub fn readable(value: f64, digits: usize) -> String {
     if value == 0.0 || (1e-3..1e6).contains(&size) { format!("{value:.digits$}") } else { sci(value, digits) }
 }
 
+/// Units behind the numbers of the closing lines, each with a blank before it; empty where the scene names none.
+#[derive(Debug, Clone, Default)]
+pub struct UnitWords {
+    /// Unit of coordinates and displacements.
+    pub length: String,
+    /// Unit of the contact: that of a length in the plane, of an area in space and for bodies of revolution.
+    pub extent: String,
+    /// Unit of stresses and pressures.
+    pub stress: String,
+    /// Unit of forces.
+    pub force: String,
+}
+
+impl RoundReport {
+    /// Heads of the columns of [`Self::line`].
+    pub const HEADS: &str = "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds";
+
+    /// Return the mesh with this number, its estimated errors and its cost as a line for the terminal.
+    pub fn line(&self, number: usize) -> String {
+        let [pressure, displacement, energy] = [self.pressure, self.displacement, self.energy].map(|e| sci(e, 2));
+        format!(
+            "  {number:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {energy:>10} {:>11} {:>9}",
+            self.cells,
+            self.dofs,
+            self.iterations,
+            seconds(self.seconds)
+        )
+    }
+}
+
 impl Report {
-    /// Return the closing lines of a run for the terminal.
-    pub fn summary(&self) -> String {
+    /// Return the closing lines of a run for the terminal. The table of adapted meshes is not among them: each mesh has its line when it ends.
+    pub fn summary(&self, units: &UnitWords) -> String {
         let mut lines = vec![format!("{}: {}", self.title, self.message), self.counts()];
-        lines.extend(self.settings["units"].as_str().map(|units| format!("  units: {units}")));
-        lines.extend(self.mesh_table());
         lines.extend(self.discretization_line());
         if self.steps.len() <= LISTED {
-            lines.extend(self.steps.iter().enumerate().map(|(index, step)| step_line(index + 1, step)));
+            lines.extend(self.steps.iter().enumerate().map(|(index, step)| self.step_line(index + 1, step, units)));
         }
         lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
-        lines.extend(busiest(&self.pairs, LISTED).into_iter().map(|i| self.pair_line(&self.pairs[i])));
-        lines.extend(self.balance_lines());
+        lines.extend(busiest(&self.pairs, LISTED).into_iter().map(|i| pair_line(&self.pairs[i], units)));
+        lines.extend(self.balance_lines(units));
         lines.extend(warning_lines(&self.warnings, "report.json"));
         lines.join("\n")
     }
@@ -441,27 +496,6 @@ impl Report {
         )
     }
 
-    /// Return the table of the adapted meshes, empty without any.
-    fn mesh_table(&self) -> Vec<String> {
-        if self.rounds.is_empty() {
-            return Vec::new();
-        }
-        let mut lines =
-            vec!["  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds".to_owned()];
-        for (index, round) in self.rounds.iter().enumerate() {
-            let [pressure, displacement, energy] =
-                [round.pressure, round.displacement, round.energy].map(|e| sci(e, 2));
-            lines.push(format!(
-                "  {index:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {energy:>10} {:>11} {:>9}",
-                round.cells,
-                round.dofs,
-                round.iterations,
-                seconds(round.seconds)
-            ));
-        }
-        lines
-    }
-
     /// Return the line on the estimated error of the discretisation.
     fn discretization_line(&self) -> Option<String> {
         let error = self.discretization_error.as_ref()?;
@@ -474,37 +508,45 @@ impl Report {
         ))
     }
 
-    /// Return the line of a pair. Where two bodies have several pairs, their surfaces name it.
-    fn pair_line(&self, pair: &PairReport) -> String {
-        let is_only = self.pairs.iter().filter(|other| other.bodies == pair.bodies).count() == 1;
-        let [a, b] = if is_only { &pair.bodies } else { &pair.surfaces };
-        let names = format!("  {a} - {b}");
-        if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
-            return format!("{names}: no contact");
-        }
-        format!(
-            "{names}: force {}, peak pressure {} at {}, contact {}, open {}",
-            vector(pair.force[0]),
-            readable(pair.peak_pressure, 6),
-            point(pair.peak_at),
-            readable(pair.extent.contact(), 6),
-            readable(pair.extent.open(), 6)
-        )
+    /// Return the line of a load step; `number` counts from 1.
+    fn step_line(&self, number: usize, step: &StepReport, units: &UnitWords) -> String {
+        let UnitWords { stress, force, .. } = units;
+        let pairs = match step.pairs.len() {
+            ..=LISTED => {
+                let pairs = step.pairs.iter().zip(&self.pairs).map(|(at, pair)| {
+                    let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
+                    let (peak, sum) = (readable(at.peak_pressure, 6), vector(at.force));
+                    format!(
+                        "{a} - {b}: force on `{on}` {sum}{force}, peak pressure {peak}{stress}, {} points closed",
+                        at.closed
+                    )
+                });
+                pairs.collect::<Vec<_>>().join("; ")
+            }
+            count => {
+                let peak = step.pairs.iter().map(|pair| pair.peak_pressure).fold(0.0, f64::max);
+                let closed: usize = step.pairs.iter().map(|pair| pair.closed).sum();
+                format!("{count} pairs, peak pressure {}{stress}, {closed} points closed", readable(peak, 6))
+            }
+        };
+        let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
+        let factors = factors.collect::<Vec<_>>().join(", ");
+        format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
     }
 
     /// Return the words on the largest displacement and von Mises stress of all bodies, empty where none is known.
-    fn largest_fields(&self) -> String {
+    fn largest_fields(&self, units: &UnitWords) -> String {
         let most = |field: fn(&BodyReport) -> Option<f64>| self.bodies.iter().filter_map(field).reduce(f64::max);
-        largest(most(|body| body.max_displacement), most(|body| body.max_von_mises), "")
+        largest(most(|body| body.max_displacement), most(|body| body.max_von_mises), "", units)
     }
 
     /// Return a line per body on its extreme fields and its balance, or one line for many bodies; none before the first iterate.
-    fn balance_lines(&self) -> Vec<String> {
+    fn balance_lines(&self, units: &UnitWords) -> Vec<String> {
         if self.residual.is_none() {
             return Vec::new();
         }
         if self.bodies.len() <= LISTED {
-            return self.bodies.iter().map(balance_line).collect();
+            return self.bodies.iter().map(|body| balance_line(body, units)).collect();
         }
         let worst = |imbalance: fn(&BalanceReport) -> f64| {
             let all = self.bodies.iter().map(|body| (imbalance(&body.balance), &body.name));
@@ -514,7 +556,7 @@ impl Report {
         vec![format!(
             "  {} bodies: {}imbalance at most {} of forces, {} of moments",
             self.bodies.len(),
-            self.largest_fields(),
+            self.largest_fields(units),
             worst(|balance| balance.force_imbalance),
             worst(|balance| balance.moment_imbalance)
         )]
@@ -522,30 +564,37 @@ impl Report {
 }
 
 /// Return the words on the largest displacement and von Mises stress, followed by a semicolon; empty where a field is not known.
-fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str) -> String {
+fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units: &UnitWords) -> String {
     let (Some(displacement), Some(von_mises)) = (displacement, von_mises) else { return String::new() };
-    format!("displacement up to {}, von Mises stress up to {}{place}; ", sci(displacement, 3), readable(von_mises, 6))
+    let UnitWords { length, stress, .. } = units;
+    let (displacement, von_mises) = (sci(displacement, 3), readable(von_mises, 6));
+    format!("displacement up to {displacement}{length}, von Mises stress up to {von_mises}{stress}{place}; ")
 }
 
-/// Return the line of a load step; `number` counts from 1.
-fn step_line(number: usize, step: &StepReport) -> String {
-    let pairs = match step.pairs.len() {
-        ..=LISTED => {
-            let pairs = step.pairs.iter().map(|pair| {
-                let (peak, force) = (readable(pair.peak_pressure, 6), vector(pair.force));
-                format!("force {force}, peak pressure {peak}, {} points closed", pair.closed)
-            });
-            pairs.collect::<Vec<_>>().join("; ")
-        }
-        count => {
-            let peak = step.pairs.iter().map(|pair| pair.peak_pressure).fold(0.0, f64::max);
-            let closed: usize = step.pairs.iter().map(|pair| pair.closed).sum();
-            format!("{count} pairs, peak pressure {}, {closed} points closed", readable(peak, 6))
-        }
+/// Return the line of a pair, which its surfaces name in the order of the scene.
+fn pair_line(pair: &PairReport, units: &UnitWords) -> String {
+    let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
+    // a bonded pair may pull everywhere
+    if pair.peak_pressure <= 0.0 && pair.force[0] == [0.0; 3] || pair.peak_pressure.is_nan() {
+        return format!("  {a} - {b}: no contact");
+    }
+    let UnitWords { extent, stress, force, length, .. } = units;
+    let moved = |ObstacleReport { approach, tilt, moment, .. }: &ObstacleReport| {
+        let turned = || format!(", tilt {}, moment {}", vector(*tilt), vector(*moment));
+        let turned = if *tilt == [0.0; 3] { String::new() } else { turned() };
+        format!(", approach {}{length}{turned}", sci(*approach, 5))
     };
-    let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
-    let factors = factors.collect::<Vec<_>>().join(", ");
-    format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
+    let offset = pair.offset.map(|offset| format!(", offset {}{length}", sci(offset, 5)));
+    let more = pair.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
+    let what = if pair.extent.is_area() { "area" } else { "length" };
+    format!(
+        "  {a} - {b}: force on `{on}` {}{force}{more}, peak pressure {}{stress} at {}, {what} in contact {}{extent}, open {}{extent}",
+        vector(pair.force[0]),
+        readable(pair.peak_pressure, 6),
+        point(pair.peak_at),
+        readable(pair.extent.contact(), 6),
+        readable(pair.extent.open(), 6)
+    )
 }
 
 /// Change of the stress within the cells at its largest value beyond which this value may be anything: half of it. There the next mesh of half the
@@ -553,10 +602,10 @@ fn step_line(number: usize, step: &StepReport) -> String {
 pub const UNSETTLED: f64 = 0.5;
 
 /// Return the line of a body with its reactions and imbalances.
-fn balance_line(body: &BodyReport) -> String {
+fn balance_line(body: &BodyReport, units: &UnitWords) -> String {
     let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
     let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
-        let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
+        let all: Vec<_> = parts.map(|part| format!("{} {}{}", part.on, vector(part.force), units.force)).collect();
         if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
     };
     let reactions = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
@@ -565,7 +614,7 @@ fn balance_line(body: &BodyReport) -> String {
         format!(", not to be trusted: it changes by {:.0} % within a cell there", 100.0 * change)
     });
     let place = body.max_von_mises_at.map_or(String::new(), |x| format!(" at {}{doubt}", point(x)));
-    let fields = largest(body.max_displacement, body.max_von_mises, &place);
+    let fields = largest(body.max_displacement, body.max_von_mises, &place, units);
     format!(
         "  {}: {fields}{reactions}imbalance {} of forces, {} of moments",
         body.name,

@@ -1,86 +1,190 @@
 //! Pairs of contact surfaces: two that the scene names, or rules that find pairs.
 
-use super::body::body_name;
+use super::body::{check_name, one, plain_pattern};
+use super::geometry::{Geometry, Plane};
 use super::layer::LayerSpec;
-use crate::error::{Error, Located, Result};
+use super::load::{echo_of, moment_of};
+use super::pattern;
+use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, checked, kept, positive};
+use crate::error::{Error, Located, shown};
 use crate::expression::Field;
-use crate::setting::{Context, Keys, Node, Setting, TableShape, Value, ValueKind, keys, words};
-use serde_json::{Value as Json, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-keys! {
-    /// A pair of contact surfaces and the layer between them.
-    #[derive(Debug, Clone)]
-    pub struct ContactSpec "[[contact]]" {
-        required {
-            /// write between = ["one", "other"], or between = "auto" with a distance
-            ///
-            /// The two physical groups. In a rule that finds pairs both are the word "auto".
-            pub between: [Located<String>; 2],
-            /// give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }
-            ///
-            /// Law of the layer.
-            pub layer: LayerSpec,
-        }
-        optional {
-            /// how far apart facets of a pair may be; required with "auto"
-            ///
-            /// Largest distance (a length, > 0) of facets that face each other; any distance if `None`.
-            pub distance: Option<f64> = None,
-            /// gap besides the distance of the meshes
-            ///
-            /// Gap (a length) that is added to the distance of the meshes.
-            pub gap: Field = Field::Constant(0.0),
-            /// largest angle in degrees between normals that face each other
-            ///
-            /// Largest angle between the normal of one facet and minus that of the other, > 0 and at most 90.
-            ///
-            /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most twice its own
-            /// area there. Both tend to infinity as the angle grows to a right one.
-            pub angle: f64 = 60.0,
-            /// angle in degrees beyond which facets meet at an edge, with a normal for each side
-            ///
-            /// It is > 0 and at most 180.
-            ///
-            /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45 degrees. The
-            /// default is in between.
-            pub edge: f64 = 40.0,
-            /// whether the distance of the meshes counts as zero
-            ///
-            /// Then the surfaces are assumed to touch wherever they face each other, and only [`ContactSpec::gap`] counts.
-            pub touching: bool = false,
-            /// what to do where bodies overlap before loading
-            pub overlap: Overlap = Overlap::Compress,
-            /// known contact pressure to draw and to compare with
-            pub reference: Option<Field> = None,
-        }
-        initially {
-            /// Number of the table in the scene, from 0.
-            pub table: usize = 0,
-        }
-    }
+/// A pair of contact surfaces and the layer between them, or a rule that finds such pairs: contact of all bodies that lie near each other. A pair
+/// of named surfaces of two bodies, and a later rule, take precedence.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ContactSpec {
+    /// write between = ["one", "other"], or between = "auto" with a distance
+    ///
+    /// The two physical groups. In a rule that finds pairs both are the word "auto"; before an obstacle the second is "obstacle".
+    #[serde(default = "nothing", serialize_with = "write_between", deserialize_with = "between")]
+    #[serde(skip_serializing_if = "is_with_obstacle")]
+    #[schemars(with = "Option<Either<String, [String; 2]>>")]
+    pub between: [Located<String>; 2],
+    /// the surface before an obstacle, with obstacle = true
+    pub on: Option<Located<String>>,
+    /// bodies of pairs found by "auto", or patterns: of = ["one_*", "other_*"]
+    ///
+    /// A body that matches the first name and one that matches the second form a pair. All bodies if `None`.
+    #[serde(default, deserialize_with = "of")]
+    #[schemars(with = "Option<Vec<String>>")]
+    pub of: Option<[Located<String>; 2]>,
+    /// give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }
+    ///
+    /// Law of the layer.
+    #[serde(deserialize_with = "checked")]
+    pub layer: LayerSpec,
+    /// how far apart facets of a pair may be; required with "auto"
+    ///
+    /// Largest distance (a length, > 0) of facets that face each other; any distance if `None`.
+    pub distance: Option<f64>,
+    /// gap besides the distance of the meshes
+    ///
+    /// Gap (a length) that is added to the distance of the meshes.
+    #[serde(default = "no_gap")]
+    pub gap: Field,
+    /// largest angle in degrees between normals that face each other
+    ///
+    /// Largest angle between the normal of one facet and minus that of the other, > 0 and at most 90.
+    ///
+    /// With the default a normal meets the other surface at most at twice its distance, and a facet covers at most twice its own
+    /// area there. Both tend to infinity as the angle grows to a right one.
+    #[serde(default = "angle")]
+    pub angle: f64,
+    /// angle in degrees beyond which facets meet at an edge, with a normal for each side
+    ///
+    /// It is > 0 and at most 180.
+    ///
+    /// Twelve chords of a circle, the coarsest mesh of a round part, turn by 30 degrees each. A chamfer turns by 45 degrees. The
+    /// default is in between.
+    #[serde(default = "edge")]
+    pub edge: f64,
+    /// whether the distance of the meshes counts as zero
+    ///
+    /// Then the surfaces are assumed to touch wherever they face each other, and only [`ContactSpec::gap`] counts.
+    #[serde(default)]
+    pub touching: bool,
+    /// whether the layer also pulls where it is stretched, by the same law unless `tension` gives another
+    ///
+    /// A bond fills the gap of the meshes, so that only [`ContactSpec::gap`] counts.
+    #[serde(default)]
+    pub bond: bool,
+    /// law of a bonded layer where it is stretched: tension over stretch
+    #[serde(default, deserialize_with = "checked")]
+    pub tension: Option<LayerSpec>,
+    /// whether the surface `on` is before a rigid obstacle, which is given by the gap
+    #[serde(default)]
+    pub obstacle: bool,
+    /// how far an obstacle moves towards the surface, along its mean normal; 0 without `force`
+    pub approach: Option<f64>,
+    /// how far an obstacle turns, in radians: about z in the plane, in space a vector; 0 without `moment`
+    pub tilt: Option<Axial>,
+    /// total of the normal forces, for which the gap changes by an offset; force on an obstacle along the mean normal
+    pub force: Option<f64>,
+    /// moment on an obstacle about `at`, under which it turns: a number in the plane, in space a vector
+    pub moment: Option<Axial>,
+    /// point about which an obstacle turns; the middle of its surface without this key
+    pub at: Option<Point>,
+    /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the pair is bonded
+    pub preload: Option<f64>,
+    /// column of the table of load steps with the factor of these forces and motions
+    pub path: Option<Located<String>>,
+    /// what to do where bodies overlap before loading
+    #[serde(default)]
+    pub overlap: Overlap,
+    /// known contact pressure to draw and to compare with
+    pub reference: Option<Field>,
+    /// Number of the table in the scene, from 0.
+    #[serde(skip)]
+    pub table: usize,
+    /// Factor of forces and motions at the present load step; 1 without load steps.
+    #[serde(skip, default = "one")]
+    pub factor: f64,
+}
+
+fn no_gap() -> Field {
+    Field::Constant(0.0)
+}
+
+fn angle() -> f64 {
+    60.0
+}
+
+fn edge() -> f64 {
+    40.0
 }
 
 impl ContactSpec {
     /// Return a pair of named surfaces of different bodies, with a layer between them. The gap is the distance of the meshes.
     #[track_caller]
     pub fn new(first: &str, second: &str, layer: LayerSpec) -> Self {
-        Self::with_defaults([Located::here(first), Located::here(second)], layer)
+        Self {
+            between: [Located::here(first), Located::here(second)],
+            on: None,
+            of: None,
+            layer,
+            distance: None,
+            gap: Field::Constant(0.0),
+            angle: angle(),
+            edge: edge(),
+            touching: false,
+            bond: false,
+            tension: None,
+            obstacle: false,
+            approach: None,
+            tilt: None,
+            force: None,
+            moment: None,
+            at: None,
+            preload: None,
+            path: None,
+            overlap: Overlap::default(),
+            reference: None,
+            table: 0,
+            factor: 1.0,
+        }
     }
 
     /// Set the gap (a length) that is added to the distance of the meshes, a number or a function of the coordinates.
     pub fn gap(self, gap: impl Into<Field>) -> Self {
         Self { gap: gap.into(), ..self }
     }
-}
 
-/// A rule that finds pairs: contact of all bodies that lie near each other. A [`ContactSpec`] that names surfaces of two bodies, and a
-/// later rule, take precedence.
-#[derive(Debug, Clone)]
-pub struct AutoContact {
-    /// Names or patterns of bodies. A body that matches the first and one that matches the second form a pair. All bodies if `None`.
-    pub of: Option<[Located<String>; 2]>,
-    /// The settings of each pair. Its `between` is a stand-in for the names of the two bodies.
-    pub contact: ContactSpec,
+    /// Return a surface before a rigid obstacle, whose distance is the `gap`.
+    #[track_caller]
+    pub fn obstacle(on: &str, gap: impl Into<Field>, layer: LayerSpec) -> Self {
+        Self { obstacle: true, gap: gap.into(), on: Some(Located::here(on)), ..Self::new(on, OBSTACLE, layer) }
+    }
+
+    /// Bond the surfaces: the layer also pulls where it is stretched, by its own law.
+    pub fn bonded(self) -> Self {
+        Self { bond: true, ..self }
+    }
+
+    /// Return whether the distance of the meshes counts as zero.
+    pub fn is_touching(&self) -> bool {
+        self.touching || self.bond || self.obstacle
+    }
+
+    /// Return whether forces or prescribed motions of the pair act without a path.
+    pub fn acts(&self) -> bool {
+        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(|axial| axial.0);
+        self.path.is_none() && [self.approach, self.force].into_iter().flatten().chain(turns).any(|value| value != 0.0)
+    }
+
+    /// Complete the two surfaces of a contact that was read: an obstacle is the second one.
+    pub fn complete(&mut self) {
+        if let Some(on) = &self.on {
+            self.between = [on.clone(), Located::new(OBSTACLE.to_owned(), on.place.clone())];
+        }
+    }
+
+    /// Return whether it is a rule that finds pairs, and names no surfaces: `between = "auto"`.
+    pub fn is_rule(&self) -> bool {
+        self.between.iter().all(|name| name.value == AUTO)
+    }
 }
 
 /// Which of two surfaces carries the contact points of their pairs.
@@ -94,69 +198,206 @@ pub struct Carrier {
     pub is_second: bool,
 }
 
-words! {
-    /// What to do about surfaces that overlap before loading.
-    pub enum Overlap "overlap" {
-        /// The overlap compresses the layer, and the run warns.
-        Compress = "compress",
-        /// The scene is refused.
-        Refuse = "error",
+/// What to do about surfaces that overlap before loading.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+pub enum Overlap {
+    /// The overlap compresses the layer, and the run warns.
+    #[default]
+    #[serde(rename = "compress")]
+    Compress,
+    /// The scene is refused.
+    #[serde(rename = "error")]
+    Refuse,
+}
+
+impl Check for ContactSpec {
+    /// Check all but the layer, which is checked by itself.
+    fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
+        match (&self.on, self.obstacle) {
+            (None, false) if self.between.iter().all(|name| name.is_empty()) => {
+                return Err(Flaw::new("", "[[contact]] has no `between`", "`between` is missing", EXAMPLE));
+            }
+            (None, false) if self.is_rule() => self.check_rule()?,
+            (None, false) => self.check_pair()?,
+            (on, _) => self.check_obstacle(on.as_ref())?,
+        }
+        self.check_forces(geometry)?;
+        positive("angle", "the angle", self.angle)?;
+        if self.angle > 90.0 {
+            let message = format!("the angle is {} degrees", shown(self.angle));
+            return Err(Flaw::new("angle", message, "must be at most 90", ""));
+        }
+        positive("edge", "the angle of edges", self.edge)?;
+        if self.edge > 180.0 {
+            let message = format!("the angle of edges is {} degrees", shown(self.edge));
+            return Err(Flaw::new("edge", message, "must be at most 180", "at 180 no surface is split"));
+        }
+        if self.tension.is_some() && !self.bond {
+            let help = "write bond = true, or leave `tension` away";
+            return Err(Flaw::new("tension", "only a bonded layer has a law in tension", "", help));
+        }
+        self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
     }
 }
 
-/// Return the shape of `[[contact]]`.
-pub fn shape() -> TableShape {
-    let about = "bodies of pairs found by \"auto\", or patterns: of = [\"one_*\", \"other_*\"]";
-    ContactSpec::shape().optional("of", ValueKind::Text.list(), about)
-}
+impl ContactSpec {
+    /// Check a rule that finds pairs.
+    fn check_rule(&self) -> Result<(), Flaw> {
+        if self.distance.is_none() {
+            let help = "facets of different bodies that face each other at most that far apart form pairs";
+            return Err(Flaw::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
+        }
+        let totals = [("force", self.force), ("preload", self.preload)];
+        if let Some((key, _)) = totals.iter().find(|(_, value)| value.is_some()) {
+            let help = "name the two surfaces: between = [\"one\", \"other\"]";
+            return Err(Flaw::new(*key, format!("`{key}` for pairs that are found"), "", help));
+        }
+        self.of.iter().flatten().try_for_each(check_name)?;
+        Ok(())
+    }
 
-/// Read the pairs of contact surfaces that a scene names, and the rules that find further pairs.
-///
-/// # Errors
-/// Tables and values that are no contact.
-pub fn read(items: &[Node], context: &Context) -> Result<(Vec<ContactSpec>, Vec<AutoContact>)> {
-    let (mut contacts, mut auto) = (Vec::new(), Vec::new());
-    for (table, item) in items.iter().enumerate() {
-        let keys = Keys::open(item, &shape())?;
-        let is_rule = is_rule(&keys)?;
-        let of = keys.read("of", |node| of(node, context))?;
-        let contact = ContactSpec { table, ..ContactSpec::decode(&keys, context)? };
-        match is_rule {
-            true => auto.push(AutoContact { of, contact }),
-            false => contacts.push(contact),
+    /// Check a surface before an obstacle.
+    fn check_obstacle(&self, on: Option<&Located<String>>) -> Result<(), Flaw> {
+        let is_pair = !self.between[1].is_empty() && self.between[1].value != OBSTACLE;
+        match on {
+            Some(_) if is_pair => {
+                let help = "remove `between` or `on`";
+                Err(Flaw::new("on", "[[contact]] has both `between` and `on`", "only one of them can hold", help))
+            }
+            Some(_) if !self.obstacle => {
+                let help = "one surface before a rigid obstacle has obstacle = true, two surfaces have between = [\"one\", \"other\"]";
+                Err(Flaw::new("on", "`on` without an obstacle", "", help))
+            }
+            None => {
+                let help = "an obstacle is before one surface: on = \"top\"";
+                Err(Flaw::new("obstacle", "[[contact]] has no `on`", "`on` is missing", help))
+            }
+            Some(_) if self.preload.is_some() => {
+                let help = "it has a force in each load step: force = F";
+                Err(Flaw::new("preload", "a preload of an obstacle", "", help))
+            }
+            Some(on) => Ok(pattern::check(on)?),
         }
     }
-    Ok((contacts, auto))
-}
 
-/// Return the echo of named pairs and of rules, in the order of the file.
-pub fn echo(contacts: &[ContactSpec], rules: &[AutoContact], dimension: usize) -> Json {
-    let named = contacts.iter().map(|contact| (contact.table, contact.entries(dimension)));
-    let found = rules.iter().map(|AutoContact { of, contact }| {
-        let mut entries = contact.entries(dimension);
-        if let Some(of) = of {
-            entries.insert("of".to_owned(), of.each_ref().map(|name| name.value.as_str()).into_iter().collect());
+    /// Check the forces and motions of obstacles and offsets.
+    fn check_forces(&self, geometry: Geometry) -> Result<(), Flaw> {
+        let Self { approach, tilt, force, moment, preload, .. } = self;
+        let turns = [("tilt", tilt), ("moment", moment)];
+        let numbers = [("approach", approach), ("force", force), ("preload", preload)];
+        let given = |key, is_given: bool| is_given.then_some(key);
+        let mut of_obstacle = [given("approach", approach.is_some()), given("at", self.at.is_some())]
+            .into_iter()
+            .chain(turns.map(|(key, turn)| given(key, turn.is_some())));
+        if let (false, Some(key)) = (self.obstacle, of_obstacle.find_map(|key| key)) {
+            let help = "on = \"top\", obstacle = true";
+            return Err(Flaw::new(key, format!("`{key}` of a contact without an obstacle"), "", help));
         }
-        (contact.table, entries)
-    });
-    let mut tables: Vec<_> = named.chain(found).collect();
-    tables.sort_by_key(|(table, _)| *table);
-    tables.into_iter().map(|(_, entries)| Json::from(entries)).collect()
+        let exclusive = [
+            numbers.map(|(key, value)| given(key, value.is_some())).to_vec(),
+            turns.map(|(key, turn)| given(key, turn.is_some())).to_vec(),
+        ];
+        for keys in exclusive {
+            if let [first, second, ..] = keys.into_iter().flatten().collect::<Vec<_>>()[..] {
+                let message = format!("[[contact]] has both `{first}` and `{second}`");
+                let help = format!("remove `{first}` or `{second}`");
+                return Err(Flaw::new(second, message, "only one of them can hold", &help));
+            }
+        }
+        if let (Some((key, _)), true) =
+            (turns.iter().find(|(_, turn)| turn.is_some()), geometry.plane == Plane::Axisymmetric)
+        {
+            let message = "an obstacle that turns in an axisymmetric scene";
+            return Err(Flaw::new(*key, message, "it moves along the axis alone", ""));
+        }
+        let single = numbers.into_iter().filter_map(|(key, value)| Some((key, (*value)?)));
+        let turned = turns
+            .into_iter()
+            .flat_map(|(key, turn)| turn.iter().flat_map(move |turn| turn.0.map(|value| (key, value))));
+        let all: Vec<(&str, f64)> = single.chain(turned).collect();
+        for &(key, value) in &all {
+            if !value.is_finite() {
+                return Err(Flaw::new(key, format!("`{key}` is {value}"), "", ""));
+            }
+            if value < 0.0 && (key == "preload" || key == "force" && !self.bond) {
+                let help = "a force > 0 presses; only a bonded pair can be pulled";
+                return Err(Flaw::new(key, format!("a negative `{key}`"), "", help));
+            }
+        }
+        match &self.path {
+            Some(_) if all.is_empty() => {
+                Err(Flaw::new("path", "`path` without a force or motion of this contact", "", ""))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Check a pair of surfaces: two plain names.
+    fn check_pair(&self) -> Result<(), Flaw> {
+        let [a, b] = &self.between;
+        if a == b {
+            let error = Error::scene(&b.place, format!("a contact between `{}` and itself", b.value));
+            return Err(error.help("name one surface of each of two bodies").into());
+        }
+        if self.of.is_some() {
+            let help = "it says which bodies form pairs with between = \"auto\"";
+            return Err(Flaw::new("of", "`of` for surfaces with names", "", help));
+        }
+        if let Some(name) = self.between.iter().find(|name| name.contains(['*', '?'])) {
+            let help =
+                "many pairs are found between bodies: between = \"auto\", of = [\"one_*\", \"other_*\"], distance = D";
+            let error = Error::scene(&name.place, format!("the pattern `{}` for one surface", name.value));
+            return Err(error.label("one name belongs here").help(help).into());
+        }
+        Ok(())
+    }
 }
 
-/// Return whether an open table is a rule that finds pairs: `between = "auto"`.
-fn is_rule(keys: &Keys) -> Result<bool> {
-    let is_rule = matches!(keys.require("between")?.value, Value::String(_));
-    if let (Some(entry), false) = (keys.entry("of"), is_rule) {
-        return Err(Error::scene(&entry.key_place, "`of` for surfaces with names")
-            .help("it says which bodies form pairs with between = \"auto\""));
+/// The name of an obstacle, where a pair has that of the second surface.
+pub const OBSTACLE: &str = "obstacle";
+
+/// Return the surfaces of a contact that names none.
+fn nothing() -> [Located<String>; 2] {
+    [String::new().into(), String::new().into()]
+}
+
+fn is_with_obstacle(between: &[Located<String>; 2]) -> bool {
+    between[1].value == OBSTACLE
+}
+
+/// A rotation or a moment: about z in the plane, a vector in space.
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[schemars(with = "OneOrVector")]
+pub struct Axial(pub [f64; 3]);
+
+impl<'de> Deserialize<'de> for Axial {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        moment_of(Located::deserialize(deserializer)?).map(Self).map_err(kept)
     }
-    if is_rule && keys.require("between")?.string()? == AUTO {
-        keys.require("distance").map_err(|error| {
-            error.help("facets of different bodies that face each other at most that far apart form pairs")
-        })?;
+}
+
+impl Serialize for Axial {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        echo_of(self.0).serialize(serializer)
     }
-    Ok(is_rule)
+}
+
+/// A point of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[schemars(with = "Vec<f64>")]
+pub struct Point(pub [f64; 3]);
+
+impl<'de> Deserialize<'de> for Point {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let point = Located::<Vector>::deserialize(deserializer)?;
+        point.numbers().map(Self).map_err(|error| kept(error.or_at(&point.place)))
+    }
+}
+
+impl Serialize for Point {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Vector::from(self.0).serialize(serializer)
+    }
 }
 
 /// The value of `between` in rules that find pairs, and the name of both surfaces there.
@@ -164,35 +405,34 @@ const AUTO: &str = "auto";
 
 const EXAMPLE: &str = "write between = [\"one\", \"other\"], or between = \"auto\" with a distance";
 
-/// The two surfaces of a contact. With `between = "auto"` both are the word "auto".
-impl Setting for [Located<String>; 2] {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Text, ValueKind::Text.list()])
-    }
-
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        match &node.value {
-            Value::String(word) if word == AUTO => Ok([node.name()?, node.name()?]),
-            Value::String(word) => Err(node.refuse(format!("a contact between `{word}` alone")).help(EXAMPLE)),
-            _ => match node.list()? {
-                [a, b] => Ok([a.name()?, b.name()?]),
-                _ => Err(node.refuse("a contact is between two surfaces").help(EXAMPLE)),
-            },
+/// Read the two surfaces of a contact. With `between = "auto"` both are the word "auto".
+fn between<'de, D: Deserializer<'de>>(deserializer: D) -> Result<[Located<String>; 2], D::Error> {
+    let Located { value, place } = Located::<Form<Located<String>>>::deserialize(deserializer)?;
+    match value {
+        Form::Text(word) if word == AUTO => Ok([(); 2].map(|()| Located::new(word.clone(), place.clone()))),
+        Form::Text(word) => Err(kept(Error::scene(&place, format!("a contact between `{word}` alone")).help(EXAMPLE))),
+        Form::List(names) => {
+            names.iter().try_for_each(pattern::check).map_err(kept)?;
+            let count = |_| kept(Error::scene(&place, "a contact is between two surfaces").help(EXAMPLE));
+            names.try_into().map_err(count)
         }
-    }
-
-    fn echo(&self, _: usize) -> Json {
-        match self.each_ref().map(|name| name.value.as_str()) {
-            [AUTO, AUTO] => json!(AUTO),
-            names => json!(names),
-        }
+        other => Err(other.unexpected()),
     }
 }
 
-/// Return two names of bodies, or patterns of names.
-fn of(node: &Node, context: &Context) -> Result<[Located<String>; 2]> {
-    let [a, b] = node.list()? else {
-        return Err(node.refuse("pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"));
-    };
-    Ok([body_name(a, context)?, body_name(b, context)?])
+fn write_between<S: Serializer>(between: &[Located<String>; 2], serializer: S) -> Result<S::Ok, S::Error> {
+    match between.each_ref().map(|name| name.value.as_str()) {
+        [AUTO, AUTO] => AUTO.serialize(serializer),
+        names => names.serialize(serializer),
+    }
+}
+
+/// Read two names of bodies, or patterns of names.
+fn of<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[Located<String>; 2]>, D::Error> {
+    let Located { value: names, place } = Located::<Vec<Located<String>>>::deserialize(deserializer)?;
+    let names: [Located<String>; 2] = names.try_into().map_err(|_| {
+        kept(Error::scene(&place, "pairs are of two bodies").help("write of = [\"one_*\", \"other_*\"]"))
+    })?;
+    names.iter().try_for_each(pattern::check).map_err(kept)?;
+    Ok(Some(names.map(|name| Located { value: plain_pattern(&name.value), ..name })))
 }

@@ -1,10 +1,12 @@
 //! Elastic constants of bodies and regions, and the axes that they refer to.
 
-use super::pattern::pattern;
-use crate::error::{Located, Place, Result};
+use super::geometry::Geometry;
+use super::pattern;
+use super::read::{Check, Direction, Flaw, Refused, geometry, only_one, place, positive};
+use crate::error::{Error, Kind, Located, Place, shown};
 use crate::expression::Field;
-use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, Value, ValueKind, entries, keys, words};
-use serde_json::Value as Json;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// The elastic constants of a body, or of one of its regions, and their axes.
 #[derive(Debug, Clone)]
@@ -34,7 +36,8 @@ pub enum Constants {
 }
 
 /// The directions of the material's axes.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(try_from = "AxesKeys", into = "AxesKeys")]
 pub enum AxesSpec {
     /// A direction along axis 1, and one towards axis 2.
     Directions {
@@ -53,19 +56,77 @@ pub enum AxesSpec {
     },
 }
 
-keys! {
-    /// A part of a body with constants of its own.
-    #[derive(Debug, Clone)]
-    pub struct RegionSpec "[[body.region]]" {
-        required {
-            /// group of its cells
-            pub on: Located<String> => pattern,
-        }
-        besides {
-            /// The constants of this part.
-            pub elasticity: ElasticitySpec,
+/// A part of a body with constants of its own.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegionSpec {
+    /// group of its cells
+    pub on: Located<String>,
+    /// Young's modulus, > 0
+    pub young: Option<Located<Field>>,
+    /// Poisson's ratio, between -1 and 0.5
+    pub poisson: Option<Located<Field>>,
+    /// orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }
+    pub orthotropic: Option<Located<Orthotropic>>,
+    /// C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12
+    pub anisotropic: Option<Located<Vec<Field>>>,
+    /// write first = [1, 1, 0] and second = [-1, 1, 0], or angle = "pi/6" and axis = [0, 0, 1]
+    pub axes: Option<Located<AxesSpec>>,
+}
+
+impl RegionSpec {
+    /// Return the elastic constants and their axes.
+    pub fn elasticity(&self) -> ElasticitySpec {
+        self.material().elasticity(&self.on.place)
+    }
+
+    /// Return the keys of the elasticity.
+    fn material(&self) -> Material {
+        Material {
+            young: self.young.clone(),
+            poisson: self.poisson.clone(),
+            orthotropic: self.orthotropic.clone(),
+            anisotropic: self.anisotropic.clone(),
+            axes: self.axes.clone(),
         }
     }
+}
+
+impl Check for RegionSpec {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        pattern::check(&self.on)?;
+        self.material().check("[[body.region]]")
+    }
+}
+
+/// The nine constants of an orthotropic material.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Orthotropic {
+    /// Young's modulus along axis 1
+    #[serde(rename = "E1")]
+    pub e1: Field,
+    /// Young's modulus along axis 2
+    #[serde(rename = "E2")]
+    pub e2: Field,
+    /// Young's modulus along axis 3
+    #[serde(rename = "E3")]
+    pub e3: Field,
+    /// contraction along axis 2 under tension along axis 1
+    pub nu12: Field,
+    /// contraction along axis 3 under tension along axis 1
+    pub nu13: Field,
+    /// contraction along axis 3 under tension along axis 2
+    pub nu23: Field,
+    /// shear modulus of axes 1 and 2
+    #[serde(rename = "G12")]
+    pub g12: Field,
+    /// shear modulus of axes 1 and 3
+    #[serde(rename = "G13")]
+    pub g13: Field,
+    /// shear modulus of axes 2 and 3
+    #[serde(rename = "G23")]
+    pub g23: Field,
 }
 
 impl Constants {
@@ -101,168 +162,144 @@ impl ElasticitySpec {
     }
 }
 
-words! {
-    /// What a plane problem stands for.
-    pub enum Plane "plane" {
-        /// No out-of-plane strain.
-        Strain = "strain",
-        /// No out-of-plane stress.
-        Stress = "stress",
-        /// A meridian of bodies of revolution: x is the radius, y runs along the axis.
-        Axisymmetric = "axisymmetric",
-    }
+/// The keys of the elasticity of a body or a region.
+pub(super) struct Material {
+    pub young: Option<Located<Field>>,
+    pub poisson: Option<Located<Field>>,
+    pub orthotropic: Option<Located<Orthotropic>>,
+    pub anisotropic: Option<Located<Vec<Field>>>,
+    pub axes: Option<Located<AxesSpec>>,
 }
 
-/// Add the keys of the elastic constants, which bodies and regions have, behind the first key.
-pub(super) fn with_constants(mut table: TableShape) -> TableShape {
-    use ValueKind::Field;
-    let others = table.keys.split_off(1);
-    let mut table = table
-        .optional("young", Field, "Young's modulus, > 0")
-        .optional("poisson", Field, "Poisson's ratio, between -1 and 0.5")
-        .optional("orthotropic", orthotropic_shape(), "orthotropic = { E1 = ..., E2 = ..., E3 = ..., nu12 = ..., ... }")
-        .optional("anisotropic", Field.list(), UPPER)
-        .optional("axes", axes_shape(), AXES)
-        .at_most_one(&["young", "orthotropic", "anisotropic"])
-        .not_both(&["poisson"], &["orthotropic", "anisotropic"]);
-    table.keys.extend(others);
-    table
-}
-
+/// Advice for the constants of an anisotropic material.
 const UPPER: &str = "C11, C12, ..., C16, C22, ..., C66: the upper triangle by rows, in the order 11 22 33 23 13 12";
+
+/// Advice for axes.
 const AXES: &str = "write first = [1, 1, 0] and second = [-1, 1, 0], or angle = \"pi/6\" and axis = [0, 0, 1]";
 
-fn orthotropic_shape() -> TableShape {
-    use ValueKind::Field;
-    let table = TableShape::new("the orthotropic material");
-    Constants::ORTHOTROPIC.iter().fold(table, |table, name| table.required(name, Field, "a constant of the material"))
-}
-
-fn axes_shape() -> TableShape {
-    use ValueKind::Field;
-    TableShape::new("the axes")
-        .optional("first", Field.list(), "direction of axis 1")
-        .optional("second", Field.list(), "direction on the side of axis 2")
-        .optional("angle", Field, "angle (radian) by which x, y, z are turned")
-        .optional("axis", Field.list(), "axis of the turn; z in the plane")
-        .not_both(&["first", "second"], &["angle"])
-        .at_most_one(&["first", "axis"])
-}
-
-impl ElasticitySpec {
-    /// Return the elastic constants among the keys of a body or a region.
-    pub(super) fn among(keys: &Keys, context: &Context) -> Result<Self> {
-        let (constants, place) = if let Some(node) = keys.get("orthotropic") {
-            (orthotropic(node, context)?, &node.place)
-        } else if let Some(node) = keys.get("anisotropic") {
-            (anisotropic(node, context)?, &node.place)
-        } else {
-            const OTHERS: &str =
-                "a material is young and poisson, orthotropic = { E1 = ... } or anisotropic = [C11, ...]";
-            let young = keys.require("young").map_err(|error| error.help(OTHERS))?;
-            let poisson = keys.require("poisson")?;
-            let constants =
-                Constants::Isotropic { young: Field::read(young, context)?, poisson: Field::read(poisson, context)? };
-            (constants, &young.place)
-        };
-        let axes = keys.read("axes", |node| axes(node, context))?;
-        Ok(Self { constants, axes, place: place.clone() })
-    }
-
-    /// Return the echo of the keys of the constants and axes.
-    pub(super) fn entries(&self, dimension: usize) -> Entries {
-        let constants = match &self.constants {
-            Constants::Isotropic { young, poisson } => {
-                vec![("young", young.echo(dimension)), ("poisson", poisson.echo(dimension))]
+impl Material {
+    /// Check the keys; `table` is the name of their table in messages.
+    pub fn check(&self, table: &str) -> Result<(), Flaw> {
+        let Self { young, poisson, orthotropic, anisotropic, axes } = self;
+        let [tensor, matrix] = [("orthotropic", place(orthotropic)), ("anisotropic", place(anisotropic))];
+        only_one(table, &[("young", place(young)), tensor, matrix])?;
+        only_one(table, &[("poisson", place(poisson)), tensor, matrix])?;
+        if let Some(constants) = anisotropic.as_ref().filter(|constants| constants.len() != 21) {
+            let message = format!("an anisotropic material has 21 constants, not {}", constants.len());
+            return Err(Flaw::new("anisotropic", message, "", UPPER));
+        }
+        if tensor.1.or(matrix.1).is_some() {
+            return Ok(());
+        }
+        let others = "a material is young and poisson, orthotropic = { E1 = ... } or anisotropic = [C11, ...]";
+        for (key, value) in [("young", young), ("poisson", poisson)] {
+            if value.is_none() {
+                return Err(Flaw::new("", format!("{table} has no `{key}`"), &format!("`{key}` is missing"), others));
             }
-            Constants::Orthotropic(fields) => {
-                let named = Constants::ORTHOTROPIC.iter().zip(fields.iter());
-                let table: Entries = named.map(|(name, value)| (name.to_string(), value.echo(dimension))).collect();
-                vec![("orthotropic", table.into())]
-            }
-            Constants::Anisotropic(fields) => {
-                vec![("anisotropic", fields.iter().map(|field| field.echo(dimension)).collect())]
-            }
-        };
-        let axes = self.axes.iter().map(|axes| ("axes", axes.entries().into()));
-        constants.into_iter().chain(axes).map(|(key, value)| (key.to_owned(), value)).collect()
-    }
-}
-
-impl AxesSpec {
-    /// Return the echo; directions have three components in the plane, too.
-    fn entries(&self) -> Entries {
-        match self {
-            Self::Directions { first, second } => entries([("first", first.echo(3)), ("second", second.echo(3))]),
-            Self::Angle { angle, axis } => entries([("angle", angle.echo(3)), ("axis", axis.echo(3))]),
+        }
+        check_isotropic(young.as_deref(), poisson.as_deref())?;
+        match axes {
+            None => Ok(()),
+            Some(_) => Err(Flaw::new(
+                "axes",
+                "axes of an isotropic material",
+                "all directions are alike",
+                "remove them, or give orthotropic or anisotropic constants",
+            )),
         }
     }
-}
 
-impl Setting for RegionSpec {
-    fn kind() -> ValueKind {
-        with_constants(Self::shape()).into()
-    }
-
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        let keys = Keys::open(node, &with_constants(Self::shape()))?;
-        Self::decode(&keys, context, ElasticitySpec::among(&keys, context)?)
-    }
-
-    fn echo(&self, dimension: usize) -> Json {
-        let mut entries = self.entries(dimension);
-        entries.extend(self.elasticity.entries(dimension));
-        entries.into()
-    }
-}
-
-fn orthotropic(node: &Node, context: &Context) -> Result<Constants> {
-    let keys = Keys::open(node, &orthotropic_shape())?;
-    let mut fields = [const { Field::Constant(0.0) }; 9];
-    for (field, name) in fields.iter_mut().zip(Constants::ORTHOTROPIC) {
-        *field = Field::read(keys.require(name)?, context)?;
-    }
-    Ok(Constants::Orthotropic(Box::new(fields)))
-}
-
-fn anisotropic(node: &Node, context: &Context) -> Result<Constants> {
-    let items = node.list()?;
-    let mut fields = Box::new([const { Field::Constant(0.0) }; 21]);
-    if items.len() != fields.len() {
-        return Err(node.refuse(format!("an anisotropic material has 21 constants, not {}", items.len())).help(UPPER));
-    }
-    for (field, item) in fields.iter_mut().zip(items) {
-        *field = Field::read(item, context)?;
-    }
-    Ok(Constants::Anisotropic(fields))
-}
-
-fn axes(node: &Node, context: &Context) -> Result<AxesSpec> {
-    let keys = Keys::open(node, &axes_shape())?;
-    if let Some(angle) = keys.get("angle") {
-        let axis = match (keys.get("axis"), context.dimension) {
-            (None, 2) => [0.0, 0.0, 1.0].map(Field::Constant),
-            (None, _) => direction(keys.require("axis")?, context)?,
-            (Some(axis), _) => direction(axis, context)?,
+    /// Return the elastic constants; `near` is their place if they have none.
+    pub fn elasticity(self, near: &Place) -> ElasticitySpec {
+        let zero = || Located::new(Field::Constant(0.0), near.clone());
+        let (constants, place) = match (self.orthotropic, self.anisotropic) {
+            (Some(Located { value, place }), _) => {
+                let Orthotropic { e1, e2, e3, nu12, nu13, nu23, g12, g13, g23 } = value;
+                (Constants::Orthotropic(Box::new([e1, e2, e3, nu12, nu13, nu23, g12, g13, g23])), place)
+            }
+            (None, Some(Located { value, place })) => {
+                let mut values = value.into_iter();
+                let next = |_| values.next().unwrap_or(Field::Constant(0.0));
+                (Constants::Anisotropic(Box::new(std::array::from_fn(next))), place)
+            }
+            (None, None) => {
+                let [young, poisson] = [self.young, self.poisson].map(|field| field.unwrap_or_else(zero));
+                (Constants::Isotropic { young: young.value, poisson: poisson.value }, young.place)
+            }
         };
-        return Ok(AxesSpec::Angle { angle: Field::read(angle, context)?, axis });
+        ElasticitySpec { constants, axes: self.axes.map(|axes| axes.value), place }
     }
-    let first = direction(keys.require("first").map_err(|error| error.help(AXES))?, context)?;
-    let second = match (keys.get("second"), context.dimension) {
-        (None, 2) => None,
-        (None, _) => Some(direction(keys.require("second").map_err(|error| error.help(AXES))?, context)?),
-        (Some(second), _) => Some(direction(second, context)?),
-    };
-    Ok(AxesSpec::Directions { first, second })
 }
 
-/// Return a direction in space. In plane problems the third component may be left out.
-fn direction(node: &Node, context: &Context) -> Result<[Field; 3]> {
-    match &node.value {
-        Value::List(items) if context.dimension == 2 && items.len() == 3 => {
-            let [x, y, z] = [0, 1, 2].map(|i| Field::read(&items[i], context));
-            Ok([x?, y?, z?])
+fn check_isotropic(young: Option<&Field>, poisson: Option<&Field>) -> Result<(), Flaw> {
+    if let Some(Field::Constant(young)) = young {
+        positive("young", "Young's modulus", *young)?;
+    }
+    match poisson {
+        Some(&Field::Constant(value)) if !(value > -1.0 && value < 0.5) => {
+            let help = "incompressible bodies are not possible; take 0.4999 and order = 2, say";
+            let message = format!("Poisson's ratio is {}", shown(value));
+            let help = if value == 0.5 { help } else { "" };
+            Err(Flaw::new("poisson", message, "must lie between -1 and 0.5", help))
         }
-        _ => <[Field; 3]>::read(node, context),
+        _ => Ok(()),
+    }
+}
+
+/// The axes of a material.
+#[derive(Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct AxesKeys {
+    /// direction of axis 1
+    first: Option<Located<Direction>>,
+    /// direction on the side of axis 2
+    second: Option<Located<Direction>>,
+    /// angle (radian) by which x, y, z are turned
+    angle: Option<Located<Field>>,
+    /// axis of the turn; z in the plane
+    axis: Option<Located<Direction>>,
+}
+
+impl TryFrom<AxesKeys> for AxesSpec {
+    type Error = Refused;
+
+    fn try_from(AxesKeys { first, second, angle, axis }: AxesKeys) -> Result<Self, Refused> {
+        for [a, b] in [
+            [("first", place(&first)), ("angle", place(&angle))],
+            [("second", place(&second)), ("angle", place(&angle))],
+            [("first", place(&first)), ("axis", place(&axis))],
+        ] {
+            only_one("the axes", &[a, b])?;
+        }
+        let missing = |key: &str| {
+            let error = Error::new(Kind::Scene, format!("the axes have no `{key}`"));
+            Refused::from(error.label(format!("`{key}` is missing")).help(AXES))
+        };
+        let is_plane = geometry().is_plane();
+        let [first, second, axis] = [first, second, axis].map(|direction| direction.map(|direction| direction.value.0));
+        if let Some(angle) = angle {
+            let along_z = is_plane.then(|| [0.0, 0.0, 1.0].map(Field::Constant));
+            let axis = axis.or(along_z).ok_or_else(|| missing("axis"))?;
+            return Ok(Self::Angle { angle: angle.value, axis });
+        }
+        let first = first.ok_or_else(|| missing("first"))?;
+        if second.is_none() && !is_plane {
+            return Err(missing("second"));
+        }
+        Ok(Self::Directions { first, second })
+    }
+}
+
+impl From<AxesSpec> for AxesKeys {
+    fn from(axes: AxesSpec) -> Self {
+        let direction = |fields| Some(Direction(fields).into());
+        match axes {
+            AxesSpec::Directions { first, second } => {
+                Self { first: direction(first), second: second.and_then(direction), ..Self::default() }
+            }
+            AxesSpec::Angle { angle, axis } => {
+                Self { angle: Some(angle.into()), axis: direction(axis), ..Self::default() }
+            }
+        }
     }
 }

@@ -5,21 +5,27 @@
 //!
 //! In a scene they are `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
-use super::body::{BodySpec, LoadKind};
-use crate::error::{Error, Kind, Located, Place, Result, Source, joined};
+use super::body::BodySpec;
+use super::contact::ContactSpec;
+use super::geometry::Geometry;
+use super::load::LoadKind;
+use super::read::{Check, Either, Flaw, Form, file, kept, positive};
+use crate::error::{Error, Located, Result as Checked, joined};
 use crate::expression::Field;
 use crate::file::{other_encoding, with_unix_lines};
-use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, Value, ValueKind, file};
-use serde_json::{Value as Json, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::json;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// The name of the factor of all lines without a `path`.
 const COMMON: &str = "factor";
 
 /// The factors of loads and prescribed displacements, step by step.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, JsonSchema)]
+#[schemars(with = "Either<usize, Either<Vec<f64>, StepsKeys>>")]
 pub struct History {
     /// Names of the factors.
     pub names: Vec<String>,
@@ -29,6 +35,8 @@ pub struct History {
     pub table: Option<Located<PathBuf>>,
     /// Whether some loads have no factor and stay constant.
     pub constant: bool,
+    /// Whether no two steps are of one leg, as where a step locks what it finds.
+    pub apart: bool,
     /// Number of steps that were solved before this process started.
     pub begun: usize,
 }
@@ -87,6 +95,9 @@ impl History {
 
     /// Return the number r > 0 with loads of `step` = r * loads of `other`, if there is one. Both steps without loads have r = 1.
     fn ratio(&self, step: usize, other: usize) -> Option<f64> {
+        if self.apart {
+            return (step == other).then_some(1.0);
+        }
         // constant loads have the factor 1 in every step
         let constant = self.constant.then_some(1.0);
         let factors = |step: usize| self.steps[step].factors.iter().copied().chain(constant);
@@ -106,13 +117,32 @@ impl History {
     }
 
     /// Give all loads and prescribed displacements the factors of the last step of the leg of `step`. Without such a step, leave them.
-    pub fn apply(&self, step: usize, bodies: &mut [BodySpec]) {
+    pub fn apply(&self, step: usize, bodies: &mut [BodySpec], contacts: &mut [ContactSpec]) {
         let Some(last) = self.leg(step).next_back().filter(|_| step < self.steps.len()) else { return };
+        for contact in contacts {
+            contact.factor = match contact.preload {
+                Some(_) => self.preload_factor(last, contact),
+                None => self.factor(last, contact.path.as_ref()),
+            };
+        }
         for body in bodies {
             body.load.iter_mut().for_each(|load| load.factor = self.factor(last, load.path.as_ref()));
             body.fix.iter_mut().for_each(|fix| fix.factor = self.factor(last, fix.path.as_ref()));
             body.force_factor = self.factor(last, None);
         }
+    }
+}
+
+impl History {
+    /// Return the factor of the preload of a contact at a step. Without a path it is 1 in every step.
+    fn preload_factor(&self, step: usize, contact: &ContactSpec) -> f64 {
+        contact.path.as_ref().filter(|_| self.is_table()).map_or(1.0, |path| self.factor(step, Some(path)))
+    }
+
+    /// Return whether a contact keeps in a step what the step before has found: its preload has the same factor in both.
+    pub fn locks(&self, step: usize, contact: &ContactSpec) -> bool {
+        let factor = |step: usize| self.preload_factor(step, contact);
+        contact.preload.is_some() && step > 0 && factor(step) == factor(step - 1)
     }
 }
 
@@ -137,49 +167,68 @@ fn has_common(body: &BodySpec) -> bool {
 }
 
 /// The most steps that a number may stand for.
-const MOST_STEPS: usize = 1000;
+const MOST_STEPS: i64 = 1000;
 
 const TIME: &str = "time";
 
-/// Return the shape of `steps` from a file.
-fn shape() -> TableShape {
-    use ValueKind::Text;
-    TableShape::new("the load steps").required("table", Text, "CSV file with a column of each factor")
+/// The key of `steps` from a file.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct StepsKeys {
+    /// CSV file with a column of each factor
+    table: Located<String>,
 }
 
-impl Setting for History {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Integer(1), ValueKind::Number.list(), shape().into()])
-    }
-
-    /// Read the load steps: so many equal ones, a list of factors, or the table of a file.
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        match &node.value {
-            Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(History::of_shares),
-            Value::Table(_) => {
-                let keys = Keys::open(node, &shape())?;
-                read_table(file(context.folder, keys.require("table")?)?)
+/// So many equal load steps, a list of factors, or the table of a file.
+impl<'de> Deserialize<'de> for History {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Located { value, place } = Located::<Form<f64, StepsKeys>>::deserialize(deserializer)?;
+        match value {
+            Form::Integer(count) if (1..=MOST_STEPS).contains(&count) => {
+                Ok(History::of_shares((1..=count).map(|step| step as f64 / count as f64).collect()))
             }
-            _ => match node.count()? {
-                count @ 1..=MOST_STEPS => {
-                    Ok(History::of_shares((1..=count).map(|step| step as f64 / count as f64).collect()))
-                }
-                _ => Err(node.refuse(format!("the number of load steps must lie between 1 and {MOST_STEPS}"))),
-            },
+            Form::Integer(count) => Err(kept(
+                Error::scene(&place, format!("`steps` is {count}"))
+                    .label(format!("the number of load steps must lie between 1 and {MOST_STEPS}")),
+            )),
+            Form::List(factors) => Ok(History::of_shares(factors)),
+            Form::Table(keys) => file(keys.table).and_then(read_table).map_err(kept),
+            other => Err(other.unexpected()),
         }
     }
+}
 
-    fn echo(&self, _: usize) -> Json {
-        let factors = |column: usize| self.steps.iter().map(|step| step.factors[column]).collect::<Json>();
+impl Serialize for History {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let factors = |column: usize| self.steps.iter().map(|step| step.factors[column]).collect::<Vec<f64>>();
         match &self.table {
-            None if self.steps.is_empty() => Json::Null,
-            None => factors(0),
+            None if self.steps.is_empty() => serializer.serialize_none(),
+            None => factors(0).serialize(serializer),
             Some(table) => {
                 let times = (TIME.to_owned(), self.steps.iter().map(|step| step.time).collect());
                 let named = self.names.iter().enumerate().map(|(column, name)| (name.clone(), factors(column)));
-                let columns: Entries = std::iter::once(times).chain(named).collect();
-                json!({ "table": table.value.display().to_string(), "columns": columns })
+                let columns: BTreeMap<String, Vec<f64>> = std::iter::once(times).chain(named).collect();
+                json!({ "table": table.display().to_string(), "columns": columns }).serialize(serializer)
             }
+        }
+    }
+}
+
+impl Check for History {
+    /// Check factors of all loads. Those of a table were checked when its file was read.
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        if self.is_table() {
+            return Ok(());
+        }
+        for (k, step) in self.steps.iter().enumerate() {
+            step.factors.iter().try_for_each(|factor| positive(&k.to_string(), "the factor", *factor))?;
+        }
+        match self.steps.last() {
+            Some(last) if last.factors != [1.0] => {
+                let help = "end the list with 1; a table may end anywhere: steps = { table = \"path.csv\" }";
+                Err(Flaw::new("", "the last load step is not the full load", "", help))
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -190,140 +239,99 @@ impl History {
     ///
     /// # Errors
     /// A path that is no column, and a column that no line names.
-    pub fn join(&mut self, bodies: &[BodySpec]) -> Result<()> {
+    pub fn join(&mut self, bodies: &[BodySpec], contacts: &[ContactSpec]) -> Checked<()> {
         let Some(table) = &self.table else { return Ok(()) };
+        let all = || bodies.iter().flat_map(paths).chain(contacts.iter().filter_map(|contact| contact.path.as_ref()));
         let columns = || self.names.iter().map(String::as_str).filter(|name| *name != COMMON);
-        for path in bodies.iter().flat_map(paths) {
+        for path in all() {
             if self.names.iter().all(|name| *name != path.value) {
                 let message = format!("the table of load steps has no column `{}`", path.value);
                 let otherwise = || format!("its columns are {}", joined(self.names.iter().map(String::as_str)));
                 return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
-        if let Some(unused) = columns().find(|name| bodies.iter().flat_map(paths).all(|path| path.value != **name)) {
+        if let Some(unused) = columns().find(|name| all().all(|path| path.value != **name)) {
             return Err(Error::scene(
                 &table.place,
-                format!("no load and no support has the path `{unused}` of this table"),
+                format!("no load, support or contact has the path `{unused}` of this table"),
             )
             .help(format!(
-                "path = \"{unused}\" in a line of `load` or `fix`; `{COMMON}` is the column of all lines without"
+                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact; `{COMMON}` is the column of all lines without"
             )));
         }
         let common = self.names.iter().any(|name| name == COMMON);
-        self.constant = !common && bodies.iter().any(has_common);
+        self.constant = !common && (bodies.iter().any(has_common) || contacts.iter().any(ContactSpec::acts));
         Ok(())
     }
 }
 
 /// Read a table of factors: a line of names, then one line a step.
-fn read_table(file: Located<PathBuf>) -> Result<History> {
-    let source = text_of(&file)?;
-    let mut lines = Lines::new(&source);
+fn read_table(file: Located<PathBuf>) -> Checked<History> {
+    let bytes = crate::file::read(&file).map_err(|error| error.at(&file.place))?;
+    let name = file.display().to_string();
+    if let Some(other) = other_encoding(&bytes) {
+        return Err(Error::scene(&file.place, format!("{name} {other}")).help("save it as CSV in UTF-8"));
+    }
+    let bytes = with_unix_lines(bytes);
+    let mut format = csv::ReaderBuilder::new();
+    format.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
+    let (mut reader, mut record) = (format.from_reader(&bytes[..]), csv::StringRecord::new());
     let mut history = History::default();
-    if let Some(place) = lines.next()? {
-        let names: Vec<String> = lines.record.iter().map(str::to_owned).collect();
-        check_names(&names, &place)?;
-        while let Some(place) = lines.next()? {
-            history.steps.push(step(&names, &lines.record, &place, history.steps.last())?);
+    let mut names: Vec<String> = Vec::new();
+    while reader.read_record(&mut record).map_err(|cause| {
+        let error = Error::scene(&file.place, format!("{name} is not a table"));
+        error.because(cause.to_string()).help("save it as CSV in UTF-8")
+    })? {
+        let end = reader.position().byte() as usize;
+        let refuse = |message: String| {
+            let line = 1 + bytes[..end].trim_ascii_end().iter().filter(|byte| **byte == b'\n').count();
+            Error::scene(&file.place, format!("{name}:{line}: {message}"))
+        };
+        if names.is_empty() {
+            names = record.iter().map(str::to_owned).collect();
+            check_names(&names).map_err(|(message, help)| refuse(message).help(help))?;
+        } else {
+            history.steps.push(step(&names, &record, history.steps.last()).map_err(refuse)?);
         }
-        history.names = names.into_iter().filter(|name| name != TIME).collect();
     }
     if history.is_empty() {
         return Err(Error::scene(&file.place, "the table of load steps has no steps")
             .help("a line of names, then one line of numbers a step: factor, 0.5, 1"));
     }
+    history.names = names.into_iter().filter(|name| name != TIME).collect();
     history.table = Some(file);
     Ok(history)
 }
 
-/// Return the text of a table, which must be UTF-8.
-fn text_of(file: &Located<PathBuf>) -> Result<Arc<Source>> {
-    let bytes = crate::file::read(&file.value).map_err(|error| error.at(&file.place))?;
-    let name = file.value.display().to_string();
-    let refuse =
-        |what: &str| Error::new(Kind::Scene, format!("{name} {what}")).help("save it as CSV in UTF-8").at(&file.place);
-    if let Some(other) = other_encoding(&bytes) {
-        return Err(refuse(other));
-    }
-    let text = String::from_utf8(with_unix_lines(bytes)).map_err(|_| refuse("is not UTF-8 text"))?;
-    Ok(Arc::new(Source { name, text }))
-}
-
-/// The lines of a CSV file, one after the other.
-struct Lines<'a> {
-    source: &'a Arc<Source>,
-    reader: csv::Reader<&'a [u8]>,
-    /// The words of the line that was read last.
-    record: csv::StringRecord,
-}
-
-impl<'a> Lines<'a> {
-    fn new(source: &'a Arc<Source>) -> Self {
-        let mut format = csv::ReaderBuilder::new();
-        format.has_headers(false).flexible(true).comment(Some(b'#')).trim(csv::Trim::All);
-        let reader = format.from_reader(source.text.as_bytes());
-        Self { source, reader, record: csv::StringRecord::new() }
-    }
-
-    /// Read the next line and return its place; `None` at the end of the file.
-    fn next(&mut self) -> Result<Option<Place>> {
-        let before = self.reader.position().byte() as usize;
-        let is_line = self.reader.read_record(&mut self.record).map_err(|cause| {
-            let rest = self.place(before, self.source.text.len());
-            Error::scene(&rest, "this is not a table").because(cause.to_string())
-        })?;
-        if !is_line {
-            return Ok(None);
-        }
-        // comments and empty lines may stand before the line
-        let begin = self.record.position().map_or(before, |position| position.byte() as usize);
-        Ok(Some(self.place(begin, self.reader.position().byte() as usize)))
-    }
-
-    /// Return the place of a byte range, without the blanks around it.
-    fn place(&self, from: usize, to: usize) -> Place {
-        let span = self.source.text.get(from..to).unwrap_or_default();
-        let start = from + span.len() - span.trim_start().len();
-        Place { source: self.source.clone(), span: start..start + span.trim().len() }
-    }
-}
-
-/// Refuse names that are no names of factors, and names that two columns have.
-fn check_names(names: &[String], line: &Place) -> Result<()> {
-    if let [name] = names
-        && name.contains([';', '\t'])
-    {
-        return Err(Error::scene(line, "this table has one column").help("separate its columns by commas"));
+/// Refuse names that are no names of factors, and names that two columns have. The error is a message and advice.
+fn check_names(names: &[String]) -> Result<(), (String, &'static str)> {
+    if matches!(names, [name] if name.contains([';', '\t'])) {
+        return Err(("this table has one column".to_owned(), "separate its columns by commas"));
     }
     let help = "the first line names the columns: `time` if there is one, `factor`, and what loads name by `path`";
-    if names.iter().all(|name| name == TIME) || names.iter().any(|name| name.is_empty() || name.parse::<f64>().is_ok())
-    {
-        return Err(Error::scene(line, "these are no names of factors").help(help));
+    let is_none = |name: &String| name.is_empty() || name.parse::<f64>().is_ok();
+    if names.iter().all(|name| name == TIME) || names.iter().any(is_none) {
+        return Err(("these are no names of factors".to_owned(), help));
     }
     match (1..names.len()).find(|&column| names[..column].contains(&names[column])) {
-        Some(twice) => Err(Error::scene(line, format!("two columns are called `{}`", names[twice]))),
+        Some(twice) => Err((format!("two columns are called `{}`", names[twice]), help)),
         None => Ok(()),
     }
 }
 
 /// Return the step of one line of the table. `before` is the step of the line before it.
-fn step(names: &[String], record: &csv::StringRecord, line: &Place, before: Option<&LoadStep>) -> Result<LoadStep> {
+fn step(names: &[String], record: &csv::StringRecord, before: Option<&LoadStep>) -> Result<LoadStep, String> {
     if record.len() != names.len() {
-        let message = format!("a step has {} numbers here, not {}", names.len(), record.len());
-        return Err(Error::scene(line, message).label(format!("the columns are {}", names.join(", "))));
+        return Err(format!("a step has {} numbers here, not {}", names.len(), record.len()));
     }
     let mut step = LoadStep { time: before.map_or(1.0, |before| before.time + 1.0), factors: Vec::new() };
     for (name, word) in names.iter().zip(record) {
-        let Some(number) = word.parse().ok().filter(|number: &f64| number.is_finite()) else {
-            return Err(Error::scene(line, format!("`{name}` is `{word}`")).label("not a finite number"));
-        };
+        let number = word.parse().ok().filter(|number: &f64| number.is_finite());
+        let number = number.ok_or_else(|| format!("`{name}` is `{word}`, not a finite number"))?;
         if name == TIME { step.time = number } else { step.factors.push(number) }
     }
     match before.filter(|before| before.time >= step.time) {
-        Some(before) => {
-            let message = format!("the time {} comes after {}", step.time, before.time);
-            Err(Error::scene(line, message).label("must be later than the step before"))
-        }
+        Some(before) => Err(format!("the time {} comes after {}", step.time, before.time)),
         None => Ok(step),
     }
 }

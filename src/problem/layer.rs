@@ -1,20 +1,24 @@
-//! Laws of layers p(c), pressure p over compression c: their forms and parameters.
+//! Laws of layers p(c), pressure p over compression c, and their parameters.
 
-use crate::error::{Error, Result};
-use crate::expression::{Expression, Field, KnownNames};
-use crate::setting::{Context, Entries, Keys, Node, Setting, TableShape, ValueKind};
-use serde_json::{Value as Json, json};
+use super::geometry::Geometry;
+use super::read::{Check, Flaw, Refused, expression, only_one, place, positive};
+use crate::error::{Error, Kind, Located, shown};
+use crate::expression::{Expression, Field};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-/// The law of a Winkler layer.
-#[derive(Debug, Clone)]
+/// The law of a Winkler layer. Parameters are numbers or expressions in the coordinates.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(try_from = "LayerKeys", into = "LayerKeys")]
 pub enum LayerSpec {
-    /// A law of a known form, whose parameters are numbers or expressions in the coordinates.
-    Form {
-        /// The form.
-        form: &'static LawForm,
-        /// One value for each parameter of the form.
-        values: Vec<Field>,
-    },
+    /// p = (c/B)^(1/a), the layer of the paper.
+    Power(Power),
+    /// p = stiffness c.
+    Linear(Linear),
+    /// p = p0 (e^(c/c0) - 1).
+    Exponential(Exponential),
+    /// p = k1 c + k3 c^3.
+    Cubic(Cubic),
     /// A monotone cubic curve through points (c, p). Both columns increase from (0, 0), which is not among the points.
     Table(Vec<[f64; 2]>),
     /// The law of this name from a Rust program ([`Scene::law`](crate::scene::Scene::law)).
@@ -28,59 +32,87 @@ pub enum LayerSpec {
     },
 }
 
+/// The parameters of the power law.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Power {
+    /// compression at unit pressure, > 0
+    #[serde(rename = "B")]
+    pub b: Field,
+    /// exponent of the pressure, > 0 and at most 1
+    pub a: Field,
+}
+
+/// The parameter of the linear law.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Linear {
+    /// pressure per compression, > 0
+    pub stiffness: Field,
+}
+
+/// The parameters of the exponential law.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Exponential {
+    /// a pressure, > 0
+    pub p0: Field,
+    /// a length, > 0
+    pub c0: Field,
+}
+
+/// The parameters of the cubic law.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cubic {
+    /// stiffness at first touch, > 0
+    pub k1: Field,
+    /// coefficient of the cube, >= 0
+    pub k3: Field,
+}
+
 impl LayerSpec {
     /// Return p = (c/B)^(1/a) with B > 0 and a in (0, 1], the layer of the paper.
     pub fn power(b: impl Into<Field>, a: impl Into<Field>) -> Self {
-        Self::Form { form: &POWER, values: vec![b.into(), a.into()] }
+        Self::Power(Power { b: b.into(), a: a.into() })
     }
 
     /// Return p = `stiffness` c with a stiffness (stress per length) > 0.
     pub fn linear(stiffness: impl Into<Field>) -> Self {
-        Self::Form { form: &LINEAR, values: vec![stiffness.into()] }
+        Self::Linear(Linear { stiffness: stiffness.into() })
     }
 
     /// Return p = p0 (e^(c/c0) - 1) with a stress p0 > 0 and a length c0 > 0.
     pub fn exponential(p0: impl Into<Field>, c0: impl Into<Field>) -> Self {
-        Self::Form { form: &EXPONENTIAL, values: vec![p0.into(), c0.into()] }
+        Self::Exponential(Exponential { p0: p0.into(), c0: c0.into() })
     }
 
     /// Return p = k1 c + k3 c^3 with k1 > 0 and k3 >= 0.
     pub fn cubic(k1: impl Into<Field>, k3: impl Into<Field>) -> Self {
-        Self::Form { form: &CUBIC, values: vec![k1.into(), k3.into()] }
+        Self::Cubic(Cubic { k1: k1.into(), k3: k3.into() })
+    }
+
+    /// Return the name of the law and its parameters, for a law that has some.
+    pub fn parameters(&self) -> (&'static str, Vec<Parameter<'_>>) {
+        use Bounds::{NotNegative, Positive, UpToOne};
+        let (law, list) = match self {
+            Self::Power(law) => ("power", vec![("B", &law.b, Positive), ("a", &law.a, UpToOne)]),
+            Self::Linear(law) => ("linear", vec![("stiffness", &law.stiffness, Positive)]),
+            Self::Exponential(law) => ("exponential", vec![("p0", &law.p0, Positive), ("c0", &law.c0, Positive)]),
+            Self::Cubic(law) => ("cubic", vec![("k1", &law.k1, Positive), ("k3", &law.k3, NotNegative)]),
+            Self::Table(_) | Self::Own(_) | Self::Pressure { .. } => ("", Vec::new()),
+        };
+        (law, list.into_iter().map(|(key, value, bounds)| Parameter { key, value, bounds }).collect())
     }
 }
 
-/// The laws that have a form with a few parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LawKind {
-    /// p = stiffness c.
-    Linear,
-    /// p = (c/B)^(1/a).
-    Power,
-    /// p = p0 (e^(c/c0) - 1).
-    Exponential,
-    /// p = k1 c + k3 c^3.
-    Cubic,
-}
-
-/// A form of law: its name and its parameters. The decoder, the JSON schema and the checks of a scene are made of this table.
-#[derive(Debug, PartialEq, Eq)]
-pub struct LawForm {
-    /// The law.
-    pub kind: LawKind,
-    /// Key in the scene.
-    pub name: &'static str,
-    /// The parameters, in the order of the values of [`LayerSpec::Form`].
-    pub parameters: &'static [Parameter],
-}
-
 /// A parameter of a law.
-#[derive(Debug, PartialEq, Eq)]
-pub struct Parameter {
-    /// Key in the scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter<'a> {
+    /// Key in the scene, and name in messages.
     pub key: &'static str,
-    /// Name in messages.
-    pub what: &'static str,
+    /// The value.
+    pub value: &'a Field,
     /// The range of values that make a law.
     pub bounds: Bounds,
 }
@@ -108,124 +140,134 @@ impl Bounds {
     }
 }
 
-const fn parameter(key: &'static str, what: &'static str, bounds: Bounds) -> Parameter {
-    Parameter { key, what, bounds }
+/// The keys of a layer.
+#[derive(Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct LayerKeys {
+    /// write power = { B = ..., a = ... }
+    power: Option<Located<Power>>,
+    /// write linear = { stiffness = ... }
+    linear: Option<Located<Linear>>,
+    /// write exponential = { p0 = ..., c0 = ... }
+    exponential: Option<Located<Exponential>>,
+    /// write cubic = { k1 = ..., k3 = ... }
+    cubic: Option<Located<Cubic>>,
+    /// write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0
+    table: Option<Located<Vec<Located<Vec<f64>>>>>,
+    /// p as an expression in c and the coordinates: pressure = "1e5*c + 1e9*c^2"
+    pressure: Option<Located<String>>,
+    /// compression beyond which the expression goes on linearly
+    up_to: Option<Located<f64>>,
+    /// Name of a law of a Rust program, for the echo.
+    #[serde(skip_deserializing)]
+    own: Option<String>,
 }
 
-static POWER: LawForm = LawForm {
-    kind: LawKind::Power,
-    name: "power",
-    parameters: &[parameter("B", "B", Bounds::Positive), parameter("a", "a", Bounds::UpToOne)],
-};
-static LINEAR: LawForm = LawForm {
-    kind: LawKind::Linear,
-    name: "linear",
-    parameters: &[parameter("stiffness", "the stiffness", Bounds::Positive)],
-};
-static EXPONENTIAL: LawForm = LawForm {
-    kind: LawKind::Exponential,
-    name: "exponential",
-    parameters: &[parameter("p0", "p0", Bounds::Positive), parameter("c0", "c0", Bounds::Positive)],
-};
-static CUBIC: LawForm = LawForm {
-    kind: LawKind::Cubic,
-    name: "cubic",
-    parameters: &[parameter("k1", "k1", Bounds::Positive), parameter("k3", "k3", Bounds::NotNegative)],
-};
+impl TryFrom<LayerKeys> for LayerSpec {
+    type Error = Refused;
 
-/// All forms.
-pub static FORMS: [&LawForm; 4] = [&POWER, &LINEAR, &EXPONENTIAL, &CUBIC];
-
-/// Advice for a layer without a law.
-const EXAMPLE: &str = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
-/// What a table of points is, and the advice for wrong points.
-const POINTS: &str = "write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0";
-
-fn shape() -> TableShape {
-    use ValueKind::{Number, Text};
-    let laws: Vec<&str> = FORMS.iter().map(|form| form.name).chain(["table", "pressure"]).collect();
-    FORMS
-        .into_iter()
-        .fold(TableShape::new("the layer"), with_form)
-        .optional("table", Number.list().list(), POINTS)
-        .optional("pressure", Text, "p as an expression in c and the coordinates: pressure = \"1e5*c + 1e9*c^2\"")
-        .optional("up_to", Number, "compression beyond which the expression goes on linearly")
-        .at_most_one(&laws)
-}
-
-/// Add the key of a law with parameters.
-fn with_form(table: TableShape, form: &'static LawForm) -> TableShape {
-    let values: Vec<String> = form.parameters.iter().map(|known| format!("{} = ...", known.key)).collect();
-    let advice = format!("write {} = {{ {} }}", form.name, values.join(", "));
-    table.optional(form.name, form_shape(form), advice)
-}
-
-/// Return the shape of a law with parameters.
-fn form_shape(form: &'static LawForm) -> TableShape {
-    use ValueKind::Field;
-    let table = TableShape::new(format!("the {} layer", form.name));
-    form.parameters.iter().fold(table, |table, known| table.required(known.key, Field, known.what))
-}
-
-impl Setting for LayerSpec {
-    fn kind() -> ValueKind {
-        shape().into()
-    }
-
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        let keys = Keys::open(node, &shape())?;
-        if let (Some(entry), None) = (keys.entry("up_to"), keys.get("pressure")) {
-            return Err(Error::scene(&entry.key_place, "`up_to` without an expression")
-                .help("it says how far `pressure = \"...\"` goes; other laws need no end"));
+    fn try_from(keys: LayerKeys) -> Result<Self, Refused> {
+        let LayerKeys { power, linear, exponential, cubic, table, pressure, up_to, own: _ } = keys;
+        let given = [
+            ("power", place(&power)),
+            ("linear", place(&linear)),
+            ("exponential", place(&exponential)),
+            ("cubic", place(&cubic)),
+            ("table", place(&table)),
+            ("pressure", place(&pressure)),
+        ];
+        only_one("the layer", &given)?;
+        if let (Some(end), None) = (&up_to, &pressure) {
+            return Err(Error::scene(&end.place, "`up_to` without an expression")
+                .help("it says how far `pressure = \"...\"` goes; other laws need no end")
+                .into());
         }
-        if let Some(points) = keys.get("table") {
-            return table(points);
-        }
-        if let Some(law) = keys.get("pressure") {
-            let scope = KnownNames { variables: &["c", "x", "y", "z"][..=context.dimension], data: &context.data };
-            let law = Expression::parse(law.string()?, &law.place, scope)?;
-            return Ok(LayerSpec::Pressure { law, up_to: keys.read("up_to", Node::number)? });
-        }
-        match FORMS.into_iter().find_map(|form| Some((form, keys.get(form.name)?))) {
-            Some((form, node)) => read_form(form, node, context),
-            None => Err(keys.node.refuse("the layer has no law").help(EXAMPLE)),
-        }
-    }
-
-    fn echo(&self, dimension: usize) -> Json {
-        match self {
-            Self::Form { form, values } => {
-                let named = form.parameters.iter().zip(values);
-                let values = named.map(|(known, value)| (known.key.to_owned(), value.echo(dimension)));
-                json!({ form.name: values.collect::<Entries>() })
+        let law = match pressure {
+            Some(text) => {
+                let law = expression(&text, &text.place, &["c"])?;
+                Some(Self::Pressure { law, up_to: up_to.map(|end| end.value) })
             }
-            Self::Table(points) => json!({ "table": points }),
-            Self::Own(name) => json!({ "own": name }),
-            Self::Pressure { law, up_to: None } => json!({ "pressure": law.text() }),
-            Self::Pressure { law, up_to } => json!({ "pressure": law.text(), "up_to": up_to }),
-        }
+            None => table.map(|points| of_points(points.value)).transpose()?,
+        };
+        law.or(power.map(|law| Self::Power(law.value)))
+            .or(linear.map(|law| Self::Linear(law.value)))
+            .or(exponential.map(|law| Self::Exponential(law.value)))
+            .or(cubic.map(|law| Self::Cubic(law.value)))
+            .ok_or_else(|| {
+                let help = "give power = { B = 2.5e-5, a = 0.5 } or linear = { stiffness = 1e5 }";
+                Error::new(Kind::Scene, "the layer has no law").help(help).into()
+            })
     }
-}
-
-/// Return a law with the values of its parameters.
-fn read_form(form: &'static LawForm, node: &Node, context: &Context) -> Result<LayerSpec> {
-    let keys = Keys::open(node, &form_shape(form))?;
-    let value = |parameter: &Parameter| Field::read(keys.require(parameter.key)?, context);
-    let values = form.parameters.iter().map(value).collect::<Result<_>>()?;
-    Ok(LayerSpec::Form { form, values })
 }
 
 /// Return the law through points (c, p).
-fn table(node: &Node) -> Result<LayerSpec> {
+fn of_points(given: Vec<Located<Vec<f64>>>) -> Result<LayerSpec, Refused> {
     let mut points: Vec<[f64; 2]> = Vec::new();
-    for item in node.list()? {
-        let [c, p] = item.list().map_err(|error| error.help(POINTS))? else {
-            return Err(item.refuse("a point of the table is a compression and a pressure").help(POINTS));
+    for point in given {
+        let &[c, p] = &point.value[..] else {
+            return Err(Error::scene(&point.place, "a point of the table is a compression and a pressure")
+                .help("write table = [[1e-5, 2], [2e-5, 10]]: compressions and pressures, both increasing from 0")
+                .into());
         };
-        points.push([c.number()?, p.number()?]);
+        points.push([c, p]);
     }
     if points.first() == Some(&[0.0, 0.0]) {
         points.remove(0); // every law begins at the origin
     }
     Ok(LayerSpec::Table(points))
+}
+
+impl From<LayerSpec> for LayerKeys {
+    fn from(layer: LayerSpec) -> Self {
+        let none = Self::default();
+        match layer {
+            LayerSpec::Power(law) => Self { power: Some(law.into()), ..none },
+            LayerSpec::Linear(law) => Self { linear: Some(law.into()), ..none },
+            LayerSpec::Exponential(law) => Self { exponential: Some(law.into()), ..none },
+            LayerSpec::Cubic(law) => Self { cubic: Some(law.into()), ..none },
+            LayerSpec::Table(points) => {
+                let points: Vec<Located<Vec<f64>>> = points.into_iter().map(|point| point.to_vec().into()).collect();
+                Self { table: Some(points.into()), ..none }
+            }
+            LayerSpec::Own(name) => Self { own: Some(name), ..none },
+            LayerSpec::Pressure { law, up_to } => {
+                Self { pressure: Some(law.text().to_owned().into()), up_to: up_to.map(Located::from), ..none }
+            }
+        }
+    }
+}
+
+impl Check for LayerSpec {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        let (law, parameters) = self.parameters();
+        for Parameter { key, value, bounds } in parameters {
+            let Field::Constant(value) = *value else { continue };
+            let Some(breach) = bounds.breach(value) else { continue };
+            let steep = "p(c) = (c/B)^(1/a) with a > 1 is infinitely stiff at first touch, p'(0) = infinity";
+            let help = if breach == "must not exceed 1" { steep } else { "" };
+            return Err(Flaw::new(format!("{law}.{key}"), format!("{key} is {}", shown(value)), breach, help));
+        }
+        match self {
+            LayerSpec::Table(points) => check_table(points),
+            LayerSpec::Pressure { up_to: Some(end), .. } => positive("up_to", "the end of the law", *end),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Check that compressions and pressures (c, p) increase from (0, 0).
+fn check_table(points: &[[f64; 2]]) -> Result<(), Flaw> {
+    if points.is_empty() {
+        return Err(Flaw::new("table", "the table has no point", "", "write table = [[1e-5, 2], [2e-5, 10]]"));
+    }
+    for (before, point) in std::iter::once(&[0.0; 2]).chain(points).zip(points) {
+        for (k, what) in ["compression", "pressure"].into_iter().enumerate() {
+            if point[k] <= before[k] || !point[k].is_finite() {
+                let values = [point[k], before[k]].map(shown).join(" of the table does not exceed ");
+                let help = "a layer's law increases from p(0) = 0";
+                return Err(Flaw::new("table", format!("the {what} {values}"), "", help));
+            }
+        }
+    }
+    Ok(())
 }

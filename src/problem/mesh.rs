@@ -1,40 +1,60 @@
 //! Where meshes come from.
 
+use super::geometry::Geometry;
 use super::order::Order;
-use crate::error::{Located, Place};
-use crate::setting::keys;
+use super::read::{Check, Either, Flaw, Form, at_least_one, file, kept, only_one, place, place_of, positive};
+use crate::error::{Error, Kind, Located, Place, Result as Checked};
+use schemars::JsonSchema;
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::json;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::sync::Arc;
+use toml::Spanned;
 
-keys! {
-    /// Limits and settings of Gmsh for a script or a shape.
-    #[derive(Debug, Clone, Copy, PartialEq)]
-    pub struct Guard "the mesh" {
-        optional {
-            /// largest size of elements in a shape
-            pub size: Option<f64> = None,
-            /// threads of Gmsh for free meshes in space
-            ///
-            /// Gmsh then uses its parallel algorithm (HXT), and that of the script otherwise.
-            pub threads: Option<usize> = None,
-            /// seconds after which Gmsh is ended
-            ///
-            /// The default is ten times what Gmsh takes for a million tetrahedra.
-            pub seconds as "timeout": f64 = 1000.0,
-        }
-    }
+/// Limits and settings of Gmsh for a script or a shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guard {
+    /// Largest size of elements in a shape.
+    pub size: Option<f64>,
+    /// Threads of Gmsh for free meshes in space. Gmsh then uses its parallel algorithm (HXT), and that of the script otherwise.
+    pub threads: Option<usize>,
+    /// Seconds after which Gmsh is ended.
+    pub seconds: f64,
 }
 
 impl Default for Guard {
-    /// Return the settings of a scene that gives none.
+    /// Return the settings of a scene that gives none: ten times what Gmsh takes for a million tetrahedra.
     fn default() -> Self {
-        Self::with_defaults()
+        Self { size: None, threads: None, seconds: 1000.0 }
     }
 }
 
+/// The keys of `mesh`.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct MeshKeys {
+    /// a Gmsh script, or a shape (.step, .iges, .brep, .stl), relative to the scene's folder
+    geo: Option<Located<String>>,
+    /// a mesh: Gmsh's .msh, or a format that Gmsh converts
+    msh: Option<Located<String>>,
+    /// numbers for the script: set = { n = 32 }
+    #[schemars(with = "Option<BTreeMap<String, f64>>")]
+    set: Option<Located<BTreeMap<Spanned<String>, f64>>>,
+    /// largest size of elements in a shape
+    size: Option<Located<f64>>,
+    /// threads of Gmsh for free meshes in space
+    #[schemars(range(min = 1))]
+    threads: Option<Located<usize>>,
+    /// seconds after which Gmsh is ended; 1000
+    timeout: Option<Located<f64>>,
+}
+
 /// Where the mesh comes from. Paths are joined with the folder of the scene file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, JsonSchema)]
+#[schemars(with = "Either<String, MeshKeys>")]
 pub enum MeshSource {
     /// A Gmsh script with numbers set in it (`gmsh -setnumber NAME VALUE`), or a shape of another program.
     Geo {
@@ -76,6 +96,123 @@ impl MeshSource {
     pub fn file(file: impl AsRef<Path>) -> Self {
         let place = Place::here(&file.as_ref().display().to_string());
         Self::Msh { file: Located::new(file.as_ref().to_owned(), place) }
+    }
+}
+
+/// Kinds of file with the shape of bodies.
+const SHAPES: [&str; 6] = ["step", "stp", "iges", "igs", "brep", "stl"];
+
+/// Return whether a file has the shape of bodies, by its name.
+pub fn is_shape(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default();
+    SHAPES.iter().any(|kind| ending == *kind || ending == kind.to_ascii_uppercase().as_str())
+}
+
+impl MeshKeys {
+    /// Return the keys that the name of a file stands for.
+    fn of_name(name: Located<String>) -> Self {
+        let path = Path::new(&name.value);
+        match is_shape(path) || path.extension().is_some_and(|ending| ending == "geo") {
+            true => Self { geo: Some(name), ..Self::default() },
+            false => Self { msh: Some(name), ..Self::default() },
+        }
+    }
+
+    /// Return the mesh. Its file must exist; it is not read.
+    fn source(self) -> Checked<MeshSource> {
+        only_one("the mesh", &[("geo", place(&self.geo)), ("msh", place(&self.msh))])?;
+        let of_gmsh = [
+            ("set", place(&self.set)),
+            ("size", place(&self.size)),
+            ("threads", place(&self.threads)),
+            ("timeout", place(&self.timeout)),
+        ];
+        if let Some(name) = self.msh {
+            let file = file(name)?;
+            if is_shape(&file) {
+                return Err(Error::scene(&file.place, "this is the shape of bodies, and no mesh")
+                    .help("mesh = { geo = \"...\", size = 0.1 }"));
+            }
+            return match of_gmsh.into_iter().find_map(|(key, place)| Some((key, place?))) {
+                None => Ok(MeshSource::Msh { file }),
+                Some((key, place)) => Err(Error::scene(place, format!("`{key}` for a finished mesh"))
+                    .help("it is for Gmsh, which makes meshes from scripts: mesh = { geo = \"...\" }")),
+            };
+        }
+        let Some(name) = self.geo else {
+            return Err(Error::new(Kind::Scene, "the mesh has no `geo`")
+                .label("`geo` is missing")
+                .help("write the name of a file, or mesh = { geo = \"a.geo\", set = { n = 32 } }"));
+        };
+        let file = file(name)?;
+        if let (Some(size), false) = (&self.size, is_shape(&file)) {
+            return Err(Error::scene(&size.place, "`size` for a script, which has sizes of its own")
+                .help("it is for shapes (.step, .iges, .brep, .stl): give scripts numbers by set = { n = 32 }"));
+        }
+        let numbers = self.set.map(|set| set.value).unwrap_or_default();
+        let (mut set, mut places) = (Vec::new(), Vec::new());
+        for (name, number) in numbers {
+            let place = place_of(name.span());
+            check_number(name.get_ref(), number, &place)?;
+            set.push((name.into_inner(), number));
+            places.push(place);
+        }
+        let [size, seconds] = [self.size, self.timeout].map(|number| number.map(|number| number.value));
+        let guard = Guard {
+            size,
+            threads: self.threads.map(|threads| threads.value),
+            seconds: seconds.unwrap_or(Guard::default().seconds),
+        };
+        Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
+    }
+}
+
+/// Refuse what cannot be a number of Gmsh, or its name.
+fn check_number(name: &str, number: f64, place: &Place) -> Checked<()> {
+    if !number.is_finite() {
+        return Err(Error::scene(place, format!("`{name}` is not a finite number")));
+    }
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    match name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) && !name.is_empty() {
+        true => Ok(()),
+        false => Err(Error::scene(place, format!("`{name}` is no name of a Gmsh number"))),
+    }
+}
+
+impl Check for MeshSource {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        let Self::Geo { guard, .. } = self else { return Ok(()) };
+        positive("timeout", "the timeout", guard.seconds)?;
+        guard.threads.map_or(Ok(()), |threads| at_least_one("threads", threads))?;
+        guard.size.map_or(Ok(()), |size| positive("size", "the size", size))
+    }
+}
+
+/// The name of a file, or a table.
+impl<'de> Deserialize<'de> for MeshSource {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Located { value, place } = Located::<Form<IgnoredAny, MeshKeys>>::deserialize(deserializer)?;
+        let keys = match value {
+            Form::Text(name) => MeshKeys::of_name(Located::new(name, place)),
+            Form::Table(keys) => keys,
+            other => return Err(other.unexpected()),
+        };
+        keys.source().map_err(kept)
+    }
+}
+
+impl Serialize for MeshSource {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let echo = match self {
+            Self::Arrays(arrays) => json!({ "points": arrays.points.len(), "groups": arrays.groups.len() }),
+            Self::Msh { file } => json!({ "msh": file.display().to_string() }),
+            Self::Geo { file, set, guard: Guard { size, threads, seconds }, .. } => {
+                let set: BTreeMap<_, _> = set.iter().cloned().collect();
+                let geo = file.display().to_string();
+                json!({ "geo": geo, "set": set, "size": size, "threads": threads, "timeout": seconds })
+            }
+        };
+        echo.serialize(serializer)
     }
 }
 

@@ -1,43 +1,44 @@
 //! The outer iteration, its rules, and inner solvers by name.
 
+use super::geometry::Geometry;
 use super::history::History;
-use super::name_of;
-use crate::error::Result;
+use super::read::{Check, Either, Flaw, Form, at_least_one, checked, condition, kept, of_word, positive, word};
+use crate::error::{Error, Located};
 use crate::expression::Field;
-use crate::setting::{Context, Keys, Node, Setting, TableShape, Value, ValueKind, choose, keys, word, words};
-use serde::{Deserialize, Serialize};
-use serde_json::{Value as Json, json};
+use schemars::JsonSchema;
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
-keys! {
-    /// The outer iteration.
-    #[derive(Debug, Clone)]
-    pub struct MethodSpec "[method]" {
-        optional {
-            /// the method
-            ///
-            /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given, and
-            /// [`MethodName::Auto`] otherwise.
-            pub name: MethodName = MethodName::Auto,
-            /// Robin zone: "none", "full", "active" or a condition
-            pub psi: Zone = Zone::Active,
-            /// relaxation of `robin`: a number, a list, a rule
-            pub gamma: Gamma = Gamma::Stationary(0.6),
-            /// Robin coefficient on the zone, "tangent" if the method is `robin`
-            pub robin: RobinRule = RobinRule::Auto,
-            /// whether `robin` finds the interval of gamma at the end
-            ///
-            /// It is the interval (33).
-            pub interval: bool = false,
-            /// how linear steps are solved; chosen by the program without it
-            pub linear: Option<Linear> = None,
-            /// start of the iteration: "auto", "zero" or { normal = 1e-4 }
-            pub start: Start = Start::Auto,
-            /// load steps: a number, shares that end with 1, or a table
-            pub steps: History = History::default(),
-            /// when to stop: stop = { residual = 1e-8 }
-            pub stop: StopRule = StopRule::default(),
-        }
-    }
+/// The outer iteration.
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MethodSpec {
+    /// the method
+    ///
+    /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given ([`complete`]).
+    pub name: MethodName,
+    /// Robin zone: "none", "full", "active" or a condition
+    pub psi: Zone,
+    /// relaxation of `robin`: a number, a list, a rule
+    pub gamma: Gamma,
+    /// Robin coefficient on the zone, "tangent" if the method is `robin`
+    pub robin: RobinRule,
+    /// whether `robin` finds the interval of gamma at the end
+    ///
+    /// It is the interval (33).
+    pub interval: bool,
+    /// how linear steps are solved; chosen by the program without it
+    pub linear: Option<Linear>,
+    /// start of the iteration: "auto", "zero" or { normal = 1e-4 }
+    pub start: Start,
+    /// load steps: a number, shares that end with 1, or a table
+    #[serde(deserialize_with = "checked")]
+    pub steps: History,
+    /// when to stop: stop = { residual = 1e-8 }
+    #[serde(deserialize_with = "checked")]
+    pub stop: StopRule,
 }
 
 impl MethodSpec {
@@ -48,43 +49,109 @@ impl MethodSpec {
     }
 }
 
-impl Default for MethodSpec {
-    fn default() -> Self {
-        Self::with_defaults()
+/// Write those defaults of `[method]` into its table that depend on other keys: the method and coefficient of the paper where its keys are used, and the
+/// tolerance of the residual.
+pub fn complete(method: &mut Spanned<DeValue<'_>>) {
+    // what is written here has no place in the text
+    let span = method.span().end..method.span().end;
+    let DeValue::Table(method) = method.get_mut() else { return };
+    let mut by_increment = false;
+    if let Some(DeValue::Table(stop)) = method.get_mut("stop").map(Spanned::get_mut) {
+        by_increment = stop.contains_key("increment");
+        if !by_increment && !stop.contains_key("residual") {
+            let residual = DeValue::parse(TOLERANCE).map_or(DeValue::Boolean(false), Spanned::into_inner);
+            stop.insert(Spanned::new(span.clone(), "residual".into()), Spanned::new(span.clone(), residual));
+        }
+    }
+    let put = |method: &mut DeTable<'_>, key: &'static str, word: &'static str| {
+        method.insert(Spanned::new(span.clone(), key.into()), Spanned::new(span.clone(), DeValue::String(word.into())));
+    };
+    let is_paper = by_increment || ["psi", "gamma", "robin"].iter().any(|key| method.contains_key(*key));
+    if is_paper && !method.contains_key("name") {
+        put(method, "name", "robin");
+    }
+    let is_robin = matches!(method.get("name").map(Spanned::get_ref), Some(DeValue::String(name)) if name == "robin");
+    if is_robin && !method.contains_key("robin") {
+        put(method, "robin", "tangent");
     }
 }
 
-words! {
-    /// The methods.
-    pub enum MethodName "method" {
-        /// Newton's method, with the kind of linear step that suits the bodies, the memory and the number of ranks.
-        Auto = "auto",
-        /// The paper's iteration (41)-(42).
-        Robin = "robin",
-        /// Newton's method with linear steps by conjugate gradients over the sweep.
-        NewtonRobin = "newton-robin",
-        /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
-        Newton = "newton",
+impl Check for MethodSpec {
+    /// Check all but steps and stop rule, which are checked by themselves.
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        match &self.gamma {
+            Gamma::Stationary(gamma) => positive("gamma", "gamma", *gamma)?,
+            Gamma::Schedule(list) if list.is_empty() => {
+                let help = "write a number, a list of numbers, or the name of a rule";
+                return Err(Flaw::new("gamma", "gamma has no value", "", help));
+            }
+            Gamma::Schedule(list) => {
+                let one = |(k, gamma): (usize, &f64)| positive(&format!("gamma.{k}"), "gamma", *gamma);
+                list.iter().enumerate().try_for_each(one)?;
+            }
+            Gamma::LineSearch | Gamma::Aitken | Gamma::Own(_) => {}
+        }
+        if let RobinRule::Floor(floor) = self.robin {
+            positive("robin.floor", "the floor", floor)?;
+        }
+        if self.linear.is_some() && !matches!(self.name, MethodName::Auto | MethodName::Newton) {
+            let help = "name = \"newton\", or leave `linear` away";
+            return Err(Flaw::new("linear", "only Newton's method has linear steps of all bodies", "", help));
+        }
+        if self.interval && self.name != MethodName::Robin {
+            let help = "name = \"robin\", or leave `interval` away";
+            return Err(Flaw::new("interval", "only the method `robin` has an interval of gamma", "", help));
+        }
+        Ok(())
     }
 }
 
-words! {
-    /// The ways to solve the linear steps of Newton's method.
-    #[derive(Serialize, Deserialize)]
-    pub enum Linear "way to solve linear steps" {
-        /// One dense matrix of condensed bodies.
-        Dense = "dense",
-        /// One sparse factorisation of all bodies.
-        Direct = "direct",
-        /// Conjugate gradients with multigrid of all bodies.
-        Multigrid = "multigrid",
-        /// Conjugate gradients over the Robin sweep (one solve in every body).
-        Sweeps = "sweeps",
+/// The methods.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MethodName {
+    /// Newton's method, with the kind of linear step that suits the bodies, the memory and the number of ranks.
+    #[default]
+    Auto,
+    /// The paper's iteration (41)-(42).
+    Robin,
+    /// Newton's method with linear steps by conjugate gradients over the sweep.
+    NewtonRobin,
+    /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
+    Newton,
+}
+
+impl MethodName {
+    /// Return the name in the scene.
+    pub fn name(self) -> String {
+        word(&self)
+    }
+}
+
+/// The ways to solve the linear steps of Newton's method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Linear {
+    /// One dense matrix of condensed bodies.
+    Dense,
+    /// One sparse factorisation of all bodies.
+    Direct,
+    /// Conjugate gradients with multigrid of all bodies.
+    Multigrid,
+    /// Conjugate gradients over the Robin sweep (one solve in every body).
+    Sweeps,
+}
+
+impl Linear {
+    /// Return the name in the scene.
+    pub fn name(self) -> String {
+        word(&self)
     }
 }
 
 /// The relaxation gamma^k of iteration k.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, JsonSchema)]
+#[schemars(with = "Either<f64, Either<Vec<f64>, Rule>>")]
 pub enum Gamma {
     /// The same number > 0 in every iteration.
     Stationary(f64),
@@ -98,87 +165,89 @@ pub enum Gamma {
     Own(String),
 }
 
-impl Gamma {
-    /// All rules of the program with their names in the scene.
-    pub const NAMED: [(&'static str, Gamma); 2] = [("line-search", Gamma::LineSearch), ("aitken", Gamma::Aitken)];
+impl Default for Gamma {
+    fn default() -> Self {
+        Self::Stationary(0.6)
+    }
 }
 
 /// The start of the iteration, given on the contact surfaces.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum Start {
     /// The solution with rigid bodies, each layer in series with a spring that stands for the surfaces of the two bodies.
+    #[default]
     Auto,
     /// Zero normal displacement.
     Zero,
     /// Outer normal displacement on every contact surface.
-    Normal(Field),
+    Normal(
+        /// outer normal displacement on every contact surface
+        Field,
+    ),
 }
 
 /// The rule for the Robin coefficient kappa on the zone. p is the law of the layer and c^k the compression at iterate k.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
 pub enum RobinRule {
     /// kappa = p'(c^k), as in the paper.
     Tangent,
     /// The coefficient of the start in every iteration, made safe as in `Auto`. It needs one factorisation in a run. Theorem 3 allows it.
     Frozen,
     /// kappa = max(p'(c^k), F) everywhere on the contact surfaces; F > 0 is this number.
-    Floor(f64),
+    Floor(
+        /// least coefficient everywhere on the contact
+        f64,
+    ),
     /// The tangent on the zone, and more for a body that the tangent does not constrain safely.
+    #[default]
     Auto,
 }
 
 /// The Robin zone: psi of (38), a characteristic function of a part of the contact surfaces. c is the compression of the layer.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default, JsonSchema)]
+#[schemars(with = "String")]
 pub enum Zone {
     /// psi = 0: Neumann-Neumann.
     None,
     /// psi = 1: full Robin.
     Full,
     /// psi = chi = \[c > 0\], equation (36).
+    #[default]
     Active,
     /// psi = 1 where the expression in x, y, z and the iteration k = 0, 1, ... is > 0 (true is 1).
     Subset(Field),
 }
 
-keys! {
-    /// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct StopRule "the stop rule" {
-        optional {
-            /// relative residual, or error of Newton's method
-            ///
-            /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md). In a
-            /// scene file there is no default if `increment` is given.
-            pub residual: Option<f64> = Some(1e-8),
-            /// the paper's rule on the increment
-            ///
-            /// Tolerance of the relative increment of normal displacements, in every body.
-            pub increment: Option<f64> = None,
-            /// most iterations
-            pub iterations: usize = 2000,
-        }
-    }
+/// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StopRule {
+    /// relative residual, or error of Newton's method; 1e-8 if `increment` is not given
+    ///
+    /// Tolerance of the relative residual of sweeps, or of the largest relative error of Newton's method (docs/theory.md).
+    pub residual: Option<f64>,
+    /// the paper's rule on the increment
+    ///
+    /// Tolerance of the relative increment of normal displacements, in every body.
+    pub increment: Option<f64>,
+    /// most iterations
+    #[serde(default = "iterations")]
+    #[schemars(range(min = 1))]
+    pub iterations: usize,
+}
+
+/// Tolerance of the residual without a rule.
+const TOLERANCE: &str = "1e-8";
+
+fn iterations() -> usize {
+    2000
 }
 
 impl Default for StopRule {
     fn default() -> Self {
-        Self::with_defaults()
-    }
-}
-
-impl Setting for StopRule {
-    fn kind() -> ValueKind {
-        Self::shape().into()
-    }
-
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        let stop = Self::decode(&Keys::open(node, &Self::shape())?, context)?;
-        let by_increment = stop.increment.is_some() && !node.has_key("residual");
-        Ok(Self { residual: stop.residual.filter(|_| !by_increment), ..stop })
-    }
-
-    fn echo(&self, dimension: usize) -> Json {
-        self.entries(dimension).into()
+        Self { residual: TOLERANCE.parse().ok(), increment: None, iterations: iterations() }
     }
 }
 
@@ -196,122 +265,111 @@ impl StopRule {
     }
 }
 
-/// The inner solver that the scene requests. PETSc options override it.
-#[derive(Debug, Clone, Default, PartialEq)]
+impl Check for StopRule {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        at_least_one("iterations", self.iterations)?;
+        if self.residual.or(self.increment).is_none() {
+            return Err(Flaw::new("", "a stop rule has a tolerance", "", "stop = { residual = 1e-8 }"));
+        }
+        for (key, tolerance) in [("residual", self.residual), ("increment", self.increment)] {
+            tolerance.map_or(Ok(()), |tolerance| positive(key, "the tolerance", tolerance))?;
+        }
+        Ok(())
+    }
+}
+
+/// The inner solver that the scene requests, a word or a table. PETSc options override it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, JsonSchema)]
+#[schemars(with = "Either<Preset, SolverKeys>")]
 pub struct SolverSpec {
     /// The preset; the program chooses if `None`.
     pub preset: Option<Preset>,
 }
 
-words! {
-    /// The presets of inner solvers.
-    #[derive(Serialize, Deserialize)]
-    pub enum Preset "solver" {
-        /// Sparse Cholesky factorisation by MUMPS.
-        Mumps = "mumps",
-        /// Interior dofs eliminated once by MUMPS, and a dense system on the contact in each sweep.
-        Condensed = "condensed",
-        /// Conjugate gradients preconditioned by hypre's BoomerAMG.
-        Hypre = "hypre",
-        /// Conjugate gradients preconditioned by PETSc's GAMG.
-        Gamg = "gamg",
-        /// Conjugate gradients preconditioned by an incomplete Cholesky factorisation.
-        Icc = "icc",
+/// The keys of `[solver]`.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SolverKeys {
+    /// the inner solver of all bodies
+    preset: Option<Preset>,
+}
+
+/// The presets of inner solvers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Sparse Cholesky factorisation by MUMPS.
+    Mumps,
+    /// Interior dofs eliminated once by MUMPS, and a dense system on the contact in each sweep.
+    Condensed,
+    /// Conjugate gradients preconditioned by hypre's BoomerAMG.
+    Hypre,
+    /// Conjugate gradients preconditioned by PETSc's GAMG.
+    Gamg,
+    /// Conjugate gradients preconditioned by an incomplete Cholesky factorisation.
+    Icc,
+}
+
+impl Preset {
+    /// All presets.
+    pub const ALL: [Self; 5] = [Self::Mumps, Self::Condensed, Self::Hypre, Self::Gamg, Self::Icc];
+
+    /// Return the name in the scene.
+    pub fn name(self) -> String {
+        word(&self)
     }
 }
 
-/// A table without a name, but with `psi`, `gamma`, `robin` or `stop.increment`, is the method `robin`.
-impl Setting for MethodSpec {
-    fn kind() -> ValueKind {
-        Self::shape().into()
-    }
-
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        let mut method = Self::decode(&Keys::open(node, &Self::shape())?, context)?;
-        let is_paper_rule = method.stop.increment.is_some();
-        if !node.has_key("name") && (is_paper_rule || ["psi", "gamma", "robin"].iter().any(|key| node.has_key(key))) {
-            method.name = MethodName::Robin;
+impl<'de> Deserialize<'de> for SolverSpec {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match Form::<IgnoredAny, SolverKeys>::deserialize(deserializer)? {
+            Form::Text(word) => of_word(&word).map(|preset| Self { preset: Some(preset) }),
+            Form::Table(SolverKeys { preset }) => Ok(Self { preset }),
+            other => Err(other.unexpected()),
         }
-        if !node.has_key("robin") {
-            method.robin = Self::new(method.name).robin;
-        }
-        Ok(method)
-    }
-
-    /// Leave out keys of other methods, which change nothing.
-    fn echo(&self, dimension: usize) -> Json {
-        let mut entries = self.entries(dimension);
-        let is_robin = self.name == MethodName::Robin;
-        entries.retain(|key, _| match key.as_str() {
-            "gamma" => is_robin,
-            "interval" => is_robin && self.interval,
-            _ => true,
-        });
-        entries.into()
     }
 }
 
-impl Setting for Gamma {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Number, ValueKind::Number.list(), word(&Self::NAMED)])
-    }
+/// The rules for gamma by name.
+#[derive(Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+enum Rule {
+    LineSearch,
+    Aitken,
+}
 
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        match &node.value {
-            Value::String(_) => choose(node, "rule for gamma", &Self::NAMED),
-            Value::List(items) => items.iter().map(Node::number).collect::<Result<_>>().map(Self::Schedule),
-            _ => node.number().map(Self::Stationary),
+impl<'de> Deserialize<'de> for Gamma {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match Form::<f64>::deserialize(deserializer)? {
+            Form::Integer(gamma) => Ok(Self::Stationary(gamma as f64)),
+            Form::Number(gamma) => Ok(Self::Stationary(gamma)),
+            Form::List(list) => Ok(Self::Schedule(list)),
+            Form::Text(rule) => of_word(&rule).map(|rule| match rule {
+                Rule::LineSearch => Self::LineSearch,
+                Rule::Aitken => Self::Aitken,
+            }),
+            other => Err(other.unexpected()),
         }
     }
+}
 
-    fn echo(&self, _: usize) -> Json {
+impl Serialize for Gamma {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Stationary(gamma) => json!(gamma),
-            Self::Schedule(list) => json!(list),
-            Self::Own(name) => json!({ "own": name }),
-            rule => json!(name_of(&Self::NAMED, rule)),
+            Self::Stationary(gamma) => gamma.serialize(serializer),
+            Self::Schedule(list) => list.serialize(serializer),
+            Self::LineSearch => Rule::LineSearch.serialize(serializer),
+            Self::Aitken => Rule::Aitken.serialize(serializer),
+            Self::Own(name) => serializer.collect_map([("own", name)]),
         }
     }
 }
 
-/// Rules for the Robin coefficient by name.
-const COEFFICIENTS: [(&str, RobinRule); 3] =
-    [("tangent", RobinRule::Tangent), ("frozen", RobinRule::Frozen), ("auto", RobinRule::Auto)];
-
-impl Setting for RobinRule {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![word(&COEFFICIENTS), floor_shape().into()])
-    }
-
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        if let Value::String(_) = node.value {
-            return choose(node, "Robin coefficient", &COEFFICIENTS);
-        }
-        Keys::open(node, &floor_shape())?.require("floor")?.number().map(Self::Floor)
-    }
-
-    fn echo(&self, _: usize) -> Json {
-        match self {
-            Self::Floor(floor) => json!({ "floor": floor }),
-            rule => json!(name_of(&COEFFICIENTS, rule)),
-        }
-    }
-}
-
-fn floor_shape() -> TableShape {
-    let about = "least coefficient everywhere on the contact";
-    TableShape::new("the Robin coefficient").required("floor", ValueKind::Number, about)
-}
-
-/// The echo is a text, as the key takes no number.
-impl Setting for Zone {
-    fn kind() -> ValueKind {
-        ValueKind::Text
-    }
-
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        let text = node.string()?;
-        match text {
+/// A word, or a condition as a text.
+impl<'de> Deserialize<'de> for Zone {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Located { value: text, place } = Located::<String>::deserialize(deserializer)?;
+        match text.as_str() {
             "none" => return Ok(Self::None),
             "full" => return Ok(Self::Full),
             "active" => return Ok(Self::Active),
@@ -320,47 +378,21 @@ impl Setting for Zone {
         // a single word of more than two letters is a slip of one of the three, not of a variable
         if text.len() > 2 && text.chars().all(char::is_alphabetic) {
             let otherwise = || "psi is none, full, active, or a condition such as \"x > 1 && k < 5\"".to_owned();
-            let error = node.refuse(format!("unknown zone `{text}`"));
-            return Err(error.suggest(text, ["none", "full", "active"], otherwise));
+            let error = Error::scene(&place, format!("unknown zone `{text}`"));
+            return Err(kept(error.suggest(&text, ["none", "full", "active"], otherwise)));
         }
-        Field::parse(text, &node.place, context.dimension, true, &context.data).map(Self::Subset)
-    }
-
-    fn echo(&self, _: usize) -> Json {
-        match self {
-            Self::None => json!("none"),
-            Self::Full => json!("full"),
-            Self::Active => json!("active"),
-            Self::Subset(condition) => json!(condition.text()),
-        }
+        condition(&text, &place, true).map(Self::Subset).map_err(kept)
     }
 }
 
-impl Setting for Start {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Word(vec!["auto", "zero"]), start_shape().into()])
-    }
-
-    fn read(node: &Node, context: &Context) -> Result<Self> {
-        if let Value::String(_) = node.value {
-            let all = "it is \"auto\", \"zero\" or { normal = 1e-4 }";
-            let starts = [("auto", Self::Auto), ("zero", Self::Zero)];
-            return choose(node, "start", &starts).map_err(|error| error.help(all));
-        }
-        let keys = Keys::open(node, &start_shape())?;
-        Field::read(keys.require("normal")?, context).map(Self::Normal)
-    }
-
-    fn echo(&self, dimension: usize) -> Json {
+impl Serialize for Zone {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
-            Self::Auto => json!("auto"),
-            Self::Zero => json!("zero"),
-            Self::Normal(normal) => json!({ "normal": normal.echo(dimension) }),
+            Self::None => serializer.serialize_str("none"),
+            Self::Full => serializer.serialize_str("full"),
+            Self::Active => serializer.serialize_str("active"),
+            // a text, as the key takes no number
+            Self::Subset(condition) => serializer.serialize_str(&condition.text()),
         }
     }
-}
-
-fn start_shape() -> TableShape {
-    let about = "outer normal displacement on every contact surface";
-    TableShape::new("the start").required("normal", ValueKind::Field, about)
 }

@@ -1,25 +1,35 @@
-//! What is to be solved, and how, as plain data: bodies, contacts, layers, and methods and solvers by name. Each file declares the keys of its
-//! structs; values with several forms and tables whose keys exclude each other are read and echoed there, too.
+//! What is to be solved, and how, as plain data: bodies, contacts, layers, and methods and solvers by name.
+//!
+//! A key of the scene is a field: its type, its default, and its doc comment, whose first paragraph is shown in refusals and in the JSON schema.
+//! serde reads and writes the structs, schemars describes them. Tables whose keys exclude each other have a struct of keys (`...Keys`) and become an enum.
+//! Values that are impossible or contradict each other are refused beside their struct ([`Check`](read::Check)), for scenes from files
+//! and from Rust alike.
 //!
 //! Names of groups keep the place where they were written ([`Located`](crate::error::Located)): the mesh is read later, and a refusal of
 //! a group that it does not have points there.
 
 pub mod body;
 pub mod contact;
+pub mod data;
 pub mod elasticity;
+pub mod geometry;
 pub mod history;
 pub mod layer;
+pub mod load;
 pub mod mesh;
 pub mod method;
 pub mod order;
 pub mod pattern;
+pub mod read;
 pub mod units;
 
-pub use body::{BodySpec, Load, LoadKind, SpringKind, SpringSpec, Support};
-pub use contact::{AutoContact, ContactSpec, Overlap};
-pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Plane, RegionSpec};
+pub use body::BodySpec;
+pub use contact::{ContactSpec, Overlap};
+pub use elasticity::{AxesSpec, Constants, ElasticitySpec, Orthotropic, RegionSpec};
+pub use geometry::Plane;
 pub use history::{History, LoadStep};
-pub use layer::{LawKind, LayerSpec};
+pub use layer::LayerSpec;
+pub use load::{Load, LoadKind, SpringKind, SpringSpec, Support};
 pub use mesh::{GroupArrays, Guard, MeshArrays, MeshSource};
 pub use method::{Gamma, Linear, MethodName, MethodSpec, Preset, RobinRule, SolverSpec, Start, StopRule, Zone};
 pub use order::Order;
@@ -29,11 +39,6 @@ use crate::error::{Error, Kind, Result};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::rc::Rc;
-
-/// Return the name of a choice in a list of choices; empty if the list does not have it.
-pub fn name_of<T: PartialEq>(choices: &[(&'static str, T)], choice: &T) -> &'static str {
-    choices.iter().find(|(_, known)| known == choice).map_or("", |(name, _)| name)
-}
 
 /// The laws or rules of a Rust program, by name.
 pub struct Own<T: ?Sized>(BTreeMap<String, Rc<T>>);

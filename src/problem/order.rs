@@ -1,14 +1,15 @@
 //! The order of finite elements.
 
-use crate::error::Result;
-use crate::setting::{Context, Node, Setting, ValueKind};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value as Json;
 
-/// The polynomial order of the displacements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// The polynomial order of the displacements. In a scene it is a number.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[schemars(with = "usize", extend("enum" = [1, 2]))]
+#[serde(try_from = "usize", into = "usize")]
 pub enum Order {
     /// Linear simplices.
+    #[default]
     P1,
     /// Quadratic simplices.
     P2,
@@ -24,16 +25,20 @@ impl Order {
     }
 }
 
-impl Setting for Order {
-    fn kind() -> ValueKind {
-        ValueKind::OneOf(&[1, 2])
-    }
+impl TryFrom<usize> for Order {
+    type Error = &'static str;
 
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        Ok(if node.count()? == 2 { Order::P2 } else { Order::P1 })
+    fn try_from(degree: usize) -> Result<Self, Self::Error> {
+        match degree {
+            1 => Ok(Order::P1),
+            2 => Ok(Order::P2),
+            _ => Err("must be 1 or 2"),
+        }
     }
+}
 
-    fn echo(&self, _: usize) -> Json {
-        self.degree().into()
+impl From<Order> for usize {
+    fn from(order: Order) -> Self {
+        order.degree()
     }
 }

@@ -1,7 +1,6 @@
 //! Names of bodies and groups, and patterns that stand for many names, as in shells.
 
-use crate::error::{Located, Result as Checked};
-use crate::setting::{Context, Node};
+use crate::error::{Error, Located, Result as Checked};
 use glob::Pattern as Glob;
 
 /// The text that stands for the name of the body in the names of its groups.
@@ -20,18 +19,18 @@ pub struct Pattern<'a> {
     glob: Option<Glob>,
 }
 
-/// Read the name of a group, or a pattern of names.
+/// Check the name of a group, or a pattern of names.
 ///
 /// # Errors
 /// An empty text, and a pattern that is none.
-pub(crate) fn pattern(node: &Node, _: &Context) -> Checked<Located<String>> {
-    let name = node.name()?;
-    match Pattern::new(&name.value) {
-        Ok(_) => Ok(name),
-        Err(flaw) => Err(node
-            .refuse(format!("`{}` is no pattern: {flaw}", name.value))
-            .help("`*` is any text, `?` one character, `[0-9]` one of some")),
+pub fn check(name: &Located<String>) -> Checked<()> {
+    if name.is_empty() {
+        return Err(Error::scene(&name.place, "the name is empty"));
     }
+    Pattern::new(name).map(drop).map_err(|flaw| {
+        Error::scene(&name.place, format!("`{}` is no pattern: {flaw}", name.value))
+            .help("`*` is any text, `?` one character, `[0-9]` one of some")
+    })
 }
 
 impl<'a> Pattern<'a> {

@@ -4,7 +4,9 @@ mod surface;
 
 pub use surface::Surface;
 
-use crate::output::{BodyReport, ForceReport, PairReport, Plot, Report, UNSETTLED, trimmed};
+use crate::output::{
+    BodyReport, ForceReport, ObstacleReport, PairReport, Plot, Report, RoundReport, UNSETTLED, trimmed,
+};
 use crate::problem::{Units, label};
 use serde_json::Value;
 
@@ -125,6 +127,7 @@ impl Page<'_> {
             pressures = format_args!("<div class=\"figures\">{figures}</div>"),
             contacts = self.contact_table(),
             steps = approach.map_or(String::new(), |figure| format!("<h2>Load steps</h2>{figure}")),
+            meshes = self.mesh_table(),
             convergence = convergence.unwrap_or_else(|| "<p>No iterations.</p>".to_owned()),
             scene = scene(&report.settings),
             bodies = self.body_table(),
@@ -182,11 +185,11 @@ impl Page<'_> {
     /// Return the choice of fields of the view.
     fn fields(&self) -> String {
         let mut options = vec![
-            ("stress", self.label("von Mises stress", |units| units.stress)),
-            ("travel", self.label("displacement", |units| units.length)),
+            ("stress", self.label("von Mises stress", |units| &units.stress)),
+            ("travel", self.label("displacement", |units| &units.length)),
         ];
         if !self.contacts.is_empty() {
-            options.push(("pressure", self.label("contact pressure", |units| units.stress)));
+            options.push(("pressure", self.label("contact pressure", |units| &units.stress)));
         }
         options.iter().map(|(value, text)| format!("<option value=\"{value}\">{}</option>", escape(text))).collect()
     }
@@ -201,13 +204,22 @@ impl Page<'_> {
             "layer".to_owned(),
             "#points".to_owned(),
             self.label("force on the first", |units| &units.force),
-            self.label("#peak pressure", |units| units.stress),
-            self.label("at", |units| units.length),
+            self.label("#peak pressure", |units| &units.stress),
+            self.label("at", |units| &units.length),
             label(if is_area { "#area in contact" } else { "#length in contact" }, unit.as_deref()),
             label("#open", unit.as_deref()),
         ];
+        let moves = pairs.iter().any(|pair| pair.obstacle.is_some() || pair.offset.is_some());
+        let columns: Vec<String> = columns.into_iter().chain(moves.then(|| "obstacle or offset".to_owned())).collect();
         let row = |pair: &PairReport| {
-            vec![
+            let obstacle = pair.obstacle.as_ref().map(|obstacle| {
+                let ObstacleReport { approach, tilt, force, moment, .. } = obstacle;
+                let [approach, force] = [approach, force].map(|value| digits(*value));
+                format!("approach {approach}, tilt {}, force {force}, moment {}", vector(tilt), vector(moment))
+            });
+            let offset = pair.offset.map(|offset| format!("offset {}", digits(offset)));
+            let moved = moves.then(|| obstacle.or(offset).unwrap_or_default());
+            let cells = vec![
                 escape(&pair.bodies.join(" – ")),
                 escape(&pair.surfaces.join(" – ")),
                 escape(&words(&self.report.settings["contact"][pair.contact]["layer"])),
@@ -217,7 +229,8 @@ impl Page<'_> {
                 if pair.peak_pressure > 0.0 { vector(&pair.peak_at) } else { String::new() },
                 digits(pair.extent.contact()),
                 digits(pair.extent.open()),
-            ]
+            ];
+            cells.into_iter().chain(moved).collect()
         };
         let rest = match pairs.len() {
             ..=ROWS => String::new(),
@@ -226,9 +239,24 @@ impl Page<'_> {
         table(&columns, pairs.iter().take(ROWS).map(row)) + &rest
     }
 
+    /// Return the table of adapted meshes with their estimated errors, empty without any.
+    fn mesh_table(&self) -> String {
+        if self.report.rounds.is_empty() {
+            return String::new();
+        }
+        let columns =
+            ["#cells", "#dofs", "#error of pressures", "#of displacements", "#in energy", "#iterations", "#seconds"];
+        let row = |round: &RoundReport| {
+            let errors = [round.pressure, round.displacement, round.energy].map(digits);
+            let counts = [round.cells, round.dofs].map(|count| count.to_string());
+            [&counts[..], &errors, &[round.iterations.to_string(), digits(round.seconds)]].concat()
+        };
+        format!("<h2>Meshes</h2>\n{}", table(&columns, self.report.rounds.iter().map(row)))
+    }
+
     fn body_table(&self) -> String {
-        let displacement = self.label("#largest displacement", |units| units.length);
-        let stress = self.label("#von Mises stress", |units| units.stress);
+        let displacement = self.label("#largest displacement", |units| &units.length);
+        let stress = self.label("#von Mises stress", |units| &units.stress);
         let columns =
             ["body", "#cells", "#dofs", "inner solver", &displacement, &stress, "#imbalance of forces", "#of moments"];
         let row = |body: &BodyReport| {
@@ -291,6 +319,7 @@ fn scene(settings: &Value) -> String {
     let row = |body: &Value| {
         let mut material = body.as_object().cloned().unwrap_or_default();
         ["name", "fix", "load", "spring"].iter().for_each(|key| drop(material.remove(*key)));
+        material.retain(|_, value| *value != false && value.as_array().is_none_or(|list| !list.is_empty()));
         vec![
             escape(body["name"].as_str().unwrap_or_default()),
             escape(&words(&Value::Object(material))),

@@ -22,7 +22,7 @@ pub struct Surface {
     pub name: String,
     /// Points before deformation.
     points: Vec<[f64; 3]>,
-    /// Displacement at each point, zero for contact surfaces.
+    /// Displacement at each point.
     displacement: Vec<[f64; 3]>,
     /// Von Mises stress at each point, or the contact pressure; NaN where there is none.
     value: Vec<f64>,
@@ -55,12 +55,15 @@ impl Surface {
 
     /// Return the surface of a pair with its pressures.
     pub fn of_contact(grid: UnstructuredGrid) -> Self {
-        let pressure = grid.at_points.into_iter().find(|array| array.name == "pressure");
+        let values = |name: &str| {
+            let array = grid.at_points.iter().find(|array| array.name == name);
+            array.map_or(Vec::new(), |array| array.values.clone())
+        };
         Self {
+            displacement: values("displacement").as_chunks().0.to_vec(),
+            value: values("pressure"),
             name: grid.title,
-            displacement: vec![[0.0; 3]; grid.points.len()],
             points: grid.points,
-            value: pressure.map_or(Vec::new(), |array| array.values),
             faces: grid.connectivity.chunks_exact(grid.cell.stride()).map(<[u32]>::to_vec).collect(),
         }
     }
@@ -176,6 +179,7 @@ pub fn view(bodies: &[Surface], contacts: &[Surface], is_space: bool) -> Value {
         "travel": range(bodies.iter().flat_map(Surface::travel)),
         "stress": stress,
         "pressure": [0.0, most],
+        "origin": low,
         "low": [0.0, 0.0, 0.0],
         "high": relative(low, &high),
         "scale": magnification(bodies),

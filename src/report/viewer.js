@@ -59,7 +59,7 @@
     // bodies in the plane have outlines
     const lines = data.space ? [] : rim(arrays.indices, arrays.value.data.length);
     const outline = lines.length ? twgl.createBufferInfoFromArrays(gl, { ...arrays, indices: lines }) : null;
-    return { kind, shown: true, buffer, outline };
+    return { kind, name: part.name, shown: true, buffer, outline, arrays, values };
   };
   const parts = [...data.bodies.map(b => part(b, "body")), ...data.surfaces.map(s => part(s, "surface"))];
   const middle = data.low.map((low, k) => (low + data.high[k]) / 2);
@@ -85,6 +85,7 @@
     return [...normal, k < 0 ? 1 : data.low[k] + depth.value / 100 * (data.high[k] - data.low[k])];
   };
   const number = v => Number(v.toPrecision(3)).toString();
+  const axes = figure.querySelector(".axes"), under = figure.querySelector(".under");
 
   let waiting = false;
   const redraw = () => { if (!waiting) { waiting = true; requestAnimationFrame(draw); } };
@@ -101,11 +102,18 @@
     const toward = [Math.cos(eye.rise) * Math.cos(eye.turn), Math.cos(eye.rise) * Math.sin(eye.turn), Math.sin(eye.rise)];
     const camera = m4.lookAt(middle.map((x, k) => x + 2 * size * toward[k]), middle, data.space ? [0, 0, 1] : [0, 1, 0]);
     const flat = m4.ortho(eye.right - w, eye.right + w, eye.up - h, eye.up + h, -20 * size, 40 * size);
+    const look = m4.inverse(camera);
+    eye.view = m4.multiply(flat, look);
+    // the directions of x, y and z on the screen
+    axes.innerHTML = ["x", "y", "z"].slice(0, data.space ? 3 : 2).map((name, k) => {
+      const [right, up] = [look[4 * k], -look[4 * k + 1]];
+      return `<line x2="${22 * right}" y2="${22 * up}"/><text x="${31 * right}" y="${31 * up}">${name}</text>`;
+    }).join("");
     gl.useProgram(program.program);
     const pressure = what.value === "pressure";
     // the colour of the text around
     const ink = [...getComputedStyle(figure).color.match(/\d+/g).slice(0, 3).map(part => part / 255), 1];
-    const lit = { view: m4.multiply(flat, m4.inverse(camera)), toward, colors, cut: section(), scale: factor(), travel: data.travel };
+    const lit = { view: eye.view, toward, colors, cut: section(), scale: factor(), travel: data.travel };
     for (const part of parts) {
       if (!part.shown || pressure !== (part.kind === "surface")) continue;
       twgl.setBuffersAndAttributes(gl, program, part.buffer);
@@ -132,12 +140,63 @@
     redraw();
   }
 
+  // the nearest point of what is drawn at a place of the picture (-1 to 1 to the right and up): its part, its place before deformation and its value
+  const hit = (right, up) => {
+    const pressure = what.value === "pressure", cut = section(), times = factor(), view = eye.view;
+    let best = null;
+    for (const part of parts) {
+      if (!part.shown || pressure !== (part.kind === "surface")) continue;
+      const { point: { data: points }, displacement: { data: moves }, indices } = part.arrays;
+      const count = points.length / 3, screen = new Float64Array(3 * count);
+      const moved = (node, k) => points[3 * node + k] + times * moves[3 * node + k];
+      for (let node = 0; node < count; node++)
+        for (let row = 0; row < 3; row++)
+          screen[3 * node + row] = view[row] * moved(node, 0) + view[4 + row] * moved(node, 1) + view[8 + row] * moved(node, 2) + view[12 + row];
+      for (let t = 0; t < indices.length; t += 3) {
+        const nodes = indices.subarray(t, t + 3), [a, b, c] = nodes;
+        const [ax, ay] = [screen[3 * a], screen[3 * a + 1]];
+        const [bx, by, cx, cy] = [screen[3 * b] - ax, screen[3 * b + 1] - ay, screen[3 * c] - ax, screen[3 * c + 1] - ay];
+        const area = bx * cy - by * cx, [x, y] = [right - ax, up - ay];
+        const [s, r] = [(x * cy - y * cx) / area, (bx * y - by * x) / area];
+        if (!(s >= 0 && r >= 0 && s + r <= 1)) continue;
+        const shares = [1 - s - r, s, r];
+        const mean = of => shares.reduce((sum, share, k) => sum + share * of(nodes[k]), 0);
+        const depth = mean(node => screen[3 * node + 2]);
+        const beyond = [0, 1, 2].reduce((sum, k) => sum + cut[k] * mean(node => moved(node, k)), 0) > cut[3];
+        if (beyond || best && best.depth <= depth) continue;
+        best = { depth, part, nodes: [...nodes], shares, place: [0, 1, 2].map(k => mean(node => points[3 * node + k])) };
+      }
+    }
+    return best;
+  };
+  // the value of a hit in words
+  const told = ({ part, nodes, shares, place }) => {
+    const [low, high] = data[what.value];
+    const size = node => Math.hypot(...part.arrays.displacement.data.subarray(3 * node, 3 * node + 3));
+    const value = node => what.value === "travel" ? size(node) : part.values[node] === 65535 ? NaN : low + part.values[node] / 65534 * (high - low);
+    const mean = nodes.reduce((sum, node, k) => sum + shares[k] * value(node), 0);
+    const at = place.slice(0, data.space ? 3 : 2).map((x, k) => number(x + data.origin[k])).join(", ");
+    return `${part.name} at (${at}): ${Number.isNaN(mean) ? "open" : number(mean)} (${what.selectedOptions[0].text})`;
+  };
+  let pointing = null;
+  const point = () => {
+    if (!pointing || !eye.view) return;
+    const box = canvas.getBoundingClientRect();
+    const found = hit(2 * (pointing.clientX - box.left) / box.width - 1, 1 - 2 * (pointing.clientY - box.top) / box.height);
+    under.textContent = found ? told(found) : "";
+    pointing = null;
+  };
+
   const fingers = new Map();
   canvas.addEventListener("pointerdown", e => { fingers.set(e.pointerId, e); canvas.setPointerCapture(e.pointerId); });
   for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, e => fingers.delete(e.pointerId));
   canvas.addEventListener("pointermove", e => {
     const before = fingers.get(e.pointerId);
-    if (!before) return;
+    if (!before) {
+      if (!pointing) requestAnimationFrame(point);
+      pointing = e;
+      return;
+    }
     const [dx, dy] = [e.clientX - before.clientX, e.clientY - before.clientY];
     if (fingers.size === 2) {
       const [other] = [...fingers.values()].filter(f => f.pointerId !== e.pointerId);

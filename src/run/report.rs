@@ -6,9 +6,11 @@ use super::{results, warnings};
 use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
+use crate::error::Result;
 use crate::error::few;
 use crate::estimate::Estimate;
-use crate::exchange::all_gather;
+use crate::exchange::{all_gather, gather};
+use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
@@ -16,6 +18,7 @@ use crate::output::{
 };
 use crate::petsc::Session;
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 
 /// Return the report of a run. Collective.
 pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) -> Report {
@@ -189,7 +192,7 @@ impl GatheredCounters {
     pub fn gather(discrete: &Discrete) -> Self {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
-        for slot in &discrete.model.bodies {
+        for slot in discrete.model.bodies.iter().filter(|slot| !slot.is_rigid) {
             let owned = slot.local.as_ref().filter(|body| body.states().leads());
             mine.solvers.push(owned.map_or_else(String::new, Body::describe));
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
@@ -243,6 +246,8 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         peak_compression: results::peak(c),
         extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
+        obstacle: results::obstacle(done, i),
+        offset: results::offset(done, i),
     }
 }
 
@@ -263,7 +268,14 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     let (model, outcome) = (done.model(), &done.outcome);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let sides = done.built.discrete.sides(i);
-    let displacement = |side: usize| model.displacement(&outcome.iterate.trace, i, side, done.share);
+    let displacement = |side: usize| {
+        let mut u = model.displacement(&outcome.iterate.trace, i, side, done.share);
+        if side == 1 && !done.built.discrete.contacts[i].spec.obstacle {
+            // the offset of a gap is no displacement
+            axpy(-1.0, &model.rigid_closing(i, &outcome.iterate.rigid), &mut u);
+        }
+        u
+    };
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.position.clone(),
@@ -281,11 +293,44 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     }
 }
 
-/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points.
-pub fn contact_surface(name: &str, done: &Done, i: usize) -> UnstructuredGrid {
+/// Return the displacement at the points of the surface of each pair, on the first rank, and none on the others. The points of a distributed body are
+/// known by their coordinates; NaN where the displacement of the body is not known. Collective.
+///
+/// # Errors
+/// A message that cannot be read.
+pub fn surface_displacements(done: &Done, recovered: &All) -> Result<Vec<Vec<[f64; 3]>>> {
+    let (discrete, model) = (&done.built.discrete, done.model());
+    let surface = |i: usize| discrete.contacts[i].surface.points();
+    let mut known: Vec<(usize, usize, [f64; 3])> = Vec::new();
+    for (body, (info, recovered)) in discrete.bodies.iter().zip(recovered).enumerate() {
+        let Some(Ok(recovered)) = recovered else { continue };
+        let mut wanted: HashMap<[u64; 3], Vec<(usize, usize)>> = HashMap::new();
+        for i in (0..model.pairs.len()).filter(|&i| model.pairs[i].bodies[0] == body) {
+            let places = surface(i).iter().map(|x| x.map(f64::to_bits)).enumerate();
+            places.for_each(|(point, place)| wanted.entry(place).or_default().push((i, point)));
+        }
+        let field = recovered.field(info);
+        for (x, u) in field.points.iter().zip(&field.displacement) {
+            let points = wanted.get(&x.map(f64::to_bits));
+            known.extend(points.into_iter().flatten().map(|&(i, point)| (i, point, *u)));
+        }
+    }
+    let all = gather(&*model.exchange, known)?;
+    if all.is_empty() {
+        return Ok(Vec::new());
+    }
+    let mut displacement: Vec<Vec<[f64; 3]>> =
+        (0..model.pairs.len()).map(|i| vec![[f64::NAN; 3]; surface(i).len()]).collect();
+    all.into_iter().flatten().for_each(|(i, point, u)| displacement[i][point] = u);
+    Ok(displacement)
+}
+
+/// Return the surface of pair `i` with gap, compression, pressure, normal (from side a to side b) and area (length) of the points, and with the
+/// `displacement` of side a.
+pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 3]]) -> UnstructuredGrid {
     let (model, layer) = (done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
-    done.built.discrete.contacts[i].surface.grid(
+    let mut grid = done.built.discrete.contacts[i].surface.grid(
         name.to_owned(),
         vec![
             FieldArray::new("gap", 1, pair.gap.clone()),
@@ -294,5 +339,7 @@ pub fn contact_surface(name: &str, done: &Done, i: usize) -> UnstructuredGrid {
             FieldArray::new("normal", 3, pair.normal.as_flattened().to_vec()),
             FieldArray::new(pair.measure, 1, pair.weight.clone()),
         ],
-    )
+    );
+    grid.at_points.push(FieldArray::new("displacement", 3, displacement.as_flattened().to_vec()));
+    grid
 }

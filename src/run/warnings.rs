@@ -95,8 +95,8 @@ pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<Strin
 /// Return warnings of pressures whose estimated error is a guess.
 pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
     let mut warnings = Vec::new();
-    for (i, pair) in discrete.model.pairs.iter().enumerate() {
-        let [a, b] = &pair.surfaces;
+    for i in 0..discrete.model.pairs.len() {
+        let [a, b] = discrete.surfaces(i);
         if let Some(guess) = estimate.guesses[i] {
             let place = point(guess.place);
             let reason = match guess.cause {
@@ -130,9 +130,10 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
         warnings.extend(lost(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
+            let [a, b] = names(contact);
             warnings.push(format!(
-                "{} - {}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
-                pair.surfaces[0], pair.surfaces[1], -overlap
+                "{a} - {b}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
+                -overlap
             ));
         }
     }
@@ -189,11 +190,10 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
         true => format!("would change by about {:.0} % on these", 100.0 * f64::sqrt(changed / whole)),
         false => "would not vanish on these".to_owned(),
     };
+    let [a, b] = names(&done.built.discrete.contacts[i]);
     Some(format!(
-        "{} - {}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
+        "{a} - {b}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
          or a finer mesh; if the true surfaces have one distance everywhere, write touching = true, with that distance as `gap` (negative for an overlap)",
-        pair.surfaces[0],
-        pair.surfaces[1],
         sci(*sagitta, 2),
     ))
 }
@@ -255,6 +255,9 @@ pub fn tilted(done: &Done, i: usize) -> Option<String> {
 /// Return the warning that no pair carries a pressure, at the solution or in a load step. Then contact has no part in the results.
 pub fn nothing_touches(done: &Done) -> Option<String> {
     let pairs = 0..done.model().pairs.len();
+    if pairs.clone().any(|i| done.model().pairs[i].law.is_bonded()) {
+        return None;
+    }
     let compressed: Option<Vec<Compressed>> = pairs.map(|i| most_compressed(done, i)).collect();
     let compressed = compressed.filter(|all| all.iter().all(|found| found.pressure <= 0.0))?;
     let nearest = (0..compressed.len()).max_by(|&i, &j| compressed[i].most.total_cmp(&compressed[j].most))?;
@@ -328,7 +331,7 @@ const NEARLY: f64 = 0.5;
 fn reached(done: &Done, i: usize) -> usize {
     let (layer, first) = (&done.outcome.layer, done.model().range(i).start);
     let (contact, gap) = (&done.built.discrete.contacts[i], &done.model().pairs[i].gap);
-    let least = contact.spec.distance.filter(|_| !contact.spec.touching).map_or(f64::NEG_INFINITY, |d| NEARLY * d);
+    let least = contact.spec.distance.filter(|_| !contact.spec.is_touching()).map_or(f64::NEG_INFINITY, |d| NEARLY * d);
     let goes_on = |q: &&usize| layer.pressure[first + *q] > 0.0 && layer.compression[first + *q] + gap[**q] >= least;
     contact.ends.iter().filter(goes_on).count()
 }

@@ -36,7 +36,7 @@ const HEIGHTS: &str =
 pub fn explain(error: Error) -> Error {
     let words: Vec<&str> = error.message().split('`').collect();
     let name = match words[..] {
-        ["unknown key ", name, ..] => name,
+        ["unknown key " | "unknown word ", name, ..] => name,
         [start, .., name, ""] if start.starts_with("unknown ") => name,
         _ => return error,
     };

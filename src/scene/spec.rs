@@ -1,153 +1,214 @@
-//! The scene as data that declares its keys, and how it is built in Rust and compared between ranks and runs.
+//! The scene as data that declares its keys, and how it is built in Rust, checked, and compared between ranks and runs.
 
 use crate::contact::law::{LayerLaw, OwnLaws};
 use crate::data::Library;
 use crate::ddm::gamma::{GammaRule, OwnRules};
-use crate::error::{Located, Place, Result};
+use crate::error::{Error, Located, Place, Result, shown};
 use crate::file::digest;
 use crate::problem::contact::Carrier;
-use crate::problem::{AutoContact, BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
-use crate::setting::{Context, Node, Setting, ValueKind, choose, keys, remove, table, word, words};
+use crate::problem::data::DataKeys;
+use crate::problem::geometry::Geometry;
+use crate::problem::read::{
+    self, Check, Context, Either, Flaw, Form, all, at_least_one, checked, of_word, positive, within,
+};
+use crate::problem::{BodySpec, ContactSpec, MeshSource, MethodSpec, Plane, SolverSpec, Units};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::de::{Error as _, IgnoredAny};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Value as Json, json};
+use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
 use std::rc::Rc;
 
-keys! {
-    /// A checked scene.
-    // the description of `body` has the name of a table in brackets, which is no link
-    #[allow(rustdoc::broken_intra_doc_links)]
-    #[derive(Debug, Clone)]
-    pub struct Scene "the scene" {
-        required {
-            /// a file name, or a table: mesh = { geo = "a.geo", set = { n = 32 } }
-            pub mesh: MeshSource,
-            /// a body starts with the line [[body]]
-            ///
-            /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of groups.
-            pub bodies as "body": Vec<BodySpec>,
+/// A checked scene.
+// the description of `body` has the name of a table in brackets, which is no link
+#[allow(rustdoc::broken_intra_doc_links)]
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// title of plots and reports; the name of the file without one
+    #[serde(default)]
+    pub title: String,
+    /// 2 in the plane, 3 in space
+    #[schemars(extend("enum" = [2, 3]))]
+    pub dimension: Located<usize>,
+    /// what a plane problem stands for
+    #[serde(default)]
+    pub plane: Plane,
+    /// words for labels, such as "mm, MPa"; nothing is converted
+    pub units: Option<Units>,
+    /// a file name, or a table: mesh = { geo = "a.geo", set = { n = 32 } }
+    #[serde(deserialize_with = "checked")]
+    pub mesh: MeshSource,
+    /// functions from files; each begins with a line [data.NAME]
+    ///
+    /// A file that no expression and no layer uses is not read.
+    #[serde(default, deserialize_with = "known_data", serialize_with = "crate::problem::data::write")]
+    #[schemars(with = "BTreeMap<String, DataKeys>")]
+    pub data: Library,
+    /// a body starts with the line [[body]]
+    ///
+    /// The tables of bodies, in the order of the file. The name of a body may be a pattern, and so may the names of groups.
+    #[serde(rename = "body", deserialize_with = "all")]
+    pub bodies: Vec<BodySpec>,
+    /// a contact starts with the line [[contact]]
+    ///
+    /// Pairs of contact surfaces, and rules that find pairs on the mesh, in the order of the file.
+    #[serde(rename = "contact", default, deserialize_with = "all")]
+    pub contacts: Vec<ContactSpec>,
+    /// the iteration; Newton's method without it
+    #[serde(default, deserialize_with = "checked")]
+    pub method: MethodSpec,
+    /// the inner solver; chosen by the program without it
+    #[serde(default)]
+    pub solver: SolverSpec,
+    /// whether to estimate the error that the mesh leaves
+    #[serde(default)]
+    pub estimate: bool,
+    /// adapts the mesh to an error: adapt = { error = 1e-2 }
+    #[serde(default, deserialize_with = "checked")]
+    pub adapt: Option<AdaptSpec>,
+    /// what is written, and where
+    #[serde(default, deserialize_with = "checked")]
+    pub output: OutputSpec,
+    /// Path of the scene file, as given.
+    #[serde(skip)]
+    pub path: PathBuf,
+    /// Laws of layers from a Rust program, by name.
+    #[serde(skip)]
+    pub laws: OwnLaws,
+    /// Rules for gamma from a Rust program, by name.
+    #[serde(skip)]
+    pub own_rules: OwnRules,
+    /// The surfaces that carry contact points on an earlier mesh of the scene, and on this one, too.
+    #[serde(skip)]
+    pub carriers: Vec<Carrier>,
+}
+
+/// Return the data, which are known before the scene is read.
+fn known_data<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Library, D::Error> {
+    IgnoredAny::deserialize(deserializer).map(|_| read::data())
+}
+
+/// The accuracy to which meshes are adapted, and the limits of adaptation.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AdaptSpec {
+    /// largest relative error of pressures and displacements: 0.01 is one per cent
+    pub error: Located<f64>,
+    /// most cells of a mesh
+    #[serde(default = "cells")]
+    #[schemars(range(min = 1))]
+    pub cells: usize,
+    /// most meshes
+    #[serde(default = "rounds")]
+    #[schemars(range(min = 1))]
+    pub rounds: usize,
+}
+
+fn cells() -> usize {
+    1_000_000
+}
+
+fn rounds() -> usize {
+    10
+}
+
+impl Check for AdaptSpec {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        positive("error", "the error", self.error.value)?;
+        if self.error.value >= 1.0 {
+            let message = format!("the error is {}", shown(self.error.value));
+            return Err(Flaw::new("error", message, "must be less than 1", "it is a share: 0.01 is one per cent"));
         }
-        optional {
-            /// what a plane problem stands for
-            pub plane: Plane = Plane::Strain,
-            /// words for labels, such as "mm, MPa"; nothing is converted
-            pub units: Option<Units> = None,
-            /// the iteration; Newton's method without it
-            pub method: MethodSpec = MethodSpec::default(),
-            /// the inner solver; chosen by the program without it
-            pub solver: SolverSpec = SolverSpec::default(),
-            /// whether to estimate the error that the mesh leaves
-            pub estimate: bool = false,
-            /// adapts the mesh to an error: adapt = { error = 1e-2 }
-            pub adapt: Option<AdaptSpec> = None,
-            /// what is written, and where
-            pub output: OutputSpec = OutputSpec::default(),
-        }
-        besides {
-            /// Path of the scene file, as given.
-            pub path: PathBuf,
-            /// Title; by default the name of the file without its extension.
-            pub title: String,
-            /// Space dimension: 2 or 3.
-            pub dimension: Located<usize>,
-        }
-        initially {
-            /// Laws of layers from a Rust program, by name.
-            pub laws: OwnLaws = OwnLaws::default(),
-            /// Rules for gamma from a Rust program, by name.
-            pub rules: OwnRules = OwnRules::default(),
-            /// Functions from files, by name. A file that no expression and no layer uses is not read.
-            pub data: Library = Library::new(),
-            /// The pairs of contact surfaces, in the order of the file.
-            pub contacts: Vec<ContactSpec> = Vec::new(),
-            /// Rules that find pairs on the mesh, in the order of the file.
-            pub auto: Vec<AutoContact> = Vec::new(),
-            /// The surfaces that carry contact points on an earlier mesh of the scene, and on this one, too.
-            pub carriers: Vec<Carrier> = Vec::new(),
-        }
+        at_least_one("cells", self.cells)?;
+        at_least_one("rounds", self.rounds)
     }
 }
 
-table! {
-    /// The accuracy to which meshes are adapted, and the limits of adaptation.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct AdaptSpec "`adapt`" {
-        required {
-            /// largest relative error of pressures and displacements: 0.01 is one per cent
-            pub error: Located<f64>,
-        }
-        optional {
-            /// most cells of a mesh
-            pub cells: usize = 1_000_000,
-            /// most meshes
-            pub rounds: usize = 10,
-        }
-    }
-}
-
-table! {
-    /// The files to write.
-    #[derive(Debug, Clone, PartialEq)]
-    pub struct OutputSpec "[output]" {
-        optional {
-            /// folder of the results; results/CASE without it
-            ///
-            /// The option `-o` wins.
-            pub dir: Option<PathBuf> = None,
-            /// whether to write fields for ParaView
-            ///
-            /// They are `<body>.vtu` and the `.pvd`.
-            pub vtu: bool = false,
-            /// whether to write fields as views for Gmsh
-            pub msh: bool = false,
-            /// whether to write the page report.html
-            pub report: bool = false,
-            /// of the numbers in VTU files
-            pub precision: Precision = Precision::Double,
-            /// whether to draw the SVG plots
-            pub plots: bool = true,
-            /// most pairs with files of their own; 24
-            pub pairs: Option<Most> = None,
-        }
-    }
+/// The files to write.
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OutputSpec {
+    /// folder of the results; results/CASE without it
+    ///
+    /// The option `-o` wins.
+    pub dir: Option<PathBuf>,
+    /// whether to write fields for ParaView
+    ///
+    /// They are `<body>.vtu` and the `.pvd`.
+    pub vtu: bool,
+    /// whether to write fields as views for Gmsh
+    pub msh: bool,
+    /// whether to write the page report.html
+    pub report: bool,
+    /// of the numbers in VTU files
+    pub precision: Precision,
+    /// whether to draw the SVG plots
+    pub plots: bool,
+    /// most pairs with files of their own; 24
+    pub pairs: Option<Most>,
 }
 
 impl Default for OutputSpec {
     fn default() -> Self {
-        Self::with_defaults()
+        Self {
+            dir: None,
+            vtu: false,
+            msh: false,
+            report: false,
+            precision: Precision::Double,
+            plots: true,
+            pairs: None,
+        }
     }
 }
 
-words! {
-    /// The precision of numbers in VTU files.
-    pub enum Precision "precision" {
-        /// Eight bytes.
-        Double = "double",
-        /// Four bytes.
-        Single = "single",
+impl Check for OutputSpec {
+    fn check(&self, _: Geometry) -> Result<(), Flaw> {
+        match &self.dir {
+            Some(dir) if dir.as_os_str().is_empty() => Err(Flaw::new("dir", "the name is empty", "", "")),
+            _ => Ok(()),
+        }
     }
+}
+
+/// The precision of numbers in VTU files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// Eight bytes.
+    Double,
+    /// Four bytes.
+    Single,
 }
 
 /// The most pairs with files of their own; the largest number stands for all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, JsonSchema)]
+#[schemars(with = "Either<usize, All>")]
 pub struct Most(pub usize);
 
 /// The word that stands for all pairs.
-const ALL: [(&str, Most); 1] = [("all", Most(usize::MAX))];
+#[derive(Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum All {
+    All,
+}
 
-impl Setting for Most {
-    fn kind() -> ValueKind {
-        ValueKind::Either(vec![ValueKind::Integer(0), word(&ALL)])
-    }
-
-    fn read(node: &Node, _: &Context) -> Result<Self> {
-        match node.string() {
-            Ok(_) => choose(node, "number of pairs", &ALL),
-            Err(_) => node.count().map(Self),
+impl<'de> Deserialize<'de> for Most {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        match Form::<IgnoredAny>::deserialize(deserializer)? {
+            Form::Text(word) => of_word::<All, _>(&word).map(|_| Self(usize::MAX)),
+            Form::Integer(count) => usize::try_from(count).map(Self).map_err(|_| D::Error::custom("must be 0 or more")),
+            other => Err(other.unexpected()),
         }
     }
+}
 
-    fn echo(&self, _: usize) -> Json {
-        if self.0 == usize::MAX { json!("all") } else { json!(self.0) }
+impl Serialize for Most {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0 == usize::MAX { All::All.serialize(serializer) } else { self.0.serialize(serializer) }
     }
 }
 
@@ -157,8 +218,25 @@ impl Scene {
     #[track_caller]
     pub fn new(dimension: usize, mesh: impl Into<MeshSource>) -> Self {
         let place = Place::here(&dimension.to_string());
-        let path = place.source.name.clone().into();
-        Self::with_defaults(mesh.into(), Vec::new(), path, "scene".to_owned(), Located::new(dimension, place))
+        Self {
+            title: "scene".to_owned(),
+            path: place.source.name.clone().into(),
+            dimension: Located::new(dimension, place),
+            plane: Plane::Strain,
+            units: None,
+            mesh: mesh.into(),
+            data: Library::new(),
+            bodies: Vec::new(),
+            contacts: Vec::new(),
+            method: MethodSpec::default(),
+            solver: SolverSpec::default(),
+            estimate: false,
+            adapt: None,
+            output: OutputSpec::default(),
+            laws: OwnLaws::default(),
+            own_rules: OwnRules::default(),
+            carriers: Vec::new(),
+        }
     }
 
     /// Add a body.
@@ -167,7 +245,17 @@ impl Scene {
         self
     }
 
-    /// Add a pair of contact surfaces.
+    /// Iterate over the pairs of contact surfaces that the scene names.
+    pub fn pairs(&self) -> impl Iterator<Item = &ContactSpec> {
+        self.contacts.iter().filter(|contact| !contact.is_rule())
+    }
+
+    /// Iterate over the rules that find pairs.
+    pub fn rules(&self) -> impl Iterator<Item = &ContactSpec> {
+        self.contacts.iter().filter(|contact| contact.is_rule())
+    }
+
+    /// Add a pair of contact surfaces, or a rule that finds pairs.
     pub fn contact(mut self, contact: ContactSpec) -> Self {
         self.contacts.push(ContactSpec { table: self.contacts.len(), ..contact });
         self
@@ -189,12 +277,105 @@ impl Scene {
     /// Add a rule for gamma, which [`Gamma::Own`](crate::problem::method::Gamma::Own) uses by its name. `maker` returns a new rule for
     /// each run.
     pub fn rule<R: GammaRule + 'static>(mut self, name: &str, maker: impl Fn() -> R + 'static) -> Self {
-        self.rules.insert(name, Rc::new(move || Box::new(maker()) as _));
+        self.own_rules.insert(name, Rc::new(move || Box::new(maker()) as _));
         self
     }
 }
 
 impl Scene {
+    /// Check what no later stage checks: numbers that are not fields, names, and keys that contradict each other.
+    ///
+    /// # Errors
+    /// The first refusal, with the line of the program where the body, surface or group was named.
+    pub fn check(&self) -> Result<()> {
+        if self.adapt.is_some() {
+            let message = "several meshes for one scene: only the command line makes them";
+            return Err(Error::scene(&self.dimension.place, message));
+        }
+        self.verify()
+    }
+
+    /// Check the whole scene: each table by itself, and what tables have to do with each other.
+    pub(super) fn verify(&self) -> Result<()> {
+        let place = &self.dimension.place;
+        let geometry = self.geometry();
+        if !(geometry.is_plane() || (geometry.dimension == 3 && self.plane == Plane::Strain)) {
+            let message = "the dimension is 2 or 3, and only plane problems have a `plane`";
+            return Err(Error::scene(place, message));
+        }
+        self.mesh.refuse(geometry, place)?;
+        if self.bodies.is_empty() {
+            return Err(Error::scene(place, "the scene has no body").help("a body starts with the line [[body]]"));
+        }
+        self.bodies.iter().try_for_each(|body| check_body(body, geometry))?;
+        for contact in &self.contacts {
+            let near = &contact.between[0].place;
+            contact.refuse(geometry, near)?;
+            contact.layer.refuse(geometry, near)?;
+            contact.tension.refuse(geometry, near)?;
+        }
+        self.check_names()?;
+        self.method.refuse(geometry, place)?;
+        self.method.steps.refuse(geometry, place)?;
+        self.method.stop.refuse(geometry, place)?;
+        self.adapt.refuse(geometry, place)?;
+        self.output.refuse(geometry, place)
+    }
+
+    /// Refuse bodies with one name, and contacts of one pair or rule.
+    fn check_names(&self) -> Result<()> {
+        let mut names = HashSet::new();
+        if let Some(twice) = self.bodies.iter().map(|body| &body.name).find(|name| !names.insert(&name.value)) {
+            return Err(Error::scene(&twice.place, format!("two bodies are called `{}`", twice.value))
+                .label("taken by an earlier body")
+                .help("names of bodies are those of physical groups of cells, one for each"));
+        }
+        let mut pairs = HashSet::new();
+        for contact in &self.contacts {
+            let sorted = |names: &[Located<String>; 2]| {
+                let [a, b] = names.each_ref().map(|name| name.value.clone());
+                if a < b { [a, b] } else { [b, a] }
+            };
+            let (rule, of) = (contact.is_rule(), contact.of.as_ref());
+            let names = if rule { of } else { Some(&contact.between) };
+            if pairs.insert((rule, names.map(sorted))) {
+                continue;
+            }
+            let message = match names.map(|names| names.each_ref().map(|name| &name.value)) {
+                None => "a second contact between \"auto\" of all bodies".to_owned(),
+                Some([a, b]) if rule => format!("a second contact between \"auto\" of `{a}` and `{b}`"),
+                Some([a, b]) => format!("a second contact of `{a}` and `{b}`"),
+            };
+            let place = &names.unwrap_or(&contact.between)[0].place;
+            let help = if names.is_some() {
+                "remove one of the two"
+            } else {
+                "name the bodies of each: of = [\"one_*\", \"other_*\"]"
+            };
+            return Err(Error::scene(place, message).help(help));
+        }
+        Ok(())
+    }
+
+    fn geometry(&self) -> Geometry {
+        Geometry { dimension: self.dimension.value, plane: self.plane }
+    }
+
+    /// Return the scene as JSON, keyed like the scene file, with every default written out. Keys that have no default and were not given
+    /// are left out. Expressions are texts.
+    ///
+    /// A key that is missing here is also ignored where scenes are compared: by a restart, in a sweep, and between ranks.
+    pub fn settings(&self) -> Json {
+        let context = Context { geometry: self.geometry(), ..Context::default() };
+        let mut settings = within(context, || serde_json::to_value(self)).unwrap_or_default();
+        without_null(&mut settings);
+        if self.dimension.value == 3 {
+            remove(&mut settings, "", &["plane"]);
+        }
+        settings["scene"] = json!(self.path.display().to_string());
+        settings
+    }
+
     /// Return the settings without the names of files and folders. The name of each data file is replaced by a digest of its numbers;
     /// the settings have the numbers of tables themselves. The contents of the mesh's files are not included.
     pub fn contents(&self) -> Json {
@@ -214,5 +395,69 @@ impl Scene {
         let mut contents = self.contents();
         remove(&mut contents, "", &["title", "units", "output"]);
         contents
+    }
+}
+
+fn check_body(body: &BodySpec, geometry: Geometry) -> Result<()> {
+    body.refuse(geometry, &body.name.place)?;
+    body.regions.iter().try_for_each(|region| region.refuse(geometry, &region.on.place))?;
+    body.fix.iter().try_for_each(|support| support.refuse(geometry, &support.on.place))?;
+    body.spring.iter().try_for_each(|spring| spring.refuse(geometry, &spring.on.place))?;
+    body.load.iter().try_for_each(|load| load.refuse(geometry, &load.on.place))
+}
+
+/// Remove keys of the table at a place (a JSON pointer) of settings, if it is there.
+pub fn remove(settings: &mut Json, place: &str, keys: &[&str]) {
+    if let Some(table) = settings.pointer_mut(place).and_then(Json::as_object_mut) {
+        keys.iter().for_each(|key| drop(table.remove(*key)));
+    }
+}
+
+/// Remove keys without a value, which TOML does not have.
+fn without_null(value: &mut Json) {
+    match value {
+        Json::Object(entries) => {
+            entries.retain(|_, value| !value.is_null());
+            entries.values_mut().for_each(without_null);
+        }
+        Json::Array(items) => items.iter_mut().for_each(without_null),
+        _ => {}
+    }
+}
+
+/// Return the JSON schema of scene files (draft 2020-12).
+pub fn schema() -> Json {
+    let mut settings = SchemaSettings::draft2020_12();
+    settings.inline_subschemas = true;
+    let mut schema = settings.into_generator().into_root_schema_for::<Scene>().to_value();
+    schema["title"] = json!("Scene of winkler");
+    tidy(&mut schema);
+    schema
+}
+
+/// Remove null from a schema, which TOML does not have, and call forms of a value `anyOf`.
+fn tidy(schema: &mut Json) {
+    match schema {
+        Json::Object(entries) => {
+            if let Some(forms) = entries.remove("oneOf") {
+                entries.insert("anyOf".to_owned(), forms);
+            }
+            for key in ["type", "enum", "anyOf"] {
+                let Some(Json::Array(forms)) = entries.get_mut(key) else { continue };
+                forms.retain(|form| !form.is_null() && form != "null" && *form != json!({ "type": "null" }));
+            }
+            if let Some(Json::Array(types)) = entries.get("type")
+                && let [only] = &types[..]
+            {
+                entries["type"] = only.clone();
+            }
+            entries.retain(|key, value| key != "default" || !(value.is_null() || value == ""));
+            if let Some(whole) = entries.get("default").and_then(Json::as_f64).filter(|number| number.fract() == 0.0) {
+                entries.insert("default".to_owned(), json!(whole as i64));
+            }
+            entries.values_mut().for_each(tidy);
+        }
+        Json::Array(items) => items.iter_mut().for_each(tidy),
+        _ => {}
     }
 }

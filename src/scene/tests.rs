@@ -2,7 +2,7 @@ use super::*;
 use crate::error::caret;
 use crate::expression::Field;
 use crate::problem::{
-    BodySpec, Constants, Gamma, LawKind, LayerSpec, LoadKind, MeshSource, MethodName, Order, Plane, Preset, RobinRule,
+    BodySpec, Constants, Gamma, LayerSpec, LoadKind, MeshSource, MethodName, Order, Plane, Preset, RobinRule,
     SolverSpec, Start, StopRule, Zone,
 };
 
@@ -50,7 +50,7 @@ fn load_text(text: &str, overrides: &[&str]) -> Result<Scene> {
 
 /// The constants of an isotropic, homogeneous body.
 fn isotropic(body: &BodySpec) -> (f64, f64) {
-    match &body.elasticity.constants {
+    match &body.elasticity().constants {
         Constants::Isotropic { young: Field::Constant(young), poisson: Field::Constant(poisson) } => (*young, *poisson),
         other => panic!("{other:?}"),
     }
@@ -102,11 +102,11 @@ fn overrides_replace_and_add() {
     .unwrap();
     assert_eq!(isotropic(&scene.bodies[1]).0, 1e5);
     assert_eq!([0, 1].map(|body| scene.bodies[body].order), [Order::P1, Order::P2]);
-    assert_eq!(scene.bodies[1].elasticity.place.source.name, "--set");
+    assert_eq!(scene.bodies[1].elasticity().place.source.name, "--set");
     let LoadKind::Traction(traction) = &scene.bodies[1].load[0].kind else { panic!() };
     assert_eq!(traction[1].eval([0.0; 3]), 2.0);
-    let LayerSpec::Form { form, values } = &scene.contacts[0].layer else { panic!("{:?}", scene.contacts) };
-    assert!(form.kind == LawKind::Linear && matches!(values[..], [Field::Constant(1.0)]));
+    let LayerSpec::Linear(law) = &scene.contacts[0].layer else { panic!("{:?}", scene.contacts) };
+    assert!(matches!(law.stiffness, Field::Constant(1.0)));
     assert_eq!(scene.contacts[0].gap.eval([2.0, 0.0, 0.0]), 2e-4);
     assert_eq!(scene.contacts[0].reference.as_ref().unwrap().eval([3.0, 0.0, 0.0]), -2.0);
     let Zone::Subset(zone) = &scene.method.psi else { panic!() };
@@ -190,16 +190,16 @@ const CASES: &[Case] = &[
     // Keys.
     ("young = 2.1e5", "yuong = 2.1e5", "yuong", "unknown key `yuong` in [[body]]", "did you mean `young`?"),
     ("young = 2.1e5", "density = 2.1e5", "density", "unknown key `density` in [[body]]", "its keys are name, young, poisson, "),
-    ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, mesh, body"),
+    ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, plane, units, mesh"),
     ("[method]", "[methods]", "methods", "unknown key `methods` in the scene", "`method`"),
-    ("B = 2.5e-5", "b = 2.5e-5", "b", "unknown key `b` in the power layer", "`B`"),
-    ("increment", "incremnt", "incremnt", "unknown key `incremnt` in the stop rule", "`increment`"),
-    ("pressure = 10", "presure = 10", "presure", "unknown key `presure` in a load", "`pressure`"),
+    ("B = 2.5e-5", "b = 2.5e-5", "b", "unknown key `b` in `power`", "`B`"),
+    ("increment", "incremnt", "incremnt", "unknown key `incremnt` in `stop`", "`increment`"),
+    ("pressure = 10", "presure = 10", "presure", "unknown key `presure` in an item of `load`", "`pressure`"),
     ("young = 2.1e5\n", "", "[[body]]", "[[body]] has no `young`", ""),
     ("name = \"upper\"\n", "", "[[body]]", "[[body]] has no `name`", ""),
     ("dimension = 2 ", "", "t", "the scene has no `dimension`", ""),
-    ("B = 2.5e-5, ", "", "{ a = 0.5 }", "the power layer has no `B`", ""),
-    ("on = \"lower_face\", ", "", "{ pressure = 10 }", "a load has no `on`", ""),
+    ("B = 2.5e-5, ", "", "{ a = 0.5 }", "`power` has no `B`", ""),
+    ("on = \"lower_face\", ", "", "{ pressure = 10 }", "an item of `load` has no `on`", ""),
     // Kinds of value.
     ("order = 1", "order = \"1\"", "\"1\"", "expected a whole number, found a string", "without quotes"),
     ("young = 2.1e5", "young = [1]", "[1]", "expected a number or an expression, found a list", ""),
@@ -219,11 +219,11 @@ const CASES: &[Case] = &[
     ("poisson = 0.3\norder", "order", "[[body]]", "[[body]] has no `poisson`", ""),
     ("young = 2.1e5\npoisson = 0.3\norder", "order", "[[body]]", "[[body]] has no `young`", "orthotropic = { E1 = ... }"),
     ("order = 1", "axes = { angle = 1 }\norder = 1", "{ angle = 1 }", "axes of an isotropic material", "remove them"),
-    ("order = 1", "orthotropic = { E1 = 1 }\norder = 1", "orthotropic", "[[body]] has both `young` and `orthotropic`", ""),
-    ("young = 2.1e5\n", "anisotropic = [1]\n", "poisson", "[[body]] has both `poisson` and `anisotropic`", ""),
+    ("order = 1", "anisotropic = [1]\norder = 1", "[1]", "[[body]] has both `young` and `anisotropic`", ""),
+    ("young = 2.1e5\n", "anisotropic = [1]\n", "0.3", "[[body]] has both `poisson` and `anisotropic`", ""),
     ("young = 2.1e5\npoisson = 0.3\norder", "anisotropic = [1, 2]\norder", "[1, 2]", "an anisotropic material has 21 constants, not 2", "upper triangle"),
-    ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { E1 = 1 }\norder", "{ E1 = 1 }", "the orthotropic material has no `E2`", ""),
-    ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { e1 = 1 }\norder", "e1", "unknown key `e1` in the orthotropic material", "`E1`"),
+    ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { E1 = 1 }\norder", "{ E1 = 1 }", "`orthotropic` has no `E2`", ""),
+    ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { e1 = 1 }\norder", "e1", "unknown key `e1` in `orthotropic`", "`E1`"),
     ("order = 1", "region = [{ on = \"core\", young = 1 }]\norder = 1", "{ on = \"core\", young = 1 }", "[[body.region]] has no `poisson`", ""),
     ("order = 1", "region = [{ young = 1, poisson = 0 }]\norder = 1", "{ young = 1, poisson = 0 }", "[[body.region]] has no `on`", ""),
     ("order = 1", "order = 3", "3", "`order` is 3", ""),
@@ -239,10 +239,10 @@ const CASES: &[Case] = &[
     ("psi = \"active\"", "psi = \"actve\"", "\"actve\"", "unknown zone `actve`", "`active`"),
     ("psi = \"active\"", "psi = \"robin\"", "\"robin\"", "unknown zone `robin`", "none, full, active"),
     ("psi = \"active\"", "psi = \"z > 0\"", "z", "unknown variable `z`", "x, y, k"),
-    ("start = { normal = 1e-4 }", "start = \"none\"", "\"none\"", "unknown start `none`", "\"zero\""),
-    ("[method]", "[solver]\npreset = \"mumpz\"\n[method]", "\"mumpz\"", "unknown solver `mumpz`", "`mumps`"),
-    ("dimension = 2 ", "dimension = 2\nplane = \"strein\" ", "\"strein\"", "unknown plane `strein`", "`strain`"),
-    ("dimension = 2 ", "dimension = 3\nplane = \"strain\" ", "plane", "`plane` in a problem in space", ""),
+    ("start = { normal = 1e-4 }", "start = \"none\"", "\"none\"", "unknown word `none` for `method.start`", "auto, zero, normal"),
+    ("[method]", "[solver]\npreset = \"mumpz\"\n[method]", "\"mumpz\"", "unknown word `mumpz` for `solver.preset`", "`mumps`"),
+    ("dimension = 2 ", "dimension = 2\nplane = \"strein\" ", "\"strein\"", "unknown word `strein` for `plane`", "`strain`"),
+    ("dimension = 2 ", "dimension = 3\nplane = \"strain\" ", "\"strain\"", "`plane` in a problem in space", ""),
     // Bodies.
     ("name = \"upper\"", "name = \"lower\"", "\"lower\"", "two bodies are called `lower`", ""),
     ("name = \"upper\"", "name = \"LOWER\"", "\"LOWER\"", "two bodies are called `lower`", ""),
@@ -251,27 +251,27 @@ const CASES: &[Case] = &[
     ("name = \"upper\"", "name = \"up**\"", "\"up**\"", "`up**` is no pattern", "`*` is any text"),
     ("\"lower_face\"", "\"lower_***\"", "\"lower_***\"", "`lower_***` is no pattern", ""),
     ("\"upper_bottom\"", "\"upper_*\"", "\"upper_*\"", "the pattern `upper_*` for one surface", "of = ["),
-    ("gap = ", "of = [\"upper\", \"lower\"]\ngap = ", "of", "`of` for surfaces with names", "which bodies"),
+    ("gap = ", "of = [\"upper\", \"lower\"]\ngap = ", "[\"upper\", \"lower\"]", "`of` for surfaces with names", "which bodies"),
     ("[\"lower_top\", \"upper_bottom\"]", "\"auto\"\ndistance = 1\nof = [\"upper\"]", "[\"upper\"]", "pairs are of two bodies", "of = ["),
     ("[\"lower_top\", \"upper_bottom\"]", "\"auto\"\ndistance = 1\nof = [\"u*\", \"KSP\"]", "\"KSP\"", "`ksp` cannot be the name of a body", ""),
     ("[method]", "[[contact]]\nbetween = \"auto\"\ndistance = 1\nof = [\"u*\", \"l*\"]\nlayer = { linear = { stiffness = 1 } }\n[[contact]]\nbetween = \"auto\"\ndistance = 2\nof = [\"l*\", \"u*\"]\nlayer = { linear = { stiffness = 1 } }\n[method]", "\"l*\"", "a second contact between \"auto\" of `l*` and `u*`", "remove one"),
     ("name = \"upper\"", "name = \"\"", "\"\"", "the name is empty", ""),
     ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\" }", "{ on = \"lower_axis\" }", "the support on `lower_axis` holds no component", "x, y: x = 0"),
     ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", z = 0 }", "0", "a support in `z` in a plane problem", ""),
-    ("pressure = 10 ", "", "{ on = \"lower_face\", }", "the load on `lower_face` has no component", "[tx, ty]"),
-    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", x = 0, symmetry = true }", "symmetry", "a support has both `x` and `symmetry`", ""),
-    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", normal = 0, symmetry = true }", "symmetry", "a support has both `normal` and `symmetry`", ""),
+    ("pressure = 10 ", "", "\"lower_face\"", "the load on `lower_face` has no component", "[tx, ty]"),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", x = 0, symmetry = true }", "true", "a support has both `x` and `symmetry`", ""),
+    ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", normal = 0, symmetry = true }", "true", "a support has both `normal` and `symmetry`", ""),
     ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", symmetry = false }", "false", "`symmetry = false` holds nothing", ""),
     ("{ on = \"lower_axis\", x = 0 }", "{ on = \"lower_axis\", x = \"2*u\" }", "u", "unknown variable `u`", ""),
-    ("pressure = 10", "pressure = 10, force = [0, 0]", "force", "a load has both `pressure` and `force`", ""),
-    ("pressure = 10", "pressure = 10, rigid = true", "rigid", "`rigid` without a force or a moment", "force = [0, -10]"),
+    ("pressure = 10", "pressure = 10, force = [0, 0]", "[0, 0]", "a load has both `pressure` and `force`", ""),
+    ("pressure = 10", "pressure = 10, rigid = true", "true", "`rigid` without a force or a moment", "force = [0, -10]"),
     ("pressure = 10", "force = [0, 1], moment = 2", "2", "a load has both `force` and `moment`", "two loads, or rigid = true"),
-    ("pressure = 10", "traction = [0, 1], moment = 2", "moment", "a load has both `moment` and `traction`", ""),
+    ("pressure = 10", "traction = [0, 1], moment = 2", "2", "a load has both `traction` and `moment`", ""),
     ("pressure = 10", "force = [0, \"2*x\"]", "\"2*x\"", "a total force or moment does not depend on the place", "traction"),
-    ("order = 1", "spring = [{ on = \"lower_face\" }]", "{ on = \"lower_face\" }", "the spring on `lower_face` has no stiffness", "normal = k"),
+    ("order = 1", "spring = [{ on = \"lower_face\" }]", "\"lower_face\"", "the spring on `lower_face` has no stiffness", "normal = k"),
     ("order = 1", "spring = [{ on = \"lower_face\", normal = 0 }]", "0", "the stiffness is 0", ""),
     ("order = 1", "spring = [{ on = \"lower_face\", stiffness = [0, 0] }]", "[0, 0]", "the spring has no stiffness", ""),
-    ("pressure = 10", "pressure = 10, traction = [0, 0]", "traction", "a load has both `pressure` and `traction`", ""),
+    ("pressure = 10", "pressure = 10, traction = [0, 0]", "[0, 0]", "a load has both `pressure` and `traction`", ""),
     ("force = [0, ", "force = [0, 0, ", "\"-9.81e-6 * (1 + y)\"", "a vector has 2 components here, not 3", "dimension"),
     ("traction = [\"2*x\", -10]", "traction = []", "[]", "a vector has 2 components here, not 0", ""),
     // Expressions.
@@ -283,26 +283,28 @@ const CASES: &[Case] = &[
     // Contacts.
     ("\"upper_bottom\"", "\"lower_top\"", "\"lower_top\"", "a contact between `lower_top` and itself", ""),
     (", \"upper_bottom\"", "", "[\"lower_top\"]", "a contact is between two surfaces", ""),
+    ("[method]", "tension = { linear = { stiffness = 1 } }\n[method]", "{ linear = { stiffness = 1 } }", "only a bonded layer has a law in tension", "bond = true"),
+    ("[method]", "bond = true\ntension = { linear = { stiffness = 0 } }\n[method]", "0", "stiffness is 0", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "", "{  }", "the layer has no law", "linear = { stiffness = 1e5 }"),
-    ("a = 0.5 } }", "a = 0.5 }, linear = { stiffness = 1 } }", "linear", "the layer has both `power` and `linear`", ""),
+    ("a = 0.5 } }", "a = 0.5 }, linear = { stiffness = 1 } }", "{ stiffness = 1 }", "the layer has both `power` and `linear`", ""),
     ("B = 2.5e-5", "B = \"w\"", "w", "unknown variable `w`", "known are x, y, pi"),
     ("power = { B = 2.5e-5, a = 0.5 }", "exponential = { p0 = 1, c0 = 0 }", "0", "c0 is 0", ""),
-    ("power = { B = 2.5e-5, a = 0.5 }", "exponential = { p0 = 1 }", "{ p0 = 1 }", "the exponential layer has no `c0`", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "exponential = { p0 = 1 }", "{ p0 = 1 }", "`exponential` has no `c0`", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "cubic = { k1 = 1, k3 = -1 }", "-1", "k3 is -1", ""),
-    ("power = { B = 2.5e-5, a = 0.5 }", "cubik = { k1 = 1, k3 = 1 }", "cubik", "unknown key `cubik` in the layer", "did you mean `cubic`?"),
+    ("power = { B = 2.5e-5, a = 0.5 }", "cubik = { k1 = 1, k3 = 1 }", "cubik", "unknown key `cubik` in `layer`", "did you mean `cubic`?"),
     ("power = { B = 2.5e-5, a = 0.5 }", "table = []", "[]", "the table has no point", "table = ["),
     ("power = { B = 2.5e-5, a = 0.5 }", "table = [[1, 2, 3]]", "[1, 2, 3]", "a point of the table is a compression and a pressure", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "table = [[0, 0], [1, 2], [2, 1]]", "[[0, 0], [1, 2], [2, 1]]", "the pressure 1 of the table does not exceed 2", "increases"),
     ("power = { B = 2.5e-5, a = 0.5 }", "table = [[-1, 2]]", "[[-1, 2]]", "the compression -1 of the table does not exceed 0", ""),
-    ("power = { B = 2.5e-5, a = 0.5 }", "table = [[1, 2]], pressure = \"c\"", "pressure", "the layer has both `table` and `pressure`", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "table = [[1, 2]], pressure = \"c\"", "\"c\"", "the layer has both `table` and `pressure`", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "pressure = \"1e5*d\"", "d", "unknown variable `d`", "known are c, x, y, pi"),
     ("power = { B = 2.5e-5, a = 0.5 }", "pressure = 7", "7", "expected a string, found a whole number", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "pressure = \"c\", up_to = 0", "0", "the end of the law is 0", ""),
-    ("power = { B = 2.5e-5, a = 0.5 }", "linear = { stiffness = 1 }, up_to = 1", "up_to", "`up_to` without an expression", ""),
+    ("power = { B = 2.5e-5, a = 0.5 }", "linear = { stiffness = 1 }, up_to = 1", "1", "`up_to` without an expression", ""),
     ("[method]", "[[contact]]\nbetween = [\"upper_bottom\", \"lower_top\"]\nlayer.linear.stiffness = 1\n[method]", "\"upper_bottom\"", "a second contact of `upper_bottom` and `lower_top`", ""),
     // The method.
-    ("[method]", "[method]\nname = \"ncg\"", "\"ncg\"", "unknown method `ncg`", "auto"),
-    ("start = { normal = 1e-4 }", "start = \"nested\"", "\"nested\"", "unknown start `nested`", "auto"),
+    ("[method]", "[method]\nname = \"ncg\"", "\"ncg\"", "unknown word `ncg` for `method.name`", "auto"),
+    ("start = { normal = 1e-4 }", "start = \"nested\"", "\"nested\"", "unknown word `nested` for `method.start`", "auto"),
     ("[method]", "[method]\ndepth = 3", "depth", "unknown key `depth`", "anderson"),
     ("[method]", "[method]\nname = \"newton\"\ninterval = true", "true", "only the method `robin` has an interval of gamma", "name = \"robin\""),
     ("[method]", "[method]\nsteps = [0.5, 0.9]", "[0.5, 0.9]", "the last load step is not the full load", "end the list with 1"),
@@ -310,15 +312,15 @@ const CASES: &[Case] = &[
     ("[method]", "[method]\nsteps = 0", "0", "`steps` is 0", ""),
     ("[[contact]]", "adapt = { error = 1e-3 }\n[[contact]]", "", "", ""),
     // The mesh.
-    ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "msh", "the mesh has both `geo` and `msh`", ""),
-    ("geo = \"groove.geo\"", "msh = \"groove.msh\"", "set", "`set` for a finished mesh", ""),
+    ("geo = \"groove.geo\"", "geo = \"groove.geo\", msh = \"groove.msh\"", "\"groove.msh\"", "the mesh has both `geo` and `msh`", ""),
+    ("geo = \"groove.geo\"", "msh = \"groove.msh\"", "{ n = 32 }", "`set` for a finished mesh", ""),
     ("geo = \"groove.geo\"", "geo = \"grove.geo\"", "\"grove.geo\"", "/grove.geo", "did you mean `groove.geo`?"),
     ("geo = \"groove.geo\"", "geo = \"no/such.geo\"", "\"no/such.geo\"", "/no/such.geo", "relative"),
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
     ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
     ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` is 0", ""),
     ("n = 32 }", "n = 32 }, memory = 8", "memory", "unknown key `memory`", "`timeout` alone"),
-    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", timeout = 1", "timeout", "`timeout` for a finished mesh", ""),
+    ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", timeout = 1", "1", "`timeout` for a finished mesh", ""),
     ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),
     ("n = 32", "\"n m\" = 32", "\"n m\"", "`n m` is no name of a Gmsh number", ""),
 ];
@@ -372,12 +374,12 @@ fn refusals_of_overrides_point_into_them() {
         ("metod.gamma=1", "metod", "unknown key `metod` in the scene", "`method`"),
         ("method.gama=1", "gama", "unknown key `gama` in [method]", "`gamma`"),
         ("method.gamma = -1", "-1", "gamma is -1", ""),
-        ("method.gamma=much", "much", "unknown rule for gamma `much`", "line-search"),
+        ("method.gamma=much", "much", "unknown word `much` for `method.gamma`", "line-search"),
         ("method.gamma=", "", "the value is missing", ""),
         ("method..gamma=1", "method..gamma", "this is not a key of the scene", "joined by points"),
-        ("mesh.msh=groove.msh", "msh", "the mesh has both `geo` and `msh`", ""),
+        ("mesh.msh=groove.msh", "groove.msh", "the mesh has both `geo` and `msh`", ""),
         ("contact.0.layer.linear.stiffness=1", "linear", "the layer has both `power` and `linear`", ""),
-        ("contact.0.layer={linear={stiffness=0}}", "0", "the stiffness is 0", ""),
+        ("contact.0.layer={linear={stiffness=0}}", "0", "stiffness is 0", ""),
         ("contact.0.layer={linear={stiffness=1}", "", "this is not TOML: unclosed inline table", ""),
         ("contact.0.gap=1e-4 * max(0, w)", "w", "unknown variable `w`", ""),
         ("mesh.geo=other.geo", "other.geo", "/other.geo", ""),
@@ -399,7 +401,7 @@ fn refusals_of_short_options_point_into_what_was_typed() {
         ("--tolerance 5", "5", "the error is 5"),
         ("--tolerance ", "", "the value is missing"),
         ("--tolerance much", "much", "expected a number, found a string"),
-        ("--method newtn", "newtn", "unknown method `newtn`"),
+        ("--method newtn", "newtn", "unknown word `newtn` for `method.name`"),
         ("--over method.gamma=-1", "-1", "gamma is -1"),
     ] {
         let shown = refused(GROOVE, &[text], text, [marked, message, ""]);

@@ -403,7 +403,7 @@ fn stress_along_the_circles() {
     let (across, along) = (volume + 2.0 * mu * a, volume + 2.0 * mu * b);
     let scene = load_scene(&case("shells"), &[]).expect("a scene");
     let elasticity =
-        Elasticity::new(&[&scene.bodies[0].elasticity], Vec::new(), 2, scene.plane).expect("an isotropic material");
+        Elasticity::new(&[&scene.bodies[0].elasticity()], Vec::new(), 2, scene.plane).expect("an isotropic material");
     for degree in [Order::P1, Order::P2] {
         let mesh = load::<2>(&scene.mesh, degree, &Interrupt::default()).expect("a mesh").mesh;
         let space = Space::new(&mesh, mesh.group("inner").expect("a body"), degree);

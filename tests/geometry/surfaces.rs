@@ -138,7 +138,7 @@ fn slips_in_data_are_pointed_at() {
         (&["data.h.file=g.csv"], "[data.h] has no `spacing`"),
         (&["data.x={file=\"g.csv\",spacing=1}"], "data cannot be called `x`"),
         (&["data.a-b={file=\"g.csv\",spacing=1}"], "data cannot be called `a-b`"),
-        (&["data.file=g.csv"], "in data without a name"),
+        (&["data.file=g.csv"], "write [data.rough]"),
         (&["contact.0.gap=g(x)"], "`g` takes 2 values, not 1"),
         (&["contact.0.gap=q(x, y)"], "`q` takes 1 value, not 2"),
         (&["contact.0.gap=g"], "`g` needs its value in parentheses"),

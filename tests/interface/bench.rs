@@ -151,6 +151,7 @@ fn rows_name_what_ran() {
         "s",
         "MB",
         "error",
+        "of",
     ];
     let at = lines.iter().position(|line| *line == head).expect("a heading");
     for (line, row) in lines[at + 1..].iter().zip(&rows) {

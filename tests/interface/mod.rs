@@ -3,6 +3,7 @@
 mod bench;
 mod documents;
 mod library;
+mod lines;
 mod manners;
 mod options;
 mod pictures;

@@ -62,7 +62,7 @@ fn a_plane_run_has_a_page_of_its_own() {
             "--set",
             "mesh.set.n=4",
             "--set",
-            "units=MPa, cm",
+            "units=cm, MPa",
             "--set",
             "title=<b>A</b> & </script><script>boom()</script>",
             "-ksp_type",
@@ -102,6 +102,33 @@ fn a_plane_run_has_a_page_of_its_own() {
         assert!(dom.contains("Run it again"));
         // the script has drawn
         assert!(dom.contains("<output>× ") && dom.contains("<span style=\"background"), "the view is not drawn");
+    }
+}
+
+/// The value under the mouse stands below the picture, and the axes in its corner. An adapted run has a table of its meshes.
+#[test]
+fn the_mouse_reads_values() {
+    let run = solve(case("groove-held"), &["--report", "--tolerance", "2e-2", "--set", "method={}"]).converged();
+    let html = page(&run.folder);
+    let rounds = run.report["rounds"].as_array().expect("meshes");
+    assert!(
+        html.contains("<h2>Meshes</h2>") && rounds.iter().all(|mesh| html.contains(&format!(">{}</td>", mesh["dofs"])))
+    );
+    // frames are not drawn in a browser without a screen
+    let frames = "<head><script>window.requestAnimationFrame = draw => setTimeout(draw, 0)</script>";
+    let pointing = "<script>setTimeout(() => {
+        const canvas = document.querySelector('canvas'), box = canvas.getBoundingClientRect();
+        const [clientX, clientY] = [box.left + box.width / 2, box.top + box.height / 4];
+        canvas.dispatchEvent(new PointerEvent('pointermove', { clientX, clientY }));
+    }, 100)</script></body>";
+    let path = run.folder.join("pointed.html");
+    fs::write(&path, html.replacen("<head>", frames, 1).replacen("</body>", pointing, 1)).expect("a page");
+    if let Some(dom) = opened(&path) {
+        let under = dom.split("class=\"under\">").nth(1).and_then(|rest| rest.split('<').next()).expect("a line");
+        // the middle of the upper block lies a quarter below the upper end of the picture
+        assert!(under.starts_with("upper at (2") && under.ends_with(" (von Mises stress)"), "{under}");
+        let axes = dom.split("class=\"axes\"").nth(1).and_then(|rest| rest.split("</svg>").next()).expect("axes");
+        assert!(axes.contains(">x</text>") && axes.contains(">y</text>") && !axes.contains(">z</text>"), "{axes}");
     }
 }
 

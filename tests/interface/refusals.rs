@@ -44,7 +44,7 @@ fn a_scene_that_is_not_there() {
 fn keys_and_types() {
     groove_refused("gamma = 0.6", "gama = 0.6", "gama", &["unknown key `gama`", "did you mean `gamma`?"]);
     groove_refused("psi = \"active\"", "psi = \"activ\"", "activ\"", &["`activ`", "did you mean `active`?"]);
-    groove_refused("gamma = 0.6", "gamma = \"big\"", "big", &["unknown rule for gamma `big`", "line-search"]);
+    groove_refused("gamma = 0.6", "gamma = \"big\"", "big", &["unknown word `big` for `method.gamma`", "line-search"]);
     groove_refused("gamma = 0.6", "gamma = -0.6", "-0.6", &["gamma"]);
     groove_refused("a = 0.5", "a = 1.5", "a = 1.5", &["a is 1.5", "must not exceed 1"]);
     groove_refused("[method]", "[method", "[method", &["TOML"]);
@@ -136,7 +136,7 @@ fn overrides() {
     };
     set("method.gama=1", SCENE, &["--set method.gama=1\n", "`gama`", "did you mean `gamma`?"]);
     set("contact.5.gap=1", SCENE, &["--set contact.5.gap=1\n", "no number 5"]);
-    set("method.gamma=abc", SCENE, &["--set method.gamma=abc\n", "unknown rule for gamma"]);
+    set("method.gamma=abc", SCENE, &["--set method.gamma=abc\n", "unknown word `abc` for `method.gamma`"]);
     set("body.0.fix.0.on=nothing", SCENE, &["--set body.0.fix.0.on=nothing\n", "`nothing`"]);
     set("method.gamma", 2, &["without `=`"]);
     // the place is where the user wrote the name

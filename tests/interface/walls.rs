@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 /// The modules from the ground up; each may use those below it.
-const MODULES: &str = "error exchange file interrupt linalg petsc data expression setting problem mesh fem contact parallel \
+const MODULES: &str = "error exchange file interrupt linalg petsc data expression problem mesh fem contact parallel \
     solver model robin ddm output report scene discretize estimate run api commands internals cli main";
 
 /// Modules that may use less than what lies below them.

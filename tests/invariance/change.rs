@@ -2,9 +2,10 @@
 
 use std::rc::Rc;
 use winkler::api::{
-    AxesSpec, BodySpec, Constants, ContactSpec, ElasticitySpec, Error, Field, LawKind, LayerSpec, LoadKind, MeshArrays,
-    MeshSource, Plane, Result, Scene, SpringKind, Start,
+    AxesSpec, BodySpec, ContactSpec, Error, Field, LayerSpec, LoadKind, MeshArrays, MeshSource, Orthotropic, Plane,
+    Result, Scene, SpringKind, Start,
 };
+use winkler::error::Located;
 use winkler::internals::expression::{Expression, KnownNames};
 use winkler::internals::fem::cross;
 use winkler::internals::mesh::Mesh;
@@ -88,9 +89,6 @@ impl Change {
         for contact in &mut scene.contacts {
             self.contact(contact, D)?;
         }
-        for rule in &mut scene.auto {
-            self.contact(&mut rule.contact, D)?;
-        }
         if let Start::Normal(field) = &mut scene.method.start {
             *field = self.field(field, self.length);
         }
@@ -115,8 +113,12 @@ impl Change {
 
     fn body<const D: usize>(&self, body: &mut BodySpec, mesh: &Mesh<D>, force: f64) {
         let (l, s) = (self.length, self.stress);
-        self.elasticity(&mut body.elasticity);
-        body.regions.iter_mut().for_each(|region| self.elasticity(&mut region.elasticity));
+        self.isotropic(&mut body.young, &mut body.poisson);
+        self.anisotropic(&mut body.orthotropic, &mut body.anisotropic, &mut body.axes);
+        for region in &mut body.regions {
+            self.isotropic(&mut region.young, &mut region.poisson);
+            self.anisotropic(&mut region.orthotropic, &mut region.anisotropic, &mut region.axes);
+        }
         for fix in &mut body.fix {
             let old = fix.value.clone();
             let value = |i: usize| Some(self.field(old[self.axis[i]].as_ref()?, self.sign[i] * l));
@@ -143,27 +145,33 @@ impl Change {
                 SpringKind::Vector(k) => *k = std::array::from_fn(|i| self.field(&k[self.axis[i]], factor)),
             }
         }
-        body.force = body.force.as_ref().map(|fields| self.fields(fields, s / l));
+        body.force = body.force.as_ref().map(|fields| self.fields(fields, s / l).into());
         // it has no part in the answer
         body.exact = None;
     }
 
-    fn elasticity(&self, elasticity: &mut ElasticitySpec) {
-        let s = self.stress;
-        match &mut elasticity.constants {
-            Constants::Isotropic { young, poisson } => {
-                (*young, *poisson) = (self.field(young, s), self.field(poisson, 1.0));
-                return;
-            }
-            Constants::Orthotropic(fields) => {
-                for (field, name) in fields.iter_mut().zip(Constants::ORTHOTROPIC) {
-                    *field = self.field(field, if name.starts_with("nu") { 1.0 } else { s });
-                }
-            }
-            Constants::Anisotropic(fields) => fields.iter_mut().for_each(|field| *field = self.field(field, s)),
+    fn isotropic(&self, young: &mut Option<Located<Field>>, poisson: &mut Option<Located<Field>>) {
+        young.iter_mut().for_each(|young| young.value = self.field(young, self.stress));
+        poisson.iter_mut().for_each(|poisson| poisson.value = self.field(poisson, 1.0));
+    }
+
+    fn anisotropic(
+        &self,
+        orthotropic: &mut Option<Located<Orthotropic>>,
+        anisotropic: &mut Option<Located<Vec<Field>>>,
+        axes: &mut Option<Located<AxesSpec>>,
+    ) {
+        if orthotropic.is_none() && anisotropic.is_none() {
+            return;
         }
+        if let Some(Located { value: Orthotropic { e1, e2, e3, nu12, nu13, nu23, g12, g13, g23 }, .. }) = orthotropic {
+            [e1, e2, e3, g12, g13, g23].into_iter().for_each(|modulus| *modulus = self.field(modulus, self.stress));
+            [nu12, nu13, nu23].into_iter().for_each(|ratio| *ratio = self.field(ratio, 1.0));
+        }
+        let constants = anisotropic.iter_mut().flat_map(|constants| &mut constants.value);
+        constants.for_each(|constant| *constant = self.field(constant, self.stress));
         let constant = |v: [f64; 3]| v.map(Field::Constant);
-        let [first, second] = match elasticity.axes.take() {
+        let [first, second] = match axes.take().map(|axes| axes.value) {
             None => [constant([1.0, 0.0, 0.0]), constant([0.0, 1.0, 0.0])],
             Some(AxesSpec::Directions { first, second: Some(second) }) => [first, second],
             Some(AxesSpec::Directions { first, second: None }) => {
@@ -181,7 +189,7 @@ impl Change {
         };
         // the third axis is the cross product of these: orthotropic constants do not see its sign
         let (first, second) = (self.fields(&first, 1.0), Some(self.fields(&second, 1.0)));
-        elasticity.axes = Some(AxesSpec::Directions { first, second });
+        *axes = Some(AxesSpec::Directions { first, second }.into());
     }
 
     fn contact(&self, contact: &mut ContactSpec, dimension: usize) -> Result<()> {
@@ -190,19 +198,16 @@ impl Change {
         contact.gap = self.field(&contact.gap, l);
         contact.reference = None;
         match &mut contact.layer {
-            LayerSpec::Form { form, values } => {
-                let scaled = |k: usize, factor: f64| self.field(&values[k], factor);
-                *values = match form.kind {
-                    LawKind::Linear => vec![scaled(0, s / l)],
-                    LawKind::Exponential => vec![scaled(0, s), scaled(1, l)],
-                    LawKind::Cubic => vec![scaled(0, s / l), scaled(1, s / l.powi(3))],
-                    // p = (c/B)^(1/a): B is the compression under p = 1
-                    LawKind::Power => {
-                        let (b, a) = (scaled(0, l), scaled(1, 1.0));
-                        let exponent = a.clone();
-                        vec![product(b, move |x| s.powf(-exponent.eval(x))), a]
-                    }
-                }
+            LayerSpec::Linear(law) => law.stiffness = self.field(&law.stiffness, s / l),
+            LayerSpec::Exponential(law) => (law.p0, law.c0) = (self.field(&law.p0, s), self.field(&law.c0, l)),
+            LayerSpec::Cubic(law) => {
+                (law.k1, law.k3) = (self.field(&law.k1, s / l), self.field(&law.k3, s / l.powi(3)));
+            }
+            // p = (c/B)^(1/a): B is the compression under p = 1
+            LayerSpec::Power(law) => {
+                let (b, a) = (self.field(&law.b, l), self.field(&law.a, 1.0));
+                let exponent = a.clone();
+                (law.b, law.a) = (product(b, move |x| s.powf(-exponent.eval(x))), a);
             }
             LayerSpec::Table(points) => points.iter_mut().for_each(|[c, p]| (*c, *p) = (l * *c, s * *p)),
             LayerSpec::Own(name) => {

@@ -112,7 +112,7 @@ fn run_in<const D: usize>(
     let [low, high] = bounds(mesh.points.iter().map(|&x| mesh.in_scene(x)));
     let size = (0..3).map(|c| high[c] - low[c]).fold(0.0, f64::max);
     let Some(change) = change::<D>(scene, size, kind) else { return Ok(None) };
-    let modulus = scene.bodies.iter().map(|body| largest(&body.elasticity.constants)).fold(0.0, f64::max);
+    let modulus = scene.bodies.iter().map(|body| largest(&body.elasticity().constants)).fold(0.0, f64::max);
     change.apply(scene, &mesh)?;
     debug_assert!(matches!(scene.mesh, MeshSource::Arrays(_)));
     let force = change.force(scene);

@@ -1,6 +1,7 @@
 //! Newton's method is the same on any number of ranks: dofs are distributed, or every rank solves for the contacts of condensed bodies.
 
 use crate::common::here::solve_here;
+use crate::common::vtu::Grid;
 use crate::common::{Report, Run, case, solve, solve_on, winkler_on};
 use std::fs;
 use tempfile::TempDir;
@@ -88,6 +89,27 @@ fn rows_are_distributed() {
         let run = solve_on(3, case("groove3d"), &args).converged();
         let view = ["KSP Object: (newton_) 3 MPI processes", "type: mpiaij", "rows=1020, cols=1020"];
         assert!(view.iter().all(|text| run.stdout.contains(text)), "{}", run.stdout);
+    }
+}
+
+/// The contact surface moves with its body, of which other ranks have parts.
+#[test]
+fn contact_surfaces_have_displacements() {
+    let args = ["--method", "newton", "--set", "mesh.set.n=4", "--set", "solver=hypre", "--set", STOP, "--vtu"];
+    let [one, three] = [1, 3].map(|ranks| solve_on(ranks, case("groove3d"), &args).converged());
+    let surface = |run: &Run| Grid::read(&run.folder.join("contact-lower-upper.vtu"));
+    let (alone, shared) = (surface(&one), surface(&three));
+    let body = Grid::read(&one.folder.join("lower.vtu"));
+    let place = |grid: &Grid, node: usize| grid.points[3 * node..3 * node + 3].to_vec();
+    let largest = body.arrays["displacement"].iter().fold(0.0f64, |most, u| most.max(u.abs()));
+    for node in 0..alone.points.len() / 3 {
+        let other =
+            (0..body.points.len() / 3).find(|&other| place(&body, other) == place(&alone, node)).expect("a node");
+        for c in 0..3 {
+            let moved = alone.arrays["displacement"][3 * node + c];
+            assert_eq!(moved, body.arrays["displacement"][3 * other + c]);
+            assert!((moved - shared.arrays["displacement"][3 * node + c]).abs() < 1e-8 * largest, "node {node}");
+        }
     }
 }
 

@@ -78,8 +78,8 @@ impl Benchmark {
         let Some(folder) = &request.against else { return Ok(None) };
         let [scene] = &self.scenes[..] else { return Err(usage("`--against` goes with one scene")) };
         let found = compare::tables(folder)?;
-        let (tables, pairs) = (found.len(), scene.contacts.len());
-        if found.is_empty() || (scene.auto.is_empty() && tables != pairs) {
+        let (tables, pairs) = (found.len(), scene.pairs().count());
+        if found.is_empty() || (scene.rules().next().is_none() && tables != pairs) {
             let message = format!("{} has {tables} contact tables, the scene {pairs} pairs", folder.display());
             return Err(usage(message).help("give the folder of results of the same scene"));
         }
@@ -178,7 +178,7 @@ struct Shown {
     text: fn(&Row) -> Option<String>,
 }
 
-const SHOWN: [Shown; 8] = [
+const SHOWN: [Shown; 9] = [
     Shown { heading: "dofs", text: |row| row.dofs.map(|count| count.to_string()) },
     Shown { heading: "iterations", text: |row| row.iterations.map(|count| count.to_string()) },
     Shown { heading: "sweeps", text: |row| row.sweeps.map(|count| count.to_string()) },
@@ -187,4 +187,5 @@ const SHOWN: [Shown; 8] = [
     Shown { heading: "CPU s", text: |row| row.cpu_seconds.map(seconds) },
     Shown { heading: "MB", text: |row| row.memory_mb.map(|memory| format!("{memory:.0}")) },
     Shown { heading: "error", text: |row| row.error.map(|error| sci(error, 2)) },
+    Shown { heading: "of", text: |row| row.error.map(|_| row.error_of.clone()) },
 ];

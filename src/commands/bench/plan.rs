@@ -170,7 +170,7 @@ fn orders_of(scene: &Scene) -> String {
 fn solvers(typed: &[String]) -> Result<Vec<AxisValue>> {
     let preset = |name: &str| AxisValue::new(name, vec![format!("solver={name}")]);
     if typed.is_empty() {
-        return Ok(Preset::ALL.iter().map(|(name, _)| preset(name)).collect());
+        return Ok(Preset::ALL.iter().map(|known| preset(&known.name())).collect());
     }
     let mut solvers = Vec::new();
     for text in typed {

@@ -3,9 +3,8 @@
 use super::expression::ExpressionLaw;
 use super::{LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result, shown};
-use crate::expression::Field;
 use crate::linalg::portable::pow;
-use crate::problem::layer::{LawForm, LawKind, Parameter};
+use crate::problem::layer::{LayerSpec, Parameter};
 use std::rc::Rc;
 
 /// The law p0 (e^(c/c0) - 1) of the parameters x = p0 and y = c0, in a form that keeps its digits where c is small.
@@ -17,21 +16,25 @@ pub const CUBIC: &str = "x*c + y*c^3";
 /// of such pressures are finite.
 pub const LINE: f64 = 60.0;
 
-/// Make the law of a form with these values of its parameters, for the contact points `position`.
+/// Make a law with parameters for the contact points `position`.
 ///
 /// # Errors
 /// A parameter that is not finite or out of its range at a point.
-pub fn make(form: &LawForm, values: &[Field], position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
-    match form.kind {
-        LawKind::Linear => formed(form, values, position, |v| LinearLaw { stiffness: v[0] }),
-        LawKind::Power => formed(form, values, position, |v| Power::new(v[0], v[1])),
-        LawKind::Exponential => {
+pub fn make(spec: &LayerSpec, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
+    let (_, parameters) = spec.parameters();
+    match spec {
+        LayerSpec::Linear(_) => formed(&parameters, position, |v| LinearLaw { stiffness: v[0] }),
+        LayerSpec::Power(_) => formed(&parameters, position, |v| Power::new(v[0], v[1])),
+        LayerSpec::Exponential(_) => {
             let law = ExpressionLaw::text(EXPONENTIAL)?;
-            formed(form, values, position, |v| ExpressionLaw::known(&law, v[0], v[1], LINE * v[1]))
+            formed(&parameters, position, |v| ExpressionLaw::known(&law, v[0], v[1], LINE * v[1]))
         }
-        LawKind::Cubic => {
+        LayerSpec::Cubic(_) => {
             let law = ExpressionLaw::text(CUBIC)?;
-            formed(form, values, position, |v| ExpressionLaw::known(&law, v[0], v[1], f64::INFINITY))
+            formed(&parameters, position, |v| ExpressionLaw::known(&law, v[0], v[1], f64::INFINITY))
+        }
+        LayerSpec::Table(_) | LayerSpec::Own(_) | LayerSpec::Pressure { .. } => {
+            Err(Error::new(Kind::Scene, "a law without parameters"))
         }
     }
 }
@@ -41,16 +44,15 @@ pub fn make(form: &LawForm, values: &[Field], position: &[[f64; 3]]) -> Result<R
 /// # Errors
 /// A parameter that is not finite or out of its range at a point.
 fn formed<L: LayerLaw + 'static>(
-    form: &LawForm,
-    values: &[Field],
+    parameters: &[Parameter<'_>],
     position: &[[f64; 3]],
     new: impl Fn(&[f64]) -> L,
 ) -> Result<Rc<dyn LayerLaw>> {
     let at = |&x: &[f64; 3]| -> Result<L> {
-        let parameters = form.parameters.iter().zip(values).map(|(parameter, field)| checked(parameter, field, x));
-        Ok(new(&parameters.collect::<Result<Vec<f64>>>()?))
+        let values = parameters.iter().map(|parameter| checked(parameter, x));
+        Ok(new(&values.collect::<Result<Vec<f64>>>()?))
     };
-    match values.iter().all(Field::is_constant) {
+    match parameters.iter().all(|parameter| parameter.value.is_constant()) {
         true => Ok(Rc::new(at(&[0.0; 3])?)),
         false => Ok(Rc::new(PerPoint(position.iter().map(at).collect::<Result<_>>()?))),
     }
@@ -60,10 +62,10 @@ fn formed<L: LayerLaw + 'static>(
 ///
 /// # Errors
 /// A value that is not finite or out of its range.
-fn checked(parameter: &Parameter, field: &Field, x: [f64; 3]) -> Result<f64> {
-    let value = field.eval_finite(parameter.what, x)?;
-    let Some(breach) = parameter.bounds.breach(value) else { return Ok(value) };
-    let message = format!("{} is {} at ({}, {}, {})", parameter.what, shown(value), x[0], x[1], x[2]);
+fn checked(&Parameter { key, value: field, bounds }: &Parameter<'_>, x: [f64; 3]) -> Result<f64> {
+    let value = field.eval_finite(key, x)?;
+    let Some(breach) = bounds.breach(value) else { return Ok(value) };
+    let message = format!("{} is {} at ({}, {}, {})", key, shown(value), x[0], x[1], x[2]);
     let error = Error::new(Kind::Scene, message);
     Err(match field.place() {
         Some(place) => error.at(place).label(breach),
