@@ -274,7 +274,7 @@ impl AdaptiveRun {
     fn next_sizes(&self, done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> Option<Sizes> {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
-        let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
+        let degree = (0..model.meshed()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let least = if degree > 2.0 { LEAST * LEAST } else { LEAST };
         let share = (AIM * goal.error.value / estimate.largest()).max(least).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
