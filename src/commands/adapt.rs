@@ -19,7 +19,7 @@ use crate::scene::{AdaptSpec, Scene};
 use std::rc::Rc;
 use std::sync::Arc;
 
-/// Cells of a body's first mesh, less at orders above two, which have about as many dofs. A cube with three cells along each edge, six tetrahedra each, has 162; with two it has a single inner node.
+/// Cells of a body's first mesh. A cube with three cells along each edge, six tetrahedra each, has 162; with two it has a single inner node.
 const FIRST_CELLS: usize = 150;
 
 /// Ratio of the error that the next mesh aims at to the error asked for. An estimate a little too good then costs no further mesh.
@@ -107,10 +107,7 @@ impl AdaptiveRun {
             scene.carriers = own.discrete.carriers();
             if head.is_none() {
                 let bodies = own.discrete.bodies.len();
-                let coarse = |meshes: &Rc<dyn Meshes>| {
-                    let degree = (0..bodies).map(|body| meshes.degree(body)).min().unwrap_or(1);
-                    view(&sizes::coarse(&**meshes, bodies, 2 * FIRST_CELLS * bodies / degree.max(2)))
-                };
+                let coarse = |meshes: &Rc<dyn Meshes>| view(&sizes::coarse(&**meshes, bodies, FIRST_CELLS * bodies));
                 follow(scene, own.discrete.meshes.as_ref().map(coarse).map(Into::into));
                 plan.defer_steps();
             }
@@ -275,15 +272,12 @@ impl AdaptiveRun {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.meshed()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
-        let least = if degree > 2.0 { LEAST * LEAST } else { LEAST };
-        let share = (AIM * goal.error.value / estimate.largest()).max(least).powf(2.0 * degree / (degree + 1.0));
+        let share = (AIM * goal.error.value / estimate.largest()).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
         let most = goal.cells as f64 * excess;
-        // above order two cells are added at single places, and the error of all others is small
-        let more = if degree > 2.0 { 1.0 } else { GROWTH };
-        let aim = Aim { share, more, most };
+        let aim = Aim { share, more: GROWTH, most };
         let mut next = sizes::wanted(&**meshes, model, &done.outcome.layer, estimate, aim);
         // where the script bounds the sizes, no smaller ones give the missing cells: GROWTH bounds what is tried
         next.refine(excess.clamp(1.0, GROWTH).min(most / next.cells));

@@ -36,15 +36,6 @@ pub struct Sizes {
 /// same number of meshes, the last ones of the same size within 7 %.
 const RANGE: (f64, f64) = (0.25, 2.0);
 
-/// Largest power p with which the error h^p of a cell at a kink falls. Where contact ends under a layer, and where a gap begins, displacements have a kink in
-/// the second derivative, so that orders above two gain nothing in cells at these places. Elsewhere their cells have hardly any error: they keep their sizes, or
-/// become larger. With sizes for equal errors by the order of smooth solutions `groove-held` with order 6 to 1e-5 took 2372 cells and was a hundred times too good.
-const KINK: f64 = 2.0;
-
-/// Least share of the squared error that the next mesh aims at where orders are above two. The smallest cells at kinks leave 0.25^4 = 0.004 of theirs, so that
-/// 0.6 per cent of the error may be in cells that are left as they are.
-const SHARE_AT_KINKS: f64 = 0.01;
-
 /// The requirements on the next mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Aim {
@@ -60,7 +51,7 @@ pub struct Aim {
 ///
 /// Let p be the degree of the elements and D the dimension. With h -> s h the squared error eta^2 of a cell becomes s^(2p) eta^2,
 /// and s^-D cells take its place. The number of cells is least where s^(2p + D) eta^2 is the same everywhere. Every cell of the
-/// new mesh then has nearly the same error. For p above two see [`KINK`].
+/// new mesh then has nearly the same error.
 pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
     let bodies = model.meshed();
@@ -76,18 +67,12 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     let dimension = meshes.cells(0).stride as f64 - 1.0;
     let degrees = (0..bodies).flat_map(|body| std::iter::repeat_n(meshes.degree(body) as f64, counts[body]));
     let all: Vec<(f64, f64)> = errors.iter().copied().zip(degrees).collect();
-    let least = if all.iter().any(|cell| cell.1 > KINK) { SHARE_AT_KINKS } else { 0.0 };
-    let goal = share.max(least) * errors.iter().sum::<f64>();
-    // above order two, errors above the level are those of kinks, which take the smallest ratio
-    let at_kink = |level: f64, (error, p): (f64, f64)| p > KINK && error > level;
-    let ratio = |level: f64, cell: (f64, f64)| {
-        let free = (level / cell.0.max(f64::MIN_POSITIVE)).powf(1.0 / (2.0 * cell.1 + dimension));
-        if at_kink(level, cell) { RANGE.0 } else { free.clamp(RANGE.0, RANGE.1) }
+    let goal = share * errors.iter().sum::<f64>();
+    let ratio = |level: f64, (error, p): (f64, f64)| {
+        let free = (level / error.max(f64::MIN_POSITIVE)).powf(1.0 / (2.0 * p + dimension));
+        free.clamp(RANGE.0, RANGE.1)
     };
-    let left = |level: f64| -> f64 {
-        let power = |cell| 2.0 * if at_kink(level, cell) { KINK } else { cell.1 };
-        all.iter().map(|&cell| cell.0 * ratio(level, cell).powf(power(cell))).sum()
-    };
+    let left = |level: f64| -> f64 { all.iter().map(|&cell| cell.0 * ratio(level, cell).powf(2.0 * cell.1)).sum() };
     let cells = |level: f64| -> f64 { all.iter().map(|&cell| ratio(level, cell).powf(-dimension)).sum() };
     // Remaining error and cell sizes increase with the level, so its logarithm is bisected.
     let largest = errors.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
