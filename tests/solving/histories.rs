@@ -87,6 +87,16 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
     }
 }
 
+/// The stationary iteration, too, begins with the pressures of a step whose loads had another direction.
+#[test]
+fn sweeps_go_on_in_another_direction() {
+    let run = |method: &str| solve(with_table(PATH), &["--method", method]).converged();
+    let (ours, theirs) = (steps(&run("robin").folder), steps(&run("auto").folder));
+    for (step, peak) in theirs["peak_pressure lower-upper"].iter().enumerate() {
+        near(ours["peak_pressure lower-upper"][step], *peak, 1e-5, &format!("step {step}"));
+    }
+}
+
 /// Steps with loads in proportion are one problem, and others are as many as there are directions; condensed bodies serve all of them.
 #[test]
 fn only_another_direction_makes_another_problem() {
