@@ -91,9 +91,11 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
 #[test]
 fn sweeps_go_on_in_another_direction() {
     let run = |method: &str| solve(with_table(PATH), &["--method", method]).converged();
-    let (ours, theirs) = (steps(&run("robin").folder), steps(&run("auto").folder));
-    for (step, peak) in theirs["peak_pressure lower-upper"].iter().enumerate() {
-        near(ours["peak_pressure lower-upper"][step], *peak, 1e-5, &format!("step {step}"));
+    let (ours, theirs) = (run("robin"), run("auto"));
+    // nothing presses in the first step
+    for step in 1..7 {
+        let peak = format!("steps/{step}/pairs/0/peak_pressure");
+        near(ours.number(&peak), theirs.number(&peak), 1e-5, &peak);
     }
 }
 
