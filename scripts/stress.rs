@@ -4,6 +4,8 @@
 mod builder;
 #[path = "../tests/stress/laws.rs"]
 mod laws;
+#[path = "../tests/stress/mixed.rs"]
+mod mixed;
 #[path = "../tests/stress/random.rs"]
 mod random;
 #[path = "../tests/stress/runs.rs"]
@@ -31,6 +33,8 @@ use winkler::petsc::Session;
 /// laws of every form in one scene, springs to the ground, own weight, and given starts. With --slender they are leaves, discs, plates, frames and
 /// hoops from 1:5 to 1:200, in the plane, of revolution and in space. A seed stands for other scenes then.
 ///
+/// With --mixed they have obstacles, bonds and forces besides.
+///
 /// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.
 #[derive(Parser)]
 #[command(name = "scripts/stress")]
@@ -47,6 +51,9 @@ struct Arguments {
     /// Draws slender bodies
     #[arg(long)]
     slender: bool,
+    /// Draws obstacles, bonds and forces
+    #[arg(long, conflicts_with_all = ["wide", "slender"])]
+    mixed: bool,
     /// Seed of the series
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -150,6 +157,7 @@ fn write(arguments: &Arguments, folder: &Path, index: usize) -> Result<(Case, Pa
     let draw = match (arguments.wide, arguments.slender) {
         (true, _) => wide::scene,
         (_, true) => slender::scene,
+        _ if arguments.mixed => mixed::scene,
         _ => scenes::scene,
     };
     let case = draw(arguments.seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));

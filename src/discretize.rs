@@ -16,6 +16,7 @@ mod partition;
 mod patterns;
 mod post;
 mod prepare;
+mod rigid;
 mod share;
 mod supports;
 mod surface;
@@ -28,14 +29,16 @@ pub use facts::BodyInfo;
 pub use groups::point;
 pub use pairs::ContactInfo;
 pub use post::ForceBalance;
+pub use prepare::StepSpecs;
+pub use rigid::Obstacle;
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
-use crate::model::{Mechanism, Model};
+use crate::model::{Body, BodySlot, Mechanism, Model};
+use crate::problem::Start;
 use crate::problem::contact::Carrier;
-use crate::problem::{BodySpec, Start};
 use crate::scene::Scene;
 use assembly::Assembler;
 use body::BodyMesh;
@@ -66,7 +69,7 @@ pub struct Discrete {
 /// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
 /// assembles it.
 ///
-/// `bodies` are those of `verified` under the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
+/// `specs` are the bodies of `verified` and the contacts of the scene under the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
 /// `factory` turns each body of this rank into one with a solver. `keep` requests that the meshes are kept for an estimate of the
 /// error.
 ///
@@ -76,7 +79,7 @@ pub struct Discrete {
 pub fn discretize<const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
-    bodies: &[BodySpec],
+    specs: StepSpecs,
     cut: contact::pieces::Cut<D>,
     keep: bool,
     exchange: Rc<dyn Exchange>,
@@ -88,17 +91,17 @@ where
 {
     let mut prepared = None;
     let shared = broadcast(&*exchange, || {
-        let (shared, whole) = prepare(scene, verified, bodies, cut, keep, exchange.ranks(), factory)?;
+        let (shared, whole) = prepare(scene, verified, specs, cut, keep, exchange.ranks(), factory)?;
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, contacts, mechanisms, fine, plan } = shared;
-    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene)).collect();
+    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
+    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene, specs.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
         factory.adopt(plan)?;
         for (pair, contact) in pairs.iter_mut().zip(&contacts) {
-            pair.law = law::make(&contact.spec.layer, &scene.laws, &pair.position)?;
+            pair.law = law::of_pair(&contact.spec, &scene.laws, &pair.position)?;
         }
     }
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
@@ -106,11 +109,16 @@ where
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
     for (body, local) in locals.into_iter().enumerate() {
         if let Some(local) = local {
-            assembler.make(&bodies[body], local, &mut slots[body], &mut infos[body])?;
+            assembler.make(&specs.bodies[body], local, &mut slots[body], &mut infos[body])?;
         }
     }
     let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
     let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
+    let of_rank = |slot: BodySlot| match rank == 0 && !slot.motions.is_empty() {
+        true => BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot },
+        false => slot,
+    };
+    slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
     Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, assemblies, assemblies_avoided })
@@ -138,6 +146,16 @@ where
 }
 
 impl Discrete {
+    /// Keep the gap of pair `i` as an earlier load step has left it, with this offset (a length), which is no unknown any more.
+    pub fn lock(&mut self, i: usize, offset: f64) {
+        let model = &mut self.model;
+        model.pairs[i].offset = offset;
+        for slot in model.bodies.iter_mut().filter(|slot| slot.is_rigid && slot.segments[0].pair == i) {
+            (slot.local, slot.motions) = (None, Vec::new());
+        }
+        model.scale_gaps(1.0);
+    }
+
     /// Return which surface carries the contact points of each pair.
     pub fn carriers(&self) -> Vec<Carrier> {
         self.model.pairs.iter().zip(&self.contacts).map(|(pair, contact)| contact.carrier(pair.bodies)).collect()
@@ -160,12 +178,12 @@ impl Discrete {
         let mut message = vec![0.0; count + 2 * self.model.points()];
         for (body, slot) in self.model.bodies.iter().enumerate() {
             message[body] = slot.scale;
-            if slot.local.is_some() {
+            if slot.local.is_some() && !slot.is_rigid {
                 self.model.put(body, &slot.row_stiffness, &mut message[count..]);
             }
         }
         self.model.exchange.sum(&mut message);
-        for body in 0..count {
+        for body in 0..self.model.meshed() {
             let rows = self.model.of_body(body, &message[count..]);
             let slot = &mut self.model.bodies[body];
             (slot.scale, slot.row_stiffness) = (message[body], rows);

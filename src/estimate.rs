@@ -93,10 +93,10 @@ pub fn estimate(
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
     let mut local = LocalErrors::of_bodies(meshes, &recovered, &work_on_missed(meshes, model, layer, &recovered));
     for pair in 0..model.pairs.len() {
-        local.add_pair(meshes, model, layer, &recovered, pair);
+        local.add_pair(meshes, model, layer, &recovered, (pair, &rigid_closing(model, iterate, share, pair)));
     }
     drop(recovered);
-    let mut bodies: Vec<f64> = local.cells.iter().map(|cells| cells.iter().sum()).collect();
+    let mut bodies: Vec<f64> = local.cells.iter().take(model.meshed()).map(|cells| cells.iter().sum()).collect();
     model.exchange.sum(&mut bodies);
     local.cells.iter_mut().zip(&local.strips).for_each(|(cells, strips)| axpy(1.0, strips, cells));
     let held = HoldingSprings::of(model, layer);
@@ -140,7 +140,7 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
     let mut all = Vec::new();
     for (index, (state, rigid)) in iterate.states.iter().zip(&iterate.rigid).enumerate() {
         let slot = &model.bodies[index];
-        let Some(body) = slot.local.as_ref() else {
+        let Some(body) = slot.local.as_ref().filter(|_| !slot.is_rigid) else {
             all.push(None);
             continue;
         };
@@ -148,6 +148,16 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
         all.push(body.states().leads().then(|| meshes.displacements(index, &u)));
     }
     Ok(all)
+}
+
+/// Return by how much an obstacle or an offset closes the points of a pair, n. `share` is the factor of prescribed motions.
+fn rigid_closing(model: &Model, iterate: &Field, share: f64, index: usize) -> Vec<f64> {
+    let (pair, mut closing) = (&model.pairs[index], model.rigid_closing(index, &iterate.rigid));
+    closing.iter_mut().for_each(|closing| *closing += pair.offset);
+    if model.bodies[pair.bodies[1]].is_rigid {
+        axpy(share, &pair.prescribed[1], &mut closing);
+    }
+    closing
 }
 
 /// The errors of nodal values: the response of bodies and layers to what the elements cannot represent.
@@ -231,7 +241,7 @@ impl LocalErrors {
         model: &Model,
         layer: &Layer,
         recovered: &RecoveredBodies,
-        index: usize,
+        (index, rigid): (usize, &[f64]),
     ) {
         let (pair, points, range) = (&model.pairs[index], meshes.points(index), model.range(index));
         let soft = pressure::softness(model, index);
@@ -243,6 +253,9 @@ impl LocalErrors {
             }
         }
         model.exchange.sum(&mut compression);
+        for (g, sum) in compression.iter_mut().enumerate() {
+            *sum += points.interpolation.row(g).map(|(q, shape)| shape * rigid[q]).sum::<f64>();
+        }
         let mut mean_error = vec![0.0; pair.len()];
         if let Some(recovered) = &recovered[pair.bodies[1]] {
             mean_error = recovered.beyond_means(index, &pair.nodal[1]);
@@ -270,7 +283,8 @@ fn work_on_missed(meshes: &dyn Meshes, model: &Model, layer: &Layer, recovered: 
     let mut work = vec![0.0; recovered.len()];
     for (index, pair) in model.pairs.iter().enumerate() {
         let (points, pressure) = (meshes.points(index), &layer.pressure[model.range(index)]);
-        let at = |g: usize| points.interpolation.row(g).map(|(q, share)| share * pressure[q]).sum::<f64>().max(0.0);
+        let least = if pair.law.is_bonded() { f64::NEG_INFINITY } else { 0.0 };
+        let at = |g: usize| points.interpolation.row(g).map(|(q, share)| share * pressure[q]).sum::<f64>().max(least);
         let force: Vec<f64> = points.each.iter().enumerate().map(|(g, point)| -point.weight * at(g)).collect();
         for (side, &body) in pair.bodies.iter().enumerate() {
             if let Some(recovered) = &recovered[body] {

@@ -271,7 +271,7 @@ impl AdaptiveRun {
     fn next_sizes(&self, done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> Option<Sizes> {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
-        let degree = (0..model.bodies.len()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
+        let degree = (0..model.meshed()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let share = (AIM * goal.error.value / estimate.largest()).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio

@@ -11,7 +11,7 @@ use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
 use crate::output::terminal::ProgressLine;
 use crate::output::{
-    Folder, HistoryWriter, IterationTable, Report, RoundReport, RowFile, StepTable, say, warning_lines,
+    Folder, HistoryWriter, IterationTable, PairColumns, Report, RoundReport, RowFile, StepTable, say, warning_lines,
 };
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -294,7 +294,9 @@ impl Tables {
         let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
         let mut tables = Self { history: Some(rows), steps: None };
         if !history.is_empty() {
-            let (pairs, reactions) = (results::pair_names(built), results::reaction_names(built));
+            let columns = built.discrete.contacts.iter().map(|contact| results::columns(&contact.spec));
+            let pairs: Vec<(String, PairColumns)> = results::pair_names(built).into_iter().zip(columns).collect();
+            let reactions = results::reaction_names(built);
             let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
             let mut steps = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
             ready.steps.iter().for_each(|step| steps.row(&history.names, step));

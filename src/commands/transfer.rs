@@ -26,7 +26,7 @@ pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
 pub fn pressure(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
     let mut pressure = Vec::new();
     for (pair, table) in discrete.model.pairs.iter().zip(tables) {
-        let closed: Vec<f64> = table.pressure.iter().map(|&p| f64::from(p > 0.0)).collect();
+        let closed: Vec<f64> = table.pressure.iter().map(|&p| f64::from(p != 0.0)).collect();
         let at = |weights: Weights| if mean(&weights, &closed) < 0.5 { 0.0 } else { mean(&weights, &table.pressure) };
         pressure.extend(neighbours(pair, table).map(at));
     }

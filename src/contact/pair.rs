@@ -43,6 +43,8 @@ pub struct ContactPair {
     pub tilt: Vec<f64>,
     /// Initial gap d_q along the normal, n: the distance of the meshes plus the gap that the scene adds.
     pub gap: Vec<f64>,
+    /// Closing of the gap (a length) that an earlier load step has found and locked.
+    pub offset: f64,
     /// Contribution of prescribed displacements to the outer normal displacement of each side, n each.
     pub prescribed: [Vec<f64>; 2],
     /// B_a and B_b, n rows each with the dofs of the body as columns: `B_a u_a = <n.u_a>`, `B_b u_b = -<n.u_b>`. Prescribed
@@ -200,6 +202,7 @@ pub fn assemble<const D: usize>(
         face: faces(a, &on_side, &points, &position),
         on_side,
         position,
+        offset: 0.0,
         prescribed: [Vec::new(), Vec::new()],
         rows: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],
         nodal: [Csr::new(a.space.dofs()), Csr::new(b.space.dofs())],

@@ -30,7 +30,7 @@ pub(super) const EXACT: f64 = 1.5e-8;
 pub struct Reached {
     /// Error in the energy norm: that of the layers from the duality gap, that of the linear step from its solver.
     pub error: f64,
-    /// Whether `error` is a bound: no pressure is negative, and the linear step is exact to rounding.
+    /// Whether `error` is a bound: no pressure of a layer that lets go is negative, and the linear step is exact to rounding.
     pub is_bound: bool,
     /// Error of the pressures. It is the largest difference from the law, relative to the largest pressure, or the error of an inexact linear
     /// step, relative to the energy of the contact alone.
@@ -45,7 +45,7 @@ pub struct Reached {
 pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
     let slopes = surface_slopes(model);
     let at = |q: usize| places.force[q] * places.pressure[q] * (places.tangent[q].recip() + slopes[q].recip());
-    (0..slopes.len()).filter(|&q| places.force[q] > 0.0).map(at).sum()
+    (0..slopes.len()).filter(|&q| places.force[q] != 0.0).map(at).sum()
 }
 
 /// Return the part of [`contact_energy`] that is in the surfaces, sum omega p^2 / rho0.
@@ -56,7 +56,7 @@ pub(super) fn surface_energy(model: &Model, places: &Layer) -> f64 {
 
 /// Return the compression within c -+ `roundoff` at which the pressure of a law is nearest to p.
 fn nearest(law: &dyn LayerLaw, point: usize, c: f64, roundoff: f64, p: f64) -> f64 {
-    let difference = if p > 0.0 { law.compression(point, p) - c } else { c.min(0.0) - c };
+    let difference = if p > 0.0 || law.is_bonded() { law.compression(point, p) - c } else { c.min(0.0) - c };
     if difference.is_finite() { c + difference.clamp(-roundoff, roundoff) } else { c }
 }
 
@@ -83,8 +83,9 @@ impl Reached {
                 let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
                 let changed = (p - places.pressure[q]).powi(2) / rho[q];
                 mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
-                gap += weight * if p < 0.0 { changed } else { pair.law.duality_gap(point, c, p) };
-                is_bound &= p >= 0.0;
+                let is_on_side = p >= 0.0 || pair.law.is_bonded();
+                gap += weight * if is_on_side { pair.law.duality_gap(point, c, p) } else { changed };
+                is_bound &= is_on_side;
             }
         }
         let (linear, energy) = (step.error, strain + places.work);
@@ -169,7 +170,7 @@ impl Scale {
             let approach = model.compression(trace);
             scale.energy = scale.energy.max(PART * PART * dot(&layer.force, &approach));
             scale.pressure = scale.pressure.max(PART * layer.peak());
-            scale.force = scale.force.max(PART * layer.force.iter().sum::<f64>());
+            scale.force = scale.force.max(PART * layer.force.iter().map(|force| force.abs()).sum::<f64>());
         }
         scale
     }
@@ -214,7 +215,7 @@ impl Scale {
 
     /// Return the pressure by which errors of pressures are measured in bodies with u'Ku = `strain`: the largest one (n), or the least scale.
     pub fn peak(&self, pressure: &[f64], strain: f64) -> f64 {
-        pressure.iter().copied().fold(self.pressure.max(self.stress(strain)), f64::max)
+        pressure.iter().map(|p| p.abs()).fold(self.pressure.max(self.stress(strain)), f64::max)
     }
 
     /// Return the forces out of balance on a body under the contact forces `force` (n), relative to these forces: the largest over all rigid motions
@@ -256,7 +257,7 @@ pub(super) fn compression_roundoff(model: &Model, trace: &[f64]) -> Vec<f64> {
 pub(super) fn pressure_roundoff(model: &Model, trace: &[f64], layer: &Layer, answer: &[f64], peak: f64) -> f64 {
     let roundoff = compression_roundoff(model, trace);
     let error = |q: usize| in_series(layer.tangent[q], answer[q]) * roundoff[q];
-    let most = (0..roundoff.len()).filter(|&q| layer.pressure[q] > 0.0).map(error).fold(0.0, f64::max);
+    let most = (0..roundoff.len()).filter(|&q| layer.pressure[q] != 0.0).map(error).fold(0.0, f64::max);
     if most > 0.0 { 2.0 * most / peak } else { 0.0 }
 }
 

@@ -60,7 +60,7 @@ impl<'a> Forcing<'a> {
             let here = (p[q] - old).abs();
             change += model.weight[q] * here;
             distance += model.weight[q] * (p[q] - resolved.pressure[q]).abs();
-            (largest_change, peak) = (largest_change.max(here), peak.max(resolved.pressure[q]));
+            (largest_change, peak) = (largest_change.max(here), peak.max(resolved.pressure[q].abs()));
         }
         // an error that is small relative to the energy of the bodies may be large for the pressures of stiff layers
         let ends_run = || {
@@ -89,14 +89,19 @@ pub fn respond(
 ) -> Result<std::result::Result<(Field, f64), Failure>> {
     let (mut residual, mut work) = (Vec::new(), [0.0]);
     for (slot, load) in model.bodies.iter_mut().zip(loads) {
+        let count = if slot.is_rigid { slot.local.as_ref().map_or(0, |_| slot.motions.len()) } else { 0 };
+        if count > 0 {
+            residual.push(vec![0.0; count]);
+            continue;
+        }
         let reduced = slot.local.as_mut().map(|body| body.reduce(load)).transpose()?.unwrap_or_default();
         residual.push(reduced.force);
         work[0] += reduced.work;
     }
     model.exchange.sum(&mut work);
-    let springs = resisting(model, places.springs(model));
+    let springs = resisting(model, places);
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(share);
-    let system = System { model, places, springs: &springs, residual: &residual, enough: &mut enough };
+    let system = System { model, places, springs: &springs.all, residual: &residual, enough: &mut enough };
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy + work[0])))
 }
 
@@ -104,17 +109,33 @@ pub fn respond(
 /// without end.
 const PROXIMAL: f64 = 1e-3;
 
-/// Return the springs omega kappa of a linear step, n, with one more for every rigid motion of the bodies together that is otherwise unresisted: a
-/// contact that is still open may stop it.
+/// The springs of a linear step.
+pub struct Springs {
+    /// omega kappa, with those that were added, n.
+    pub all: Vec<f64>,
+    /// Those that stand in for a contact, which resists the motions of bodies together only when it has closed.
+    pub added: Vec<Spring>,
+}
+
+/// A spring at a contact point.
+pub struct Spring {
+    /// Number of the point.
+    pub at: usize,
+    /// Force over closing.
+    pub stiffness: f64,
+}
+
+/// Return the springs omega kappa of a linear step from `places`, n, with one more for every rigid motion of the bodies together that is otherwise
+/// unresisted: a contact that is still open may stop it.
 ///
-/// The additional spring is at the point that the motion closes most, and nowhere else. Forces may be in balance on the motion, for example where
-/// bodies rest and could turn about the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry
-/// forces.
-pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
-    let motions = Motions::of(model);
+/// The additional spring is at one point, and nowhere else. Forces may be in balance on the motion, for example where bodies rest and could turn about
+/// the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry forces. Of the points that the motion closes
+/// at least half as much as any, it is that of the least gap: over a wide one it would tie the body to another that a support carries along.
+pub fn resisting(model: &Model, places: &Layer) -> Springs {
+    let (motions, mut all, mut added) = (Motions::of(model), places.springs(model), Vec::new());
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
-        let mut free = motions.springs(&springs).factor().kernel();
+        let mut free = motions.springs(&all).factor().kernel();
         if free.is_empty() {
             break;
         }
@@ -122,19 +143,23 @@ pub fn resisting(model: &Model, mut springs: Vec<f64>) -> Vec<f64> {
             surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
         while let Some(motion) = free.pop() {
             let closing = motions.closing(&motion);
-            let Some(most) = (0..closing.len()).max_by(|&p, &q| closing[p].abs().total_cmp(&closing[q].abs())) else {
+            let half = 0.5 * closing.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
+            let near = |p: &usize, q: &usize| places.compression[*p].total_cmp(&places.compression[*q]);
+            let Some(at) = (0..closing.len()).filter(|&q| closing[q].abs() >= half).max_by(near) else {
                 break;
             };
-            let shares = closing.iter().map(|s| (s / closing[most]).powi(2));
-            springs[most] += PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            let shares = closing.iter().map(|s| (s / closing[at]).powi(2));
+            let spring = PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            all[at] += spring;
+            added.push(Spring { at, stiffness: spring });
             // take this motion out of the others, so that they close nothing at that point
             for other in &mut free {
-                let share = motions.closing(other)[most] / closing[most];
+                let share = motions.closing(other)[at] / closing[at];
                 other.axpy(-share, &motion, 1.0);
             }
         }
     }
-    springs
+    Springs { all, added }
 }
 
 #[cfg(test)]

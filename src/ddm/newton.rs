@@ -13,7 +13,7 @@
 //! ([`Newton::descend`]).
 
 use super::bound::{EXACT, Reached, compression_roundoff};
-use super::forcing::{Forcing, resisting};
+use super::forcing::{Forcing, Spring, resisting};
 use super::run::{LoopEnd, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength, WholeStep};
@@ -53,14 +53,15 @@ pub(super) fn iterate(
 ) -> Result<LoopEnd> {
     let (progress, tolerance, foreign) = (Progress::new(run.model), run.stop.tolerance(), linear.sweeps());
     let (stagnation, start) = (Stagnation::default(), Some(u.clone()));
-    let mut newton = Newton { run, linear, progress, stagnation, tolerance, foreign, u, start, states, is_near };
+    let mut newton =
+        Newton { run, linear, progress, stagnation, tolerance, foreign, u, start, states, added: Vec::new(), is_near };
     loop {
         let step = match newton.linear_step()? {
             Ok(step) => step,
             Err(failure) => return Ok(newton.end_without_step(Status::InnerSolver(failure))),
         };
         let part = newton.step_length(&step);
-        if (part.is_lost || newton.leads_apart(&step, &part)) && newton.descend()? {
+        if (part.is_lost || newton.is_unresisted(&step)) && newton.descend()? {
             continue;
         }
         let iterate = newton.advance(step, part);
@@ -89,7 +90,9 @@ struct Newton<'n, 'r> {
     start: Option<Field>,
     /// States of the layers from which the next linear step is taken.
     states: Layer,
-    /// Whether these states are those of another solution, while the displacements are still at rest.
+    /// Springs that stood in for a contact in the last linear step.
+    added: Vec<Spring>,
+    /// Whether the states are those of another solution, while the displacements are still at rest.
     is_near: bool,
 }
 
@@ -138,7 +141,8 @@ impl Newton<'_, '_> {
     /// Solve the linear step from the states.
     fn linear_step(&mut self) -> Result<LinearResult> {
         let (model, states) = (&mut *self.run.model, &self.states);
-        let springs = resisting(model, states.springs(model));
+        let springs = resisting(model, states);
+        self.added = springs.added;
         let compression = model.compression(&self.u.trace);
         let products = self.linear.multiply(model, &self.u.states);
         let (residual, _) = residual(model, products, &self.u, &model.forces(&states.linear(&compression)));
@@ -148,7 +152,13 @@ impl Newton<'_, '_> {
         let roughest = limit.min(self.linear.roughest());
         let mut forcing = Forcing::new(states, compression, &rho, scale, roughest);
         let mut enough = |model: &Model, trial: &Trial| forcing.is_enough(model, trial);
-        self.linear.solve(System { model, places: states, springs: &springs, residual: &residual, enough: &mut enough })
+        self.linear.solve(System {
+            model,
+            places: states,
+            springs: &springs.all,
+            residual: &residual,
+            enough: &mut enough,
+        })
     }
 
     /// Return the part of a step that does not lead away from the laws.
@@ -162,15 +172,12 @@ impl Newton<'_, '_> {
         self.progress.step_length(model, &self.states, &step)
     }
 
-    /// Return whether a step from states on the laws opens every point, though loads work on free bodies. Its end is on the laws, too, but nothing holds the
-    /// bodies there: the length of the step is that of the springs which resist their motions in place of the contact, and says nothing of where they meet.
-    fn leads_apart(&self, step: &LinearSolution, part: &StepLength) -> bool {
-        let model = &*self.run.model;
-        let is_smoothed = !self.states.smoothing.is_empty();
-        let is_pushed = model.bodies.iter().any(|slot| slot.motions.iter().any(|motion| motion.work != 0.0));
+    /// Return whether springs that stand in for a contact take more of a step's energy than the accuracy of a line search. The step then has the direction
+    /// in which loads push the bodies, but a length that those springs chose, which says nothing of where the bodies meet.
+    fn is_unresisted(&self, step: &LinearSolution) -> bool {
         let closing = step.field.closing();
-        let before = model.compression(&self.u.trace);
-        !is_smoothed && is_pushed && before.iter().zip(&closing).all(|(c, closing)| c + part.length * closing <= 0.0)
+        let taken: f64 = self.added.iter().map(|spring| spring.stiffness * closing[spring.at].powi(2)).sum();
+        taken > SEARCH * step.energy
     }
 
     /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
@@ -207,13 +214,18 @@ impl Newton<'_, '_> {
     fn descent_step(&mut self) -> Result<Option<f64>> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
-        let springs = resisting(model, layer.springs(model));
+        let springs = resisting(model, &layer);
         let products = self.linear.multiply(model, &self.u.states);
         let (residual, _) = residual(model, products, &self.u, &layer.force);
         let roughest = self.linear.roughest();
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(roughest);
-        let system =
-            System { model: &mut *model, places: &layer, springs: &springs, residual: &residual, enough: &mut enough };
+        let system = System {
+            model: &mut *model,
+            places: &layer,
+            springs: &springs.all,
+            residual: &residual,
+            enough: &mut enough,
+        };
         let Ok(step) = self.linear.solve(system)? else { return Ok(None) };
         let products = self.linear.multiply(model, &step.field.states);
         let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field, &products).minimize(SEARCH) else {
@@ -292,11 +304,11 @@ impl Newton<'_, '_> {
     /// its solution to the errors, since roundoff may do as much again. Return the solution, none if the system is not solved.
     fn look(&mut self, iterate: &StepResult, measured: &mut Measured) -> Result<Option<LinearSolution>> {
         let (run, places) = (&mut *self.run, &self.states);
-        let springs = resisting(run.model, places.springs(run.model));
+        let springs = resisting(run.model, places);
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
         let before = self.linear.counts();
         let system =
-            System { model: run.model, places, springs: &springs, residual: &measured.rest, enough: &mut enough };
+            System { model: run.model, places, springs: &springs.all, residual: &measured.rest, enough: &mut enough };
         let Ok(more) = self.linear.solve(system)? else { return Ok(None) };
         let counts = self.linear.counts();
         measured.inner_iterations += counts.inner_iterations - before.inner_iterations;

@@ -12,11 +12,12 @@ use crate::linalg::axpy;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::{self, Motions};
+use crate::model::rigid::{self, Motions, Moved};
 use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
+use nalgebra::DVector;
 use std::time::Instant;
 
 /// The method of a run.
@@ -127,7 +128,7 @@ impl Run<'_> {
         wants_interval: bool,
     ) -> Result<LoopEnd> {
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
-        let states = first_states(self.model, &start, rigid);
+        let FirstStates { states, amounts } = first_states(self.model, &start, rigid);
         let is_known = matches!(start, InitialGuess::Known(_));
         let mut trace = match &start {
             InitialGuess::Trace(given) => given.clone(),
@@ -140,7 +141,7 @@ impl Run<'_> {
         };
         let is_near = is_known && known.is_none();
         let has_displacements = known.is_some();
-        let mut u = known.unwrap_or_else(|| Field { rigid: self.motions_of(rigid), ..Field::rest(self.model) });
+        let mut u = known.unwrap_or_else(|| Field { rigid: self.motions_of(&amounts), ..Field::rest(self.model) });
         let fallen = rigid::trace(self.model, &u.rigid);
         self.model.close_gap(&fallen);
         match method {
@@ -164,8 +165,8 @@ impl Run<'_> {
     }
 
     /// Return the amounts of the free motions of each body in a start. Bodies on springs begin at rest, since springs resist some of the motions of the start.
-    fn motions_of(&self, rigid: &RigidStart) -> Vec<Vec<f64>> {
-        let mut amounts = Motions::with_springs(self.model).of_bodies(&rigid.amounts);
+    fn motions_of(&self, amounts: &DVector<f64>) -> Vec<Vec<f64>> {
+        let mut amounts = Motions::with_springs(self.model).of_bodies(amounts);
         for (amounts, slot) in amounts.iter_mut().zip(&self.model.bodies).filter(|(_, slot)| slot.sprung.is_some()) {
             *amounts = vec![0.0; slot.motions.len()];
         }
@@ -270,7 +271,7 @@ impl From<Option<Vec<f64>>> for InitialGuess {
 /// the one that is found.
 pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>> {
     let rigid = find_start(model).ok()?;
-    let springs = resisting(model, first_states(model, begin, &rigid).springs(model));
+    let springs = resisting(model, &first_states(model, begin, &rigid).states).all;
     if let InitialGuess::Automatic = begin {
         *begin = InitialGuess::Found(Box::new(rigid));
     }
@@ -283,20 +284,37 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
     if let Some(mechanism) = &model.mechanism {
         return Err(Status::Mechanism(mechanism.clone()));
     }
-    if let Some(moved) = underconstrained(model, &model.row_stiffness()) {
+    if let Some(moved) = underconstrained(model, &model.holding_stiffness()).or_else(|| follows(model)) {
         return Err(Status::Underconstrained(moved));
     }
     start::find(model, None).map_err(|moving| Status::Unbounded { moving })
 }
 
-/// Return the layer states from which Newton's method begins.
-fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> Layer {
+/// Return a motion of a body together with rigid parts that changes no gap, if there is one: the parts follow the body wherever it goes.
+fn follows(model: &Model) -> Option<Moved> {
+    let motions = Motions::of(model);
+    let has_rigid = |all: &Vec<Moved>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
+    let all = motions.springs(&model.weight).factor().kernel();
+    all.iter().map(|motion| motions.names(motion)).find(has_rigid)?.into_iter().next()
+}
+
+/// The states from which Newton's method begins, and the amounts of the free motions of all bodies that belong to them.
+struct FirstStates {
+    states: Layer,
+    amounts: DVector<f64>,
+}
+
+/// Return the first states of a start, where `rigid` is the automatic one.
+fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> FirstStates {
+    let of = |rigid: &RigidStart| FirstStates { states: rigid.places.clone(), amounts: rigid.amounts.clone() };
     match begin {
-        InitialGuess::Automatic | InitialGuess::Found(_) => rigid.places.clone(),
+        InitialGuess::Automatic | InitialGuess::Found(_) => of(rigid),
         InitialGuess::Trace(trace) => match start::find(model, Some(trace)) {
-            Ok(rigid) => rigid.places,
-            Err(_) => start::at(model, trace),
+            Ok(rigid) => of(&rigid),
+            Err(_) => FirstStates { states: start::at(model, trace), amounts: rigid.amounts.clone() },
         },
-        InitialGuess::Known(solution) => Layer::new(model, solution.compression.clone()),
+        InitialGuess::Known(solution) => {
+            FirstStates { states: Layer::new(model, solution.compression.clone()), amounts: rigid.amounts.clone() }
+        }
     }
 }

@@ -13,11 +13,12 @@
 //! iteration.
 //!
 //! The energy has no minimum exactly when loads push bodies away from everything that could stop them. Then there is a motion a that closes no
-//! contact, B E a <= 0, and gains work, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
+//! contact, B E a <= 0, changes no bonded layer, B E a = 0 there, and gains work, w'a > 0 (Farkas). Elastic bodies then have no equilibrium either.
 //!
 //! Two quantities count as zero below [`PART`] of what they could be. Forces out of balance: the elastic bodies change the start by more. Closings
 //! of a motion: rounding and proximal springs make some. A motion that is resisted at a meshed circle of 1000 edges closes 1e-5 of itself.
 
+use crate::contact::ContactPair;
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{self, Unbounded};
@@ -140,6 +141,8 @@ impl Rigid<'_> {
     /// A motion along which the energy falls for ever.
     fn descend(&self, mut amounts: DVector<f64>) -> Result<DVector<f64>, DVector<f64>> {
         let largest = self.work.amax();
+        let of_pair = |(i, pair): (usize, &ContactPair)| vec![pair.law.is_bonded(); self.model.range(i).len()];
+        let bonded: Vec<bool> = self.model.pairs.iter().enumerate().flat_map(of_pair).collect();
         for _ in 0..STEPS {
             let places = self.states(&amounts);
             let push = self.motions.work(&places.force);
@@ -155,7 +158,8 @@ impl Rigid<'_> {
             let (gain, resisted) = (step.dot(&self.work), step.dot(&self.ground.multiply(&step)));
             let gains = gain > PART * step.amax() * largest;
             let most = closing.iter().fold(0.0f64, |most, s| most.max(s.abs()));
-            let opens = closing.iter().all(|&s| s <= PART * most);
+            let opens =
+                closing.iter().zip(&bonded).all(|(&s, &bonded)| s <= PART * most && (!bonded || -s <= PART * most));
             // loads and ground have the energy first_slope t + resisted t^2 / 2; where no contact closes, the whole energy falls at least as long
             let first_slope = step.dot(&pull) - gain;
             if gains && resisted <= -PART * first_slope && opens {

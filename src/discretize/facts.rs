@@ -69,6 +69,7 @@ impl<const D: usize> WholeBody<'_, D> {
         let slot = BodySlot {
             name: self.part.spec.name.value.clone(),
             local: None,
+            is_rigid: false,
             segments: self.segments.clone(),
             motions: self.motions.clone(),
             sprung: self.sprung.clone(),

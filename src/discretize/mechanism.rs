@@ -65,14 +65,17 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         &self.bodies[body].part.mesh.extent
     }
 
-    /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies.
+    /// Return the groups of at least two bodies that pairs connect, in the order of their first bodies. A group before an obstacle does not move as one.
     fn groups(&self) -> Vec<Vec<usize>> {
-        let mut joined = DisjointSets::new(self.bodies.len());
-        self.pairs.iter().map(|pair| pair.bodies.map(|body| body as u32)).for_each(|[a, b]| joined.join(a, b));
+        let count = self.bodies.len();
+        let (apart, before): (Vec<_>, Vec<_>) =
+            self.pairs.iter().map(|pair| pair.bodies).partition(|[_, b]| *b < count);
+        let mut joined = DisjointSets::new(count);
+        apart.iter().for_each(|&[a, b]| joined.join(a as u32, b as u32));
         let (count, group) = joined.classes();
         let mut members = vec![Vec::new(); count];
         (0..self.bodies.len()).for_each(|body| members[group[body] as usize].push(body));
-        members.retain(|bodies| bodies.len() > 1);
+        members.retain(|bodies| bodies.len() > 1 && before.iter().all(|[body, _]| !bodies.contains(body)));
         members
     }
 

@@ -5,14 +5,16 @@ use super::auto::{self, ContactEntry, SurfacePair};
 use super::bodies::SceneBody;
 use super::carrier;
 use super::groups::{Owners, find_group, point};
+use super::rigid;
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
-use crate::contact::pieces::{Cut, Reach};
+use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, unit};
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh};
+use crate::model::BodySlot;
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -41,10 +43,10 @@ pub struct ContactFacts {
 }
 
 impl ContactFacts {
-    /// Return the facts of the pair, including its description in the scene.
-    pub fn info(self, scene: &Scene) -> ContactInfo {
+    /// Return the facts of the pair, including its description in the scene, whose named `contacts` have the factors of a step.
+    pub fn info(self, scene: &Scene, contacts: &[ContactSpec]) -> ContactInfo {
         let Self { entry, names, swapped, chords, ends, surface } = self;
-        ContactInfo { spec: entry.spec(scene, names), swapped, chords, ends, surface }
+        ContactInfo { spec: entry.spec(scene, contacts, names), swapped, chords, ends, surface }
     }
 }
 
@@ -72,10 +74,10 @@ impl ContactInfo {
 
 impl ContactEntry {
     /// Return the scene's description of a pair of this table. `between` has the names of the pair.
-    fn spec(self, scene: &Scene, names: [String; 2]) -> ContactSpec {
+    fn spec(self, scene: &Scene, contacts: &[ContactSpec], names: [String; 2]) -> ContactSpec {
         let rules: Vec<&ContactSpec> = scene.rules().collect();
         let mut spec = match self {
-            ContactEntry::Named(number) => scene.contacts[number].clone(),
+            ContactEntry::Named(number) => contacts[number].clone(),
             ContactEntry::Found(rule) => rules[rule].clone(),
         };
         spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value = own);
@@ -83,33 +85,38 @@ impl ContactEntry {
     }
 }
 
-/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests
-/// integration points.
+/// Return all pairs of the scene: first the named ones in the order of the file, then those that are found; and the rigid parts, obstacles and
+/// offsets. `contacts` are the named ones, with the factors of a step. `fine` requests integration points.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
 pub fn all<const D: usize>(
     scene: &Scene,
+    specs: &[ContactSpec],
     mesh: &Mesh<D>,
     cut: Cut<D>,
     parts: &[SceneBody<D>],
     fine: bool,
-) -> Result<Vec<Contact<D>>> {
+) -> Result<(Vec<Contact<D>>, Vec<BodySlot>)> {
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
     let rules: Vec<&ContactSpec> = scene.rules().collect();
-    let named = scene.contacts.iter().enumerate().filter(|(_, spec)| !spec.is_rule());
-    let mut found = named.map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
+    let named = || specs.iter().enumerate().filter(|(_, spec)| !spec.is_rule());
+    let mut found = named().map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&rules, cut, parts, &taken)?);
     let mut contacts: Vec<Contact<D>> = Vec::new();
     for pair in found {
-        contacts.extend(Opposite::new(scene, parts, pair).assemble(&scene.laws, parts, cut, fine)?);
+        contacts.extend(Opposite::new(scene, specs, parts, pair).assemble(&scene.laws, parts, cut, fine)?);
+    }
+    let mut rigid = Vec::new();
+    for (number, (contact, (_, spec))) in contacts.iter_mut().zip(named()).enumerate() {
+        rigid.extend(rigid::part(&mut contact.pair, spec, number, parts.len() + rigid.len())?);
     }
     auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.entry))?;
-    Ok(contacts)
+    Ok((contacts, rigid))
 }
 
 /// Return the pair of the two surfaces that a contact names.
@@ -126,13 +133,20 @@ fn named<'a, const D: usize>(
         let group = find_group(mesh, &spec.between[k], &[D - 1], "contact surface")?;
         bounded(&spec.between[k], group, owners, parts)
     };
-    let [(first, on_first), (second, on_second)] = [surface(0)?, surface(1)?];
-    if first == second {
+    let names = spec.between.each_ref().map(|name| name.value.as_str());
+    let (first, on_first) = surface(0)?;
+    if spec.obstacle {
+        let side = parts[first].side(names[0], on_first, spec.edge);
+        let obstacle = Side { name: names[1], ..side.clone() };
+        let (entry, bodies) = (ContactEntry::Named(number), [first, rigid::OBSTACLE]);
+        return Ok(SurfacePair { entry, bodies, sides: [side, obstacle], far: Default::default() });
+    }
+    let (second, on_second) = surface(1)?;
+    if first == second && !(spec.bond && spec.preload.is_some()) {
         let message = format!("both surfaces belong to body `{}`", parts[first].spec.name.value);
         return Err(Error::scene(&spec.between[1].place, message)
             .help("contact of a body with itself is out of scope; make two bodies of it"));
     }
-    let names = spec.between.each_ref().map(|name| name.value.as_str());
     let sides = [parts[first].side(names[0], on_first, spec.edge), parts[second].side(names[1], on_second, spec.edge)];
     Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], sides, far: Default::default() })
 }
@@ -153,10 +167,11 @@ struct Opposite<'a, const D: usize> {
 
 impl<'a, const D: usize> Opposite<'a, D> {
     /// Choose the side that carries the points.
-    fn new(scene: &Scene, parts: &[SceneBody<D>], pair: SurfacePair<'a, D>) -> Self {
+    fn new(scene: &Scene, specs: &[ContactSpec], parts: &[SceneBody<D>], pair: SurfacePair<'a, D>) -> Self {
         let SurfacePair { entry, bodies, sides: [first, second], far: [far_first, far_second] } = pair;
-        let spec = entry.spec(scene, [first.name, second.name].map(str::to_owned));
-        let swapped = carrier::is_second(parts, bodies, [&first.facets, &second.facets], spec.table, &scene.carriers);
+        let spec = entry.spec(scene, specs, [first.name, second.name].map(str::to_owned));
+        let swapped = !spec.obstacle
+            && carrier::is_second(parts, bodies, [&first.facets, &second.facets], spec.table, &scene.carriers);
         let ((body_a, a, far), (body_b, b)) = match swapped {
             true => ((bodies[1], second, far_second), (bodies[0], first)),
             false => ((bodies[0], first, far_first), (bodies[1], second)),
@@ -174,16 +189,19 @@ impl<'a, const D: usize> Opposite<'a, D> {
         cut: Cut<D>,
         fine: bool,
     ) -> Result<Option<Contact<D>>> {
-        let mut common = cut(&self.a, &self.b, &self.reach);
-        if self.a.towards(&self.b, &common) {
+        let mut common = match self.spec.obstacle {
+            true => Intersection::of_one(&self.a),
+            false => cut(&self.a, &self.b, &self.reach),
+        };
+        if !self.spec.obstacle && self.a.towards(&self.b, &common) {
             common = cut(&self.a, &self.b, &self.reach);
         }
-        if self.spec.touching {
+        if self.spec.is_touching() {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
         let Self { entry, spec, bodies, a, b, swapped, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
-        let law = |position: &[[f64; 3]]| law::make(&spec.layer, laws, position);
+        let law = |position: &[[f64; 3]]| law::of_pair(&spec, laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
             Err(Fault::NoPartner) if matches!(entry, ContactEntry::Found(_)) => return Ok(None),
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
@@ -205,16 +223,19 @@ impl<'a, const D: usize> Opposite<'a, D> {
             pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
         }
         let surface = ContactSurface::new(&a, &pair);
-        let jumps = |k: usize, side: &Side<D>| jumping(side.space, &parts[bodies[k]].elasticity, &side.facets.nodes);
+        let jumps = |k: usize, side: &Side<D>| match parts.get(bodies[k]) {
+            Some(part) => jumping(side.space, &part.elasticity, &side.facets.nodes),
+            None => HashSet::new(),
+        };
         let fine = match fine {
             true => {
                 let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
                 at_a.extend(a.layer_jumps(&law)?);
-                Some(Fine::new(&a, &b, &common, &pair, &gap, spec.touching, [&at_a, &at_b]))
+                Some(Fine::new(&a, &b, &common, &pair, &gap, spec.is_touching(), [&at_a, &at_b]))
             }
             false => None,
         };
-        let chords = if spec.touching { None } else { Chords::of(&a, &b, &common, &pair) };
+        let chords = if spec.is_touching() { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         Ok(Some(Contact { pair, fine, facts: ContactFacts { entry, names, swapped, chords, ends, surface } }))
     }

@@ -18,9 +18,18 @@ use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
-use crate::problem::BodySpec;
+use crate::problem::{BodySpec, ContactSpec};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
+
+/// The bodies and the named contacts of a scene, with the factors of a load step.
+#[derive(Clone, Copy)]
+pub struct StepSpecs<'a> {
+    /// The bodies of the mesh.
+    pub bodies: &'a [BodySpec],
+    /// The contacts that name their surfaces.
+    pub contacts: &'a [ContactSpec],
+}
 
 /// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]
@@ -30,6 +39,8 @@ pub struct ReplicatedProblem<const D: usize, P> {
     pub bodies: Vec<(BodySlot, BodyInfo)>,
     /// Arrays on which the method works.
     pub pairs: Vec<ContactPair>,
+    /// Rigid parts, which follow the bodies.
+    pub rigid: Vec<BodySlot>,
     /// Origin of each pair.
     pub contacts: Vec<ContactFacts>,
     /// Motions that nothing resists.
@@ -80,16 +91,17 @@ fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)
 pub fn prepare<'a, const D: usize, F: Factory>(
     scene: &Scene,
     verified: &Verified<D>,
-    specs: &'a [BodySpec],
+    specs: StepSpecs<'a>,
     cut: Cut<D>,
     keep: bool,
     ranks: usize,
     factory: &mut F,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let mesh = &verified.mesh;
-    let parts = parts(scene, verified, specs)?;
+    let parts = parts(scene, verified, specs.bodies)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
+    let (all, rigid) = pairs::all(scene, specs.contacts, mesh, cut, &parts, keep)?;
+    for found in all {
         pairs.push(found.pair);
         contacts.push(found.facts);
         fine.extend(found.fine);
@@ -111,7 +123,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem { bodies: shared, pairs, contacts, mechanisms, fine, plan };
+    let shared = ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan };
     Ok((shared, WholeProblem { bodies, partitions, keep }))
 }
 

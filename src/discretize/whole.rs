@@ -51,7 +51,9 @@ impl<'a, const D: usize> WholeBody<'a, D> {
     pub fn all(parts: Vec<SceneBody<'a, D>>, pairs: &[ContactPair], mesh: &Mesh<D>) -> Result<Vec<Self>> {
         let mut segments = vec![Vec::new(); parts.len()];
         for (pair, sides) in pairs.iter().enumerate() {
-            (0..2).for_each(|side| segments[sides.bodies[side]].push(Segment { pair, side }));
+            for (side, &body) in sides.bodies.iter().enumerate().filter(|(_, body)| **body < parts.len()) {
+                segments[body].push(Segment { pair, side });
+            }
         }
         parts.into_iter().zip(segments).map(|(part, segments)| Self::new(part, segments, pairs, mesh)).collect()
     }

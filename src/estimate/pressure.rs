@@ -89,7 +89,7 @@ impl PressureErrors {
         let peak = (0..pressure.len()).max_by(|&p, &q| pressure[p].total_cmp(&pressure[q]));
         self.guesses.push(if rim.squared > squared.max(UNFINISHED.powi(2) * whole) {
             Some(Guess { cause: Cause::Rim, place: position[rim.worst] })
-        } else if share_of_whole_facets(points, pressure) < RESOLVED {
+        } else if !model.pairs[index].law.is_bonded() && share_of_whole_facets(points, pressure) < RESOLVED {
             peak.map(|peak| Guess { cause: Cause::FewFacets, place: position[peak] })
         } else {
             None
@@ -220,11 +220,13 @@ impl LayerError {
         let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range.clone()]);
         let tangent = &layer.tangent[range];
         let mut error = Self { energy: 0.0, pressure: Vec::with_capacity(giving.len()) };
+        let is_bonded = pair.law.is_bonded();
+        let least = if is_bonded { f64::NEG_INFINITY } else { 0.0 };
         for (g, giving) in giving.iter().enumerate() {
             let point = &points.each[g];
             let (compliance, nearest) = (point.size * soft / PI, point.nearest);
             let carriers = || points.interpolation.row(g);
-            let is_whole = carriers().all(|(q, _)| compression[q] >= 0.0);
+            let is_whole = is_bonded || carriers().all(|(q, _)| compression[q] >= 0.0);
             // A curve through points of which some are open may rise above all of them, the more the faster the gap grows. No
             // pressure follows from such a rise.
             let between = |value: &dyn Fn(usize) -> f64| {
@@ -239,7 +241,7 @@ impl LayerError {
             let (c_h, p_h) = met(between(&|q| compression[q] + compliance * pressure[q]));
             let lacking: f64 = carriers().map(|(q, share)| share * beyond[q]).sum();
             let here = giving - point.gap - lacking;
-            let (c, p) = met(here + compliance * between(&|q| pressure[q]).max(0.0));
+            let (c, p) = met(here + compliance * between(&|q| pressure[q]).max(least));
             error.energy += point.weight * (p - p_h) * (c - c_h);
             let (mut discrete, mut amplified) = (0.0, 0.0);
             for (q, mu) in points.pressing.row(g) {

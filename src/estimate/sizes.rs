@@ -11,6 +11,7 @@
 //! partly outside these cells. A field gives no size where it has no cell.
 
 use super::Estimate;
+use crate::contact::ContactPair;
 use crate::discretize::meshes::{BodyCells, Meshes};
 use crate::fem::{cross, length, minus, unit};
 use crate::linalg::dot;
@@ -53,7 +54,7 @@ pub struct Aim {
 /// new mesh then has nearly the same error.
 pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Estimate, aim: Aim) -> Sizes {
     let Aim { share, more, most } = aim;
-    let bodies = model.bodies.len();
+    let bodies = model.meshed();
     let counts = counts(meshes, bodies);
     // Every rank has the meshes, and only the owner rank of a body has its errors.
     let mut errors = vec![0.0; counts.iter().sum()];
@@ -114,10 +115,11 @@ struct Touching {
 /// Return the integration points of all pairs that are under pressure.
 fn touching(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<Touching> {
     let mut all = Vec::new();
-    for (index, pair) in model.pairs.iter().enumerate() {
+    let is_meshed = |pair: &ContactPair| !model.bodies[pair.bodies[1]].is_rigid;
+    for (index, pair) in model.pairs.iter().enumerate().filter(|(_, pair)| is_meshed(pair)) {
         let (points, pressure) = (meshes.points(index), &layer.pressure[model.range(index)]);
         for g in 0..points.each.len() {
-            if points.interpolation.row(g).any(|(q, _)| pressure[q] > 0.0) {
+            if points.interpolation.row(g).any(|(q, _)| pressure[q] != 0.0) {
                 let vertices = [0, 1].map(|side| meshes.vertices(index, side, g));
                 all.push(Touching { bodies: pair.bodies, vertices });
             }

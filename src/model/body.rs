@@ -1,5 +1,6 @@
 //! A body as this rank has it: K, f and contact rows B on its dofs, and a solver for G = K + B' diag(d) B.
 
+use super::Motion;
 use super::states::{Distribution, States};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{Couplings, ElasticBody};
@@ -54,6 +55,8 @@ pub struct Body {
     robin: Option<RobinMatrix>,
     /// The function that makes the solver of G; `None` once it was used.
     make: Option<MakeSolver>,
+    /// Whether K stays here when a solver is made of it.
+    keeps_stiffness: bool,
     /// Description of the solver to be made, for reports.
     words: String,
     interior: Option<Interior>,
@@ -96,7 +99,24 @@ impl Body {
         elastic.held = Couplings::default();
         let prescribed = std::mem::take(&mut elastic.prescribed);
         let states = States::new(elastic.load.len(), prescribed, rows, free, distribution.map(Rc::new));
-        Self { states, elastic, diagonal: Vec::new(), robin: None, make: Some(make), words, interior: None }
+        let (diagonal, make) = (Vec::new(), Some(make));
+        Self { states, elastic, diagonal, robin: None, make, keeps_stiffness: false, words, interior: None }
+    }
+
+    /// Return a rigid part, whose dofs are the amounts of its `motions`, without a stiffness.
+    pub fn rigid(motions: &[Motion]) -> Self {
+        let (count, points) = (motions.len(), motions.first().map_or(0, |motion| motion.trace.len()));
+        let mut rows = Csr::new(count);
+        (0..points).for_each(|q| rows.push_row(motions.iter().map(|motion| motion.trace[q]).enumerate()));
+        let unit = |k: usize| (0..count).map(|i| f64::from(u8::from(i == k))).collect();
+        let elastic = ElasticBody {
+            stiffness: Csr::full(count, vec![0.0; count * count]),
+            load: motions.iter().map(|motion| motion.work).collect(),
+            ..ElasticBody::default()
+        };
+        let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
+        let body = Self::new(elastic, rows, (0..count).map(unit).collect(), None, make, "rigid".to_owned());
+        Self { keeps_stiffness: true, ..body }
     }
 
     /// Return a body that is to be condensed to its interface dofs. `whole` and `free` are on all dofs.
@@ -128,7 +148,8 @@ impl Body {
         };
         let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
         let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
-        Self { states, elastic, diagonal, robin: None, make: Some(make), words, interior: Some(interior) }
+        let (make, interior) = (Some(make), Some(interior));
+        Self { states, elastic, diagonal, robin: None, make, keeps_stiffness: true, words, interior }
     }
 
     /// Eliminate the interior, if the body is to be condensed and is not yet.
@@ -207,8 +228,7 @@ impl Body {
     /// Return G, which is made of K first if it does not exist.
     fn robin_matrix(&mut self) -> Result<&mut RobinMatrix> {
         if let Some(make) = self.make.take() {
-            let stiffness =
-                if self.interior.is_none() { self.take_stiffness() } else { self.elastic.stiffness.clone() };
+            let stiffness = if self.keeps_stiffness { self.elastic.stiffness.clone() } else { self.take_stiffness() };
             let diagonal = |i: usize| self.diagonal.get(i).map_or_else(|| stiffness.diagonal(i), |value| *value);
             let square = |q: usize| self.states.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
             let mut row_stiffness: Vec<f64> = (0..self.states.rows.rows()).map(square).collect();

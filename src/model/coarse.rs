@@ -1,7 +1,7 @@
 //! The free rigid motions of all bodies as a coarse space around a preconditioner of PETSc.
 
 use super::rigid::Motions;
-use super::{Model, Motion, Segment};
+use super::{BodySlot, Model, Motion, Segment};
 use crate::error::Result;
 use crate::exchange::Exchange;
 use crate::linalg::{Csr, Factor, axpy, dot};
@@ -43,15 +43,17 @@ impl RigidSpace {
     /// bodies together, and `first` is the number of the first row that this rank owns.
     pub fn of(model: &Model, offset: &[usize], rows: &Csr, first: usize) -> Option<MakeSubspace> {
         let mut free_sides = vec![0; model.pairs.len()];
-        for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty()) {
+        let bodies: Vec<(Vec<Segment>, Vec<Motion>)> = model.bodies.iter().map(of_body).collect();
+        for slot in model.bodies.iter().filter(|slot| !slot.motions.is_empty() && !slot.is_rigid) {
             slot.segments.iter().for_each(|segment| free_sides[segment.pair] += 1);
         }
         if !free_sides.contains(&2) {
             return None;
         }
-        let (length, motions) = (offset[offset.len() - 1], Motions::of(model));
+        let points: Vec<usize> = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
+        let (length, motions) = (offset[offset.len() - 1], motions_of(&bodies, &points));
         let mut columns = Vec::new();
-        for (body, slot) in model.bodies.iter().enumerate() {
+        for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.is_rigid) {
             let shapes = slot.local.as_ref().into_iter().flat_map(|local| &local.states().motions);
             let column = |(motion, values): (usize, &Vec<f64>)| MotionColumn {
                 motion,
@@ -61,8 +63,8 @@ impl RigidSpace {
             columns.extend(motions.of_body(body).zip(shapes).map(column));
         }
         let space = Rc::new(Self {
-            bodies: model.bodies.iter().map(|slot| (slot.segments.clone(), slot.motions.clone())).collect(),
-            points: (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect(),
+            bodies,
+            points,
             columns,
             rows: rows.of_columns(length, |i| i.checked_sub(first).filter(|i| *i < length)),
             exchange: model.exchange.clone(),
@@ -76,8 +78,17 @@ impl RigidSpace {
 
     /// Return the rigid motions of all bodies.
     fn motions(&self) -> Motions<'_> {
-        Motions::new(self.bodies.iter().map(|(segments, motions)| (&segments[..], &motions[..])), &self.points)
+        motions_of(&self.bodies, &self.points)
     }
+}
+
+/// Return the contact rows and motions of a body in the matrix, which does not have those of rigid parts.
+fn of_body(slot: &BodySlot) -> (Vec<Segment>, Vec<Motion>) {
+    (slot.segments.clone(), if slot.is_rigid { Vec::new() } else { slot.motions.clone() })
+}
+
+fn motions_of<'m>(bodies: &'m [(Vec<Segment>, Vec<Motion>)], points: &[usize]) -> Motions<'m> {
+    Motions::new(bodies.iter().map(|(segments, motions)| (&segments[..], &motions[..])), points)
 }
 
 /// The space for one set of springs D.

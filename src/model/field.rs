@@ -114,7 +114,7 @@ impl Field {
             if let Some(body) = slot.local.as_ref() {
                 let mut rows = vec![0.0; slot.row_stiffness.len()];
                 body.states().rows.multiply(&self.states[index], &mut rows);
-                model.put(index, &rows, &mut trace);
+                model.add(index, &rows, &mut trace);
             }
         }
         self.trace = trace;

@@ -5,8 +5,9 @@
 //! condensed bodies it is small and dense, and cheaper than the sweeps that it saves. Where bodies are distributed over ranks, each
 //! rank owns some rows. Where whole bodies live on several ranks, as condensed ones do, every rank has the whole matrix and solves for itself.
 
+use super::border::{self, Border, BorderMotion};
 use super::coarse::RigidSpace;
-use super::linear::{Failure, LinearResult, LinearSolution, LinearStep, System, Trial};
+use super::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
 use super::{BodySlot, Distribution, Field, Model, States};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
@@ -22,7 +23,8 @@ use std::ops::Range;
 ///
 /// Layers may be far softer than the rounding of K, which resists rigid motions E of a free body by that. So where a matrix is factored, some dofs of each body
 /// are *pins*, as many as it has free motions. Its displacements are v + E a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the
-/// rows of K for a are zero, exactly, and a contact row has B E there.
+/// rows of K for a are zero, exactly, and a contact row has B E there. All dofs of a rigid part are pins. A matrix of complete nodes has no rigid parts:
+/// they are eliminated around it ([`border`]).
 pub struct Joint {
     matrix: RobinMatrix,
     /// B of all bodies: one row [B_a B_b] for each contact point, also for those of other ranks.
@@ -37,6 +39,10 @@ pub struct Joint {
     is_redundant: bool,
     /// Whether the bodies have given their K away.
     has_stiffness: bool,
+    /// Motions of rigid parts that the matrix does not have.
+    motions: Vec<BorderMotion>,
+    /// Their elimination for the springs of the last solve.
+    border: Option<Border>,
 }
 
 impl Joint {
@@ -69,7 +75,65 @@ impl Joint {
         let row_stiffness = side_a.iter().zip(side_b).map(|(a, b)| a + b).collect();
         let matrix = RobinMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         let is_redundant = !of_nodes && model.exchange.ranks() > 1;
-        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness: of_nodes })
+        let motions = if of_nodes { border::motions(model) } else { Vec::new() };
+        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness: of_nodes, motions, border: None })
+    }
+
+    /// Solve G x = r with the matrix until `enough` accepts an iterate. Return x, and the estimated energy norm of its error, or why the solver gave up.
+    fn solve_matrix(&mut self, model: &Model, r: &[f64], enough: &mut StoppingTest) -> Result<Solution> {
+        let (rows, first) = (&self.rows, self.first);
+        let (mut x, mut last_error) = (vec![0.0; r.len()], None);
+        let mut test = |iterate: &KspIterate| {
+            let (closing, energy) = closing_and_energy(model, rows, first, iterate.x, r);
+            let error = estimated_error(iterate, energy);
+            last_error = Some(error);
+            enough(model, &Trial { closing: &closing, energy, error })
+        };
+        let failure = self.matrix.apply(|solver| solver.solve_until(r, &mut x, &mut test))?.failure;
+        Ok(Solution { x, last_error, failure })
+    }
+
+    /// Return B' `force` in the rows of this rank, for forces at the points, n.
+    fn pull(&self, force: &[f64], length: usize) -> Vec<f64> {
+        let mut pull = vec![0.0; length];
+        for (q, force) in force.iter().enumerate() {
+            let owned = self.rows.row(q).filter_map(|(i, b)| Some((i.checked_sub(self.first)?, b)));
+            owned.filter(|(i, _)| *i < length).for_each(|(i, b)| pull[i] += force * b);
+        }
+        pull
+    }
+
+    /// Eliminate the rigid parts around the matrix, which has these springs. Return why the solver gave up, if it did.
+    fn make_border(&mut self, model: &Model, springs: &[f64]) -> Result<Option<String>> {
+        if self.motions.is_empty() || self.border.as_ref().is_some_and(|border| border.springs == springs) {
+            return Ok(None);
+        }
+        let (motions, length) = (std::mem::take(&mut self.motions), self.offset[self.offset.len() - 1]);
+        let mut before = self.border.take().map_or(Vec::new(), |border| border.columns).into_iter();
+        let mut border = Border::new(&motions, springs);
+        for (k, motion) in motions.iter().enumerate() {
+            let load = self.pull(&border.forces[k], length);
+            // the column for the springs before is near
+            let mut column = before.next().unwrap_or_else(|| vec![0.0; length]);
+            let (closing, known) = closing_and_energy(model, &self.rows, self.first, &column, &load);
+            let held: Vec<f64> = closing.iter().zip(springs).map(|(closing, spring)| closing * spring).collect();
+            let (mut rest, mut product) = (load.clone(), self.pull(&held, length));
+            axpy(-1.0, &product, &mut rest);
+            self.matrix.multiply_stiffness(&self.rows, &column, &mut product);
+            axpy(-1.0, &product, &mut rest);
+            let is_enough = |trial: &Trial| trial.error <= border::ACCURACY * (known + trial.energy).sqrt();
+            let solution = self.solve_matrix(model, &rest, &mut |_, trial| is_enough(trial))?;
+            if solution.failure.is_some() {
+                self.motions = motions;
+                return Ok(solution.failure);
+            }
+            axpy(1.0, &solution.x, &mut column);
+            let (closing, energy) = closing_and_energy(model, &self.rows, self.first, &column, &load);
+            let error = solution.last_error.unwrap_or(self.matrix.solver().accuracy() * energy.sqrt());
+            border.push(motion, column, &closing, error);
+        }
+        (self.motions, self.border) = (motions, Some(border));
+        Ok(None)
     }
 
     /// Return the range of each body in a vector of all bodies.
@@ -101,7 +165,7 @@ impl Joint {
     /// Return vectors of the local bodies as one vector; it is zero for bodies of other ranks.
     fn whole(&self, states: &[Vec<f64>]) -> Vec<f64> {
         let mut whole = vec![0.0; self.offset[self.offset.len() - 1]];
-        for (part, state) in self.parts().zip(states).filter(|(_, state)| !state.is_empty()) {
+        for (part, state) in self.parts().zip(states).filter(|(part, state)| part.len() == state.len()) {
             whole[part].copy_from_slice(state);
         }
         whole
@@ -109,8 +173,11 @@ impl Joint {
 
     /// Return the vector of each local body from a vector of all bodies. `like` has a vector of each local body.
     fn apart(&self, x: &[f64], like: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let of_body =
-            |(part, like): (Range<usize>, &Vec<f64>)| if like.is_empty() { Vec::new() } else { x[part].to_vec() };
+        let of_body = |(part, like): (Range<usize>, &Vec<f64>)| match like.len() {
+            // a body of another rank, or a rigid part beside the matrix
+            count if count != part.len() => vec![0.0; count],
+            _ => x[part].to_vec(),
+        };
         self.parts().zip(like).map(of_body).collect()
     }
 }
@@ -141,23 +208,40 @@ impl LinearStep for Joint {
         if self.is_redundant {
             model.exchange.sum(&mut r);
         }
-        let mut x = vec![0.0; r.len()];
         self.matrix.update(&self.rows, springs)?;
-        let (rows, first) = (&self.rows, self.first);
-        let mut last_error = None;
-        let mut enough = |iterate: &KspIterate| {
-            let (closing, energy) = closing_and_energy(model, rows, first, iterate.x, &r);
-            let error = estimated_error(iterate, energy);
-            last_error = Some(error);
+        if let Some(reason) = self.make_border(model, springs)? {
+            return Ok(Err(Failure { body: None, reason }));
+        }
+        let (border, works) = (self.border.take(), border::works(model, &self.motions, residual));
+        let mut test = |model: &Model, trial: &Trial| {
+            let Some(moved) = border.as_ref().map(|border| border.moved(&works, trial.closing)) else {
+                return enough(model, trial);
+            };
+            let closing: Vec<f64> = trial.closing.iter().zip(&moved.closing).map(|(b, n)| b + n).collect();
+            let (energy, error) = (trial.energy + moved.energy, trial.error + moved.error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
-        let failure = self.matrix.apply(|solver| solver.solve_until(&r, &mut x, &mut enough))?.failure;
+        let Solution { mut x, mut last_error, failure } = self.solve_matrix(model, &r, &mut test)?;
         if let (false, Some(reason)) = (self.is_redundant, &failure) {
             return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
+        let mut energy = 0.0;
+        let mut amounts = Vec::new();
+        if let Some(border) = &border {
+            let (closing, _) = closing_and_energy(model, &self.rows, self.first, &x, &r);
+            let moved = border.moved(&works, &closing);
+            border.columns.iter().zip(&moved.amounts).for_each(|(column, &a)| axpy(-a, column, &mut x));
+            energy = if model.exchange.rank() == 0 { dot(&moved.amounts, &works) } else { 0.0 };
+            last_error = last_error.map(|error| error + moved.error);
+            amounts = moved.amounts;
+        }
+        self.border = border;
         let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
-        let energy: f64 = local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum();
-        let [states, apart] = self.displacements(&x, residual);
+        energy += local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
+        let [states, mut apart] = self.displacements(&x, residual);
+        for (motion, a) in self.motions.iter().zip(amounts).filter(|(motion, _)| !residual[motion.body].is_empty()) {
+            apart[motion.body].push(a);
+        }
         let (field, sums) = Field::of_step(model, states, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
         let (energy, failures) = (sums[0], sums[1]);
         if failures > 0.0 {
@@ -176,6 +260,16 @@ impl LinearStep for Joint {
     fn describe(&self) -> String {
         self.matrix.solver().describe()
     }
+}
+
+/// The outcome of a solve with the matrix.
+struct Solution {
+    /// x in the rows of this rank.
+    x: Vec<f64>,
+    /// Estimated energy norm of its error, by an iterative solver.
+    last_error: Option<f64>,
+    /// Why the solver gave up.
+    failure: Option<String>,
 }
 
 /// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this rank, from number `first` on. One message.
@@ -219,8 +313,17 @@ struct BodyMatrices<'a> {
 
 impl<'a> BodyMatrices<'a> {
     fn of_nodes((stiffness, slot): (Csr, &'a BodySlot)) -> Self {
+        if slot.is_rigid {
+            return Self::without_dofs(slot);
+        }
         let rows = slot.local.as_ref().map_or_else(Cow::default, |body| Cow::Borrowed(&body.states().rows));
         Self { stiffness: Cow::Owned(stiffness), rows, motions: Cow::Borrowed(&[]) }
+    }
+
+    /// Return the matrices of a rigid part that has no unknown in the matrix.
+    fn without_dofs(slot: &BodySlot) -> Self {
+        let rows = Csr { ptr: vec![0; slot.row_stiffness.len() + 1], ..Csr::new(0) };
+        Self { stiffness: Cow::Owned(Csr::new(0)), rows: Cow::Owned(rows), motions: Cow::Borrowed(&[]) }
     }
 
     fn copy(slot: &'a BodySlot) -> Option<Self> {
@@ -237,14 +340,18 @@ fn no_matrices() -> Error {
 
 /// Return the K that each body gives away.
 fn given(model: &mut Model) -> Result<Vec<Csr>> {
-    let give = |slot: &mut BodySlot| slot.local.as_mut()?.give_stiffness();
+    let give = |slot: &mut BodySlot| match slot.is_rigid {
+        true => Some(Csr::new(0)),
+        false => slot.local.as_mut()?.give_stiffness(),
+    };
     model.bodies.iter_mut().map(give).collect::<Option<_>>().ok_or_else(no_matrices)
 }
 
 /// Return the matrices of all bodies. Of several ranks each owns some of them, and sends them to all. One message.
 fn copies(model: &Model) -> Result<Vec<BodyMatrices<'_>>> {
     let mut all = all_gather(&*model.exchange, model.bodies.iter().map(BodyMatrices::copy).collect::<Vec<_>>());
-    let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take());
+    let rigid = |body: usize| model.bodies[body].is_rigid.then(|| BodyMatrices::without_dofs(&model.bodies[body]));
+    let of = |body: usize| all.iter_mut().find_map(|of_rank| of_rank.get_mut(body)?.take()).or_else(|| rigid(body));
     (0..model.bodies.len()).map(of).collect::<Option<_>>().ok_or_else(no_matrices)
 }
 
@@ -268,7 +375,7 @@ struct Layout<'a> {
 type Coupled = HashMap<usize, Vec<i32>>;
 
 /// A contact row of a body.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct BodyRow {
     body: usize,
     row: usize,
@@ -294,7 +401,10 @@ impl<'a> Layout<'a> {
         let owned = first..first + self.offset[self.parts.len()];
         let (mut rows, mut coupled) = (Csr::new(self.total), Coupled::new());
         for sides in self.rows_of_points() {
-            let entries: Vec<(usize, f64)> = sides.into_iter().flat_map(|side| self.entries(side)).collect();
+            let mut entries: Vec<(usize, f64)> = sides.iter().flat_map(|&side| self.entries(side)).collect();
+            if sides[0].body == sides[1].body {
+                merge(&mut entries);
+            }
             for &(i, _) in entries.iter().filter(|(i, _)| owned.contains(i)) {
                 coupled.entry(i - first).or_default().extend(entries.iter().map(|&(j, _)| j as i32));
             }
@@ -307,16 +417,17 @@ impl<'a> Layout<'a> {
         (rows, coupled)
     }
 
-    /// Return the row of each of the two bodies for each contact point.
-    fn rows_of_points(&self) -> Vec<[BodyRow; 2]> {
+    /// Return the rows of the bodies and rigid parts for each contact point, that of side a first.
+    fn rows_of_points(&self) -> Vec<Vec<BodyRow>> {
         let points = self.model.points();
-        let mut rows = vec![[BodyRow::default(); 2]; points];
+        let mut sides = [vec![Vec::new(); points], vec![Vec::new(); points]];
         for body in 0..self.parts.len() {
             for (row, place) in self.model.trace_ranges(body).flatten().enumerate() {
-                rows[place % points][place / points] = BodyRow { body, row };
+                sides[place / points][place % points].push(BodyRow { body, row });
             }
         }
-        rows
+        let [a, b] = sides;
+        a.into_iter().zip(b).map(|(a, b)| [a, b].concat()).collect()
     }
 
     /// Return the entries (column of the whole matrix, value) of a contact row.
@@ -360,6 +471,16 @@ impl<'a> Layout<'a> {
         stiffness.values.shrink_to_fit();
         Ok(stiffness)
     }
+}
+
+/// Add entries of the same column, where one body is at both sides of a point.
+fn merge(entries: &mut Vec<(usize, f64)>) {
+    entries.sort_by_key(|entry| entry.0);
+    entries.dedup_by(|next, kept| {
+        let is_same = next.0 == kept.0;
+        kept.1 += if is_same { next.1 } else { 0.0 };
+        is_same
+    });
 }
 
 /// Append a row with the entries (column, value) `known` and with zeros at the other ones of `columns`. Both are sorted by column.

@@ -97,9 +97,9 @@ impl Layer {
         compression.iter().enumerate().map(at).collect()
     }
 
-    /// Return the largest pressure.
+    /// Return the largest pressure, or tension.
     pub fn peak(&self) -> f64 {
-        self.pressure.iter().copied().fold(0.0, f64::max)
+        self.pressure.iter().map(|p| p.abs()).fold(0.0, f64::max)
     }
 }
 

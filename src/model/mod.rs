@@ -5,6 +5,7 @@
 //! A body is local if it lives on this rank, wholly or in part.
 
 pub mod body;
+mod border;
 mod coarse;
 pub mod field;
 pub mod joint;
@@ -25,7 +26,7 @@ pub use states::{Distribution, States};
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::exchange::Exchange;
-use crate::linalg::dot;
+use crate::linalg::{axpy, dot};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -77,7 +78,10 @@ pub struct Sprung {
     pub stiffness: DMatrix<f64>,
 }
 
-/// A body in the model. Every rank has the arrays; only the ranks where the body lives have the body itself.
+/// A body in the model, or a rigid part. Every rank has the arrays; only the ranks where the body lives have the body itself.
+///
+/// A rigid part has no mesh, and its dofs are the amounts of its free motions: an obstacle before a surface, or the offset of a gap. It is at side b of its
+/// pair, alone or beside the body there, and rank 0 has it.
 #[derive(Serialize, Deserialize)]
 pub struct BodySlot {
     /// Name in the scene.
@@ -85,6 +89,8 @@ pub struct BodySlot {
     /// The body, on the rank that owns it, or on every rank that may own a part of it.
     #[serde(skip)]
     pub local: Option<Body>,
+    /// Whether it is a rigid part.
+    pub is_rigid: bool,
     /// Its contact rows: the groups in their order.
     pub segments: Vec<Segment>,
     /// Rigid motions that neither supports nor springs constrain.
@@ -104,6 +110,23 @@ pub struct BodySlot {
 }
 
 impl BodySlot {
+    /// Return a rigid part with these motions at side b of pair number `pair`, which has so many points.
+    pub fn rigid(name: &str, pair: usize, points: usize, motions: Vec<Motion>) -> Self {
+        Self {
+            name: name.to_owned(),
+            local: None,
+            is_rigid: true,
+            segments: vec![Segment { pair, side: 1 }],
+            motions,
+            sprung: None,
+            scale: 0.0,
+            modulus: f64::INFINITY,
+            depth: 1.0,
+            imposed: vec![0.0; points],
+            row_stiffness: vec![0.0; points],
+        }
+    }
+
     /// Return the work of the loads and of forces at the contact rows, which push the body away, on each of its free motions.
     pub fn works(&self, force: &[f64]) -> Vec<f64> {
         self.motions.iter().map(|motion| motion.work - dot(&motion.trace, force)).collect()
@@ -179,14 +202,40 @@ impl Model {
     /// Return the stiffness of the nodes under every contact row, as a trace vector (2n).
     pub fn row_stiffness(&self) -> Vec<f64> {
         let mut all = vec![0.0; 2 * self.points()];
-        (0..self.bodies.len()).for_each(|body| self.put(body, &self.bodies[body].row_stiffness, &mut all));
+        (0..self.bodies.len()).for_each(|body| self.add(body, &self.bodies[body].row_stiffness, &mut all));
         all
+    }
+
+    /// Return the stiffness by which the sweeps hold bodies at every contact row, as a trace vector (2n): that of the nodes under the row, or, for a
+    /// rigid part, of those before it.
+    pub fn holding_stiffness(&self) -> Vec<f64> {
+        let (points, mut all) = (self.points(), self.row_stiffness());
+        for segment in self.bodies.iter().filter(|slot| slot.is_rigid).flat_map(|slot| &slot.segments) {
+            self.range(segment.pair).for_each(|q| all[points + q] = all[points + q].max(all[q]));
+        }
+        all
+    }
+
+    /// Return the number of bodies with a mesh; the rigid parts follow them.
+    pub fn meshed(&self) -> usize {
+        self.bodies.iter().filter(|slot| !slot.is_rigid).count()
+    }
+
+    /// Return by how much rigid parts close each point of pair `i`, n, with these amounts of their motions, one list a body.
+    pub fn rigid_closing(&self, i: usize, amounts: &[Vec<f64>]) -> Vec<f64> {
+        let mut closing = vec![0.0; self.range(i).len()];
+        for (slot, amounts) in
+            self.bodies.iter().zip(amounts).filter(|(slot, _)| slot.is_rigid && slot.segments[0].pair == i)
+        {
+            slot.motions.iter().zip(amounts).for_each(|(motion, &a)| axpy(a, &motion.trace, &mut closing));
+        }
+        closing
     }
 
     /// Return the trace vector (2n) of the rigid motions that prescribed displacements impose on the bodies.
     pub fn imposed(&self) -> Vec<f64> {
         let mut all = vec![0.0; 2 * self.points()];
-        (0..self.bodies.len()).for_each(|body| self.put(body, &self.bodies[body].imposed, &mut all));
+        (0..self.bodies.len()).for_each(|body| self.add(body, &self.bodies[body].imposed, &mut all));
         all
     }
 
@@ -241,6 +290,16 @@ impl Model {
         }
     }
 
+    /// Add values at the rows of a body to a trace vector. Unlike other bodies, a rigid part may share rows with a body.
+    pub fn add(&self, body: usize, rows: &[f64], trace: &mut [f64]) {
+        let mut next = 0;
+        for range in self.trace_ranges(body) {
+            let count = range.len();
+            axpy(1.0, &rows[next..next + count], &mut trace[range]);
+            next += count;
+        }
+    }
+
     /// Condense the bodies that are to be condensed and are not yet.
     ///
     /// # Errors
@@ -287,7 +346,7 @@ impl Model {
 
 /// Return the gap at local point `q` of a pair in units of `factor`, less the part that prescribed displacements close.
 fn free_gap(pair: &ContactPair, q: usize, factor: f64) -> f64 {
-    pair.gap[q] / factor - pair.prescribed[0][q] - pair.prescribed[1][q]
+    (pair.gap[q] - pair.offset) / factor - pair.prescribed[0][q] - pair.prescribed[1][q]
 }
 
 /// A model for tests that need points but no bodies.
@@ -327,6 +386,7 @@ pub(crate) mod sample {
             weight: WEIGHT[2 * i..2 * i + 2].to_vec(),
             normal: vec![[0.0, 1.0, 0.0]; 2],
             gap: vec![0.0; 2],
+            offset: 0.0,
             prescribed: [vec![0.0; 2], vec![0.0; 2]],
             rows: [Csr::new(0), Csr::new(0)],
             nodal: [Csr::new(0), Csr::new(0)],
@@ -341,6 +401,7 @@ pub(crate) mod sample {
         let body = |side: usize, row_stiffness: [f64; 4]| BodySlot {
             name: side.to_string(),
             local: None,
+            is_rigid: false,
             segments: (0..2).map(|pair| Segment { pair, side }).collect(),
             motions: Vec::new(),
             sprung: None,

@@ -145,7 +145,7 @@ impl<'a> Motions<'a> {
             let mut rows = vec![0.0; motion.trace.len()];
             let own = self.of_body(body).map(|i| amounts[i]);
             motions.iter().zip(own).for_each(|(motion, a)| axpy(a, &motion.trace, &mut rows));
-            model.put(body, &rows, &mut trace);
+            model.add(body, &rows, &mut trace);
         }
         trace
     }

@@ -17,10 +17,11 @@ pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGri
 pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
-    BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, PairReport,
-    ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, busiest, warning_lines,
+    BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
+    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, busiest,
+    warning_lines,
 };
-pub use tables::{ContactTable, HistoryWriter, PairRow, RowFile, StepTable};
+pub use tables::{ContactTable, HistoryWriter, PairColumns, PairRow, RowFile, StepTable};
 pub use terminal::IterationTable;
 
 use crate::error::{Error, Result};

@@ -282,6 +282,27 @@ pub struct PairReport {
     pub extent: Extent,
     /// Plane problems: points where contact begins or ends. They are zeros of c, interpolated linearly between contact points.
     pub contact_ends: Vec<[f64; 3]>,
+    /// The obstacle before the surface, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<ObstacleReport>,
+    /// Closing of the gap (a length) that was found for the force or preload of the pair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
+}
+
+/// The report of an obstacle.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ObstacleReport {
+    /// How far it has moved towards the surface, along its mean normal.
+    pub approach: f64,
+    /// How far it has turned, in radians (x, y, z).
+    pub tilt: [f64; 3],
+    /// The force with which it presses along the mean normal.
+    pub force: f64,
+    /// The moment about `at` that it needs beside this force (x, y, z).
+    pub moment: [f64; 3],
+    /// The point about which it turns (x, y, z).
+    pub at: [f64; 3],
 }
 
 /// The report of a load step.
@@ -321,6 +342,12 @@ pub struct StepPairReport {
     pub peak_compression: f64,
     /// Number of points with c > 0.
     pub closed: usize,
+    /// The obstacle before the surface, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstacle: Option<ObstacleReport>,
+    /// Closing of the gap that was found for the force or preload of the pair, or that the step keeps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub offset: Option<f64>,
 }
 
 /// The part of the common surface of a pair that is in contact, c > 0, and the part that is open, c < 0. They are lengths in
@@ -547,13 +574,21 @@ fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units
 /// Return the line of a pair, which its surfaces name in the order of the scene.
 fn pair_line(pair: &PairReport, units: &UnitWords) -> String {
     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
-    if pair.peak_pressure <= 0.0 || pair.peak_pressure.is_nan() {
+    // a bonded pair may pull everywhere
+    if pair.peak_pressure <= 0.0 && pair.force[0] == [0.0; 3] || pair.peak_pressure.is_nan() {
         return format!("  {a} - {b}: no contact");
     }
-    let UnitWords { extent, stress, force, .. } = units;
+    let UnitWords { extent, stress, force, length, .. } = units;
+    let moved = |ObstacleReport { approach, tilt, moment, .. }: &ObstacleReport| {
+        let turned = || format!(", tilt {}, moment {}", vector(*tilt), vector(*moment));
+        let turned = if *tilt == [0.0; 3] { String::new() } else { turned() };
+        format!(", approach {}{length}{turned}", sci(*approach, 5))
+    };
+    let offset = pair.offset.map(|offset| format!(", offset {}{length}", sci(offset, 5)));
+    let more = pair.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
     let what = if pair.extent.is_area() { "area" } else { "length" };
     format!(
-        "  {a} - {b}: force on `{on}` {}{force}, peak pressure {}{stress} at {}, {what} in contact {}{extent}, open {}{extent}",
+        "  {a} - {b}: force on `{on}` {}{force}{more}, peak pressure {}{stress} at {}, {what} in contact {}{extent}, open {}{extent}",
         vector(pair.force[0]),
         readable(pair.peak_pressure, 6),
         point(pair.peak_at),

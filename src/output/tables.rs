@@ -100,6 +100,29 @@ pub fn vector_fields(vector: &[f64; 3], dimension: usize) -> impl Iterator<Item 
     vector[..dimension].iter().map(|&value| field(value))
 }
 
+/// The columns that the table of load steps has for a pair beside those of all pairs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PairColumns {
+    /// No others.
+    None,
+    /// Turn and moment of an obstacle: about z in the plane, in space their components.
+    Obstacle,
+    /// The offset of the gap.
+    Offset,
+}
+
+impl PairColumns {
+    fn names(self, dimension: usize) -> impl Iterator<Item = &'static str> {
+        let names: &[&str] = match self {
+            Self::None => &[],
+            Self::Obstacle if dimension == 2 => &["tilt_z", "moment_z"],
+            Self::Obstacle => &["tilt_x", "tilt_y", "tilt_z", "moment_x", "moment_y", "moment_z"],
+            Self::Offset => &["offset"],
+        };
+        names.iter().copied()
+    }
+}
+
 /// The table `steps.csv`, one line per load step.
 pub struct StepTable {
     /// The file.
@@ -114,7 +137,7 @@ impl StepTable {
     pub fn create(
         folder: &Folder,
         factors: &[String],
-        pairs: &[String],
+        pairs: &[(String, PairColumns)],
         reactions: &[String],
         dimension: usize,
         measure: &str,
@@ -122,10 +145,11 @@ impl StepTable {
         let mut header = vec!["step".to_owned(), "time".to_owned()];
         header.extend_from_slice(factors);
         header.extend(["status", "iterations", "residual"].map(str::to_owned));
-        for pair in pairs {
+        for (pair, columns) in pairs {
             header.extend(vector_columns("force", pair, dimension));
             let numbers = ["approach", &contact_column(measure), "peak_pressure", "closed"];
             header.extend(numbers.map(|what| format!("{what} {pair}")));
+            header.extend(columns.names(dimension).map(|what| format!("{what} {pair}")));
         }
         header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
         Ok(Self { rows: RowFile::create(folder, "steps.csv", &header)?, dimension, count: 0 })
@@ -142,6 +166,13 @@ impl StepTable {
             line.extend(vector_fields(&pair.force, self.dimension));
             line.extend([number(pair.approach), field(pair.extent.contact()), field(pair.peak_pressure)]);
             line.push(pair.closed.to_string());
+            if let Some(obstacle) = &pair.obstacle {
+                let about = if self.dimension == 2 { 2..3 } else { 0..3 };
+                line.extend(
+                    [obstacle.tilt, obstacle.moment].iter().flat_map(|v| v[about.clone()].iter().map(|&c| field(c))),
+                );
+            }
+            line.extend(pair.offset.map(field));
         }
         line.extend(step.reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, self.dimension)));
         self.rows.push(&line);
@@ -195,8 +226,11 @@ fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Res
 }
 
 /// Return the names of the columns in their order, each with the value of a pair.
-fn fields(pair: &PairReport, row: &PairRow) -> [(&'static str, String); 23] {
+fn fields(pair: &PairReport, row: &PairRow) -> [(&'static str, String); 31] {
     let [force, _] = pair.force;
+    let number = |value: Option<f64>| value.map_or(String::new(), field);
+    let turn = |c: usize| number(pair.obstacle.as_ref().map(|obstacle| obstacle.tilt[c]));
+    let moment = |c: usize| number(pair.obstacle.as_ref().map(|obstacle| obstacle.moment[c]));
     [
         ("a", pair.bodies[0].clone()),
         ("b", pair.bodies[1].clone()),
@@ -219,6 +253,14 @@ fn fields(pair: &PairReport, row: &PairRow) -> [(&'static str, String); 23] {
         ("opening_mean", field(row.opening[0])),
         ("opening_largest", field(row.opening[1])),
         ("energy", field(pair.layer_energy)),
+        ("approach", number(pair.approach)),
+        ("tilt_x", turn(0)),
+        ("tilt_y", turn(1)),
+        ("tilt_z", turn(2)),
+        ("moment_x", moment(0)),
+        ("moment_y", moment(1)),
+        ("moment_z", moment(2)),
+        ("offset", number(pair.offset)),
         ("table", row.table.clone()),
         ("plot", row.plot.clone()),
     ]
@@ -274,7 +316,7 @@ impl ContactTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::output::Extent;
+    use crate::output::{Extent, ObstacleReport};
 
     #[test]
     fn rows_are_in_the_file_before_the_end() {
@@ -306,6 +348,12 @@ mod tests {
             peak_at: [5.0, 6.0, 7.0],
             extent: Extent::Area { contact_area: 8.0, open_area: 9.0 },
             layer_energy: 10.0,
+            approach: Some(11.0),
+            obstacle: Some(ObstacleReport {
+                tilt: [0.1, 0.2, 0.3],
+                moment: [4.0, 5.0, 6.0],
+                ..ObstacleReport::default()
+            }),
             ..PairReport::default()
         };
         let mut out = Vec::new();
@@ -313,10 +361,10 @@ mod tests {
         write(&mut out, &[pair], &[row]).unwrap();
         let text = String::from_utf8(out).unwrap();
         let (header, line) = text.trim().split_once('\n').unwrap();
-        assert_eq!(header.split(',').count(), 23);
+        assert_eq!(header.split(',').count(), 31);
         assert_eq!(
             line,
-            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,contact-up-low.csv,"
+            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,"
         );
     }
 }

@@ -1,10 +1,11 @@
 //! Pairs of contact surfaces: two that the scene names, or rules that find pairs.
 
-use super::body::{check_name, plain_pattern};
-use super::geometry::Geometry;
+use super::body::{check_name, one, plain_pattern};
+use super::geometry::{Geometry, Plane};
 use super::layer::LayerSpec;
+use super::load::{echo_of, moment_of};
 use super::pattern;
-use super::read::{Check, Either, Flaw, Form, checked, kept, positive};
+use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, checked, kept, positive};
 use crate::error::{Error, Located, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -17,10 +18,13 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub struct ContactSpec {
     /// write between = ["one", "other"], or between = "auto" with a distance
     ///
-    /// The two physical groups. In a rule that finds pairs both are the word "auto".
-    #[serde(serialize_with = "write_between", deserialize_with = "between")]
-    #[schemars(with = "Either<String, [String; 2]>")]
+    /// The two physical groups. In a rule that finds pairs both are the word "auto"; before an obstacle the second is "obstacle".
+    #[serde(default = "nothing", serialize_with = "write_between", deserialize_with = "between")]
+    #[serde(skip_serializing_if = "is_with_obstacle")]
+    #[schemars(with = "Option<Either<String, [String; 2]>>")]
     pub between: [Located<String>; 2],
+    /// the surface before an obstacle, with obstacle = true
+    pub on: Option<Located<String>>,
     /// bodies of pairs found by "auto", or patterns: of = ["one_*", "other_*"]
     ///
     /// A body that matches the first name and one that matches the second form a pair. All bodies if `None`.
@@ -62,6 +66,31 @@ pub struct ContactSpec {
     /// Then the surfaces are assumed to touch wherever they face each other, and only [`ContactSpec::gap`] counts.
     #[serde(default)]
     pub touching: bool,
+    /// whether the layer also pulls where it is stretched, by the same law unless `tension` gives another
+    ///
+    /// A bond fills the gap of the meshes, so that only [`ContactSpec::gap`] counts.
+    #[serde(default)]
+    pub bond: bool,
+    /// law of a bonded layer where it is stretched: tension over stretch
+    #[serde(default, deserialize_with = "checked")]
+    pub tension: Option<LayerSpec>,
+    /// whether the surface `on` is before a rigid obstacle, which is given by the gap
+    #[serde(default)]
+    pub obstacle: bool,
+    /// how far an obstacle moves towards the surface, along its mean normal; 0 without `force`
+    pub approach: Option<f64>,
+    /// how far an obstacle turns, in radians: about z in the plane, in space a vector; 0 without `moment`
+    pub tilt: Option<Axial>,
+    /// total of the normal forces, for which the gap changes by an offset; force on an obstacle along the mean normal
+    pub force: Option<f64>,
+    /// moment on an obstacle about `at`, under which it turns: a number in the plane, in space a vector
+    pub moment: Option<Axial>,
+    /// point about which an obstacle turns; the middle of its surface without this key
+    pub at: Option<Point>,
+    /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the pair is bonded
+    pub preload: Option<f64>,
+    /// column of the table of load steps with the factor of these forces and motions
+    pub path: Option<Located<String>>,
     /// what to do where bodies overlap before loading
     #[serde(default)]
     pub overlap: Overlap,
@@ -70,6 +99,9 @@ pub struct ContactSpec {
     /// Number of the table in the scene, from 0.
     #[serde(skip)]
     pub table: usize,
+    /// Factor of forces and motions at the present load step; 1 without load steps.
+    #[serde(skip, default = "one")]
+    pub factor: f64,
 }
 
 fn no_gap() -> Field {
@@ -90,6 +122,7 @@ impl ContactSpec {
     pub fn new(first: &str, second: &str, layer: LayerSpec) -> Self {
         Self {
             between: [Located::here(first), Located::here(second)],
+            on: None,
             of: None,
             layer,
             distance: None,
@@ -97,15 +130,55 @@ impl ContactSpec {
             angle: angle(),
             edge: edge(),
             touching: false,
+            bond: false,
+            tension: None,
+            obstacle: false,
+            approach: None,
+            tilt: None,
+            force: None,
+            moment: None,
+            at: None,
+            preload: None,
+            path: None,
             overlap: Overlap::default(),
             reference: None,
             table: 0,
+            factor: 1.0,
         }
     }
 
     /// Set the gap (a length) that is added to the distance of the meshes, a number or a function of the coordinates.
     pub fn gap(self, gap: impl Into<Field>) -> Self {
         Self { gap: gap.into(), ..self }
+    }
+
+    /// Return a surface before a rigid obstacle, whose distance is the `gap`.
+    #[track_caller]
+    pub fn obstacle(on: &str, gap: impl Into<Field>, layer: LayerSpec) -> Self {
+        Self { obstacle: true, gap: gap.into(), on: Some(Located::here(on)), ..Self::new(on, OBSTACLE, layer) }
+    }
+
+    /// Bond the surfaces: the layer also pulls where it is stretched, by its own law.
+    pub fn bonded(self) -> Self {
+        Self { bond: true, ..self }
+    }
+
+    /// Return whether the distance of the meshes counts as zero.
+    pub fn is_touching(&self) -> bool {
+        self.touching || self.bond || self.obstacle
+    }
+
+    /// Return whether forces or prescribed motions of the pair act without a path.
+    pub fn acts(&self) -> bool {
+        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(|axial| axial.0);
+        self.path.is_none() && [self.approach, self.force].into_iter().flatten().chain(turns).any(|value| value != 0.0)
+    }
+
+    /// Complete the two surfaces of a contact that was read: an obstacle is the second one.
+    pub fn complete(&mut self) {
+        if let Some(on) = &self.on {
+            self.between = [on.clone(), Located::new(OBSTACLE.to_owned(), on.place.clone())];
+        }
     }
 
     /// Return whether it is a rule that finds pairs, and names no surfaces: `between = "auto"`.
@@ -139,11 +212,16 @@ pub enum Overlap {
 
 impl Check for ContactSpec {
     /// Check all but the layer, which is checked by itself.
-    fn check(&self, _: Geometry) -> Result<(), Flaw> {
-        match self.is_rule() {
-            true => self.check_rule()?,
-            false => self.check_pair()?,
+    fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
+        match (&self.on, self.obstacle) {
+            (None, false) if self.between.iter().all(|name| name.is_empty()) => {
+                return Err(Flaw::new("", "[[contact]] has no `between`", "`between` is missing", EXAMPLE));
+            }
+            (None, false) if self.is_rule() => self.check_rule()?,
+            (None, false) => self.check_pair()?,
+            (on, _) => self.check_obstacle(on.as_ref())?,
         }
+        self.check_forces(geometry)?;
         positive("angle", "the angle", self.angle)?;
         if self.angle > 90.0 {
             let message = format!("the angle is {} degrees", shown(self.angle));
@@ -153,6 +231,10 @@ impl Check for ContactSpec {
         if self.edge > 180.0 {
             let message = format!("the angle of edges is {} degrees", shown(self.edge));
             return Err(Flaw::new("edge", message, "must be at most 180", "at 180 no surface is split"));
+        }
+        if self.tension.is_some() && !self.bond {
+            let help = "write bond = true, or leave `tension` away";
+            return Err(Flaw::new("tension", "only a bonded layer has a law in tension", "", help));
         }
         self.distance.map_or(Ok(()), |distance| positive("distance", "the distance", distance))
     }
@@ -165,8 +247,89 @@ impl ContactSpec {
             let help = "facets of different bodies that face each other at most that far apart form pairs";
             return Err(Flaw::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
         }
+        let totals = [("force", self.force), ("preload", self.preload)];
+        if let Some((key, _)) = totals.iter().find(|(_, value)| value.is_some()) {
+            let help = "name the two surfaces: between = [\"one\", \"other\"]";
+            return Err(Flaw::new(*key, format!("`{key}` for pairs that are found"), "", help));
+        }
         self.of.iter().flatten().try_for_each(check_name)?;
         Ok(())
+    }
+
+    /// Check a surface before an obstacle.
+    fn check_obstacle(&self, on: Option<&Located<String>>) -> Result<(), Flaw> {
+        let is_pair = !self.between[1].is_empty() && self.between[1].value != OBSTACLE;
+        match on {
+            Some(_) if is_pair => {
+                let help = "remove `between` or `on`";
+                Err(Flaw::new("on", "[[contact]] has both `between` and `on`", "only one of them can hold", help))
+            }
+            Some(_) if !self.obstacle => {
+                let help = "one surface before a rigid obstacle has obstacle = true, two surfaces have between = [\"one\", \"other\"]";
+                Err(Flaw::new("on", "`on` without an obstacle", "", help))
+            }
+            None => {
+                let help = "an obstacle is before one surface: on = \"top\"";
+                Err(Flaw::new("obstacle", "[[contact]] has no `on`", "`on` is missing", help))
+            }
+            Some(_) if self.preload.is_some() => {
+                let help = "it has a force in each load step: force = F";
+                Err(Flaw::new("preload", "a preload of an obstacle", "", help))
+            }
+            Some(on) => Ok(pattern::check(on)?),
+        }
+    }
+
+    /// Check the forces and motions of obstacles and offsets.
+    fn check_forces(&self, geometry: Geometry) -> Result<(), Flaw> {
+        let Self { approach, tilt, force, moment, preload, .. } = self;
+        let turns = [("tilt", tilt), ("moment", moment)];
+        let numbers = [("approach", approach), ("force", force), ("preload", preload)];
+        let given = |key, is_given: bool| is_given.then_some(key);
+        let mut of_obstacle = [given("approach", approach.is_some()), given("at", self.at.is_some())]
+            .into_iter()
+            .chain(turns.map(|(key, turn)| given(key, turn.is_some())));
+        if let (false, Some(key)) = (self.obstacle, of_obstacle.find_map(|key| key)) {
+            let help = "on = \"top\", obstacle = true";
+            return Err(Flaw::new(key, format!("`{key}` of a contact without an obstacle"), "", help));
+        }
+        let exclusive = [
+            numbers.map(|(key, value)| given(key, value.is_some())).to_vec(),
+            turns.map(|(key, turn)| given(key, turn.is_some())).to_vec(),
+        ];
+        for keys in exclusive {
+            if let [first, second, ..] = keys.into_iter().flatten().collect::<Vec<_>>()[..] {
+                let message = format!("[[contact]] has both `{first}` and `{second}`");
+                let help = format!("remove `{first}` or `{second}`");
+                return Err(Flaw::new(second, message, "only one of them can hold", &help));
+            }
+        }
+        if let (Some((key, _)), true) =
+            (turns.iter().find(|(_, turn)| turn.is_some()), geometry.plane == Plane::Axisymmetric)
+        {
+            let message = "an obstacle that turns in an axisymmetric scene";
+            return Err(Flaw::new(*key, message, "it moves along the axis alone", ""));
+        }
+        let single = numbers.into_iter().filter_map(|(key, value)| Some((key, (*value)?)));
+        let turned = turns
+            .into_iter()
+            .flat_map(|(key, turn)| turn.iter().flat_map(move |turn| turn.0.map(|value| (key, value))));
+        let all: Vec<(&str, f64)> = single.chain(turned).collect();
+        for &(key, value) in &all {
+            if !value.is_finite() {
+                return Err(Flaw::new(key, format!("`{key}` is {value}"), "", ""));
+            }
+            if value < 0.0 && (key == "preload" || key == "force" && !self.bond) {
+                let help = "a force > 0 presses; only a bonded pair can be pulled";
+                return Err(Flaw::new(key, format!("a negative `{key}`"), "", help));
+            }
+        }
+        match &self.path {
+            Some(_) if all.is_empty() => {
+                Err(Flaw::new("path", "`path` without a force or motion of this contact", "", ""))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Check a pair of surfaces: two plain names.
@@ -187,6 +350,53 @@ impl ContactSpec {
             return Err(error.label("one name belongs here").help(help).into());
         }
         Ok(())
+    }
+}
+
+/// The name of an obstacle, where a pair has that of the second surface.
+pub const OBSTACLE: &str = "obstacle";
+
+/// Return the surfaces of a contact that names none.
+fn nothing() -> [Located<String>; 2] {
+    [String::new().into(), String::new().into()]
+}
+
+fn is_with_obstacle(between: &[Located<String>; 2]) -> bool {
+    between[1].value == OBSTACLE
+}
+
+/// A rotation or a moment: about z in the plane, a vector in space.
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[schemars(with = "OneOrVector")]
+pub struct Axial(pub [f64; 3]);
+
+impl<'de> Deserialize<'de> for Axial {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        moment_of(Located::deserialize(deserializer)?).map(Self).map_err(kept)
+    }
+}
+
+impl Serialize for Axial {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        echo_of(self.0).serialize(serializer)
+    }
+}
+
+/// A point of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[schemars(with = "Vec<f64>")]
+pub struct Point(pub [f64; 3]);
+
+impl<'de> Deserialize<'de> for Point {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let point = Located::<Vector>::deserialize(deserializer)?;
+        point.numbers().map(Self).map_err(|error| kept(error.or_at(&point.place)))
+    }
+}
+
+impl Serialize for Point {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Vector::from(self.0).serialize(serializer)
     }
 }
 

@@ -6,6 +6,7 @@
 //! In a scene they are `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
 use super::body::BodySpec;
+use super::contact::ContactSpec;
 use super::geometry::Geometry;
 use super::load::LoadKind;
 use super::read::{Check, Either, Flaw, Form, file, kept, positive};
@@ -34,6 +35,8 @@ pub struct History {
     pub table: Option<Located<PathBuf>>,
     /// Whether some loads have no factor and stay constant.
     pub constant: bool,
+    /// Whether no two steps are of one leg, as where a step locks what it finds.
+    pub apart: bool,
     /// Number of steps that were solved before this process started.
     pub begun: usize,
 }
@@ -92,6 +95,9 @@ impl History {
 
     /// Return the number r > 0 with loads of `step` = r * loads of `other`, if there is one. Both steps without loads have r = 1.
     fn ratio(&self, step: usize, other: usize) -> Option<f64> {
+        if self.apart {
+            return (step == other).then_some(1.0);
+        }
         // constant loads have the factor 1 in every step
         let constant = self.constant.then_some(1.0);
         let factors = |step: usize| self.steps[step].factors.iter().copied().chain(constant);
@@ -111,13 +117,32 @@ impl History {
     }
 
     /// Give all loads and prescribed displacements the factors of the last step of the leg of `step`. Without such a step, leave them.
-    pub fn apply(&self, step: usize, bodies: &mut [BodySpec]) {
+    pub fn apply(&self, step: usize, bodies: &mut [BodySpec], contacts: &mut [ContactSpec]) {
         let Some(last) = self.leg(step).next_back().filter(|_| step < self.steps.len()) else { return };
+        for contact in contacts {
+            contact.factor = match contact.preload {
+                Some(_) => self.preload_factor(last, contact),
+                None => self.factor(last, contact.path.as_ref()),
+            };
+        }
         for body in bodies {
             body.load.iter_mut().for_each(|load| load.factor = self.factor(last, load.path.as_ref()));
             body.fix.iter_mut().for_each(|fix| fix.factor = self.factor(last, fix.path.as_ref()));
             body.force_factor = self.factor(last, None);
         }
+    }
+}
+
+impl History {
+    /// Return the factor of the preload of a contact at a step. Without a path it is 1 in every step.
+    fn preload_factor(&self, step: usize, contact: &ContactSpec) -> f64 {
+        contact.path.as_ref().filter(|_| self.is_table()).map_or(1.0, |path| self.factor(step, Some(path)))
+    }
+
+    /// Return whether a contact keeps in a step what the step before has found: its preload has the same factor in both.
+    pub fn locks(&self, step: usize, contact: &ContactSpec) -> bool {
+        let factor = |step: usize| self.preload_factor(step, contact);
+        contact.preload.is_some() && step > 0 && factor(step) == factor(step - 1)
     }
 }
 
@@ -214,27 +239,28 @@ impl History {
     ///
     /// # Errors
     /// A path that is no column, and a column that no line names.
-    pub fn join(&mut self, bodies: &[BodySpec]) -> Checked<()> {
+    pub fn join(&mut self, bodies: &[BodySpec], contacts: &[ContactSpec]) -> Checked<()> {
         let Some(table) = &self.table else { return Ok(()) };
+        let all = || bodies.iter().flat_map(paths).chain(contacts.iter().filter_map(|contact| contact.path.as_ref()));
         let columns = || self.names.iter().map(String::as_str).filter(|name| *name != COMMON);
-        for path in bodies.iter().flat_map(paths) {
+        for path in all() {
             if self.names.iter().all(|name| *name != path.value) {
                 let message = format!("the table of load steps has no column `{}`", path.value);
                 let otherwise = || format!("its columns are {}", joined(self.names.iter().map(String::as_str)));
                 return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
-        if let Some(unused) = columns().find(|name| bodies.iter().flat_map(paths).all(|path| path.value != **name)) {
+        if let Some(unused) = columns().find(|name| all().all(|path| path.value != **name)) {
             return Err(Error::scene(
                 &table.place,
-                format!("no load and no support has the path `{unused}` of this table"),
+                format!("no load, support or contact has the path `{unused}` of this table"),
             )
             .help(format!(
-                "path = \"{unused}\" in a line of `load` or `fix`; `{COMMON}` is the column of all lines without"
+                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact; `{COMMON}` is the column of all lines without"
             )));
         }
         let common = self.names.iter().any(|name| name == COMMON);
-        self.constant = !common && bodies.iter().any(has_common);
+        self.constant = !common && (bodies.iter().any(has_common) || contacts.iter().any(ContactSpec::acts));
         Ok(())
     }
 }

@@ -341,7 +341,7 @@ fn check_moment(moment: [f64; 3], geometry: Geometry) -> Result<(), Flaw> {
 }
 
 /// Return a moment (x, y, z): a number in the plane, a vector in space.
-fn moment_of(moment: Located<OneOrVector>) -> Checked<[f64; 3]> {
+pub(super) fn moment_of(moment: Located<OneOrVector>) -> Checked<[f64; 3]> {
     let numbers = match (&moment.value, geometry().is_plane()) {
         (OneOrVector::One(field), true) => constant(field).map(|about_z| [0.0, 0.0, about_z]),
         (OneOrVector::Vector(vector), false) => vector.numbers(),
@@ -352,7 +352,7 @@ fn moment_of(moment: Located<OneOrVector>) -> Checked<[f64; 3]> {
 }
 
 /// Return a moment as [`moment_of`] reads it.
-fn echo_of(moment: [f64; 3]) -> OneOrVector {
+pub(super) fn echo_of(moment: [f64; 3]) -> OneOrVector {
     match geometry().is_plane() {
         true => OneOrVector::One(Field::Constant(moment[2])),
         false => OneOrVector::Vector(moment.into()),

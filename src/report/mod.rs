@@ -4,7 +4,9 @@ mod surface;
 
 pub use surface::Surface;
 
-use crate::output::{BodyReport, ForceReport, PairReport, Plot, Report, RoundReport, UNSETTLED, trimmed};
+use crate::output::{
+    BodyReport, ForceReport, ObstacleReport, PairReport, Plot, Report, RoundReport, UNSETTLED, trimmed,
+};
 use crate::problem::{Units, label};
 use serde_json::Value;
 
@@ -207,8 +209,17 @@ impl Page<'_> {
             label(if is_area { "#area in contact" } else { "#length in contact" }, unit.as_deref()),
             label("#open", unit.as_deref()),
         ];
+        let moves = pairs.iter().any(|pair| pair.obstacle.is_some() || pair.offset.is_some());
+        let columns: Vec<String> = columns.into_iter().chain(moves.then(|| "obstacle or offset".to_owned())).collect();
         let row = |pair: &PairReport| {
-            vec![
+            let obstacle = pair.obstacle.as_ref().map(|obstacle| {
+                let ObstacleReport { approach, tilt, force, moment, .. } = obstacle;
+                let [approach, force] = [approach, force].map(|value| digits(*value));
+                format!("approach {approach}, tilt {}, force {force}, moment {}", vector(tilt), vector(moment))
+            });
+            let offset = pair.offset.map(|offset| format!("offset {}", digits(offset)));
+            let moved = moves.then(|| obstacle.or(offset).unwrap_or_default());
+            let cells = vec![
                 escape(&pair.bodies.join(" – ")),
                 escape(&pair.surfaces.join(" – ")),
                 escape(&words(&self.report.settings["contact"][pair.contact]["layer"])),
@@ -218,7 +229,8 @@ impl Page<'_> {
                 if pair.peak_pressure > 0.0 { vector(&pair.peak_at) } else { String::new() },
                 digits(pair.extent.contact()),
                 digits(pair.extent.open()),
-            ]
+            ];
+            cells.into_iter().chain(moved).collect()
         };
         let rest = match pairs.len() {
             ..=ROWS => String::new(),

@@ -81,7 +81,10 @@ fn tangents(law: &dyn LayerLaw, point: usize, c: f64, excess: f64) -> [f64; 2] {
     let (here, excess) = (law.response(point, c), excess * (1.0 + DIGITS));
     let rise = |other: f64| law.response(point, other).energy - here.energy - here.pressure * (other - c);
     // below zero, a compression has no energy: all open states are the same
-    let (first, can_open) = (c.max(0.0), c <= 0.0 || rise(0.0) <= excess);
+    let (first, can_open) = match law.is_bonded() {
+        true => (c, false),
+        false => (c.max(0.0), c <= 0.0 || rise(0.0) <= excess),
+    };
     let way = |side: f64| {
         let beyond = |way: f64| rise(first + side * way) - excess;
         zero(beyond, beyond(0.0), DIGITS).unwrap_or(f64::INFINITY)

@@ -182,7 +182,9 @@ pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
     (0..model.bodies.len()).find_map(|body| {
         let slot = &model.bodies[body];
         let springs = springs(model, body, &model.of_body(body, weight));
-        let free = Blocks::free(&springs, slot.scale, TOLERANCE);
+        // a rigid part has no stiffness of its own to compare with
+        let full = if slot.is_rigid { springs.diagonal().max().max(f64::MIN_POSITIVE) } else { slot.scale };
+        let free = Blocks::free(&springs, full, TOLERANCE);
         let names = slot.motions.iter().map(|motion| &motion.name[..]);
         Some(Moved { body, name: combined(names, free.first()?.iter().copied()) })
     })
@@ -194,10 +196,12 @@ const WEAK: f64 = 1e-3;
 
 /// Return the weights (2n). Every body that they do not hold safely gets at least the stiffness of its own surface as a whole.
 fn constrained(model: &Model, mut weight: Vec<f64>) -> Vec<f64> {
-    for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
+    let holding = model.holding_stiffness();
+    for (body, _) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.motions.is_empty()) {
         // the stiffness under each row, spread over all rows
-        let rows = slot.row_stiffness.len().max(1) as f64;
-        let surface: Vec<f64> = slot.row_stiffness.iter().map(|stiffness| stiffness / rows).collect();
+        let mut surface = model.of_body(body, &holding);
+        let rows = surface.len().max(1) as f64;
+        surface.iter_mut().for_each(|stiffness| *stiffness /= rows);
         let natural = springs(model, body, &surface);
         let mut safe = springs(model, body, &model.of_body(body, &weight)) - WEAK * &natural;
         // a motion that no contact row resists is not required to be held
@@ -231,7 +235,7 @@ const STEPS: usize = 4;
 /// Give every body the Robin term of its extension, and set its solver up. A refusal of the solver or of an option then comes before the first sweep, and
 /// the extension needs no other factorisation.
 pub fn prepare(model: &mut Model) -> Result<()> {
-    let springs: Vec<f64> = model.row_stiffness().iter().map(|k| STIFF * k).collect();
+    let springs: Vec<f64> = model.holding_stiffness().iter().map(|k| STIFF * k).collect();
     model.robin(&springs)?;
     let mut bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
     bodies.try_for_each(|body| body.set_up())
@@ -246,7 +250,7 @@ pub fn prepare(model: &mut Model) -> Result<()> {
 /// all displacements with that trace. It is found by the augmented Lagrangian method with springs much stiffer than the body: in every sweep
 /// the error shrinks by the ratio of the two stiffnesses. A start that closes no contact must not close any by its error.
 pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Field, Failure>> {
-    let springs: Vec<f64> = model.row_stiffness().iter().map(|k| STIFF * k).collect();
+    let springs: Vec<f64> = model.holding_stiffness().iter().map(|k| STIFF * k).collect();
     model.robin(&springs)?;
     let (mut iterate, without_contact) = (Field::rest(model), vec![0.0; model.points()]);
     let mut multiplier = vec![0.0; trace.len()];
@@ -257,6 +261,11 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
         let pull: Vec<f64> = (0..trace.len()).map(pull).collect();
         for (index, r) in r.iter_mut().enumerate() {
             let Some(body) = model.bodies[index].local.as_ref() else { continue };
+            if model.bodies[index].is_rigid {
+                // the motions of the start have moved it
+                r.fill(0.0);
+                continue;
+            }
             body.states().rows.add_transpose(1.0, &model.of_body(index, &pull), r);
         }
         let sweep = Sweeper::default().solve(model, r, energy, None, 0)?;

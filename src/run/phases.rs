@@ -8,7 +8,7 @@ use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, Verified, point};
+use crate::discretize::{self, StepSpecs, Verified, point};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
@@ -47,11 +47,15 @@ pub fn build(
 /// problem if linear steps are solved alike. Collective.
 pub fn build_after(
     session: &Session,
-    scene: Rc<Scene>,
+    mut scene: Rc<Scene>,
     before: Option<Done>,
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
+    if scene.contacts.iter().any(|contact| contact.preload.is_some()) {
+        // a step keeps offsets in its gaps, which are those of one leg
+        Rc::make_mut(&mut scene).method.steps.apart = true;
+    }
     let mut kept = Vec::new();
     if let Some(Done { built: mut last, .. }) = before.filter(|done| settings(&done.built.scene) == settings(&scene)) {
         if serves(&last, &scene) {
@@ -125,14 +129,15 @@ where
 {
     /// Build the problem under the loads of a step of the scene's history, or under the full loads. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, scene, verified, read, cut } = self;
+        let Self { session, verified, read, cut, .. } = self;
         let stage = session.stage("discretize");
-        let mut bodies = verified.bodies.clone();
-        scene.method.steps.apply(step, &mut bodies);
+        let (mut bodies, mut contacts) = (verified.bodies.clone(), self.scene.contacts.clone());
+        self.scene.method.steps.apply(step, &mut bodies, &mut contacts);
+        let (scene, specs) = (&self.scene, StepSpecs { bodies: &bodies, contacts: &contacts });
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.adapt.is_some();
-        let discrete = discretize::discretize(scene, verified, &bodies, *cut, keep, exchange, &mut inner);
+        let discrete = discretize::discretize(scene, verified, specs, *cut, keep, exchange, &mut inner);
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
         // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
@@ -211,6 +216,11 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     let _stage = session.stage("set-up");
     let scene = built.scene.clone();
     let Begin { start, steps } = begin;
+    for (i, pair) in steps.last().iter().flat_map(|step| step.pairs.iter().enumerate()) {
+        if scene.method.steps.locks(steps.len(), &built.discrete.contacts[i].spec) {
+            built.discrete.lock(i, pair.offset.unwrap_or(0.0));
+        }
+    }
     let mut start = match start {
         Some(start) => start,
         None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),

@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::error::few;
 use crate::estimate::Estimate;
 use crate::exchange::{all_gather, gather};
+use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
     BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
@@ -191,7 +192,7 @@ impl GatheredCounters {
     pub fn gather(discrete: &Discrete) -> Self {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
-        for slot in &discrete.model.bodies {
+        for slot in discrete.model.bodies.iter().filter(|slot| !slot.is_rigid) {
             let owned = slot.local.as_ref().filter(|body| body.states().leads());
             mine.solvers.push(owned.map_or_else(String::new, Body::describe));
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
@@ -245,6 +246,8 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         peak_compression: results::peak(c),
         extent: Extent::new(pair.measure, &pair.weight, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
+        obstacle: results::obstacle(done, i),
+        offset: results::offset(done, i),
     }
 }
 
@@ -265,7 +268,14 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     let (model, outcome) = (done.model(), &done.outcome);
     let (pair, range) = (&model.pairs[i], model.range(i));
     let sides = done.built.discrete.sides(i);
-    let displacement = |side: usize| model.displacement(&outcome.iterate.trace, i, side, done.share);
+    let displacement = |side: usize| {
+        let mut u = model.displacement(&outcome.iterate.trace, i, side, done.share);
+        if side == 1 && !done.built.discrete.contacts[i].spec.obstacle {
+            // the offset of a gap is no displacement
+            axpy(-1.0, &model.rigid_closing(i, &outcome.iterate.rigid), &mut u);
+        }
+        u
+    };
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.position.clone(),

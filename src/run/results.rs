@@ -4,7 +4,7 @@
 use super::numbered;
 use super::stages::{All, Built, Done, Recovered};
 use crate::contact::{ContactPair, moment_in_scene};
-use crate::discretize::{BodyInfo, Discrete, ForceBalance, mean_normal};
+use crate::discretize::{BodyInfo, Discrete, ForceBalance, Obstacle, mean_normal};
 use crate::error::{Result, few};
 use crate::exchange::all_gather;
 use crate::fem::displacement::{self, Strained};
@@ -13,8 +13,10 @@ use crate::linalg::{around, bounds};
 use crate::model::{Body, BodySlot, Field};
 use crate::output::report::readable;
 use crate::output::{
-    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ReactionReport, StepPairReport, StepReport, sci,
+    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, PairColumns, ReactionReport,
+    StepPairReport, StepReport, sci,
 };
+use crate::problem::ContactSpec;
 use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
@@ -26,7 +28,7 @@ pub fn recover(done: &Done) -> Rc<All> {
         let local = |(index, slot): (usize, &BodySlot)| {
             slot.local.as_ref().map(|body| recover_body(slot, body, &done.outcome.iterate, index, done.share))
         };
-        Rc::new(done.model().bodies.iter().enumerate().map(local).collect())
+        Rc::new(done.model().bodies.iter().take(done.model().meshed()).enumerate().map(local).collect())
     })
 }
 
@@ -293,7 +295,37 @@ fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
         peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
         peak_compression: peak(c),
         closed: c.iter().filter(|c| **c > 0.0).count(),
+        obstacle: obstacle(done, i),
+        offset: offset(done, i),
     }
+}
+
+/// Return what the table of load steps has of a pair beside the columns of all pairs.
+pub fn columns(spec: &ContactSpec) -> PairColumns {
+    match spec.force.or(spec.preload) {
+        _ if spec.obstacle => PairColumns::Obstacle,
+        Some(_) => PairColumns::Offset,
+        None => PairColumns::None,
+    }
+}
+
+/// Return the motion of the obstacle of pair `i` and what acts on it; none without an obstacle.
+pub fn obstacle(done: &Done, i: usize) -> Option<ObstacleReport> {
+    let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.contacts[i].spec);
+    let found = spec.obstacle.then(|| Obstacle::new(pair, spec))?;
+    let (approach, tilt) = found.moved(&done.outcome.iterate.rigid[pair.bodies[1]], done.share);
+    let force = &done.outcome.layer.force[done.model().range(i)];
+    let (force, moment) = (resultant(force, &pair.resultant[1]), resultant(force, &pair.moment[1]));
+    let moment = found.moment(force, moment).map(|component| 0.0 - component);
+    Some(ObstacleReport { approach, tilt, force: found.along(force), moment, at: found.at })
+}
+
+/// Return the offset of the gap of pair `i` that was found for its force or preload; none without such.
+pub fn offset(done: &Done, i: usize) -> Option<f64> {
+    let (model, spec) = (done.model(), &done.built.discrete.contacts[i].spec);
+    let has_offset = !spec.obstacle && spec.force.or(spec.preload).is_some();
+    let closing = has_offset.then(|| model.rigid_closing(i, &done.outcome.iterate.rigid))?;
+    Some(model.pairs[i].offset + closing[0])
 }
 
 /// Return the approach of the bodies of each pair along its mean normal, none without a mean normal. Collective, one message.
@@ -310,6 +342,9 @@ pub fn approaches(done: &Done, recovered: &All) -> Vec<Option<f64>> {
         segments.iter().zip(each).for_each(|(segment, own)| sums[segment.pair] += own);
     }
     model.exchange.sum(&mut sums);
+    for (i, sum) in sums.iter_mut().enumerate() {
+        *sum += obstacle(done, i).map_or(0.0, |obstacle| obstacle.approach);
+    }
     let known = |(pair, sum): (&ContactPair, f64)| mean_normal(pair).map(|_| sum).filter(|sum| sum.is_finite());
     model.pairs.iter().zip(sums).map(known).collect()
 }

@@ -255,6 +255,9 @@ pub fn tilted(done: &Done, i: usize) -> Option<String> {
 /// Return the warning that no pair carries a pressure, at the solution or in a load step. Then contact has no part in the results.
 pub fn nothing_touches(done: &Done) -> Option<String> {
     let pairs = 0..done.model().pairs.len();
+    if pairs.clone().any(|i| done.model().pairs[i].law.is_bonded()) {
+        return None;
+    }
     let compressed: Option<Vec<Compressed>> = pairs.map(|i| most_compressed(done, i)).collect();
     let compressed = compressed.filter(|all| all.iter().all(|found| found.pressure <= 0.0))?;
     let nearest = (0..compressed.len()).max_by(|&i, &j| compressed[i].most.total_cmp(&compressed[j].most))?;
@@ -328,7 +331,7 @@ const NEARLY: f64 = 0.5;
 fn reached(done: &Done, i: usize) -> usize {
     let (layer, first) = (&done.outcome.layer, done.model().range(i).start);
     let (contact, gap) = (&done.built.discrete.contacts[i], &done.model().pairs[i].gap);
-    let least = contact.spec.distance.filter(|_| !contact.spec.touching).map_or(f64::NEG_INFINITY, |d| NEARLY * d);
+    let least = contact.spec.distance.filter(|_| !contact.spec.is_touching()).map_or(f64::NEG_INFINITY, |d| NEARLY * d);
     let goes_on = |q: &&usize| layer.pressure[first + *q] > 0.0 && layer.compression[first + *q] + gap[**q] >= least;
     contact.ends.iter().filter(goes_on).count()
 }

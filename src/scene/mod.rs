@@ -58,12 +58,15 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     if scene.title.is_empty() {
         scene.title = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     }
-    scene.contacts.iter_mut().enumerate().for_each(|(table, contact)| contact.table = table);
+    for (table, contact) in scene.contacts.iter_mut().enumerate() {
+        contact.table = table;
+        contact.complete();
+    }
     // meshes that are adapted need no more digits than they are worth, unless the scene says how many
     if let (Some(adapt), false) = (&scene.adapt, has_stop) {
         scene.method.stop.residual = Some(0.1 * adapt.error.value);
     }
-    scene.method.steps.join(&scene.bodies)?;
+    scene.method.steps.join(&scene.bodies, &scene.contacts)?;
     scene.verify()?;
     Ok(scene)
 }

@@ -312,6 +312,7 @@ impl Scene {
             let near = &contact.between[0].place;
             contact.refuse(geometry, near)?;
             contact.layer.refuse(geometry, near)?;
+            contact.tension.refuse(geometry, near)?;
         }
         self.check_names()?;
         self.method.refuse(geometry, place)?;

@@ -283,6 +283,8 @@ const CASES: &[Case] = &[
     // Contacts.
     ("\"upper_bottom\"", "\"lower_top\"", "\"lower_top\"", "a contact between `lower_top` and itself", ""),
     (", \"upper_bottom\"", "", "[\"lower_top\"]", "a contact is between two surfaces", ""),
+    ("[method]", "tension = { linear = { stiffness = 1 } }\n[method]", "{ linear = { stiffness = 1 } }", "only a bonded layer has a law in tension", "bond = true"),
+    ("[method]", "bond = true\ntension = { linear = { stiffness = 0 } }\n[method]", "0", "stiffness is 0", ""),
     ("power = { B = 2.5e-5, a = 0.5 }", "", "{  }", "the layer has no law", "linear = { stiffness = 1e5 }"),
     ("a = 0.5 } }", "a = 0.5 }, linear = { stiffness = 1 } }", "{ stiffness = 1 }", "the layer has both `power` and `linear`", ""),
     ("B = 2.5e-5", "B = \"w\"", "w", "unknown variable `w`", "known are x, y, pi"),

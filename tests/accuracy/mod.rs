@@ -1,10 +1,13 @@
 //! Answers against closed forms and known solutions.
 
 mod axisymmetric;
+mod bonds;
 mod cases;
 mod elasticity;
 mod layers;
 mod manufactured;
+mod obstacles;
+mod preloads;
 mod space;
 mod supports;
 mod turning;

@@ -272,7 +272,7 @@ fn tables_that_are_none_are_refused_with_their_line() {
     refused("time,press,lift\n1,1,1\n1,1,1\n", &["the time 1 comes after 1", "path.csv:3"]);
     refused("press\n1\n", &["no column `lift`", "scene.toml"]);
     refused("press,lft\n1,1\n", &["no column `lift`", "did you mean `lft`?"]);
-    refused("press,lift,shear\n1,1,1\n", &["no load and no support has the path `shear`"]);
+    refused("press,lift,shear\n1,1,1\n", &["no load, support or contact has the path `shear`"]);
     refused("press;lift\n1;1\n", &["this table has one column", "by commas", "path.csv:1"]);
     let run = solve(groove("steps = { table = \"paths.csv\" }\n"), &[]);
     assert!(run.code == 3 && run.stderr.contains("there is no file"), "{}", run.said());

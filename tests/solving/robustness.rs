@@ -221,19 +221,17 @@ fn lost_digits_have_their_status() {
     }
 }
 
-/// A block that leans on one edge, over a gap as wide as a contact point: whole steps go back and forth between two contacts.
+/// A block that leans on one edge, over a gap as wide as a contact point: whole steps go back and forth between two contacts, since one point resists no
+/// turn, and F1 has to say how far the block turns.
 #[test]
-fn shortened_steps_come_to_an_end() {
+fn a_leaning_block_comes_to_rest() {
     for lean in [0.8, 0.85, 0.9, 0.93] {
         let upper =
             format!("order = 1\nload = [{{ on = \"b2_top\", pressure = \"5.7e3 * (1 + {lean} * (2*x - 1))\" }}]");
         let gap = "8.6e-4 * max(0, 1 - ((x - 1) / 0.3)^2)^1.5";
         let scene = blocks([9e7; 2], [2, 8], &upper, gap, "power = { B = 3.6e-13, a = 1 }");
         let run = solve(scene, &["--set", "body.0.order=1"]).converged();
-        // 17 or 18, most of them with smoothed laws
-        assert!(run.count("iterations") <= 25, "{lean}: {} steps", run.count("iterations"));
-        let history = run.history();
-        assert!(history["gamma"].iter().any(|&gamma| gamma < 1.0), "{lean}: no step was shortened");
+        assert!(run.count("iterations") <= 4, "{lean}: {} steps", run.count("iterations"));
     }
 }
 

@@ -208,7 +208,7 @@ fn a_killed_run_goes_on_to_the_same_end() {
 /// A rank that is killed at any moment ends the others within seconds.
 #[test]
 fn a_killed_rank_ends_all() {
-    let (scene, sets) = (case("groove3d"), ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=10"]);
+    let (scene, sets) = (case("groove3d"), ["--method", "newton", "--set", "solver=hypre", "--set", "mesh.set.n=20"]);
     let mut killed = 0;
     for wait in [30, 200, 500] {
         let mut run = Working::start(&words(&scene, &sets), 3);

@@ -2,6 +2,7 @@
 
 mod builder;
 mod laws;
+mod mixed;
 mod random;
 mod runs;
 mod saturating;
@@ -25,6 +26,9 @@ const SCENES: usize = 24;
 /// A series of the wider box, and one of slender bodies.
 const WIDE: u64 = 100;
 const SLENDER: u64 = 100;
+
+/// A series with obstacles, bonds and forces.
+const MIXED: u64 = 1;
 
 /// Runs scenes in the session.
 struct Bench<'s> {
@@ -83,6 +87,10 @@ fn scenes_are_solved_by_default(bench: &Bench) {
     for index in 0..SCENES {
         let case = slender::scene(SLENDER, index, Path::new(env!("CARGO_MANIFEST_DIR")));
         judge(format!("slender {SLENDER} {index}"), &["auto"], bench.solve(case, &["auto"]));
+    }
+    for index in 0..SCENES {
+        let case = mixed::scene(MIXED, index, Path::new(env!("CARGO_MANIFEST_DIR")));
+        judge(format!("mixed {MIXED} {index}"), &["auto"], bench.solve(case, &["auto"]));
     }
     let advice = "`scripts/stress --seed SEED --only INDEX --keep DIR` writes the scene file, with --wide or --slender of that family";
     assert!(bad.is_empty(), "{advice}\n{}", bad.join("\n"));

@@ -208,7 +208,7 @@ fn floats(case: &Case, reference: &Answer) -> bool {
     case.hanging && peak(reference) == 0.0
 }
 
-/// Largest pressure.
+/// Largest pressure or tension.
 pub fn peak(answer: &Answer) -> f64 {
-    answer.pressure.iter().copied().fold(0.0, f64::max)
+    answer.pressure.iter().map(|p| p.abs()).fold(0.0, f64::max)
 }

@@ -3,12 +3,27 @@
 use super::expression::{Breach, ExpressionLaw, increases};
 use super::forms;
 use super::table::Table;
-use super::{LayerLaw, PerPoint};
+use super::{Bonded, LayerLaw, PerPoint};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::diagonal;
-use crate::problem::Own;
 use crate::problem::layer::LayerSpec;
+use crate::problem::{ContactSpec, Own};
 use std::rc::Rc;
+
+/// Make the law of a pair at the contact points `position`, in compression and, where it is bonded, in tension. `laws` are those that the program
+/// brings, by name.
+///
+/// # Errors
+/// See [`make`].
+pub fn of_pair(spec: &ContactSpec, laws: &OwnLaws, position: &[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> {
+    let compression = make(&spec.layer, laws, position)?;
+    let tension = match &spec.tension {
+        _ if !spec.bond => return Ok(compression),
+        None => compression.clone(),
+        Some(tension) => make(tension, laws, position)?,
+    };
+    Ok(Rc::new(Bonded { compression, tension }))
+}
 
 /// Make the law of a layer at the contact points `position`. `laws` are the laws that the program brings, by name.
 ///

@@ -11,6 +11,7 @@
 //! [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the graph. These methods handle the open layer and the ends of
 //! the range.
 
+mod bonded;
 mod expression;
 mod forms;
 mod make;
@@ -19,10 +20,11 @@ mod table;
 #[cfg(test)]
 mod tests;
 
+pub use bonded::Bonded;
 pub use forms::LinearLaw;
 #[cfg(test)]
 pub use forms::Power;
-pub use make::{LawMaker, OwnLaws, make};
+pub use make::{LawMaker, OwnLaws, make, of_pair};
 pub use table::Table;
 
 use std::rc::Rc;
@@ -62,6 +64,11 @@ pub trait LayerLaw: std::fmt::Debug {
     /// Return the pressure alone, for searches that need nothing else.
     fn pressure(&self, point: usize, c: f64) -> f64 {
         self.response(point, c).pressure
+    }
+
+    /// Return whether the layer is bonded: whether it pulls where it is stretched, at `c < 0`. Such a law has no state without pressure but `c = 0`.
+    fn is_bonded(&self) -> bool {
+        false
     }
 
     /// Return the compression up to which the law is given at contact point `point`, infinite if it has no end. Beyond it the law
@@ -123,7 +130,7 @@ pub trait LayerLaw: std::fmt::Debug {
     /// ```
     ///
     /// which is twice the gap where the law is straight. It is not negative, and zero on the graph to rounding. It is infinite for
-    /// `pressure < 0` and for a pressure that the layer cannot reach; NaN stays NaN.
+    /// `pressure < 0` unless the layer is bonded, and for a pressure that the layer cannot reach; NaN stays NaN.
     ///
     /// The rounding of p(c) itself, 1e-16 p times the exponent of the law, does not count as an error of the gap. It equals a
     /// change of the law's parameters within double precision.
@@ -131,14 +138,14 @@ pub trait LayerLaw: std::fmt::Debug {
         if c.is_nan() || pressure.is_nan() {
             return f64::NAN;
         }
-        if pressure == 0.0 && c <= 0.0 {
+        if pressure == 0.0 && c <= 0.0 && !self.is_bonded() {
             // An open layer without pressure is on the graph at any distance.
             return 0.0;
         }
         let (at_c, on_graph) = (self.pressure(point, c), self.compression(point, pressure));
         let gap = (c - on_graph) * (at_c - pressure);
         // NaN comes from values that overflow or lie beyond the end of a law.
-        if pressure < 0.0 || gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
+        if pressure < 0.0 && !self.is_bonded() || gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
     }
 }
 
@@ -178,9 +185,25 @@ pub struct Scaled {
 
 impl LayerLaw for Scaled {
     fn compressed(&self, point: usize, c: f64) -> Response {
+        self.response(point, c)
+    }
+
+    fn response(&self, point: usize, c: f64) -> Response {
         let s = self.factor;
-        let Response { pressure, tangent, energy } = self.law.compressed(point, s * c);
+        let Response { pressure, tangent, energy } = self.law.response(point, s * c);
         Response { pressure: pressure / s, tangent, energy: energy / (s * s) }
+    }
+
+    fn is_bonded(&self) -> bool {
+        self.law.is_bonded()
+    }
+
+    fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
+        self.law.resolvent(point, self.factor * s, rho) / self.factor
+    }
+
+    fn compression(&self, point: usize, pressure: f64) -> f64 {
+        self.law.compression(point, self.factor * pressure) / self.factor
     }
 
     fn pressure(&self, point: usize, c: f64) -> f64 {
@@ -224,8 +247,10 @@ pub struct LawState {
 /// The law need not be inverted. Let P(s) be the pressure at which the law itself meets the line with the sum s. A state with the
 /// remaining gap y = mu/p has p = P(`sum` + y), so y is the root of y P(`sum` + y) = mu, where the left side increases with y. The root
 /// is least for a rigid layer, P(s) = rho s, whose gap has a closed form.
+///
+/// A bonded layer neither opens nor closes, so that nothing is smoothed.
 pub fn resolve(law: &dyn LayerLaw, point: usize, sum: f64, rho: f64, mu: f64) -> LawState {
-    if mu == 0.0 || !sum.is_finite() {
+    if mu == 0.0 || !sum.is_finite() || law.is_bonded() {
         return on_law(law, point, sum, rho);
     }
     let value = |gap: f64| {

@@ -13,8 +13,9 @@ pub use plane::in_plane;
 pub use space::in_space;
 
 use super::side::Side;
-use crate::fem::{length, minus};
+use crate::fem::{area_vector, element, length, minus};
 use crate::linalg::{around, dot};
+use crate::problem::order::Order;
 use facet::{Facet, Rays, plus};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -50,6 +51,31 @@ impl<const D: usize> Intersection<D> {
     /// Return the facets of both sides that face each other, but are too far apart.
     pub fn far(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.refused.iter().enumerate().flat_map(|(i, refused)| refused.far.iter().map(move |&j| (i, j)))
+    }
+}
+
+impl<const D: usize> Intersection<D> {
+    /// Return the integration points of all facets of a side that is before a rigid obstacle. The obstacle has the facets of the side itself, at no
+    /// distance, so that its forces are the opposite ones.
+    pub fn of_one(a: &Side<D>) -> Self {
+        let degree = match (D, a.facets.order) {
+            (2, Order::P1) => 5,
+            (2, Order::P2) => 7,
+            (_, Order::P1) => 2,
+            (_, Order::P2) => 5,
+        };
+        let rule = element::rule(D, degree);
+        let mut points = Vec::new();
+        for facet in 0..a.facets.count() {
+            let x = a.facets.coordinates(facet, a.space);
+            for (l, weight) in rule.iter() {
+                let at: [f64; D] = std::array::from_fn(|k| l[k]);
+                let ring = a.space.circle(&a.facets.point(facet, a.space, l));
+                let weight = weight * length(area_vector(a.facets.order, &x, l)) * ring;
+                points.push(IntegrationPoint { facet_a: facet, at_a: at, facet_b: facet, at_b: at, weight, gap: 0.0 });
+            }
+        }
+        Self { points, refused: vec![Refused::default(); a.facets.count()] }
     }
 }
 
