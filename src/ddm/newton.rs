@@ -61,7 +61,7 @@ pub(super) fn iterate(
             Err(failure) => return Ok(newton.end_without_step(Status::InnerSolver(failure))),
         };
         let part = newton.step_length(&step);
-        if (part.is_lost || newton.is_unresisted(&step)) && newton.descend()? {
+        if (part.is_lost || part.is_measured && newton.is_unresisted(&step)) && newton.descend()? {
             continue;
         }
         let iterate = newton.advance(step, part);
@@ -192,13 +192,20 @@ impl Newton<'_, '_> {
                 (self.u, self.run.model.gap) = (start, gap);
                 return Ok(false);
             };
-            if length == 0.0 || (length - 1.0).abs() <= WHOLE {
+            if length == 0.0 || (length - 1.0).abs() <= WHOLE || self.is_asked() {
                 break;
             }
         }
         self.states = Layer::at(self.run.model, &self.u.trace);
         self.progress.forget_pressure();
         Ok(true)
+    }
+
+    /// Return whether something outside asks the run to end, on any rank. Collective.
+    fn is_asked(&self) -> bool {
+        let mut sums = asks(self.run.observer.asked());
+        self.run.model.exchange.sum(&mut sums);
+        exchange::asked(&sums) != 0
     }
 
     /// Go back to the start and let F1 fall from there, once. A first step over a law that saturates may lead so far that roundoff hides any distance from

@@ -63,6 +63,8 @@ pub(super) struct StepLength {
     pub fall: f64,
     /// Whether no part of the step comes nearer to the laws, so that the least one is taken.
     pub is_lost: bool,
+    /// Whether parts of the step were compared. The first step of a run, and the first after a descent, is taken whole.
+    pub is_measured: bool,
 }
 
 impl Progress {
@@ -116,7 +118,7 @@ impl Progress {
     pub fn step_length(&mut self, model: &Model, states: &Layer, step: &WholeStep) -> StepLength {
         let &WholeStep { from, roundoff, compression: c, pressure: p } = step;
         if self.pressure.is_empty() {
-            return StepLength { length: 1.0, fall: 1.0, is_lost: false };
+            return StepLength { length: 1.0, fall: 1.0, is_lost: false, is_measured: false };
         }
         let change = |from: &[f64], to: &[f64]| to.iter().zip(from).map(|(to, from)| to - from).collect::<Vec<f64>>();
         self.observe(model, &change(from, c), &change(&self.pressure, p), roundoff);
@@ -130,7 +132,8 @@ impl Progress {
         let found = tried.find(|&(t, there)| there <= (1.0 - FALLS * t) * here);
         let (length, there) = found.unwrap_or_else(|| (SHORTEST, off(SHORTEST)));
         self.path.note(length, !states.smoothing.is_empty());
-        StepLength { length, fall: if here == 0.0 { 1.0 } else { there / here }, is_lost: found.is_none() }
+        let fall = if here == 0.0 { 1.0 } else { there / here };
+        StepLength { length, fall, is_lost: found.is_none(), is_measured: true }
     }
 
     /// Forget the pressures of the iterate, so that the next step is taken whole.
