@@ -33,9 +33,9 @@ pub struct FinePoint {
     pub at_rim: bool,
     /// Whether the contact points of this facet are at mid-edges.
     pub at_edges: bool,
-    /// Whether the pressure on this facet is a polynomial of second degree. It is on quadratic elements in the plane where facets are
-    /// fully covered; on a part of a facet three values do not show more than a mean.
-    pub is_quadratic: bool,
+    /// Degree of the pressure on this facet as a polynomial. It is that of the elements in the plane where facets are
+    /// fully covered; on a part of a facet, and in space, its values do not show more than a mean, which counts as one.
+    pub degree: usize,
     /// Contact point nearest to the point, for laws that differ from point to point.
     pub nearest: usize,
 }
@@ -119,7 +119,7 @@ impl<const D: usize> Fine<D> {
             size: size_under(a, point),
             at_rim: at_rim[point.facet_a],
             at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
-            is_quadratic: D == 2 && a.facets.order == Order::P2 && pair.cover[point.facet_a].is_whole(),
+            degree: if D == 2 && pair.cover[point.facet_a].is_whole() { a.facets.order.degree() } else { 1 },
             nearest: 0,
         };
         let mut points = FinePoints {
@@ -152,7 +152,7 @@ impl FinePoints {
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
             let nodes = a.on_facet(chunk[0].facet_a);
             let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets);
-            let row = |values: [f64; element::MOST]| {
+            let row = |values: element::Values| {
                 let of_point = |(node, value): (&u32, f64)| point_of[*node as usize].map(|q| (q, value));
                 let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);
                 let mut row: Vec<(usize, f64)> = entries.collect();
@@ -161,8 +161,8 @@ impl FinePoints {
             };
             for (point, fine) in chunk.iter().zip(&mut each) {
                 let phi = element::values(self.order, &point.at_a);
-                let mu = |i| if i < nodes.len() { basis.value(i, &phi, &point.at_a) } else { 0.0 };
-                self.pressing.push_row(row(std::array::from_fn(mu)));
+                let mu = (0..nodes.len()).map(|i| basis.value(i, &phi, &point.at_a));
+                self.pressing.push_row(row(mu.collect()));
                 let interpolation = row(basis.carriers().interpolation(self.order, &point.at_a));
                 let nearest = interpolation.iter().max_by(|p, q| p.1.total_cmp(&q.1));
                 fine.nearest = nearest.map_or(0, |entry| entry.0);

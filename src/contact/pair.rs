@@ -156,8 +156,8 @@ fn integrate<const D: usize>(
                 let sum = points.entry(node).or_default();
                 sum.weight += mu;
                 sum.gap += mu * point.gap;
-                nodes.iter().zip(phi).for_each(|(&n, phi)| *sum.sides[0].entry(n).or_default() += mu * phi);
-                others.iter().zip(psi).for_each(|(&n, psi)| *sum.sides[1].entry(n).or_default() += mu * psi);
+                nodes.iter().zip(&phi).for_each(|(&n, phi)| *sum.sides[0].entry(n).or_default() += mu * phi);
+                others.iter().zip(&psi).for_each(|(&n, psi)| *sum.sides[1].entry(n).or_default() += mu * psi);
             }
         }
     }
@@ -400,7 +400,7 @@ impl Coverage {
     fn of<const D: usize>(a: &Side<D>, common: &Intersection<D>, carriers: &[Option<Carriers>]) -> Vec<Self> {
         let mut covered = vec![0.0; a.facets.count()];
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
-        let rule = element::rule(D, if a.facets.order == Order::P2 { 5 } else { 2 });
+        let rule = element::rule(D, if a.facets.order == Order::P1 { 2 } else { 2 * a.facets.order.degree() + 1 });
         let of_facet = |i: usize| {
             let found = Self { share: covered[i] / facet_measure(a, i, &rule), lost: 0, carriers: carriers[i] };
             Self { lost: if found.is_whole() { 0 } else { common.refused[i].lost }, ..found }

@@ -47,7 +47,7 @@ impl Chords {
 /// of them does. The smaller turn counts.
 fn rises<const D: usize>(side: &Side<D>, facet: usize) -> Vec<f64> {
     let x = side.facets.coordinates(facet, side.space);
-    let is_straight = element::is_straight(&x, D);
+    let is_straight = element::is_straight(side.facets.order, &x, D);
     let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
     let rise = |(i, j): (usize, usize)| {
         let along = minus(x[j], x[i]);

@@ -275,7 +275,7 @@ pub fn along<const D: usize>(side: &Side<D>, nodes: impl Iterator<Item = u32>) -
     };
     for i in 0..side.facets.count() {
         let on = side.on_facet(i);
-        let chain = if on.len() == 3 { vec![on[0], on[2], on[1]] } else { on.to_vec() };
+        let chain: Vec<u32> = [&on[..1], &on[2..], &on[1..2]].concat();
         chain.windows(2).for_each(|ends| link(ends[0], ends[1]));
     }
     // the curve goes on round an edge, where a node occurs once for each face

@@ -169,7 +169,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// Return a warning if the largest Poisson's ratio is so large that linear elements are too stiff, except in plane stress. There the
     /// volume can hardly change.
     pub fn locking(&self, plane: Plane) -> Option<String> {
-        if self.spec.order == Order::P2 || (D == 2 && plane == Plane::Stress) {
+        if self.spec.order > Order::P1 || (D == 2 && plane == Plane::Stress) {
             return None;
         }
         let places = || self.mesh.space.nodes.iter().map(|&x| self.mesh.space.in_scene(x));
@@ -258,7 +258,7 @@ pub fn parts<'a, const D: usize>(
         let checked = &checked[index];
         refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
-        let (points, extent) = (checked.points.clone(), PointExtent::of(space.nodes.iter().copied()));
+        let (points, extent) = (space.points_of_nodes(), PointExtent::of(space.nodes.iter().copied()));
         let held = Constraints::new(spec, &space, mesh)?;
         let springs =
             spec.spring.iter().map(|spring| spring_blocks(spring, spec, &space, mesh)).collect::<Result<_>>()?;

@@ -152,7 +152,7 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn degree(&self, body: usize) -> usize {
-        self.shapes[body].mesh.space.order as usize + 1
+        self.shapes[body].mesh.space.order.degree()
     }
 }
 

@@ -6,13 +6,13 @@ use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::fem::displacement::{self, Strained};
-use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, Split, assemble, pad};
+use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, Split, assemble, lagrange, pad};
 use crate::output::{BodyField, CellKind, LargestStress};
 use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
 pub trait Post {
-    /// Return displacements and stresses of the cells that this rank writes. A node where the material jumps is several points, one for each
+    /// Return displacements and stresses of the cells that this rank writes, at nodes, and above order two at equally spaced points in their place. A node where the material jumps is several points, one for each
     /// material. `bent` is the state without the rigid motion that
     /// supports leave. Stresses come from `bent`, since a large rigid motion leaves few digits to the deformation.
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField;
@@ -117,11 +117,12 @@ impl<const D: usize> OnPart<D> {
 impl<const D: usize> Post for OnPart<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
         let (u, split) = (self.nodal(v), &self.split);
-        let (owned, shown) = split.space.part(self.owned());
+        let (mut owned, shown) = split.space.part(self.owned());
         let nodal = self.nodal(bent);
         let bent = split.values(&nodal);
         let stress = displacement::nodal_stresses(&split.space, &self.elasticity, &bent);
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
+        let stress = lagrange::at_equally_spaced(&owned, stress.into()).into_owned();
         let von_mises: Vec<f64> = stress.iter().map(displacement::von_mises).collect();
         let largest = (0..shown.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j]));
         let change =
@@ -130,12 +131,17 @@ impl<const D: usize> Post for OnPart<D> {
             let first = D * split.origin(node) as usize;
             pad(std::array::from_fn::<f64, D, _>(|c| u[first + c]))
         };
+        let displacement = lagrange::at_equally_spaced(&owned, shown.iter().map(displacement).collect()).into_owned();
+        let points = lagrange::at_equally_spaced(&owned, owned.nodes.clone().into());
+        // files have the edge 20 in this direction
+        let inside = (D + 1) + 2 * (owned.order.degree() - 1)..(D + 1) + 3 * (owned.order.degree() - 1);
+        owned.cells.chunks_exact_mut(owned.stride).filter(|_| D == 2).for_each(|cell| cell[inside.clone()].reverse());
         BodyField {
             name: self.name.clone(),
-            points: owned.nodes.iter().map(|&x| owned.in_scene(x)).collect(),
+            points: points.iter().map(|&x| owned.in_scene(x)).collect(),
             cell: CellKind::simplex(D, self.mesh.space.order.degree()),
             connectivity: owned.cells,
-            displacement: shown.iter().map(displacement).collect(),
+            displacement,
             von_mises,
             largest: largest.map(|point| LargestStress { point, change: change(point) }),
             principal: stress.iter().map(displacement::principal).collect(),

@@ -1,10 +1,11 @@
 //! A contact surface of a pair: its mesh for output, which holds the facets of side a and the contact points from which their values come.
 
 use crate::contact::{ContactPair, Side};
-use crate::fem::element;
+use crate::fem::{element, lagrange};
 use crate::output::{CellKind, FieldArray, UnstructuredGrid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 
 /// The facets of the side that carries the contact points.
@@ -25,29 +26,32 @@ impl ContactSurface {
     pub fn new<const D: usize>(a: &Side<D>, pair: &ContactPair) -> Self {
         let point_of = pair.point_of(a.nodes.len());
         let order = a.facets.order;
-        let places = element::nodes::<D>(order);
+        let places: Vec<[f64; D]> = match order {
+            Order::P1 | Order::P2 => element::nodes(order),
+            _ => lagrange::equally_spaced(order, D).iter().map(|l| std::array::from_fn(|k| l[k])).collect(),
+        };
         let mut surface = Self {
             points: Vec::new(),
-            cell: match (D, order) {
-                (2, Order::P1) => CellKind::Line,
-                (2, Order::P2) => CellKind::QuadraticLine,
-                (_, Order::P1) => CellKind::Triangle,
-                (_, Order::P2) => CellKind::QuadraticTriangle,
-            },
+            cell: CellKind::simplex(D - 1, order.degree()),
             connectivity: Vec::new(),
             sources: Vec::new(),
             cover: Vec::new(),
         };
+        // the same points as in the fields of the body
+        let points = lagrange::at_equally_spaced(a.space, Cow::Borrowed(&a.space.nodes));
         let mut number: HashMap<u32, u32> = HashMap::new();
+        let mut at_node = Vec::new();
         let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();
         for (facet, cover) in pair.cover.iter().enumerate() {
             let nodes = a.on_facet(facet);
             surface.cover.push(cover.share);
-            for (place, node) in places.iter().zip(nodes) {
+            for (k, (place, node)) in places.iter().zip(nodes).enumerate() {
                 let at = *number.entry(*node).or_insert(surface.points.len() as u32);
                 surface.connectivity.push(at);
                 if at as usize == surface.points.len() {
-                    surface.points.push(a.space.in_scene(a.space.nodes[a.nodes[*node as usize].node as usize]));
+                    surface.points.push(a.space.in_scene(points[a.nodes[*node as usize].node as usize]));
+                    // the points of higher orders are not at the nodes
+                    at_node.push(k < D || order <= Order::P2);
                     sums.push((0.0, BTreeMap::new()));
                 }
                 let Some(carriers) = cover.carriers else { continue };
@@ -65,7 +69,7 @@ impl ContactSurface {
             .map(|(facets, sum)| sum.into_iter().map(|(q, share)| (q, share / facets)).collect())
             .collect();
         for (node, &at) in &number {
-            if let Some(q) = point_of[*node as usize] {
+            if let Some(q) = point_of[*node as usize].filter(|_| at_node[at as usize]) {
                 surface.sources[at as usize] = vec![(q, 1.0)];
             }
         }

@@ -148,7 +148,7 @@ impl RimError {
             if !chunk[0].at_rim {
                 continue;
             }
-            let missed = missed(points.order, chunk[0].is_quadratic);
+            let missed = missed(points.order, chunk[0].degree);
             for (g, q) in on_facet.clone().zip(highest_part(points, on_facet, pressure)) {
                 let point = &points.each[g];
                 let stiffness = points.interpolation.row(g).map(|(q, _)| tangent[q]).fold(0.0, f64::max);
@@ -168,29 +168,39 @@ impl RimError {
 ///
 /// Stresses of elements of degree 2 have the degree 1. Let lambda be 0.774, the rim of a punch with right angles on a block of the same material.
 /// By its coefficients in Legendre polynomials, r^(lambda - 1) less the nearest line is 1.69 times its part of degree 2, which pressures of degree 2
-/// show, and 0.97 times its part of degree 1, which linear pressures show. For linear elements the ratio would be 1.39 by the same rule. Their
+/// show, and 0.97 times its part of degree 1, which linear pressures show. For elements of degree k the ratio is the root of 1 + k/1.08 by the same rule, from k = 2
+/// to 8 within one per cent. For linear elements the ratio would be 1.39 by the same rule. Their
 /// nodal pressures are means over two facets, which flattens the rise: on such a punch with 3, 6 and 12 elements a unit of length under a layer of 1e6
 /// the measured ratio is 2.8, 2.5 and 2.2.
-fn missed(order: Order, is_quadratic: bool) -> f64 {
-    match order {
-        Order::P1 => 2.8,
-        Order::P2 if is_quadratic => 1.69,
-        Order::P2 => 0.97,
+fn missed(order: Order, degree: usize) -> f64 {
+    match (order, degree) {
+        (Order::P1, _) => 2.8,
+        (_, 1) => 0.97,
+        (_, degree) => (1.0 + degree as f64 / 1.08).sqrt(),
     }
 }
 
 /// Return the part of the highest degree of the pressure at each integration point of a facet. `pressure` has the pressures of the contact
 /// points.
 fn highest_part(points: &FinePoints, on_facet: Range<usize>, pressure: &[f64]) -> Vec<f64> {
-    let each = &points.each;
+    let each = &points.each[on_facet.clone()];
+    let mean = |p: &[f64], q: &[f64]| each.iter().zip(p.iter().zip(q)).map(|(g, (p, q))| g.weight * p * q).sum::<f64>();
+    // what is left of functions at the points without their parts in polynomials of lower degrees, which are orthogonal
+    let rest = |lower: &[Vec<f64>], mut values: Vec<f64>| {
+        for known in lower {
+            let part = mean(known, &values) / mean(known, known);
+            values.iter_mut().zip(known).for_each(|(value, known)| *value -= part * known);
+        }
+        values
+    };
+    let mut lower: Vec<Vec<f64>> = Vec::new();
+    for degree in 0..each[0].degree.min(each.len()) {
+        let power = each.iter().map(|g| (2.0 * g.along - 1.0).powi(degree as i32)).collect();
+        let next = rest(&lower, power);
+        lower.push(next);
+    }
     let value = |g: usize| points.interpolation.row(g).map(|(q, share)| share * pressure[q]).sum::<f64>();
-    let area: f64 = each[on_facet.clone()].iter().map(|point| point.weight).sum();
-    let mean = |of: &dyn Fn(usize) -> f64| on_facet.clone().map(|g| each[g].weight * of(g)).sum::<f64>() / area;
-    let (middle, level) = (mean(&|g| each[g].along), mean(&value));
-    let spread = mean(&|g| (each[g].along - middle).powi(2));
-    let is_quadratic = each[on_facet.start].is_quadratic && spread > 0.0;
-    let slope = if is_quadratic { mean(&|g| (each[g].along - middle) * value(g)) / spread } else { 0.0 };
-    on_facet.map(|g| value(g) - level - slope * (each[g].along - middle)).collect()
+    rest(&lower, on_facet.map(value).collect())
 }
 
 /// The error of the layer of a pair between its contact points.

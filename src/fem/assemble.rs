@@ -7,7 +7,7 @@ use super::elasticity::{Elasticity, Flaw, Material};
 use super::element::{self, Rule};
 use super::frame::{Frame, place};
 use super::space::{CellPoint, Space};
-use super::{length, pad};
+use super::{lagrange, length, pad};
 use crate::exchange::Plain;
 use crate::linalg::{Csr, Total, dot};
 use crate::problem::order::Order;
@@ -231,17 +231,17 @@ pub struct Rules {
 impl Rules {
     /// Make the rules for elements of this order.
     pub fn new<const D: usize>(order: Order) -> Self {
-        let of_degree = |degree: usize| element::rule(D + 1, degree);
-        let (affine, varying) = if order == Order::P1 { (1, 2) } else { (2, 5) };
-        Self { affine: of_degree(affine), curved: of_degree(5), varying: of_degree(varying) }
+        let of_degree = |degree: usize| element::rule(D + 1, degree).with_shapes(order);
+        let degree = order.degree();
+        let varying = if order == Order::P1 { 2 } else { 2 * degree + 1 };
+        Self { affine: of_degree(2 * degree - 2), curved: of_degree(2 * degree + 1), varying: of_degree(varying) }
     }
 
     /// Return the rule for a cell.
     fn of<const D: usize>(&self, space: &Space<D>, elasticity: &Elasticity, cell: usize) -> &Rule {
-        let is_straight = || element::is_straight(&space.cell_nodes(cell), D + 1);
         match elasticity.is_constant_in(cell) && !space.axisymmetric {
             false => &self.varying,
-            true if space.order == Order::P1 || is_straight() => &self.affine,
+            true if space.is_straight(cell) => &self.affine,
             true => &self.curved,
         }
     }
@@ -290,14 +290,43 @@ pub fn stiffness<const D: usize>(
             continue;
         }
         blocks.fill([[0.0; D]; D]);
-        visit(space, elasticity, &rules, index, |point, material| {
-            let hoop = |phi: &f64| space.hoop(&point.at, *phi);
-            let hoops: Vec<f64> = point.phi[..stride].iter().filter(|_| space.axisymmetric).map(hoop).collect();
-            material.accumulate(&point.gradient[..stride], &hoops, point.weight, &mut blocks);
-        })?;
+        let is_affine = space.order > Order::P2 && !space.axisymmetric && elasticity.is_constant_in(index);
+        match is_affine && space.is_straight(index) {
+            true => affine(space, elasticity, index, &mut blocks)?,
+            false => visit(space, elasticity, &rules, index, |point, material| {
+                let hoop = |phi: &f64| space.hoop(&point.at, *phi);
+                let hoops: Vec<f64> = point.phi.iter().filter(|_| space.axisymmetric).map(hoop).collect();
+                material.accumulate(&point.gradient, &hoops, point.weight, &mut blocks);
+            })?,
+        }
         scatter(graph, &nodes, &blocks, &mut matrix);
     }
     Ok(matrix)
+}
+
+/// Compute the blocks of a straight triangle with one elasticity from the products of the derivatives on the reference triangle: with the gradients g_c of the
+/// barycentric coordinates, phi_a has the gradient sum_c phi_a,c g_c.
+fn affine<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    cell: usize,
+    blocks: &mut [[[f64; D]; D]],
+) -> Result<(), Defect> {
+    let corners = &space.cell_nodes(cell)[..=D];
+    let centre = [1.0 / (D + 1) as f64; 4];
+    let (gradient, measure) =
+        element::gradients(corners, &element::derivatives(Order::P1, &centre[..=D])).ok_or(Defect::Inverted(cell))?;
+    let at = space.in_scene(element::interpolate(corners, &centre));
+    let material = elasticity.at(cell, at).map_err(|flaw| Defect::Elasticity(elasticity.region(cell), at, flaw))?;
+    let pairs = material.blocks_of(&gradient[1..], measure);
+    for (block, products) in blocks.iter_mut().zip(lagrange::of(space.order, D + 1).products()) {
+        for (pair, product) in pairs.iter().zip(products.as_flattened()) {
+            for (sum, term) in block.as_flattened_mut().iter_mut().zip(pair.as_flattened()) {
+                *sum += product * term;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Add the symmetric stiffness matrix of a cell to a matrix.
@@ -406,7 +435,7 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
 /// Return the quadrature rule of body forces.
 pub fn load_rule<const D: usize>(space: &Space<D>) -> Rule {
     let low = space.order == Order::P1 && !space.axisymmetric;
-    element::rule(D + 1, if low { 2 } else { 5 })
+    element::rule(D + 1, if low { 2 } else { (2 * space.order.degree() + 1).max(5) }).with_shapes(space.order)
 }
 
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.

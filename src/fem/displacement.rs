@@ -1,8 +1,8 @@
 //! What follows from the displacement of a body: stresses, strains, and its error against a known one.
 
 use super::elasticity::Elasticity;
-use super::element;
-use super::space::{Slope, Space};
+use super::element::{self, Rule};
+use super::space::{CellPoint, Slope, Space};
 use crate::linalg::dot;
 use crate::problem::order::Order;
 use nalgebra::Matrix3;
@@ -17,10 +17,12 @@ use serde::{Deserialize, Serialize};
 pub fn nodal_stresses<const D: usize>(space: &Space<D>, elasticity: &Elasticity, u: &[f64]) -> Vec<[f64; 6]> {
     let mut sum = vec![[0.0; 6]; space.nodes.len()];
     let mut volume = vec![0.0; space.nodes.len()];
+    let nodes = Rule::at_nodes(space.order, D + 1);
     for index in 0..space.cell_count() {
-        for (place, &node) in space.cell(index).iter().enumerate() {
-            let l = &element::place(D + 1, place)[..=D];
-            let Some((measure, stress)) = stress_in_cell(space, elasticity, u, index, l) else { continue };
+        for (point, &node) in space.points(index, &nodes).zip(space.cell(index)) {
+            let Some((measure, stress)) = point.and_then(|at| stress_at(space, elasticity, u, index, &at)) else {
+                continue;
+            };
             volume[node as usize] += measure;
             for (sum, stress) in sum[node as usize].iter_mut().zip(stress) {
                 *sum += measure * stress;
@@ -41,11 +43,20 @@ fn stress_in_cell<const D: usize>(
     index: usize,
     l: &[f64],
 ) -> Option<(f64, [f64; 6])> {
-    let x = space.cell_nodes(index);
-    let point = space.point(index, &x, l, 1.0)?;
+    stress_at(space, elasticity, u, index, &space.point(index, &space.cell_nodes(index), l, 1.0)?)
+}
+
+/// Return the stress at a point of a cell, after the measure of the cell per share there; none where it has no value.
+fn stress_at<const D: usize>(
+    space: &Space<D>,
+    elasticity: &Elasticity,
+    u: &[f64],
+    index: usize,
+    point: &CellPoint<D>,
+) -> Option<(f64, [f64; 6])> {
     let inside = || {
         let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });
-        element::interpolate(&x, &element::values(space.order, &rule.points[0]))
+        element::interpolate(&space.cell_nodes(index), &element::values(space.order, &rule.points[0]))
     };
     let material =
         elasticity.at(index, space.in_scene(point.at)).or_else(|_| elasticity.at(index, space.in_scene(inside())));
@@ -188,7 +199,8 @@ pub struct Exact<const D: usize> {
     pub gradient: [[f64; D]; D],
 }
 
-/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five.
+/// Return the norms of u_h - u and of u, in this order, over some cells of a space, by a rule exact to degree five, or that of products of
+/// two displacements and one more.
 ///
 /// The argument `u` is the finite element displacement u_h, one entry a dof, and `exact` is the known displacement u. Points without
 /// elasticity, which assembly refuses, count without energy. The norms are NaN where `exact` is not finite.
@@ -199,7 +211,7 @@ pub fn norms_of_error<const D: usize>(
     u: &[f64],
     exact: &dyn Fn([f64; D]) -> Exact<D>,
 ) -> [Norms; 2] {
-    let rule = element::rule(D + 1, 5);
+    let rule = element::rule(D + 1, (2 * space.order.degree() + 1).max(5)).with_shapes(space.order);
     let mut squares = [Norms::default(); 2];
     for index in cells {
         for point in space.points(index, &rule).flatten() {

@@ -427,6 +427,20 @@ impl Material {
         }
     }
 
+    /// Return the blocks of [`Material::accumulate`] for all ordered pairs of gradients.
+    pub fn blocks_of<const D: usize>(&self, gradient: &[[f64; D]], weight: f64) -> Vec<[[f64; D]; D]> {
+        let n = gradient.len();
+        let mut local = vec![[[0.0; D]; D]; n * n];
+        self.accumulate(gradient, &[], weight, &mut local);
+        for a in 0..n {
+            for b in 0..a {
+                let upper = local[b * n + a];
+                local[a * n + b] = std::array::from_fn(|i| std::array::from_fn(|j| upper[j][i]));
+            }
+        }
+        local
+    }
+
     /// Do the same as [`Material::accumulate`] for any tensor C.
     fn blocks<const D: usize>(&self, gradient: &[[f64; D]], hoop: &[f64], weight: f64, local: &mut [[[f64; D]; D]]) {
         let n = gradient.len();

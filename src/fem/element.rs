@@ -1,4 +1,4 @@
-//! Lagrange simplices of order one and two, and quadrature on them, in barycentric coordinates.
+//! Lagrange simplices, of order one and two in space and of any order in the plane, and quadrature on them, in barycentric coordinates.
 //!
 //! ```text
 //! line       triangle          tetrahedron (VTK)
@@ -7,53 +7,54 @@
 //!              0 3 1
 //! ```
 //! In barycentric coordinates l the shape functions of lines, triangles and tetrahedra are the same: phi_i = l_i for order one,
-//! and l_i (2 l_i - 1) at vertices and 4 l_i l_j on edges for order two.
+//! and l_i (2 l_i - 1) at vertices and 4 l_i l_j on edges for order two. Those of higher orders are in [`lagrange`].
 
+use super::lagrange;
+pub use super::lagrange::gauss;
 use crate::problem::order::Order;
+use smallvec::SmallVec;
 
 /// Edges of the simplex with four vertices in the order of the mid-edge nodes. A triangle uses 01 12 02 and a line 01.
 pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
 
-/// Largest number of nodes of an element (P2 tetrahedron).
-pub const MOST: usize = 10;
+/// Values of the shape functions of an element, one entry a node. Those of the elements in space fit without an allocation.
+pub type Values = SmallVec<[f64; 10]>;
+
+/// Derivatives of the shape functions of an element by its barycentric coordinates, one entry a node.
+pub type Slopes = SmallVec<[[f64; 4]; 10]>;
 
 /// Return the number of nodes of the simplex with `vertices` vertices.
 pub fn node_count(vertices: usize, order: Order) -> usize {
-    match order {
-        Order::P1 => vertices,
-        Order::P2 => vertices * (vertices + 1) / 2,
+    let degree = order.degree();
+    match vertices {
+        1 => 1,
+        2 => degree + 1,
+        3 => (degree + 1) * (degree + 2) / 2,
+        _ => (degree + 1) * (degree + 2) * (degree + 3) / 6,
     }
 }
 
-/// Return the values of the shape functions at barycentric point `l`; the first `node_count` entries are set.
-pub fn values(order: Order, l: &[f64]) -> [f64; MOST] {
+/// Return the values of the shape functions at barycentric point `l`.
+pub fn values(order: Order, l: &[f64]) -> Values {
     let vertices = l.len();
-    let mut phi = [0.0; MOST];
     match order {
-        Order::P1 => phi[..vertices].copy_from_slice(l),
+        Order::P1 => l.into(),
         Order::P2 => {
-            for i in 0..vertices {
-                phi[i] = l[i] * (2.0 * l[i] - 1.0);
-            }
-            for (k, &(i, j)) in EDGES[..vertices * (vertices - 1) / 2].iter().enumerate() {
-                phi[vertices + k] = 4.0 * l[i] * l[j];
-            }
+            let mut phi: Values = l.iter().map(|l| l * (2.0 * l - 1.0)).collect();
+            phi.extend(EDGES[..vertices * (vertices - 1) / 2].iter().map(|&(i, j)| 4.0 * l[i] * l[j]));
+            phi
         }
+        _ => lagrange::of(order, vertices).values(l),
     }
-    phi
 }
 
-/// Return the derivatives of the shape functions by the barycentric coordinates (as independent variables) at `l`. Entry
-/// `[node][coordinate]` is zero beyond the coordinates of `l`.
-pub fn derivatives(order: Order, l: &[f64]) -> [[f64; 4]; MOST] {
+/// Return the derivatives of the shape functions by the barycentric coordinates at `l`. Only their differences have a meaning, since the coordinates sum to one.
+/// Entry `[node][coordinate]` is zero beyond the coordinates of `l`.
+pub fn derivatives(order: Order, l: &[f64]) -> Slopes {
     let vertices = l.len();
-    let mut d = [[0.0; 4]; MOST];
+    let mut d: Slopes = SmallVec::from_elem([0.0; 4], node_count(vertices, order));
     match order {
-        Order::P1 => {
-            for i in 0..vertices {
-                d[i][i] = 1.0;
-            }
-        }
+        Order::P1 => (0..vertices).for_each(|i| d[i][i] = 1.0),
         Order::P2 => {
             for i in 0..vertices {
                 d[i][i] = 4.0 * l[i] - 1.0;
@@ -63,13 +64,27 @@ pub fn derivatives(order: Order, l: &[f64]) -> [[f64; 4]; MOST] {
                 d[vertices + k][j] = 4.0 * l[i];
             }
         }
+        _ => return lagrange::of(order, vertices).slopes(l),
     }
     d
 }
 
 /// Return the barycentric coordinates of a node of an element with so many vertices.
-pub fn place(vertices: usize, node: usize) -> [f64; 4] {
-    middle(node.checked_sub(vertices).map_or((node, node), |edge| EDGES[edge]))
+pub fn place(order: Order, vertices: usize, node: usize) -> [f64; 4] {
+    match order {
+        Order::P1 | Order::P2 => middle(node.checked_sub(vertices).map_or((node, node), |edge| EDGES[edge])),
+        _ => {
+            let [a, b, c] = lagrange::of(order, vertices).nodes[node];
+            [a, b, c, 0.0]
+        }
+    }
+}
+
+/// Return the local numbers of the nodes of an element inside the edge between two of its `vertices` vertices, from the first to the second.
+pub fn inside_edge(order: Order, vertices: usize, [i, j]: [usize; 2]) -> impl Iterator<Item = usize> {
+    let (count, is_forward) = (order.degree() - 1, i < j);
+    let edge = EDGES.iter().position(|&edge| edge == (i.min(j), i.max(j))).unwrap_or(0);
+    (0..count).map(move |k| vertices + edge * count + if is_forward { k } else { count - 1 - k })
 }
 
 /// Return the barycentric coordinates of the middle between two vertices.
@@ -79,15 +94,27 @@ fn middle((i, j): (usize, usize)) -> [f64; 4] {
 
 /// Return the barycentric coordinates of the nodes of an element with `N` vertices.
 pub fn nodes<const N: usize>(order: Order) -> Vec<[f64; N]> {
-    (0..node_count(N, order)).map(|node| std::array::from_fn(|k| place(N, node)[k])).collect()
+    (0..node_count(N, order)).map(|node| std::array::from_fn(|k| place(order, N, node)[k])).collect()
 }
 
-/// Return the gradients in space of the shape functions of a cell at barycentric point `l`, and the measure there. The measure is
+/// The gradients in space of the shape functions of a cell, one entry a node.
+pub type Gradients<const D: usize> = SmallVec<[[f64; D]; 10]>;
+
+/// Return the gradients in space of the shape functions of a cell at a point, and the measure there. The measure is
 /// the area or volume of the affine simplex with the same Jacobian. The result is `None` if the map is singular or inverted there.
 ///
-/// `l` has D + 1 entries, and `x` are the coordinates of the element's nodes (isoparametric).
-pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Option<([[f64; D]; MOST], f64)> {
-    let d = derivatives(order, l);
+/// `d` are the [`derivatives`] there, and `x` are the coordinates of the element's nodes (isoparametric).
+pub fn gradients<const D: usize>(x: &[[f64; D]], d: &Slopes) -> Option<(Gradients<D>, f64)> {
+    let (inverse, det) = invert(&jacobian(x, d))?;
+    let gradient = |slope: &[f64; 4]| -> [f64; D] {
+        std::array::from_fn(|i| (0..D).map(|c| inverse[c][i] * (slope[c + 1] - slope[0])).sum())
+    };
+    let measure = det / if D == 2 { 2.0 } else { 6.0 };
+    (measure > 0.0).then(|| (d.iter().map(gradient).collect(), measure))
+}
+
+/// Return the Jacobian of the map to an element with nodes `x` where the shape functions have the derivatives `d`.
+fn jacobian<const D: usize>(x: &[[f64; D]], d: &Slopes) -> [[f64; D]; D] {
     // Column c of the Jacobian is the derivative along l_{c+1} - l_0.
     let mut jacobian = [[0.0; D]; D];
     for (node, x) in x.iter().enumerate() {
@@ -98,15 +125,7 @@ pub fn gradients<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> Opt
             }
         }
     }
-    let (inverse, det) = invert(&jacobian)?;
-    let mut gradient = [[0.0; D]; MOST];
-    for node in 0..x.len() {
-        for i in 0..D {
-            gradient[node][i] = (0..D).map(|c| inverse[c][i] * (d[node][c + 1] - d[node][0])).sum();
-        }
-    }
-    let measure = det / if D == 2 { 2.0 } else { 6.0 };
-    (measure > 0.0).then_some((gradient, measure))
+    jacobian
 }
 
 /// Return the inverse and the determinant of a matrix; `None` if it is singular or the determinant overflows.
@@ -139,12 +158,13 @@ pub fn invert<const D: usize>(a: &[[f64; D]; D]) -> Option<([[f64; D]; D], f64)>
     Some((inverse, det))
 }
 
-/// Return whether the mid-edge nodes of a simplex with `vertices` vertices lie in the middle of straight edges, up to rounding of
-/// the coordinates `x`.
-pub fn is_straight<const D: usize>(x: &[[f64; D]], vertices: usize) -> bool {
-    EDGES[..x.len() - vertices].iter().enumerate().all(|(k, &(i, j))| {
-        let length: f64 = (0..D).map(|c| (x[i][c] - x[j][c]).abs()).sum();
-        (0..D).all(|c| (2.0 * x[vertices + k][c] - x[i][c] - x[j][c]).abs() <= 1e-9 * length)
+/// Return whether the nodes of a simplex with `vertices` vertices lie where straight edges would have them, up to rounding of the coordinates `x`.
+pub fn is_straight<const D: usize>(order: Order, x: &[[f64; D]], vertices: usize) -> bool {
+    (vertices..x.len()).all(|node| {
+        let l = place(order, vertices, node);
+        let sum = |of: &dyn Fn(usize) -> f64| (0..vertices).map(|k| l[k] * of(k)).sum::<f64>();
+        let length: f64 = (0..D).map(|c| sum(&|k| (x[k][c] - x[node][c]).abs())).sum();
+        (0..D).all(|c| sum(&|k| x[k][c] - x[node][c]).abs() <= 1e-9 * length)
     })
 }
 
@@ -160,9 +180,31 @@ pub struct Rule {
     pub points: Vec<Vec<f64>>,
     /// Weight of each point.
     pub weights: Vec<f64>,
+    /// Values and derivatives of the shape functions at each point, once they were tabulated.
+    shapes: Vec<(Values, Slopes)>,
 }
 
 impl Rule {
+    /// Return the nodes of an element with so many vertices as points of weight one.
+    pub fn at_nodes(order: Order, vertices: usize) -> Self {
+        let mut nodes = Self::default();
+        (0..node_count(vertices, order)).for_each(|k| nodes.add(&place(order, vertices, k)[..vertices], 1.0));
+        nodes.with_shapes(order)
+    }
+
+    /// Return the rule with a table of the shape functions of this order, which saves the evaluation of orders above two in each cell.
+    pub fn with_shapes(mut self, order: Order) -> Self {
+        let shape = |l: &Vec<f64>| (values(order, l), derivatives(order, l));
+        self.shapes = self.points.iter().filter(|_| order > Order::P2).map(shape).collect();
+        self
+    }
+
+    /// Return the values and derivatives of the shape functions of an order at a point, which are those of the table, if there is one.
+    pub fn shape(&self, point: usize, order: Order) -> (Values, Slopes) {
+        let compute = || (values(order, &self.points[point]), derivatives(order, &self.points[point]));
+        self.shapes.get(point).cloned().unwrap_or_else(compute)
+    }
+
     fn add(&mut self, point: &[f64], weight: f64) {
         self.points.push(point.to_vec());
         self.weights.push(weight);
@@ -200,30 +242,8 @@ impl Rule {
     }
 }
 
-/// Return Gauss-Legendre points and weights on \[0, 1\], exact to degree `2 count - 1`, for a `count` from 1 to 5.
-pub fn gauss(count: usize) -> Vec<(f64, f64)> {
-    let half: &[(f64, f64)] = match count {
-        1 => &[(0.0, 2.0)],
-        2 => &[(0.577_350_269_189_625_8, 1.0)],
-        3 => &[(0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)],
-        4 => &[(0.339_981_043_584_856_3, 0.652_145_154_862_546_1), (0.861_136_311_594_052_6, 0.347_854_845_137_453_85)],
-        _ => &[
-            (0.0, 128.0 / 225.0),
-            (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
-            (0.906_179_845_938_664, 0.236_926_885_056_189_08),
-        ],
-    };
-    let mut rule: Vec<_> = half
-        .iter()
-        .flat_map(|&(x, w)| if x == 0.0 { vec![(x, w)] } else { vec![(-x, w), (x, w)] })
-        .map(|(x, w)| ((1.0 + x) / 2.0, w / 2.0))
-        .collect();
-    rule.sort_by(|a, b| a.0.total_cmp(&b.0));
-    rule
-}
-
-/// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 9 on lines and 5 on
-/// triangles and tetrahedra. The callers need no more, since elements have an order of at most two.
+/// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 5 on tetrahedra, whose elements
+/// have an order of at most two.
 ///
 /// # Panics
 /// If the number of vertices is not from 1 to 4.
@@ -254,6 +274,7 @@ fn triangle(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
     match degree {
         0 | 1 => add(&[1.0 / 3.0; 3], 1.0),
         2 => orbit(1.0 / 6.0, 1.0 / 3.0),
+        6.. => collapsed(degree, add),
         _ => {
             // These are Radon's seven points of degree 5.
             let root = 15f64.sqrt();
@@ -261,6 +282,16 @@ fn triangle(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
             orbit((6.0 + root) / 21.0, (155.0 + root) / 1200.0);
             add(&[1.0 / 3.0; 3], 9.0 / 40.0);
         }
+    }
+}
+
+/// Add Gauss points on the square that collapses into the triangle at vertex 2.
+fn collapsed(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
+    let across = gauss(degree / 2 + 1);
+    // the area shrinks towards the vertex, which is one more degree
+    for (height, weight) in gauss(degree.div_ceil(2) + 1) {
+        let rest = 1.0 - height;
+        across.iter().for_each(|(x, w)| add(&[rest * (1.0 - x), rest * x, height], 2.0 * rest * weight * w));
     }
 }
 
@@ -323,7 +354,7 @@ mod tests {
             .collect();
         let field = |x: &[f64; 3]| x[0] * x[1] - 2.0 * x[2] * x[2] + x[0];
         let l = [0.2, 0.3, 0.1, 0.4];
-        let (gradient, measure) = gradients(Order::P2, &x, &l).expect("positive volume");
+        let (gradient, measure) = gradients(&x, &derivatives(Order::P2, &l)).expect("positive volume");
         let at: [f64; 3] = std::array::from_fn(|i| (0..4).map(|v| l[v] * corner[v][i]).sum());
         let exact = [at[1] + 1.0, at[0], -4.0 * at[2]];
         for i in 0..3 {
@@ -334,23 +365,23 @@ mod tests {
         swapped.swap(0, 1);
         swapped.swap(5, 6);
         swapped.swap(7, 8);
-        assert!(gradients(Order::P2, &swapped, &l).is_none(), "inverted: {measure}");
+        assert!(gradients(&swapped, &derivatives(Order::P2, &l)).is_none(), "inverted: {measure}");
         let flat = x.iter().map(|x| [x[0], x[1], 0.0]).collect::<Vec<_>>();
-        assert!(gradients(Order::P2, &flat, &l).is_none(), "flat");
+        assert!(gradients(&flat, &derivatives(Order::P2, &l)).is_none(), "flat");
         let far = x.iter().map(|x| x.map(|x| 1e150 * x)).collect::<Vec<_>>();
-        assert!(gradients(Order::P2, &far, &l).is_none(), "beyond the range of numbers");
+        assert!(gradients(&far, &derivatives(Order::P2, &l)).is_none(), "beyond the range of numbers");
     }
 
     #[test]
     fn a_cell_is_straight_if_each_edge_is() {
         let straight = [[0.0, 0.0], [2.0, 0.0], [0.0, 4.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]];
-        assert!(is_straight(&straight, 3) && is_straight(&straight[..3], 3));
+        assert!(is_straight(Order::P2, &straight, 3) && is_straight(Order::P1, &straight[..3], 3));
         for (node, c) in [(3, 1), (4, 0), (5, 1)] {
             let mut bent = straight;
             bent[node][c] += 1e-6;
-            assert!(!is_straight(&bent, 3), "{node}");
+            assert!(!is_straight(Order::P2, &bent, 3), "{node}");
             bent[node][c] = straight[node][c] + 1e-10;
-            assert!(is_straight(&bent, 3), "{node}");
+            assert!(is_straight(Order::P2, &bent, 3), "{node}");
         }
     }
 

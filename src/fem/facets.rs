@@ -1,7 +1,7 @@
 //! Boundary facets of a body: their search in its cells, their orientation and their normals.
 
 use super::space::Space;
-use super::{cross, element, length, minus, pad, unit};
+use super::{EDGES, cross, element, length, minus, pad, unit};
 use crate::mesh::Group;
 use crate::mesh::faces::{Face, Faces, Simplices};
 use crate::problem::order::Order;
@@ -75,8 +75,16 @@ impl<const D: usize> Space<D> {
 
     /// Return the facets that are given as a cell and the local vertex opposite to the facet, oriented out of the cell.
     pub fn facets_of(&self, places: impl Iterator<Item = (usize, usize)>) -> Facets<D> {
-        let nodes = |(cell, opposite)| Face::at(cell, opposite).nodes(self.simplices());
-        Facets::new(self.order, places.flat_map(nodes).collect())
+        let mut nodes = Vec::new();
+        for (index, opposite) in places {
+            let (cell, corners) = (self.cell(index), Face::<D>::at(index, opposite).corners());
+            nodes.extend(corners.map(|corner| cell[corner]));
+            for &(i, j) in &EDGES[..D * (D - 1) / 2] {
+                let ends = [corners[i], corners[j]];
+                nodes.extend(element::inside_edge(self.order, D + 1, ends).map(|local| cell[local]));
+            }
+        }
+        Facets::new(self.order, nodes)
     }
 }
 
@@ -120,14 +128,14 @@ impl<const D: usize> Facets<D> {
     pub fn normals(&self, space: &Space<D>) -> Vec<[f64; D]> {
         let normals = |i: usize| {
             let x = self.coordinates(i, space);
-            (0..D).map(move |at| unit(area_vector(self.order, &x, &element::place(D, at)[..D])))
+            (0..D).map(move |at| unit(area_vector(self.order, &x, &element::place(Order::P1, D, at)[..D])))
         };
         (0..self.count()).flat_map(normals).collect()
     }
 
     /// Return the largest angle by which errors of coordinates turn the normal of a facet: those of two nodes, along and against
     /// the normal, over the least height of the facet. At a corner of a quadratic facet, the weights of the nodes in a tangent are
-    /// 3, 4 and 1 instead of 1 and 1.
+    /// 3, 4 and 1 instead of 1 and 1, and their sum grows with the square of the order.
     pub fn tilt(&self, space: &Space<D>, error: f64) -> f64 {
         let height = |i: usize| {
             let x = &self.coordinates(i, space)[..D];
@@ -136,7 +144,8 @@ impl<const D: usize> Facets<D> {
             if D == 2 { longest } else { 2.0 * length(area_vector(Order::P1, x, &[1.0 / D as f64; D])) / longest }
         };
         let least = (0..self.count()).map(height).fold(f64::INFINITY, f64::min);
-        let weights = if self.order == Order::P1 { 2.0 } else { 8.0 };
+        let corner: [f64; D] = std::array::from_fn(|k| f64::from(u8::from(k == 0)));
+        let weights: f64 = element::derivatives(self.order, &corner).iter().map(|d| (d[1] - d[0]).abs()).sum();
         weights * (D as f64).sqrt() * error / least
     }
 
@@ -169,6 +178,14 @@ impl<const D: usize> Facets<D> {
     /// Return the point of facet `i` with barycentric coordinates `l`.
     pub fn point(&self, i: usize, space: &Space<D>, l: &[f64]) -> [f64; D] {
         element::interpolate(&self.coordinates(i, space), &element::values(self.order, l))
+    }
+
+    /// Return the coordinates of the nodes of the linear or quadratic element that has the shape of facet `i`.
+    pub fn shape(&self, i: usize, space: &Space<D>) -> Vec<[f64; D]> {
+        match self.order {
+            Order::P1 | Order::P2 => self.coordinates(i, space),
+            _ => element::nodes::<D>(Order::P2).iter().map(|l| self.point(i, space, l)).collect(),
+        }
     }
 
     /// Return the coordinates of the nodes of facet `i`.

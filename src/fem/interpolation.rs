@@ -1,6 +1,6 @@
-//! Interpolation from linear to quadratic displacements. The linear ones are the coarse space of multigrid for quadratic elements.
+//! Interpolation from linear displacements to those of higher orders. The linear ones are the coarse space of multigrid for elements of higher orders.
 
-use super::element::EDGES;
+use super::element;
 use super::frame::Frame;
 use super::space::Space;
 use crate::linalg::Csr;
@@ -30,7 +30,7 @@ impl Prolongation {
 pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u32> {
     match space.order {
         Order::P1 => (0..space.nodes.len() as u32).collect(),
-        Order::P2 => {
+        _ => {
             let corners = space.cells.chunks_exact(space.stride).flat_map(|cell| &cell[..=D]);
             Space::<D>::among(corners.copied().chain(frame.leaders()))
         }
@@ -39,7 +39,7 @@ pub fn coarse_nodes<const D: usize>(space: &Space<D>, frame: &Frame<D>) -> Vec<u
 
 /// Return the interpolation from the dofs at the nodes `coarse` ([`coarse_nodes`]) to all dofs of a body.
 ///
-/// A node in the middle of an edge moves as the mean of the ends. Rows and columns of prescribed dofs are empty, except for a one
+/// A node between vertices moves as their mean, weighted by its barycentric coordinates. Rows and columns of prescribed dofs are empty, except for a one
 /// where the dof is in both spaces, so that P'KP keeps its diagonal. The rows of nodes without cells on this rank are empty.
 pub fn from_vertices<const D: usize>(
     space: &Space<D>,
@@ -49,53 +49,53 @@ pub fn from_vertices<const D: usize>(
 ) -> Prolongation {
     let own = D * coarse.len();
     let mut rows = Csr::new(own);
-    for (node, ends) in edge_ends(space).into_iter().enumerate() {
+    for (node, vertices) in vertices_around(space).into_iter().enumerate() {
         let place = coarse.binary_search(&(node as u32));
         for c in 0..D {
-            rows.push_row(match (place, ends) {
-                (Ok(place), _) => vec![(D * place + c, 1.0)],
-                (Err(_), Some(ends)) if !is_prescribed(D * node + c) => {
-                    // v_c = axis_c . (u_a + u_b)/2, where u_a and u_b are the displacements of the ends.
-                    mean_of_ends(frame, ends, frame.direction(node as u32, c), &is_prescribed, coarse)
+            rows.push_row(match place {
+                Ok(place) => vec![(D * place + c, 1.0)],
+                Err(_) if !is_prescribed(D * node + c) => {
+                    // v_c = axis_c . sum l_k u_k, where u_k are the displacements of the vertices
+                    mean_of_vertices(frame, &vertices, frame.direction(node as u32, c), &is_prescribed, coarse)
                 }
-                _ => Vec::new(),
+                Err(_) => Vec::new(),
             });
         }
     }
     Prolongation { rows, own }
 }
 
-/// Return the vertices at the ends of the edge of each node in the middle of an edge; `None` for other nodes.
-fn edge_ends<const D: usize>(space: &Space<D>) -> Vec<Option<[u32; 2]>> {
-    let mut ends = vec![None; space.nodes.len()];
-    if space.order == Order::P2 {
-        for cell in space.cells.chunks_exact(space.stride) {
-            for (&middle, (a, b)) in cell[D + 1..].iter().zip(EDGES) {
-                ends[middle as usize] = Some([cell[a], cell[b]]);
-            }
+/// Return the vertices between which each node lies that is none itself, with its barycentric coordinates.
+fn vertices_around<const D: usize>(space: &Space<D>) -> Vec<Vec<(u32, f64)>> {
+    let mut around = vec![Vec::new(); space.nodes.len()];
+    let places: Vec<[f64; 4]> = (D + 1..space.stride).map(|k| element::place(space.order, D + 1, k)).collect();
+    for cell in space.cells.chunks_exact(space.stride) {
+        for (&node, place) in cell[D + 1..].iter().zip(&places) {
+            around[node as usize] = cell.iter().copied().zip(*place).filter(|(_, l)| *l != 0.0).collect();
         }
     }
-    ends
+    around
 }
 
-/// Return the row of the mean displacement of two vertices along an axis, without prescribed dofs. The columns are the dofs at the
+/// Return the row of the weighted mean displacement of vertices along an axis, without prescribed dofs. The columns are the dofs at the
 /// nodes `coarse`.
-fn mean_of_ends<const D: usize>(
+fn mean_of_vertices<const D: usize>(
     frame: &Frame<D>,
-    ends: [u32; 2],
+    vertices: &[(u32, f64)],
     axis: [f64; D],
     is_prescribed: &impl Fn(usize) -> bool,
     coarse: &[u32],
 ) -> Vec<(usize, f64)> {
     let mut row: Vec<(usize, f64)> = Vec::new();
-    for (end, shares) in ends.into_iter().flat_map(|end| frame.force(end, axis)) {
+    let parts = vertices.iter().flat_map(|&(vertex, l)| frame.force(vertex, axis.map(|axis| l * axis)));
+    for (end, shares) in parts {
         let Ok(place) = coarse.binary_search(&end) else {
             unreachable!("a vertex is coarse, and so are the nodes that move it")
         };
         for (k, share) in shares.into_iter().enumerate().filter(|(k, _)| !is_prescribed(D * end as usize + k)) {
             match row.iter_mut().find(|entry| entry.0 == D * place + k) {
-                Some(entry) => entry.1 += 0.5 * share,
-                None => row.push((D * place + k, 0.5 * share)),
+                Some(entry) => entry.1 += share,
+                None => row.push((D * place + k, share)),
             }
         }
     }

@@ -15,7 +15,7 @@ mod patch;
 mod strip;
 
 use super::elasticity::Elasticity;
-use super::element::{self, EDGES};
+use super::element;
 use super::space::{CellPoint, Slope, Space};
 use crate::linalg::{axpy, dot};
 use crate::problem::order::Order;
@@ -53,7 +53,7 @@ pub struct Errors {
 impl<'a, const D: usize> Recovery<'a, D> {
     /// Recover the polynomials of the displacement `u`, one entry per dof. The nodes of the space are cut apart where the material jumps.
     pub fn new(space: &'a Space<D>, elasticity: &'a Elasticity, u: impl Into<Cow<'a, [f64]>>) -> Self {
-        let degree = if space.order == Order::P1 { 2 } else { 3 };
+        let degree = space.order.degree() + 1;
         let monomials = (0..=degree).rev().map(|degree| Monomials::new(D, degree)).collect();
         let (patches, blended) = (Vec::new(), Vec::new());
         let mut recovery = Self { space, elasticity, displacement: u.into(), patches, blended, monomials };
@@ -97,20 +97,22 @@ impl<'a, const D: usize> Recovery<'a, D> {
         self.monomials.iter().find_map(|monomials| fit(nodes, monomials))
     }
 
-    /// Return the values of the blend at all nodes, one entry per dof. At a vertex it is the value of the polynomial, at the
-    /// middle of an edge the mean of those of both ends.
+    /// Return the values of the blend at all nodes, one entry per dof. At a vertex it is the value of the polynomial, elsewhere
+    /// the mean of those of the vertices of the cell, weighted by the barycentric coordinates.
     fn blend_nodes(&self) -> Vec<f64> {
         let space = self.space;
         let mut blended = vec![0.0; space.dofs()];
         let mut is_known = vec![false; space.nodes.len()];
+        let places: Vec<[f64; 4]> = (0..space.stride).map(|k| element::place(space.order, D + 1, k)).collect();
         for cell in space.cells.chunks_exact(space.stride) {
             for (k, &node) in cell.iter().enumerate() {
                 if std::mem::replace(&mut is_known[node as usize], true) {
                     continue;
                 }
-                let (i, j) = k.checked_sub(D + 1).map_or((k, k), |edge| EDGES[edge]);
-                let ends = [i, j].map(|k| self.jet(cell[k], &space.nodes[node as usize]).0);
-                (0..D).for_each(|c| blended[D * node as usize + c] = 0.5 * (ends[0][c] + ends[1][c]));
+                for (&vertex, l) in cell.iter().zip(places[k]).filter(|(_, l)| *l != 0.0) {
+                    let value = self.jet(vertex, &space.nodes[node as usize]).0;
+                    (0..D).for_each(|c| blended[D * node as usize + c] += l * value[c]);
+                }
             }
         }
         blended
@@ -146,7 +148,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
     pub fn errors(&self, work_on_missed: f64) -> Errors {
         let (of_interpolant, mut load) = self.interpolation_error();
         let mut cells = self.energy_errors();
-        if self.space.order == Order::P2 {
+        if self.space.order > Order::P1 {
             cells.iter_mut().zip(&of_interpolant).for_each(|(error, nearer)| *error = error.min(*nearer));
         }
         let softening = self.softening(&cells);
@@ -161,8 +163,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
 
     /// Return the squared energy norm of the recovered minus the discrete stress on each cell.
     fn energy_errors(&self) -> Vec<f64> {
-        let rule = element::rule(D + 1, 5);
-        if self.space.order == Order::P1 && !self.space.axisymmetric {
+        let order = self.space.order;
+        let rule = element::rule(D + 1, (2 * order.degree() + 1).max(5)).with_shapes(order);
+        if order == Order::P1 && !self.space.axisymmetric {
             return (0..self.space.cell_count()).map(|index| self.energy_error_of_linear(index, &rule)).collect();
         }
         let of_cell = |index: usize| {
@@ -249,7 +252,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
     fn interpolation_error(&self) -> (Vec<f64>, Vec<f64>) {
         let space = self.space;
         // The gradient of b has one degree more than the elements, and that of v has one less.
-        let rule = element::rule(D + 1, if space.order == Order::P1 { 2 } else { 5 });
+        let degree = if space.order == Order::P1 { 2 } else { 2 * space.order.degree() + 1 };
+        let rule = element::rule(D + 1, degree).with_shapes(space.order);
         let mut residual = vec![0.0; space.dofs()];
         let of_cell = |index: usize| {
             let mut energy = 0.0;
@@ -292,7 +296,8 @@ impl<'a, const D: usize> Recovery<'a, D> {
     /// singular part, whose error reaches all nodes.
     fn softening(&self, errors: &[f64]) -> Vec<f64> {
         // Strains are of one degree less than the elements.
-        let rule = element::rule(D + 1, if self.space.order == Order::P1 { 1 } else { 2 });
+        let order = self.space.order;
+        let rule = element::rule(D + 1, 2 * order.degree() - 2).with_shapes(order);
         let mut load = vec![0.0; self.space.dofs()];
         for (index, error) in errors.iter().enumerate() {
             let (mut energy, mut stresses) = (0.0, Vec::with_capacity(rule.points.len()));
@@ -317,14 +322,12 @@ fn add_stress<const D: usize>(point: &CellPoint<D>, weight: f64, stress: &[f64; 
     }
 }
 
-/// Return the gradients of the barycentric coordinates at a point, also in curved cells. The coordinate l_k is one at vertex k, and a
-/// half in the middle of each edge at this vertex.
+/// Return the gradients of the barycentric coordinates at a point, also in curved cells, from the values of the coordinates at the nodes.
 fn hats<const D: usize>(point: &CellPoint<D>) -> [[f64; D]; 4] {
     let mut hats = [[0.0; D]; 4];
-    hats[..=D].copy_from_slice(&point.gradient[..=D]);
-    for (middle, &(i, j)) in point.gradient[D + 1..point.cell.len()].iter().zip(&EDGES) {
-        for k in [i, j] {
-            (0..D).for_each(|c| hats[k][c] += 0.5 * middle[c]);
+    for (node, gradient) in point.gradient.iter().enumerate() {
+        for (hat, l) in hats.iter_mut().zip(element::place(point.order(), D + 1, node)).filter(|(_, l)| *l != 0.0) {
+            (0..D).for_each(|c| hat[c] += l * gradient[c]);
         }
     }
     hats
@@ -364,7 +367,7 @@ mod tests {
             let cell = space.cell(index);
             let bubble = recovery.missed(cell, &l);
             for c in 0..D {
-                let interpolated: f64 = cell.iter().zip(phi).map(|(&n, phi)| phi * u[D * n as usize + c]).sum();
+                let interpolated: f64 = cell.iter().zip(&phi).map(|(&n, phi)| phi * u[D * n as usize + c]).sum();
                 let error = field::<D>(degree, &at)[c] - interpolated;
                 largest = largest.max(error.abs());
                 assert!((bubble[c] - error).abs() < 1e-10, "{D} {order:?} cell {index}: {} {error}", bubble[c]);
@@ -405,7 +408,7 @@ mod tests {
                 let phi = element::values(order, l);
                 let (exact, seen) = (wave(&element::interpolate(&x, &phi)), recovery.missed(cell, l));
                 for c in 0..3 {
-                    let interpolated: f64 = cell.iter().zip(phi).map(|(&n, phi)| phi * u[3 * n as usize + c]).sum();
+                    let interpolated: f64 = cell.iter().zip(&phi).map(|(&n, phi)| phi * u[3 * n as usize + c]).sum();
                     product += weight * seen[c] * (exact[c] - interpolated);
                     square += weight * (exact[c] - interpolated).powi(2);
                 }

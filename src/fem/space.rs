@@ -1,7 +1,7 @@
 //! The finite element space of one body: its nodes and cells, numbered within the body, and displacements at points of cells.
 
-use super::element::{self, Rule};
-use super::{cross, minus, pad};
+use super::element::{self, EDGES, Gradients, Rule, Slopes, Values};
+use super::{cross, lagrange, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
 use crate::mesh::{Group, Mesh, Numbering, datum};
@@ -29,9 +29,13 @@ pub struct Space<const D: usize> {
     pub cells: Vec<u32>,
     /// Whether this is the meridian of a body of revolution, where x is the radius and y runs along the axis.
     pub axisymmetric: bool,
-    /// Body node of each mesh point; unknown in a part of a body.
+    /// Body node of each mesh point that is one; unknown in a part of a body.
     #[serde(skip)]
     from_mesh: Numbering,
+    /// First of the nodes inside each edge for the point of the mesh in its middle, if there are several. They lie in the direction from the end with the
+    /// lower number in the mesh to the other one.
+    #[serde(skip)]
+    edges: Numbering,
     /// Area (volume) of all cells, once it has been requested.
     #[serde(skip)]
     measure: OnceCell<f64>,
@@ -41,7 +45,12 @@ impl<const D: usize> Space<D> {
     /// Make the space of `order` on the cells of `group` (of dimension `D`). The order of the mesh is at least `order`.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
-        let corners = group.connectivity.chunks_exact(group.stride).flat_map(|cell| &cell[..stride]).copied();
+        let shape = element::node_count(D + 1, order.of_shape());
+        let points = || group.connectivity.chunks_exact(group.stride).map(|cell| &cell[..shape]);
+        let numbering = |is_node: bool| {
+            let chosen = move |k: &usize| is_node == (order == Order::P2 || *k <= D);
+            Numbering::new(points().flat_map(move |cell| (0..shape).filter(chosen).map(|k| cell[k])))
+        };
         let mut space = Space {
             order,
             nodes: Vec::new(),
@@ -50,17 +59,46 @@ impl<const D: usize> Space<D> {
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
-            from_mesh: Numbering::new(corners.clone()),
+            from_mesh: numbering(true),
+            edges: numbering(false),
             measure: OnceCell::new(),
         };
-        for point in corners {
-            let (node, is_new) = space.from_mesh.number(point, space.nodes.len() as u32);
-            if is_new {
-                space.nodes.push(mesh.points[point as usize]);
-            }
-            space.cells.push(node);
-        }
+        let places = if order > Order::P2 { lagrange::of(order, D + 1).nodes.clone() } else { Vec::new() };
+        points().for_each(|cell| space.add_cell(mesh, cell, &places));
         space
+    }
+
+    /// Add the nodes of a cell of the mesh. `places` are the barycentric coordinates of the nodes of orders above two, which lie where the quadratic cell
+    /// of the mesh has them.
+    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], places: &[[f64; 3]]) {
+        let at = |point: &u32| mesh.points[*point as usize];
+        let whole = places.is_empty();
+        for point in &cell[..if whole { cell.len() } else { D + 1 }] {
+            let (node, is_new) = self.from_mesh.number(*point, self.nodes.len() as u32);
+            if is_new {
+                self.nodes.push(at(point));
+            }
+            self.cells.push(node);
+        }
+        if whole {
+            return;
+        }
+        let x: Vec<[f64; D]> = cell.iter().map(at).collect();
+        let place = |local: usize| element::interpolate(&x, &element::values(Order::P2, &places[local]));
+        let count = self.order.degree() as u32 - 1;
+        for (&middle, &(i, j)) in cell[D + 1..].iter().zip(&EDGES) {
+            let is_forward = cell[i] < cell[j];
+            let (first, is_new) = self.edges.number(middle, self.nodes.len() as u32);
+            if is_new {
+                let ends = if is_forward { [i, j] } else { [j, i] };
+                self.nodes.extend(element::inside_edge(self.order, D + 1, ends).map(place));
+            }
+            self.cells.extend((0..count).map(|k| first + if is_forward { k } else { count - 1 - k }));
+        }
+        for local in (D + 1) + (cell.len() - D - 1) * count as usize..self.stride {
+            self.cells.push(self.nodes.len() as u32);
+            self.nodes.push(place(local));
+        }
     }
 
     /// Return the space of some cells, in this order, and its nodes as numbered here, sorted. They are renumbered in the same order.
@@ -92,7 +130,8 @@ impl<const D: usize> Space<D> {
 
     /// Return the space with other nodes and cells, which has no link to points of the mesh.
     pub fn with(&self, nodes: Vec<[f64; D]>, cells: Vec<u32>) -> Self {
-        Space { nodes, cells, from_mesh: Numbering::default(), measure: OnceCell::new(), ..*self }
+        let (from_mesh, edges) = (Numbering::default(), Numbering::default());
+        Space { nodes, cells, from_mesh, edges, measure: OnceCell::new(), ..*self }
     }
 
     /// Turn the space into the meridian of a body of revolution.
@@ -157,10 +196,22 @@ impl<const D: usize> Space<D> {
         *self.measure.get_or_init(|| (0..self.cell_count()).map(|i| self.cell_measure(i)).sum())
     }
 
-    /// Return the points of the mesh that are nodes of the body, in the order of the mesh.
+    /// Return the points of the mesh on the cells of the body.
     pub fn mesh_points(&self) -> impl Iterator<Item = u32> {
-        self.from_mesh.points()
+        self.from_mesh.points().chain(self.edges.points())
     }
+
+    /// Return the point of the mesh that each node is, or [`Space::NO_POINT`].
+    pub fn points_of_nodes(&self) -> Vec<u32> {
+        let mut points = vec![Self::NO_POINT; self.nodes.len()];
+        for point in self.from_mesh.points() {
+            self.from_mesh.get(point).into_iter().for_each(|node| points[node as usize] = point);
+        }
+        points
+    }
+
+    /// What stands for the point of the mesh of a node that is none: one within an edge or a cell of order three or more.
+    pub const NO_POINT: u32 = u32::MAX;
 
     /// Return the contribution of a cell to the measure of the body, from its corners. In a body of revolution it is the volume of a
     /// ring.
@@ -180,8 +231,20 @@ impl<const D: usize> Space<D> {
     /// over the body is that of a quadrature point with this `weight`. The result is `None` if the map of the cell is singular or
     /// inverted there.
     pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<CellPoint<'a, D>> {
-        let (gradient, measure) = element::gradients(self.order, x, l)?;
-        let phi = element::values(self.order, l);
+        let shape = (element::values(self.order, l), element::derivatives(self.order, l));
+        self.point_of(i, x, l, weight, shape)
+    }
+
+    /// Return the point of a cell as [`Space::point`] does, with the values and derivatives of the shape functions there.
+    fn point_of<'a>(
+        &'a self,
+        i: usize,
+        x: &[[f64; D]],
+        l: &'a [f64],
+        weight: f64,
+        (phi, derivatives): (Values, Slopes),
+    ) -> Option<CellPoint<'a, D>> {
+        let (gradient, measure) = element::gradients(x, &derivatives)?;
         let at = element::interpolate(x, &phi);
         let weight = weight * measure * self.circle(&at);
         Some(CellPoint { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })
@@ -190,7 +253,8 @@ impl<const D: usize> Space<D> {
     /// Return the points of a quadrature rule in cell `i`; `None` for those where the map of the cell is singular or inverted.
     pub fn points<'a>(&'a self, i: usize, rule: &'a Rule) -> impl Iterator<Item = Option<CellPoint<'a, D>>> {
         let x = self.cell_nodes(i);
-        rule.iter().map(move |(l, weight)| self.point(i, &x, l, weight))
+        let shape = |k: usize| rule.shape(k, self.order);
+        rule.iter().enumerate().map(move |(k, (l, weight))| self.point_of(i, &x, l, weight, shape(k)))
     }
 
     /// Return the mean of the corners of cell `i`.
@@ -216,31 +280,49 @@ impl<const D: usize> Space<D> {
         cells.filter(|(_, cell)| wanted.contains(&sorted(cell))).map(|(index, _)| index).collect()
     }
 
+    /// Return whether the edges of cell `i` are straight.
+    pub fn is_straight(&self, i: usize) -> bool {
+        self.order == Order::P1 || element::is_straight(self.order, &self.cell_nodes(i), D + 1)
+    }
+
     /// Return the coordinates of the nodes of cell `i`.
     pub fn cell_nodes(&self, i: usize) -> Vec<[f64; D]> {
         self.cell(i).iter().map(|&node| self.nodes[node as usize]).collect()
     }
 
-    /// Return the body's nodes of one simplex of a mesh group (vertices, then mid-edges for a quadratic space), or `None` if it is
-    /// not part of this body.
+    /// Return the body's nodes of one simplex of a mesh group, or `None` if it is not part of this body: vertices, then those on edges, which are
+    /// not sorted above order two. Nodes inside the simplex are left out.
     pub(super) fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
         let vertices = dimension + 1;
-        let wanted = element::node_count(vertices, self.order);
+        let wanted = element::node_count(vertices, self.order.of_shape());
+        let [own, edges] = if self.order > Order::P2 { [vertices, wanted] } else { [wanted, wanted] };
         let mut nodes = Vec::with_capacity(wanted);
-        for &point in &points[..wanted] {
+        for &point in &points[..own] {
             nodes.push(self.from_mesh.get(point)?);
+        }
+        for &middle in &points[own..edges] {
+            let first = self.edges.get(middle)?;
+            nodes.extend(first..first + self.order.degree() as u32 - 1);
         }
         Some(nodes)
     }
 
     /// Return all body nodes on a mesh group of any dimension, sorted. The result is empty if the group does not touch the body.
     pub fn nodes_on(&self, group: &Group) -> Vec<u32> {
-        let mut nodes: Vec<u32> = group
-            .connectivity
-            .chunks_exact(group.stride)
-            .filter_map(|points| self.simplex(points, group.dimension))
-            .flatten()
-            .collect();
+        let mut nodes: Vec<u32> = match group.dimension {
+            dimension if dimension == D => self.corners(&self.cells_in(group)),
+            dimension => group
+                .connectivity
+                .chunks_exact(group.stride)
+                .filter_map(|points| self.simplex(points, dimension))
+                .flatten()
+                .collect(),
+        };
+        if group.dimension == 0 {
+            // a set of nodes holds the edges whose middles it has
+            let firsts = group.connectivity.iter().filter_map(|&point| self.edges.get(point));
+            nodes.extend(firsts.flat_map(|first| first..first + self.order.degree() as u32 - 1));
+        }
         nodes.sort_unstable();
         nodes.dedup();
         nodes
@@ -257,9 +339,9 @@ pub struct CellPoint<'a, const D: usize> {
     /// The place of the point.
     pub at: [f64; D],
     /// Values of the shape functions.
-    pub phi: [f64; element::MOST],
+    pub phi: Values,
     /// Gradients of the shape functions.
-    pub gradient: [[f64; D]; element::MOST],
+    pub gradient: Gradients<D>,
     /// Area (volume) of the affine simplex that has the Jacobian of the cell here.
     pub measure: f64,
     /// Weight of the point in an integral over the body.
@@ -267,6 +349,11 @@ pub struct CellPoint<'a, const D: usize> {
 }
 
 impl<const D: usize> CellPoint<'_, D> {
+    /// Return the order of the shape functions.
+    pub fn order(&self) -> Order {
+        self.space.order
+    }
+
     /// Return the gradient here of a displacement `u`, one entry a dof.
     pub fn slope(&self, u: &[f64]) -> Slope<D> {
         let mut h = [[0.0; D]; D];
@@ -289,7 +376,7 @@ impl<const D: usize> CellPoint<'_, D> {
 
     /// Return a displacement `u`, one entry a dof, here.
     pub fn value(&self, u: &[f64]) -> [f64; D] {
-        let at = |c| self.cell.iter().zip(self.phi).map(|(&node, phi)| phi * u[D * node as usize + c]).sum();
+        let at = |c| self.cell.iter().zip(&self.phi).map(|(&node, phi)| phi * u[D * node as usize + c]).sum();
         std::array::from_fn(at)
     }
 

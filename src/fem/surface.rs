@@ -6,11 +6,10 @@ use super::facets::{Facets, area_vector};
 use super::frame::place;
 use super::length;
 use super::space::Space;
-use crate::problem::order::Order;
 
 /// Return the quadrature rule of loads and springs on the surface of a body.
 pub fn rule<const D: usize>(space: &Space<D>) -> Rule {
-    element::rule(D, if space.order == Order::P1 { 3 } else { 5 })
+    element::rule(D, 2 * space.order.degree() + 1)
 }
 
 /// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit normal n.
@@ -47,7 +46,7 @@ struct FacetPoint<'a, const D: usize> {
     /// Nodes of the facet.
     nodes: &'a [u32],
     /// Values of the shape functions.
-    phi: [f64; element::MOST],
+    phi: element::Values,
     /// Weight of the point in an integral over the surface.
     weight: f64,
     x: [f64; D],

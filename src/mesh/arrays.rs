@@ -18,9 +18,8 @@ const NAME: &str = "mesh arrays";
 pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
     let MeshArrays { points, order: own, groups } = arrays;
     if *own < order {
-        return Err(
-            refuse_arrays("the mesh is of order 1, the scene asks for order 2").help("give mid-edge points, too")
-        );
+        return Err(refuse_arrays("the mesh is of order 1, the scene asks for order 2 or more")
+            .help("give mid-edge points, too"));
     }
     let largest = points.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     if let Some(number) = points.iter().position(|x| x.iter().any(|x| !x.is_finite())) {

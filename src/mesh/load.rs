@@ -42,13 +42,14 @@ pub enum MeshOrigin {
 
 /// Load the mesh of a scene for displacements of an order, unless a signal ends it.
 ///
-/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of order 2 serves order 1
+/// Orders above two have the shape of a mesh of order 2. Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of order 2 serves order 1
 /// without its mid-edge points. Folded quadratic cells become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
 /// A file cannot be read, or the script does not take a number. Gmsh is missing or fails. The mesh is not one of named
 /// simplices in `D` dimensions (see [`parse`](super::parse)), or its order is too low. A signal arrives.
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
+    let order = order.of_shape();
     let mut loaded = match source {
         MeshSource::Geo { file, set, places, sizes, guard } => {
             if let (true, Some(place)) = (is_shape(&file.value), places.first()) {
@@ -94,12 +95,12 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     };
     loaded.mesh = match (loaded.mesh.order, order) {
         (Order::P2, Order::P1) => loaded.mesh.lower_order(),
-        (Order::P1, Order::P2) => {
+        (Order::P1, order) if order > Order::P1 => {
             let help = format!(
                 "set `order = 1`, or save it anew: gmsh {} -order 2 -{D} -format msh41 -o new.msh",
                 path.display()
             );
-            let error = Error::mesh(path, None, "the mesh is of order 1, the scene asks for order 2");
+            let error = Error::mesh(path, None, "the mesh is of order 1, the scene asks for order 2 or more");
             return Err(error.at(&file.place).help(help));
         }
         _ => loaded.mesh,

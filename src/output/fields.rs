@@ -9,10 +9,14 @@ pub enum CellKind {
     Line,
     /// Two ends, then the middle.
     QuadraticLine,
+    /// Two ends, then equally spaced points between them, of this order.
+    LagrangeLine(u8),
     /// Three vertices.
     Triangle,
     /// Three vertices, then mid-edges 01 12 02.
     QuadraticTriangle,
+    /// Three vertices, then equally spaced points inside the edges 01 12 20 and inside the triangle, of this order.
+    LagrangeTriangle(u8),
     /// Four vertices.
     Tetra,
     /// Four vertices, then mid-edges 01 12 02 03 13 23.
@@ -20,9 +24,13 @@ pub enum CellKind {
 }
 
 impl CellKind {
-    /// Return the kind of the simplices of a dimension (2 or 3) and order (1 or 2).
+    /// Return the kind of the simplices of a dimension (1 to 3) and order.
     pub fn simplex(dimension: usize, order: usize) -> Self {
         match (dimension, order) {
+            (1, 1) => CellKind::Line,
+            (1, 2) => CellKind::QuadraticLine,
+            (1, _) => CellKind::LagrangeLine(order as u8),
+            (2, 3..) => CellKind::LagrangeTriangle(order as u8),
             (2, 1) => CellKind::Triangle,
             (2, _) => CellKind::QuadraticTriangle,
             (_, 1) => CellKind::Tetra,
@@ -36,6 +44,8 @@ impl CellKind {
             CellKind::Line => 2,
             CellKind::QuadraticLine | CellKind::Triangle => 3,
             CellKind::QuadraticTriangle => 6,
+            CellKind::LagrangeLine(order) => usize::from(order) + 1,
+            CellKind::LagrangeTriangle(order) => (usize::from(order) + 1) * (usize::from(order) + 2) / 2,
             CellKind::Tetra => 4,
             CellKind::QuadraticTetra => 10,
         }
@@ -48,6 +58,8 @@ impl CellKind {
             CellKind::QuadraticLine => 21,
             CellKind::Triangle => 5,
             CellKind::QuadraticTriangle => 22,
+            CellKind::LagrangeLine(_) => 68,
+            CellKind::LagrangeTriangle(_) => 69,
             CellKind::Tetra => 10,
             CellKind::QuadraticTetra => 24,
         }
@@ -60,6 +72,8 @@ impl CellKind {
             CellKind::QuadraticLine => (1, 8),
             CellKind::Triangle => (2, 2),
             CellKind::QuadraticTriangle => (2, 9),
+            CellKind::LagrangeLine(order) => (1, [26, 27, 28, 62, 63, 64][usize::from(order) - 3]),
+            CellKind::LagrangeTriangle(order) => (2, [21, 23, 25, 42, 43, 45][usize::from(order) - 3]),
             CellKind::Tetra => (3, 4),
             CellKind::QuadraticTetra => (3, 11),
         }

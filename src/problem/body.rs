@@ -35,7 +35,7 @@ pub struct BodySpec {
     /// whether each connected part of the group is a body, NAME_1, NAME_2, ...
     #[serde(default)]
     pub split: bool,
-    /// linear or quadratic elements
+    /// order of the elements, in space 1 or 2
     #[serde(default)]
     pub order: Order,
     /// supports: fix = [{ on = "base", x = 0, y = 0 }]
@@ -99,7 +99,7 @@ impl BodySpec {
         Self { split: true, ..self }
     }
 
-    /// Set the order of the elements, which must not exceed that of the mesh.
+    /// Set the order of the elements. Orders above one take their shape from a mesh of order two.
     pub fn order(self, order: Order) -> Self {
         Self { order, ..self }
     }
@@ -164,6 +164,10 @@ impl Check for BodySpec {
     fn check(&self, geometry: Geometry) -> Result<(), Flaw> {
         check_name(&self.name)?;
         self.material().check("[[body]]")?;
+        if self.order > Order::P2 && !geometry.is_plane() {
+            let help = "bodies in space are of order 1 or 2, in the plane from 1 to 8";
+            return Err(Flaw::new("order", format!("order {} in space", self.order.degree()), "", help));
+        }
         if geometry.is_plane() && self.force.as_ref().is_some_and(|force| !force[2].is_zero()) {
             return Err(Flaw::new("force", "a body force in z in a plane problem", "", ""));
         }

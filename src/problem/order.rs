@@ -3,25 +3,39 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The polynomial order of the displacements. In a scene it is a number.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-#[schemars(with = "usize", extend("enum" = [1, 2]))]
+/// The polynomial order of the displacements, from 1 to 8; in space 1 or 2. In a scene it is a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[schemars(with = "usize", extend("enum" = [1, 2, 3, 4, 5, 6, 7, 8]))]
 #[serde(try_from = "usize", into = "usize")]
-pub enum Order {
-    /// Linear simplices.
-    #[default]
-    P1,
-    /// Quadratic simplices.
-    P2,
-}
+pub struct Order(u8);
 
 impl Order {
-    /// Return the polynomial degree: 1 or 2.
+    /// Linear simplices.
+    pub const P1: Self = Self(1);
+    /// Quadratic simplices.
+    pub const P2: Self = Self(2);
+    /// Degree of the highest order.
+    pub const HIGHEST: usize = 8;
+
+    /// Return the order of a polynomial degree, `None` unless it is from 1 to 8.
+    pub fn new(degree: usize) -> Option<Self> {
+        (1..=Self::HIGHEST).contains(&degree).then_some(Self(degree as u8))
+    }
+
+    /// Return the polynomial degree.
     pub fn degree(self) -> usize {
-        match self {
-            Order::P1 => 1,
-            Order::P2 => 2,
-        }
+        usize::from(self.0)
+    }
+
+    /// Return the order of the mesh that gives bodies of this order their shape: 1 or 2.
+    pub fn of_shape(self) -> Self {
+        self.min(Self::P2)
+    }
+}
+
+impl Default for Order {
+    fn default() -> Self {
+        Self::P1
     }
 }
 
@@ -29,11 +43,7 @@ impl TryFrom<usize> for Order {
     type Error = &'static str;
 
     fn try_from(degree: usize) -> Result<Self, Self::Error> {
-        match degree {
-            1 => Ok(Order::P1),
-            2 => Ok(Order::P2),
-            _ => Err("must be 1 or 2"),
-        }
+        Self::new(degree).ok_or("must be from 1 to 8")
     }
 }
 

@@ -138,7 +138,7 @@ impl<'a> SolverFactory<'a> {
     }
 
     fn is_quadratic(&self) -> bool {
-        self.bodies.iter().any(|body| body.outline.order == Order::P2)
+        self.bodies.iter().any(|body| body.outline.order > Order::P1)
     }
 
     /// Return the warnings of solvers that apply a preconditioner once instead of solving, one for each kind.
@@ -192,7 +192,7 @@ impl<'a> SolverFactory<'a> {
             }
             Linear::Sweeps => {
                 for (body, plan) in self.bodies.iter_mut().zip(&plan.bodies) {
-                    let smoother = smoother(plan.is_distributed, body.outline.order == Order::P2);
+                    let smoother = smoother(plan.is_distributed, body.outline.order > Order::P1);
                     preset::apply(&mut body.chosen, plan.preset, smoother);
                 }
             }
@@ -236,7 +236,7 @@ impl Factory for SolverFactory<'_> {
             let size = BodySize {
                 dofs: rows.columns,
                 interface: None,
-                is_quadratic: order == Order::P2,
+                is_quadratic: order > Order::P1,
                 compactness: compactness(cells, facets),
             };
             let (name, is_kept) = (name.to_owned(), self.kept.contains_key(name));
@@ -279,7 +279,7 @@ impl Factory for SolverFactory<'_> {
             Linear::Sweeps => self.planned().any(|(body, plan)| {
                 let Planned { outline, chosen } = body;
                 let is_it = outline.name == name && plan.preset != Preset::Condensed;
-                is_it && outline.order == Order::P2 && has_levels(chosen)
+                is_it && outline.order > Order::P1 && has_levels(chosen)
             }),
             _ => false,
         }

@@ -226,7 +226,7 @@ const CASES: &[Case] = &[
     ("young = 2.1e5\npoisson = 0.3\norder", "orthotropic = { e1 = 1 }\norder", "e1", "unknown key `e1` in `orthotropic`", "`E1`"),
     ("order = 1", "region = [{ on = \"core\", young = 1 }]\norder = 1", "{ on = \"core\", young = 1 }", "[[body.region]] has no `poisson`", ""),
     ("order = 1", "region = [{ young = 1, poisson = 0 }]\norder = 1", "{ young = 1, poisson = 0 }", "[[body.region]] has no `on`", ""),
-    ("order = 1", "order = 3", "3", "`order` is 3", ""),
+    ("order = 1", "order = 9", "9", "`order` is 9", ""),
     ("gamma = 0.7", "gamma = 0", "0", "gamma is 0", ""),
     ("a = 0.5", "a = 1.5", "1.5", "a is 1.5", "p'(0) = infinity"),
     ("a = 0.5", "a = 0", "0", "a is 0", ""),

@@ -169,7 +169,7 @@ fn total_forces() {
 #[test]
 fn weight_under_a_rigid_surface() {
     let load = "body.1.load=[{on=\"upper_face\",force=[0,-10],rigid=true}]";
-    for order in [1, 2] {
+    for order in [1, 2, 5] {
         let run = patch(&[load, "body.1.force=[0,-4]", &format!("body.1.order={order}")]);
         let total = run.number("pairs/0/force/1/1");
         assert!((total - 14.0).abs() < 1e-9, "P{order}: {total}");
@@ -198,7 +198,7 @@ fn imbalance_of_an_early_end() {
 /// Reactions of `groove-held`, known from statics: the roller carries the whole load, 10 on a length of 4.
 #[test]
 fn reactions() {
-    for order in [1, 2] {
+    for order in [1, 2, 5] {
         let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
         let sets = ["mesh.set.n=8", "method={stop={residual=1e-11}}", &orders[0], &orders[1]];
         let run = solve_here(case("groove-held"), &sets).converged();
@@ -238,7 +238,15 @@ fn planes_of_symmetry_at_any_angle() {
     // the same without the turn; the outer normal there is -y
     let sunk = "body.0.fix.1.y=-1e-4*(1 + 1e-3*x)";
     let scene = folder.path().join("scene.toml");
-    for (order, solver, slides) in [(1, "mumps", true), (2, "mumps", true), (1, "hypre", true), (2, "mumps", false)] {
+    let kinds = [
+        (1, "mumps", true),
+        (2, "mumps", true),
+        (1, "hypre", true),
+        (2, "mumps", false),
+        (4, "hypre", true),
+        (5, "mumps", false),
+    ];
+    for (order, solver, slides) in kinds {
         std::fs::write(&scene, if slides { &planes } else { &tight }).expect("a scene");
         let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
         let solver = format!("solver={solver}");

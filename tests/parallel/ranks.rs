@@ -8,10 +8,11 @@ use tempfile::TempDir;
 
 /// Small meshes of scenes of every kind: held and floating bodies, in the plane, of revolution and in space, P1 and P2, on springs, with
 /// rigid surfaces and turned axes, many bodies.
-const SCENES: [(&str, &[&str]); 10] = [
+const SCENES: [(&str, &[&str]); 11] = [
     ("groove", &["mesh.set.n=4"]),
     ("groove3d", &["mesh.set.n=4"]),
     ("stack", &["mesh.set.n=4"]),
+    ("groove-held", &["mesh.set.n=4", "body.0.order=3", "body.1.order=6"]),
     ("bearing", &["mesh.set.n=2"]),
     ("flange", &["mesh.set.n=2", "body.0.order=2", "body.1.order=2"]),
     ("hertz-sphere", &["mesh.set.n=2", "body.0.order=1", "body.1.order=1"]),

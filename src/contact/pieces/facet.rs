@@ -47,8 +47,8 @@ pub(super) struct Facet<const D: usize> {
 
 impl<const D: usize> Facet<D> {
     pub fn of(side: &Side<D>, i: usize) -> Self {
-        let (order, on) = (side.facets.order, side.on_facet(i));
-        let mut x = side.facets.coordinates(i, side.space);
+        let (order, on) = (side.facets.order.of_shape(), side.on_facet(i));
+        let mut x = side.facets.shape(i, side.space);
         let from = x[0];
         x.iter_mut().for_each(|x| *x = minus(*x, from));
         Self {

@@ -59,10 +59,9 @@ impl<const D: usize> Intersection<D> {
     /// distance, so that its forces are the opposite ones.
     pub fn of_one(a: &Side<D>) -> Self {
         let degree = match (D, a.facets.order) {
-            (2, Order::P1) => 5,
-            (2, Order::P2) => 7,
+            (2, order) => 2 * order.degree() + 3,
             (_, Order::P1) => 2,
-            (_, Order::P2) => 5,
+            _ => 5,
         };
         let rule = element::rule(D, degree);
         let mut points = Vec::new();

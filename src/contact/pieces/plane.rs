@@ -5,7 +5,6 @@ use super::{BoxTree, IntegrationPoint, Intersection, Reach, Refused};
 use crate::contact::side::Side;
 use crate::fem::{element, length, minus};
 use crate::linalg::dot;
-use crate::problem::order::Order;
 
 /// Largest distance outside of the parameters of a facet at which a ray may meet it in the plane, where pieces end exactly where facets
 /// do. It is far above the rounding of a search and far below the spacing of integration points, so that it decides only at ends.
@@ -14,8 +13,8 @@ const ON_FACET: f64 = 1e-6;
 /// Return the common pieces of two plane curves.
 pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     let search = BoxTree::new(b);
-    let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
-    let rule = element::gauss(if quadratic { 4 } else { 3 });
+    // products of functions of both sides, and one degree more for curved facets
+    let rule = element::gauss((a.facets.order.degree() + b.facets.order.degree() + 3) / 2 + 1);
     let mut common = Intersection { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);

@@ -141,7 +141,8 @@ impl Clipped {
         }
         let is_same_normal = |n: &[f64; 3]| length(minus(*n, a.normals[0])) < SNAP;
         let is_flat = b.order == Order::P1
-            || ([a, b].iter().all(|facet| element::is_straight(&facet.x, 3)) && a.normals.iter().all(is_same_normal));
+            || ([a, b].iter().all(|facet| element::is_straight(facet.order, &facet.x, 3))
+                && a.normals.iter().all(is_same_normal));
         let parts = if is_flat { parts } else { 2 * parts };
         let offset = minus(b.from, a.from);
         let foot = |[i, j]: [usize; 2]| {

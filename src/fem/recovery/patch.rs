@@ -1,10 +1,12 @@
 //! A polynomial fitted to the nodal displacements around a vertex, and the rings of cells there.
 
 use crate::fem::{Space, length, minus};
+use crate::problem::order::Order;
 use nalgebra::DMatrix;
+use smallvec::SmallVec;
 
-/// Largest number of monomials, which is that of degree 3 in space.
-const MOST: usize = 20;
+/// A list of one entry a monomial. Those of degree 3 in space fit without an allocation.
+type Terms<T> = SmallVec<[T; 20]>;
 
 /// The monomials up to a degree, lower ones first. Each but the first is an earlier one times a coordinate.
 pub(super) struct Monomials {
@@ -34,11 +36,10 @@ impl Monomials {
     }
 
     /// Return the values of the monomials at a point.
-    fn at<const D: usize>(&self, x: &[f64; D]) -> [f64; MOST] {
-        let mut values = [0.0; MOST];
-        values[0] = 1.0;
-        for (k, &(of, i)) in self.made.iter().enumerate().skip(1) {
-            values[k] = values[of] * x[i];
+    fn at<const D: usize>(&self, x: &[f64; D]) -> Terms<f64> {
+        let mut values = Terms::from_elem(1.0, 1);
+        for &(of, i) in &self.made[1..] {
+            values.push(values[of] * x[i]);
         }
         values
     }
@@ -61,7 +62,9 @@ impl<const D: usize> Patch<D> {
     ///
     /// The error of the polynomial is the next term of Taylor's series. It grows with the distance to the power of the degree
     /// plus one, and squared differences are divided by its square. So all nodes are weighted by what they determine, and distant
-    /// ones do not spoil the derivatives at the centre. A node in the centre is weighted like the nearest other one.
+    /// ones do not spoil the derivatives at the centre. A node in the centre is weighted like the nearest other one. Polynomials of a degree above three
+    /// are to be good on all of the cells that they are blended over, some of which may be much larger than others: there the farthest node counts
+    /// as near.
     pub fn fit(space: &Space<D>, u: &[f64], centre: [f64; D], nodes: &[u32], monomials: &Monomials) -> Option<Self> {
         let n = monomials.made.len();
         if nodes.len() < n {
@@ -70,13 +73,18 @@ impl<const D: usize> Patch<D> {
         let at = |node: u32| space.nodes[node as usize];
         let distance = |node: u32| length(minus(at(node), centre));
         let size = nodes.iter().map(|&node| distance(node)).fold(f64::MIN_POSITIVE, f64::max);
-        let near = nodes.iter().map(|&node| distance(node)).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
-        let (mut gram, mut right) = ([[0.0; MOST]; MOST], [[0.0; D]; MOST]);
+        let near = match space.order {
+            Order::P1 | Order::P2 => {
+                nodes.iter().map(|&node| distance(node)).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min)
+            }
+            _ => size,
+        };
+        let (mut gram, mut right) = (DMatrix::<f64>::zeros(n, n), vec![[0.0; D]; n]);
         let mut add = |x: [f64; D], u: [f64; D], weight: f64| {
             let row = monomials.at(&std::array::from_fn::<f64, D, _>(|i| (x[i] - centre[i]) / size));
             for i in 0..n {
                 let scaled = weight * row[i];
-                (0..=i).for_each(|j| gram[i][j] += scaled * row[j]);
+                (0..=i).for_each(|j| gram[(i, j)] += scaled * row[j]);
                 (0..D).for_each(|c| right[i][c] += scaled * u[c]);
             }
         };
@@ -92,8 +100,8 @@ impl<const D: usize> Patch<D> {
             }
         }
         // The matrix is scaled to a diagonal of ones.
-        let scale: Vec<f64> = (0..n).map(|i| gram[i][i].sqrt().recip()).collect();
-        let factor = DMatrix::from_fn(n, n, |i, j| scale[i] * scale[j] * gram[i.max(j)][i.min(j)]).cholesky()?;
+        let scale: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt().recip()).collect();
+        let factor = DMatrix::from_fn(n, n, |i, j| scale[i] * scale[j] * gram[(i.max(j), i.min(j))]).cholesky()?;
         let pivots = factor.l_dirty().diagonal();
         if pivots.min() <= DETERMINED {
             return None;
@@ -107,14 +115,14 @@ impl<const D: usize> Patch<D> {
     #[inline]
     pub fn jet(&self, monomials: &Monomials, x: &[f64; D]) -> ([f64; D], [[f64; D]; D]) {
         let local: [f64; D] = std::array::from_fn(|i| (x[i] - self.centre[i]) / self.size);
-        let (mut values, mut slopes) = ([0.0; MOST], [[0.0; D]; MOST]);
-        values[0] = 1.0;
+        let (mut values, mut slopes) = (Terms::from_elem(1.0, 1), Terms::from_elem([0.0; D], 1));
         let (mut value, mut gradient) = (self.terms[0], [[0.0; D]; D]);
         for (k, term) in self.terms.iter().enumerate().skip(1) {
             let (of, i) = monomials.made[k];
-            values[k] = values[of] * local[i];
-            slopes[k] = slopes[of].map(|slope| slope * local[i]);
-            slopes[k][i] += values[of];
+            let mut slope = slopes[of].map(|slope| slope * local[i]);
+            slope[i] += values[of];
+            values.push(values[of] * local[i]);
+            slopes.push(slope);
             for c in 0..D {
                 value[c] += term[c] * values[k];
                 (0..D).for_each(|j| gradient[c][j] += term[c] * slopes[k][j]);

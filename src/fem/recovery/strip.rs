@@ -32,9 +32,9 @@ impl<const D: usize> Strip<D> {
     fn of(space: &Space<D>) -> Self {
         let places = space.lone_facets();
         let all = space.facets_of(places.iter().copied());
-        let straight = |i: &usize| element::is_straight(&all.coordinates(*i, space), D);
+        let straight = |i: &usize| element::is_straight(space.order, &all.coordinates(*i, space), D);
         // Quadratic facets represent the boundary of the mesh. If one is curved, the straight ones are exact, too.
-        let is_known = space.order == Order::P2 && !(0..all.count()).all(|i| straight(&i));
+        let is_known = space.order > Order::P1 && !(0..all.count()).all(|i| straight(&i));
         let inside = |i: usize| all.facet(i)[..D].iter().all(|&node| space.on_axis(node));
         let around = Around::new(space, &all);
         let rises: Vec<_> =

@@ -279,6 +279,27 @@ fn graded_and_anisotropic() {
     flat(graded(fibres(0.5)), Solid::isotropic(3.0, 0.2)).converges("fibres", 2, [4, 8, 16], [2.9, 1.95], 0.01);
 }
 
+/// Orders k + 1 and k up to 8 where the solution is smooth: contact is closed everywhere. Errors below 1e-11 are those of rounding.
+#[test]
+fn high_orders() {
+    let compression = || number(0.7) + number(0.5) * cosine([1.0, 0.0, 0.0]);
+    let problem = || Problem { compression: compression(), ..flat(steel(), graded(fibres(-1.1))) };
+    let finest = [(3, 8), (4, 8), (5, 6), (6, 6), (7, 6)];
+    for (order, n) in finest {
+        let k = order as f64;
+        problem().converges("smooth", order, [n - 4, n - 2, n], [k + 0.85, k - 0.15], 2e-4);
+    }
+    problem().converges("smooth", 8, [2, 2, 4], [8.3, 7.85], 1e-10);
+}
+
+/// The shape of a quadratic mesh is off a circle by h^4, and its slope by h^3, which errors of orders above two fall like.
+#[test]
+fn high_orders_on_curves() {
+    for order in [3, 5, 8] {
+        curved(steel(), fibres(0.5)).converges("curved", order, [4, 8, 16], [3.85, 2.95], 1e-4);
+    }
+}
+
 #[test]
 fn curved_surfaces() {
     curved(steel(), fibres(0.5)).converges("curved", 1, [16, 24, 32], [1.9, 0.95], 0.15);
