@@ -132,7 +132,7 @@ impl Run<'_> {
         let is_known = matches!(start, InitialGuess::Known(_));
         let mut trace = match &start {
             InitialGuess::Trace(given) => given.clone(),
-            InitialGuess::Known(solution) => solution.field.trace.clone(),
+            InitialGuess::Known(solution) if !solution.field.trace.is_empty() => solution.field.trace.clone(),
             _ => rigid.trace.clone(),
         };
         let known = match start {

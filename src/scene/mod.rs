@@ -52,6 +52,7 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     let has_stop = table.get_ref().get("method").is_some_and(|method| method.get_ref().get("stop").is_some());
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let reader = Reader { table, sources };
+    reader.refuse_lists()?;
     let mut scene = read(&reader, Context { sources: reader.sources.clone(), folder, ..Context::default() })
         .map_err(gone::explain)?;
     scene.path = path.to_owned();

@@ -52,9 +52,24 @@ impl<'i> Reader<'i> {
         T::deserialize(Deserializer::from(self.table.clone())).map_err(|error| self.refuse(&error))
     }
 
+    /// Refuse lists where tables belong.
+    ///
+    /// # Errors
+    /// The first such list.
+    pub fn refuse_lists(&self) -> Result<()> {
+        let tree = self.tree();
+        let Some(span) = list_for_table(&tree, &forms(&schema())) else { return Ok(()) };
+        let found = Found::of(&tree, &span, false).unwrap_or(Found::root(&tree));
+        Err(wrong_value(|message| Error::scene(&self.sources.place(span.clone()), message), &found, ""))
+    }
+
+    fn tree(&self) -> Spanned<DeValue<'i>> {
+        Spanned::new(self.table.span(), DeValue::Table(self.table.get_ref().clone()))
+    }
+
     /// Return the refusal of an error of serde.
     fn refuse(&self, error: &toml::de::Error) -> Error {
-        let tree = Spanned::new(self.table.span(), DeValue::Table(self.table.get_ref().clone()));
+        let tree = self.tree();
         let key_in = |table: &Range<usize>, key: &str| {
             let mut node = Found::of(&tree, table, true)?.node;
             for part in key.split('.') {
@@ -77,7 +92,8 @@ impl<'i> Reader<'i> {
         match words[..] {
             ["unknown field ", name, ..] => unknown_key(refusal, name, &found, known().collect()),
             ["missing field ", name, ..] => {
-                let about = description(&at(found.path.iter().map(String::as_str).chain([name])));
+                let schema = schema();
+                let about = description(&at(&schema, found.path.iter().map(String::as_str).chain([name])));
                 refusal(format!("{} has no `{name}`", title(&found.path)))
                     .label(format!("`{name}` is missing"))
                     .help(format!("{name}: {about}"))
@@ -149,11 +165,13 @@ fn unknown_key(refusal: impl Fn(String) -> Error, name: &str, found: &Found<'_, 
 
 /// Return the refusal of a value of the wrong kind or out of its range.
 fn wrong_value(refusal: impl Fn(String) -> Error, found: &Found<'_, '_>, message: &str) -> Error {
-    let schemas = at(found.path.iter().map(String::as_str));
+    let schema = schema();
+    let schemas = at(&schema, found.path.iter().map(String::as_str));
     let (kinds, about) = (kinds(&schemas), description(&schemas));
     let value = found.node.get_ref();
     let number = value.as_integer().map(|integer| i64::from_str_radix(integer.as_str(), integer.radix()));
-    if let Some(Err(_)) = number {
+    let is_too_large = |digits: &str| !digits.contains("inf") && digits.parse().is_ok_and(f64::is_infinite);
+    if matches!(number, Some(Err(_))) || value.as_float().is_some_and(|float| is_too_large(float.as_str())) {
         return refusal("the number is too large".to_owned());
     }
     let given = match value {
@@ -207,27 +225,45 @@ fn title(path: &[String]) -> String {
     }
 }
 
-/// Return the schemas of the value at a path.
-fn at<'p>(path: impl Iterator<Item = &'p str>) -> Vec<Json> {
-    let mut schemas = vec![schema()];
-    for key in path {
-        let below = |schema: &Json| {
-            let known = [schema["properties"].get(key), schema.get("additionalProperties"), schema.get("items")];
-            known.into_iter().flatten().find(|schema| schema.is_object()).cloned()
-        };
-        schemas = schemas.iter().flat_map(forms).filter_map(|schema| below(&schema)).collect();
-    }
-    schemas.iter().flat_map(forms).collect()
+/// Return the schemas of the value at a path, below that of a scene.
+fn at<'s, 'p>(schema: &'s Json, path: impl Iterator<Item = &'p str>) -> Vec<&'s Json> {
+    path.fold(forms(schema), |schemas, key| below(&schemas, key))
+}
+
+/// Return the schemas of the values of a key of a table, or of the items of a list.
+fn below<'s>(schemas: &[&'s Json], key: &str) -> Vec<&'s Json> {
+    let inner = |schema: &&'s Json| {
+        let known = [schema["properties"].get(key), schema.get("additionalProperties"), schema.get("items")];
+        known.into_iter().flatten().find(|schema| schema.is_object())
+    };
+    schemas.iter().filter_map(inner).flat_map(forms).collect()
 }
 
 /// Return a schema and those of the forms that its value may have.
-fn forms(schema: &Json) -> Vec<Json> {
+fn forms(schema: &Json) -> Vec<&Json> {
     let inner = schema["anyOf"].as_array().into_iter().flatten().flat_map(forms);
-    std::iter::once(schema.clone()).chain(inner).collect()
+    std::iter::once(schema).chain(inner).collect()
+}
+
+/// Return the span of the first list that stands where a table belongs. serde would take its items for the values of the keys, in their order.
+fn list_for_table(node: &Spanned<DeValue<'_>>, schemas: &[&Json]) -> Option<Range<usize>> {
+    match node.get_ref() {
+        DeValue::Array(_) if !schemas.is_empty() && schemas.iter().all(|schema| schema.get("items").is_none()) => {
+            Some(node.span())
+        }
+        DeValue::Array(items) => {
+            let schemas = below(schemas, "");
+            items.iter().find_map(|item| list_for_table(item, &schemas))
+        }
+        DeValue::Table(table) => {
+            table.iter().find_map(|(key, value)| list_for_table(value, &below(schemas, key.get_ref())))
+        }
+        _ => None,
+    }
 }
 
 /// Return the first paragraph of the description, with the default.
-fn description(schemas: &[Json]) -> String {
+fn description(schemas: &[&Json]) -> String {
     let Some(schema) = schemas.iter().find(|schema| schema["description"].is_string()) else { return String::new() };
     let text = schema["description"].as_str().unwrap_or_default();
     let paragraph = text.split("\n\n").next().unwrap_or_default().replace('\n', " ");
@@ -238,7 +274,7 @@ fn description(schemas: &[Json]) -> String {
 }
 
 /// Return what the kinds of value are called in messages.
-fn kinds(schemas: &[Json]) -> Vec<&'static str> {
+fn kinds(schemas: &[&Json]) -> Vec<&'static str> {
     let mut kinds = Vec::new();
     for schema in schemas {
         let types = match &schema["type"] {

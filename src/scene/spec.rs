@@ -451,7 +451,9 @@ fn tidy(schema: &mut Json) {
             {
                 entries["type"] = only.clone();
             }
-            entries.retain(|key, value| key != "default" || !(value.is_null() || value == ""));
+            entries.retain(|key, value| {
+                key != "default" || !(value.is_null() || value == "" || value.is_array() || value.is_object())
+            });
             if let Some(whole) = entries.get("default").and_then(Json::as_f64).filter(|number| number.fract() == 0.0) {
                 entries.insert("default".to_owned(), json!(whole as i64));
             }

@@ -87,6 +87,18 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
     }
 }
 
+/// The stationary iteration, too, begins with the pressures of a step whose loads had another direction.
+#[test]
+fn sweeps_go_on_in_another_direction() {
+    let run = |method: &str| solve(with_table(PATH), &["--method", method]).converged();
+    let (ours, theirs) = (run("robin"), run("auto"));
+    // nothing presses in the first step
+    for step in 1..7 {
+        let peak = format!("steps/{step}/pairs/0/peak_pressure");
+        near(ours.number(&peak), theirs.number(&peak), 1e-5, &peak);
+    }
+}
+
 /// Steps with loads in proportion are one problem, and others are as many as there are directions; condensed bodies serve all of them.
 #[test]
 fn only_another_direction_makes_another_problem() {
