@@ -605,8 +605,8 @@ pub const UNSETTLED: f64 = 0.5;
 fn balance_line(body: &BodyReport, units: &UnitWords) -> String {
     let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
     let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
-        let all: Vec<_> = parts.map(|part| format!("{} {}{}", part.on, vector(part.force), units.force)).collect();
-        if all.is_empty() { String::new() } else { format!("{verb} {}; ", all.join(", ")) }
+        let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
+        if all.is_empty() { String::new() } else { format!("{verb} {}{}; ", all.join(", "), units.force) }
     };
     let reactions = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
     let change = body.max_von_mises_change.filter(|change| *change > UNSETTLED);

@@ -16,7 +16,7 @@ fn lines_of_pairs_name_surfaces_bodies_and_units() {
             .lines()
             .find(|line| line.starts_with("  lower_top - upper_bottom: force on `lower` ("))
             .expect("a line");
-        for words in [", peak pressure ", " MPa at (", ", length in contact ", " cm, open "] {
+        for words in [" MPa cm, peak pressure ", " MPa at (", ", length in contact ", " cm, open "] {
             assert!(line.contains(words), "{words}: {line}");
         }
         let check = winkler(&[&["check", scene][..], &sets].concat());
