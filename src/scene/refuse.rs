@@ -256,7 +256,9 @@ fn list_for_table(node: &Spanned<DeValue<'_>>, schemas: &[&Json]) -> Option<Rang
             items.iter().find_map(|item| list_for_table(item, &schemas))
         }
         DeValue::Table(table) => {
-            table.iter().find_map(|(key, value)| list_for_table(value, &below(schemas, key.get_ref())))
+            // serde refuses a table where a list belongs
+            let tables: Vec<&Json> = schemas.iter().copied().filter(|schema| schema.get("items").is_none()).collect();
+            table.iter().find_map(|(key, value)| list_for_table(value, &below(&tables, key.get_ref())))
         }
         _ => None,
     }
