@@ -6,7 +6,7 @@ use crate::contact::add;
 use crate::error::{Error, Result};
 use crate::expression::Expression;
 use crate::fem::displacement::{self, Strained};
-use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, Split, assemble, lagrange, pad};
+use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, Split, assemble, pad, space};
 use crate::output::{BodyField, CellKind, LargestStress};
 use std::rc::Rc;
 
@@ -122,7 +122,7 @@ impl<const D: usize> Post for OnPart<D> {
         let bent = split.values(&nodal);
         let stress = displacement::nodal_stresses(&split.space, &self.elasticity, &bent);
         let stress: Vec<[f64; 6]> = shown.iter().map(|&node| stress[node as usize]).collect();
-        let stress = lagrange::at_equally_spaced(&owned, stress.into()).into_owned();
+        let stress = space::at_equally_spaced(&owned, stress.into()).into_owned();
         let von_mises: Vec<f64> = stress.iter().map(displacement::von_mises).collect();
         let largest = (0..shown.len()).max_by(|&i, &j| von_mises[i].total_cmp(&von_mises[j]));
         let change =
@@ -131,8 +131,8 @@ impl<const D: usize> Post for OnPart<D> {
             let first = D * split.origin(node) as usize;
             pad(std::array::from_fn::<f64, D, _>(|c| u[first + c]))
         };
-        let displacement = lagrange::at_equally_spaced(&owned, shown.iter().map(displacement).collect()).into_owned();
-        let points = lagrange::at_equally_spaced(&owned, owned.nodes.clone().into());
+        let displacement = space::at_equally_spaced(&owned, shown.iter().map(displacement).collect()).into_owned();
+        let points = space::at_equally_spaced(&owned, owned.nodes.clone().into());
         // files have the edge 20 in this direction
         let inside = (D + 1) + 2 * (owned.order.degree() - 1)..(D + 1) + 3 * (owned.order.degree() - 1);
         owned.cells.chunks_exact_mut(owned.stride).filter(|_| D == 2).for_each(|cell| cell[inside.clone()].reverse());

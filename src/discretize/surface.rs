@@ -1,7 +1,7 @@
 //! A contact surface of a pair: its mesh for output, which holds the facets of side a and the contact points from which their values come.
 
 use crate::contact::{ContactPair, Side};
-use crate::fem::{element, lagrange};
+use crate::fem::{element, lagrange, space};
 use crate::output::{CellKind, FieldArray, UnstructuredGrid};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
@@ -38,7 +38,7 @@ impl ContactSurface {
             cover: Vec::new(),
         };
         // the same points as in the fields of the body
-        let points = lagrange::at_equally_spaced(a.space, Cow::Borrowed(&a.space.nodes));
+        let points = space::at_equally_spaced(a.space, Cow::Borrowed(&a.space.nodes));
         let mut number: HashMap<u32, u32> = HashMap::new();
         let mut at_node = Vec::new();
         let mut sums: Vec<(f64, BTreeMap<usize, f64>)> = Vec::new();

@@ -10,18 +10,9 @@
 //! and l_i (2 l_i - 1) at vertices and 4 l_i l_j on edges for order two. Those of higher orders are in [`lagrange`].
 
 use super::lagrange;
-pub use super::lagrange::gauss;
+pub use super::lagrange::{EDGES, Slopes, Values, gauss};
 use crate::problem::order::Order;
 use smallvec::SmallVec;
-
-/// Edges of the simplex with four vertices in the order of the mid-edge nodes. A triangle uses 01 12 02 and a line 01.
-pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
-
-/// Values of the shape functions of an element, one entry a node. Those of the elements in space fit without an allocation.
-pub type Values = SmallVec<[f64; 10]>;
-
-/// Derivatives of the shape functions of an element by its barycentric coordinates, one entry a node.
-pub type Slopes = SmallVec<[[f64; 4]; 10]>;
 
 /// Return the number of nodes of the simplex with `vertices` vertices.
 pub fn node_count(vertices: usize, order: Order) -> usize {
@@ -274,7 +265,7 @@ fn triangle(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
     match degree {
         0 | 1 => add(&[1.0 / 3.0; 3], 1.0),
         2 => orbit(1.0 / 6.0, 1.0 / 3.0),
-        6.. => collapsed(degree, add),
+        6.. => lagrange::collapsed(degree, add),
         _ => {
             // These are Radon's seven points of degree 5.
             let root = 15f64.sqrt();
@@ -282,16 +273,6 @@ fn triangle(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
             orbit((6.0 + root) / 21.0, (155.0 + root) / 1200.0);
             add(&[1.0 / 3.0; 3], 9.0 / 40.0);
         }
-    }
-}
-
-/// Add Gauss points on the square that collapses into the triangle at vertex 2.
-fn collapsed(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
-    let across = gauss(degree / 2 + 1);
-    // the area shrinks towards the vertex, which is one more degree
-    for (height, weight) in gauss(degree.div_ceil(2) + 1) {
-        let rest = 1.0 - height;
-        across.iter().for_each(|(x, w)| add(&[rest * (1.0 - x), rest * x, height], 2.0 * rest * weight * w));
     }
 }
 

@@ -7,13 +7,20 @@
 //! ```
 //! On a line l_2 is zero and m = 0 alone remains. If V has the values of psi_j at node i, then phi = V^-T psi.
 
-use super::element::{self, EDGES, Slopes, Values};
-use super::space::Space;
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
-use std::borrow::Cow;
+use smallvec::SmallVec;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
+
+/// Edges of the simplex with four vertices in the order of the mid-edge nodes. A triangle uses 01 12 02 and a line 01.
+pub const EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
+
+/// Values of the shape functions of an element, one entry a node. Those of the elements in space fit without an allocation.
+pub type Values = SmallVec<[f64; 10]>;
+
+/// Derivatives of the shape functions of an element by its barycentric coordinates, one entry a node.
+pub type Slopes = SmallVec<[[f64; 4]; 10]>;
 
 /// The functions of one order on a line or a triangle.
 pub struct Lagrange {
@@ -93,7 +100,7 @@ impl Lagrange {
         self.products.get_or_init(|| {
             let count = self.nodes.len();
             let mut sums = vec![[[0.0; 2]; 2]; count * count];
-            for (l, weight) in element::rule(3, 2 * self.degree - 2).iter() {
+            collapsed(2 * self.degree - 2, &mut |l: &[f64], weight| {
                 let slopes = self.slopes(l);
                 for (a, p) in slopes.iter().enumerate() {
                     for (b, q) in slopes.iter().enumerate() {
@@ -101,7 +108,7 @@ impl Lagrange {
                         (0..4).for_each(|k| sum[k / 2][k % 2] += weight * p[1 + k / 2] * q[1 + k % 2]);
                     }
                 }
-            }
+            });
             sums
         })
     }
@@ -224,6 +231,16 @@ pub fn gauss(count: usize) -> Vec<(f64, f64)> {
     below.chain(above).collect()
 }
 
+/// Add the points and weights of a rule on the triangle, exact for polynomials of `degree`: Gauss points on the square that collapses into vertex 2.
+pub fn collapsed(degree: usize, add: &mut impl FnMut(&[f64], f64)) {
+    let across = gauss(degree / 2 + 1);
+    // the area shrinks towards the vertex, which is one more degree
+    for (height, weight) in gauss(degree.div_ceil(2) + 1) {
+        let rest = 1.0 - height;
+        across.iter().for_each(|(x, w)| add(&[rest * (1.0 - x), rest * x, height], 2.0 * rest * weight * w));
+    }
+}
+
 /// Return the zero `k` of a Legendre polynomial, counted from the largest one, and its weight in the rule of Gauss.
 fn zero_of_legendre(count: usize, k: usize) -> (f64, f64) {
     let n = count as f64;
@@ -279,33 +296,9 @@ fn nested(whole: usize, degree: usize, margin: usize) -> Vec<[f64; 3]> {
     places
 }
 
-/// Return, from values at the nodes of a space, those at equally spaced points in place of the nodes, with which files are written. Up to order two they are
-/// the same.
-pub fn at_equally_spaced<'v, const D: usize, const N: usize>(
-    space: &Space<D>,
-    values: Cow<'v, [[f64; N]]>,
-) -> Cow<'v, [[f64; N]]> {
-    if space.order <= Order::P2 {
-        return values;
-    }
-    let places = equally_spaced(space.order, D + 1);
-    // rounding leaves the points of an edge on that edge
-    let exact = |l: &[f64; 3]| -> Values {
-        element::values(space.order, l).iter().map(|phi| if phi.abs() < 1e-12 { 0.0 } else { *phi }).collect()
-    };
-    let shapes: Vec<Values> = places.iter().map(exact).collect();
-    let mut moved = values.to_vec();
-    for cell in space.cells.chunks_exact(space.stride) {
-        for (node, phi) in cell.iter().zip(&shapes).skip(D + 1) {
-            let at = |c: usize| cell.iter().zip(phi).map(|(&other, phi)| phi * values[other as usize][c]).sum();
-            moved[*node as usize] = std::array::from_fn(at);
-        }
-    }
-    moved.into()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::element;
     use super::*;
 
     fn all() -> impl Iterator<Item = (Order, usize)> {

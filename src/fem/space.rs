@@ -7,6 +7,7 @@ use crate::linalg::dot;
 use crate::mesh::{Group, Mesh, Numbering, datum};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::cell::OnceCell;
 use std::collections::HashSet;
 
@@ -447,6 +448,31 @@ pub fn strain<const D: usize>(h: &[[f64; D]; D]) -> [f64; 6] {
         (_, true) => h[i][i],
         _ => h[i][j] + h[j][i],
     })
+}
+
+/// Return, from values at the nodes of a space, those at equally spaced points in place of the nodes, with which files are written. Up to order two they are
+/// the same.
+pub fn at_equally_spaced<'v, const D: usize, const N: usize>(
+    space: &Space<D>,
+    values: Cow<'v, [[f64; N]]>,
+) -> Cow<'v, [[f64; N]]> {
+    if space.order <= Order::P2 {
+        return values;
+    }
+    let places = lagrange::equally_spaced(space.order, D + 1);
+    // rounding leaves the points of an edge on that edge
+    let exact = |l: &[f64; 3]| -> element::Values {
+        element::values(space.order, l).iter().map(|phi| if phi.abs() < 1e-12 { 0.0 } else { *phi }).collect()
+    };
+    let shapes: Vec<element::Values> = places.iter().map(exact).collect();
+    let mut moved = values.to_vec();
+    for cell in space.cells.chunks_exact(space.stride) {
+        for (node, phi) in cell.iter().zip(&shapes).skip(D + 1) {
+            let at = |c: usize| cell.iter().zip(phi).map(|(&other, phi)| phi * values[other as usize][c]).sum();
+            moved[*node as usize] = std::array::from_fn(at);
+        }
+    }
+    moved.into()
 }
 
 #[cfg(test)]

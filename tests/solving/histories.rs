@@ -90,10 +90,11 @@ fn a_step_of_a_path_is_a_run_with_its_loads() {
 /// The stationary iteration, too, begins with the pressures of a step whose loads had another direction.
 #[test]
 fn sweeps_go_on_in_another_direction() {
-    let run = |method: &str| solve(with_table(PATH), &["--method", method]).converged();
+    // the paper's iteration needs a closed contact to begin with
+    let pressed = PATH.replace("0, 0, 0\n", "");
+    let run = |method: &str| solve(with_table(&pressed), &["--method", method]).converged();
     let (ours, theirs) = (run("robin"), run("auto"));
-    // nothing presses in the first step
-    for step in 1..7 {
+    for step in 0..6 {
         let peak = format!("steps/{step}/pairs/0/peak_pressure");
         near(ours.number(&peak), theirs.number(&peak), 1e-5, &peak);
     }
