@@ -74,8 +74,8 @@ const FALLS: f64 = 0.9;
 /// was solved.
 const PATIENCE: usize = 3;
 
-/// Share of F1 by which it must fall to be progress: half of its digits. An error in the energy norm whose square is less leaves F1 no such fall, so that it
-/// is roundoff there.
+/// Share of F1 by which it must fall to be progress: half of its digits. An error in the energy norm whose square is less leaves F1 no such fall. The
+/// solution is near then: Newton's method reduces the error itself, and what else falls is roundoff.
 const SEEN: f64 = 1.5e-8;
 
 /// A watch for stagnation of Newton's method.
@@ -119,10 +119,10 @@ impl Stagnation {
         if is_better {
             self.best = step.error;
         }
-        let can_fall = step.error.powi(2) > SEEN;
-        let is_lower = can_fall && self.least - step.energy > SEEN * step.energy.abs();
+        let is_far = step.error.powi(2) > SEEN;
+        let is_lower = self.least - step.energy > SEEN * step.energy.abs();
         self.least = self.least.min(step.energy);
-        let is_progress = is_better || is_lower || step.is_smoothed || step.fall < FALLS;
+        let is_progress = is_better || step.is_smoothed || is_far && (is_lower || step.fall < FALLS);
         self.since = if is_progress { 0 } else { self.since + 1 };
         self.since >= PATIENCE
     }
@@ -154,7 +154,7 @@ mod tests {
         );
         assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -(k as f64)), [false; 4]);
         assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -1.0 - 1e-9 * k as f64), [false, false, false, true]);
-        assert_eq!(noted(&[(1e-5, 1.0, false); 4], &|k| -(k as f64)), [false, false, false, true]);
+        assert_eq!(noted(&[(1e-5, 0.5, false); 4], &|k| -(k as f64)), [false, false, false, true]);
         assert_eq!(noted(&[(1.0, 1.0, true); 5], &same), [false; 5]);
         // less than a tenth of the best error, or of the distance
         assert!(noted(&[(1.0, 1.0, false), (0.95, 0.95, false), (0.91, 1.0, false), (0.9, 1.0, false)], &same)[3]);
