@@ -78,6 +78,10 @@ const PATIENCE: usize = 3;
 /// solution is near then: Newton's method reduces the error itself, and what else falls is roundoff.
 const SEEN: f64 = 1.5e-8;
 
+/// Share to which the error must fall near the solution, where a fall by a tenth is often the luck of roundoff, and Newton's method, even with linear
+/// systems solved to a half, needs less than [`PATIENCE`] steps to halve the error.
+const HALF: f64 = 0.5;
+
 /// A watch for stagnation of Newton's method.
 ///
 /// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning: earlier steps had other slopes. Far from
@@ -115,11 +119,11 @@ pub(super) struct Attained {
 impl Stagnation {
     /// Note a step. Return whether the run stagnates.
     pub fn note(&mut self, step: Attained) -> bool {
-        let is_better = step.error < FALLS * self.best;
+        let is_far = step.error.powi(2) > SEEN;
+        let is_better = step.error < if is_far { FALLS } else { HALF } * self.best;
         if is_better {
             self.best = step.error;
         }
-        let is_far = step.error.powi(2) > SEEN;
         let is_lower = self.least - step.energy > SEEN * step.energy.abs();
         self.least = self.least.min(step.energy);
         let is_progress = is_better || step.is_smoothed || is_far && (is_lower || step.fall < FALLS);
