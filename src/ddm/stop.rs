@@ -1,5 +1,6 @@
 //! The status with which a run ends, and the watch for stagnation.
 
+use super::bound::EXACT;
 use crate::model::Mechanism;
 use crate::model::linear::Failure;
 use crate::model::rigid::Moved;
@@ -74,19 +75,16 @@ const FALLS: f64 = 0.9;
 /// was solved.
 const PATIENCE: usize = 3;
 
-/// Share of F1 by which it must fall to be progress: half of its digits. An error in the energy norm whose square is less leaves F1 no such fall. The
-/// solution is near then: Newton's method reduces the error itself, and what else falls is roundoff.
-const SEEN: f64 = 1.5e-8;
-
-/// Share to which the error must fall near the solution, where a fall by a tenth is often the luck of roundoff, and Newton's method, even with linear
-/// systems solved to a half, needs less than [`PATIENCE`] steps to halve the error.
-const HALF: f64 = 0.5;
+/// Share to which the error must fall near the solution, where a fall by a tenth is often the luck of roundoff. Linear systems are solved to a half or better
+/// ([`LinearStep::roughest`](crate::model::linear::LinearStep::roughest)), so that a step of Newton's method halves the error there.
+const NEAR_FALLS: f64 = 0.5;
 
 /// A watch for stagnation of Newton's method.
 ///
 /// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning: earlier steps had other slopes. Far from
-/// the solution this distance falls while the error may rise by many orders. Where a contact peels point by point, F1 alone falls, and what reaches a new
-/// least F1 cannot repeat itself.
+/// the solution this distance falls while the error may rise by many orders. Where a contact peels point by point, F1 alone falls, by a share that half of
+/// its digits show ([`EXACT`]), and what reaches a new least F1 cannot repeat itself. Where the square of the error, in the energy norm, is below that
+/// share, F1 has no such fall left. The solution is near then: the error itself has to fall, and what else falls is roundoff.
 #[derive(Debug, Clone)]
 pub(super) struct Stagnation {
     /// The error at the last progress in it.
@@ -119,12 +117,12 @@ pub(super) struct Attained {
 impl Stagnation {
     /// Note a step. Return whether the run stagnates.
     pub fn note(&mut self, step: Attained) -> bool {
-        let is_far = step.error.powi(2) > SEEN;
-        let is_better = step.error < if is_far { FALLS } else { HALF } * self.best;
+        let is_far = step.error.powi(2) > EXACT;
+        let is_better = step.error < if is_far { FALLS } else { NEAR_FALLS } * self.best;
         if is_better {
             self.best = step.error;
         }
-        let is_lower = self.least - step.energy > SEEN * step.energy.abs();
+        let is_lower = self.least - step.energy > EXACT * step.energy.abs();
         self.least = self.least.min(step.energy);
         let is_progress = is_better || step.is_smoothed || is_far && (is_lower || step.fall < FALLS);
         self.since = if is_progress { 0 } else { self.since + 1 };

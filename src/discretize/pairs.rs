@@ -138,7 +138,8 @@ fn named<'a, const D: usize>(
     if spec.obstacle {
         let side = parts[first].side(names[0], on_first, spec.edge);
         let obstacle = Side { name: names[1], ..side.clone() };
-        let (entry, bodies) = (ContactEntry::Named(number), [first, rigid::OBSTACLE]);
+        // the obstacle gets its number among the rigid parts, which follow the bodies, once all pairs are known
+        let (entry, bodies) = (ContactEntry::Named(number), [first, parts.len()]);
         return Ok(SurfacePair { entry, bodies, sides: [side, obstacle], far: Default::default() });
     }
     let (second, on_second) = surface(1)?;

@@ -15,12 +15,9 @@ use super::groups::point;
 use crate::contact::ContactPair;
 use crate::error::{Error, Result};
 use crate::fem::cross;
-use crate::linalg::{dot, length};
+use crate::linalg::{Csr, dot, length};
 use crate::model::{BodySlot, Motion};
 use crate::problem::ContactSpec;
-
-/// The number of the body beside a surface before an obstacle, until the obstacle has one.
-pub const OBSTACLE: usize = usize::MAX;
 
 /// An obstacle before the surface of a pair, with the directions in which it moves.
 pub struct Obstacle<'a> {
@@ -152,13 +149,7 @@ pub fn part(pair: &mut ContactPair, spec: &ContactSpec, number: usize, index: us
         let (motions, prescribed) = (obstacle.motions(), obstacle.prescribed());
         pair.bodies[1] = index;
         pair.prescribed[1] = prescribed;
-        let none = || {
-            (0..pair.len()).fold(crate::linalg::Csr::new(0), |mut rows, _| {
-                rows.push_row([]);
-                rows
-            })
-        };
-        (pair.rows[1], pair.nodal[1]) = (none(), none());
+        (pair.rows[1], pair.nodal[1]) = (Csr::without_columns(pair.len()), Csr::without_columns(pair.len()));
         return Ok(Some(BodySlot::rigid(&spec.between[1].value, number, pair.len(), motions)));
     }
     let Some(force) = spec.force.or(spec.preload) else { return Ok(None) };

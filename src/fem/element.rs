@@ -13,6 +13,7 @@ use super::lagrange;
 pub use super::lagrange::{EDGES, Slopes, Values, gauss};
 use crate::problem::order::Order;
 use smallvec::SmallVec;
+use std::borrow::Cow;
 
 /// Return the number of nodes of the simplex with `vertices` vertices.
 pub fn node_count(vertices: usize, order: Order) -> usize {
@@ -191,9 +192,9 @@ impl Rule {
     }
 
     /// Return the values and derivatives of the shape functions of an order at a point, which are those of the table, if there is one.
-    pub fn shape(&self, point: usize, order: Order) -> (Values, Slopes) {
-        let compute = || (values(order, &self.points[point]), derivatives(order, &self.points[point]));
-        self.shapes.get(point).cloned().unwrap_or_else(compute)
+    pub fn shape(&self, point: usize, order: Order) -> Cow<'_, (Values, Slopes)> {
+        let compute = || Cow::Owned((values(order, &self.points[point]), derivatives(order, &self.points[point])));
+        self.shapes.get(point).map_or_else(compute, Cow::Borrowed)
     }
 
     fn add(&mut self, point: &[f64], weight: f64) {

@@ -211,7 +211,8 @@ impl<const D: usize> Space<D> {
         points
     }
 
-    /// What stands for the point of the mesh of a node that is none: one within an edge or a cell of order three or more.
+    /// What stands for the point of the mesh of a node that is none: one within an edge or a cell of order three or more. It is the number of no point,
+    /// since a mesh has at most as many points as there are numbers below it.
     pub const NO_POINT: u32 = u32::MAX;
 
     /// Return the contribution of a cell to the measure of the body, from its corners. In a body of revolution it is the volume of a
@@ -233,7 +234,7 @@ impl<const D: usize> Space<D> {
     /// inverted there.
     pub fn point<'a>(&'a self, i: usize, x: &[[f64; D]], l: &'a [f64], weight: f64) -> Option<CellPoint<'a, D>> {
         let shape = (element::values(self.order, l), element::derivatives(self.order, l));
-        self.point_of(i, x, l, weight, shape)
+        self.point_of(i, x, l, weight, Cow::Owned(shape))
     }
 
     /// Return the point of a cell as [`Space::point`] does, with the values and derivatives of the shape functions there.
@@ -243,9 +244,13 @@ impl<const D: usize> Space<D> {
         x: &[[f64; D]],
         l: &'a [f64],
         weight: f64,
-        (phi, derivatives): (Values, Slopes),
+        shape: Cow<'_, (Values, Slopes)>,
     ) -> Option<CellPoint<'a, D>> {
-        let (gradient, measure) = element::gradients(x, &derivatives)?;
+        let (gradient, measure) = element::gradients(x, &shape.1)?;
+        let phi = match shape {
+            Cow::Owned((phi, _)) => phi,
+            Cow::Borrowed((phi, _)) => phi.clone(),
+        };
         let at = element::interpolate(x, &phi);
         let weight = weight * measure * self.circle(&at);
         Some(CellPoint { space: self, cell: self.cell(i), l, at, phi, gradient, measure, weight })

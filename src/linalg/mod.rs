@@ -85,6 +85,11 @@ impl Csr {
         Self { columns, ptr: vec![0], col: Vec::new(), values: Vec::new() }
     }
 
+    /// Return a matrix with so many rows and no columns.
+    pub fn without_columns(rows: usize) -> Self {
+        Self { ptr: vec![0; rows + 1], ..Self::new(0) }
+    }
+
     /// Return a square matrix with all entries stored, from its values row by row.
     pub fn full(rows: usize, values: Vec<f64>) -> Self {
         let ptr = (0..=rows).map(|i| (i * rows) as i32).collect();

@@ -322,7 +322,7 @@ impl<'a> BodyMatrices<'a> {
 
     /// Return the matrices of a rigid part that has no unknown in the matrix.
     fn without_dofs(slot: &BodySlot) -> Self {
-        let rows = Csr { ptr: vec![0; slot.row_stiffness.len() + 1], ..Csr::new(0) };
+        let rows = Csr::without_columns(slot.row_stiffness.len());
         Self { stiffness: Cow::Owned(Csr::new(0)), rows: Cow::Owned(rows), motions: Cow::Borrowed(&[]) }
     }
 

@@ -148,14 +148,8 @@ impl BodySpec {
     }
 
     /// Return the keys of the elasticity.
-    fn material(&self) -> Material {
-        Material {
-            young: self.young.clone(),
-            poisson: self.poisson.clone(),
-            orthotropic: self.orthotropic.clone(),
-            anisotropic: self.anisotropic.clone(),
-            axes: self.axes.clone(),
-        }
+    fn material(&self) -> Material<'_> {
+        Material::of([&self.young, &self.poisson], &self.orthotropic, &self.anisotropic, &self.axes)
     }
 }
 

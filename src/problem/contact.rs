@@ -282,53 +282,45 @@ impl ContactSpec {
 
     /// Check the forces and motions of obstacles and offsets.
     fn check_forces(&self, geometry: Geometry) -> Result<(), Flaw> {
-        let Self { approach, tilt, force, moment, preload, .. } = self;
-        let turns = [("tilt", tilt), ("moment", moment)];
-        let numbers = [("approach", approach), ("force", force), ("preload", preload)];
-        let given = |key, is_given: bool| is_given.then_some(key);
-        let mut of_obstacle = [given("approach", approach.is_some()), given("at", self.at.is_some())]
-            .into_iter()
-            .chain(turns.map(|(key, turn)| given(key, turn.is_some())));
-        if let (false, Some(key)) = (self.obstacle, of_obstacle.find_map(|key| key)) {
-            let help = "on = \"top\", obstacle = true";
-            return Err(Flaw::new(key, format!("`{key}` of a contact without an obstacle"), "", help));
-        }
-        let exclusive = [
-            numbers.map(|(key, value)| given(key, value.is_some())).to_vec(),
-            turns.map(|(key, turn)| given(key, turn.is_some())).to_vec(),
+        let turn = |axial: &Option<Axial>| axial.map_or_else(Vec::new, |axial| axial.0.to_vec());
+        let number = |value: Option<f64>| value.into_iter().collect::<Vec<f64>>();
+        let mut given = vec![
+            ("approach", number(self.approach)),
+            ("force", number(self.force)),
+            ("preload", number(self.preload)),
+            ("tilt", turn(&self.tilt)),
+            ("moment", turn(&self.moment)),
+            ("at", self.at.map_or_else(Vec::new, |at| at.0.to_vec())),
         ];
-        for keys in exclusive {
-            if let [first, second, ..] = keys.into_iter().flatten().collect::<Vec<_>>()[..] {
+        given.retain(|(_, values)| !values.is_empty());
+        let of = |keys: &[&str]| given.iter().map(|(key, _)| *key).filter(|key| keys.contains(key)).collect::<Vec<_>>();
+        if let (false, [key, ..]) = (self.obstacle, &of(&["approach", "tilt", "moment", "at"])[..]) {
+            let help = "on = \"top\", obstacle = true";
+            return Err(Flaw::new(*key, format!("`{key}` of a contact without an obstacle"), "", help));
+        }
+        for keys in [of(&["approach", "force", "preload"]), of(&["tilt", "moment"])] {
+            if let [first, second, ..] = keys[..] {
                 let message = format!("[[contact]] has both `{first}` and `{second}`");
                 let help = format!("remove `{first}` or `{second}`");
                 return Err(Flaw::new(second, message, "only one of them can hold", &help));
             }
         }
-        if let (Some((key, _)), true) =
-            (turns.iter().find(|(_, turn)| turn.is_some()), geometry.plane == Plane::Axisymmetric)
-        {
+        if let (Plane::Axisymmetric, [key, ..]) = (geometry.plane, &of(&["tilt", "moment"])[..]) {
             let message = "an obstacle that turns in an axisymmetric scene";
             return Err(Flaw::new(*key, message, "it moves along the axis alone", ""));
         }
-        let single = numbers.into_iter().filter_map(|(key, value)| Some((key, (*value)?)));
-        let turned = turns
-            .into_iter()
-            .flat_map(|(key, turn)| turn.iter().flat_map(move |turn| turn.0.map(|value| (key, value))));
-        let all: Vec<(&str, f64)> = single.chain(turned).collect();
-        for &(key, value) in &all {
-            if !value.is_finite() {
-                return Err(Flaw::new(key, format!("`{key}` is {value}"), "", ""));
+        for (key, values) in &given {
+            if let Some(value) = values.iter().find(|value| !value.is_finite()) {
+                return Err(Flaw::new(*key, format!("`{key}` is {value}"), "", ""));
             }
-            if value < 0.0 && (key == "preload" || key == "force" && !self.bond) {
+            if values[0] < 0.0 && (*key == "preload" || *key == "force" && !self.bond) {
                 let help = "a force > 0 presses; only a bonded pair can be pulled";
-                return Err(Flaw::new(key, format!("a negative `{key}`"), "", help));
+                return Err(Flaw::new(*key, format!("a negative `{key}`"), "", help));
             }
         }
-        match &self.path {
-            Some(_) if all.is_empty() => {
-                Err(Flaw::new("path", "`path` without a force or motion of this contact", "", ""))
-            }
-            _ => Ok(()),
+        match self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
+            true => Err(Flaw::new("path", "`path` without a force or motion of this contact", "", "")),
+            false => Ok(()),
         }
     }
 
@@ -338,6 +330,10 @@ impl ContactSpec {
         if a == b {
             let error = Error::scene(&b.place, format!("a contact between `{}` and itself", b.value));
             return Err(error.help("name one surface of each of two bodies").into());
+        }
+        if let Some(name) = self.between.iter().find(|name| name.value == OBSTACLE) {
+            let error = Error::scene(&name.place, format!("a surface called `{OBSTACLE}`"));
+            return Err(error.label("rigid obstacles have this name").help("give the surface another name").into());
         }
         if self.of.is_some() {
             let help = "it says which bodies form pairs with between = \"auto\"";

@@ -81,14 +81,8 @@ impl RegionSpec {
     }
 
     /// Return the keys of the elasticity.
-    fn material(&self) -> Material {
-        Material {
-            young: self.young.clone(),
-            poisson: self.poisson.clone(),
-            orthotropic: self.orthotropic.clone(),
-            anisotropic: self.anisotropic.clone(),
-            axes: self.axes.clone(),
-        }
+    fn material(&self) -> Material<'_> {
+        Material::of([&self.young, &self.poisson], &self.orthotropic, &self.anisotropic, &self.axes)
     }
 }
 
@@ -163,12 +157,12 @@ impl ElasticitySpec {
 }
 
 /// The keys of the elasticity of a body or a region.
-pub(super) struct Material {
-    pub young: Option<Located<Field>>,
-    pub poisson: Option<Located<Field>>,
-    pub orthotropic: Option<Located<Orthotropic>>,
-    pub anisotropic: Option<Located<Vec<Field>>>,
-    pub axes: Option<Located<AxesSpec>>,
+pub(super) struct Material<'a> {
+    young: Option<&'a Located<Field>>,
+    poisson: Option<&'a Located<Field>>,
+    orthotropic: Option<&'a Located<Orthotropic>>,
+    anisotropic: Option<&'a Located<Vec<Field>>>,
+    axes: Option<&'a Located<AxesSpec>>,
 }
 
 /// Advice for the constants of an anisotropic material.
@@ -177,14 +171,27 @@ const UPPER: &str = "C11, C12, ..., C16, C22, ..., C66: the upper triangle by ro
 /// Advice for axes.
 const AXES: &str = "write first = [1, 1, 0] and second = [-1, 1, 0], or angle = \"pi/6\" and axis = [0, 0, 1]";
 
-impl Material {
+impl<'a> Material<'a> {
+    /// Collect the keys.
+    pub fn of(
+        [young, poisson]: [&'a Option<Located<Field>>; 2],
+        orthotropic: &'a Option<Located<Orthotropic>>,
+        anisotropic: &'a Option<Located<Vec<Field>>>,
+        axes: &'a Option<Located<AxesSpec>>,
+    ) -> Self {
+        let (young, poisson, axes) = (young.as_ref(), poisson.as_ref(), axes.as_ref());
+        Self { young, poisson, orthotropic: orthotropic.as_ref(), anisotropic: anisotropic.as_ref(), axes }
+    }
+
     /// Check the keys; `table` is the name of their table in messages.
     pub fn check(&self, table: &str) -> Result<(), Flaw> {
-        let Self { young, poisson, orthotropic, anisotropic, axes } = self;
-        let [tensor, matrix] = [("orthotropic", place(orthotropic)), ("anisotropic", place(anisotropic))];
-        only_one(table, &[("young", place(young)), tensor, matrix])?;
-        only_one(table, &[("poisson", place(poisson)), tensor, matrix])?;
-        if let Some(constants) = anisotropic.as_ref().filter(|constants| constants.len() != 21) {
+        let Self { young, poisson, orthotropic, anisotropic, axes } = *self;
+        let [tensor, matrix] =
+            [("orthotropic", orthotropic.map(|all| &all.place)), ("anisotropic", anisotropic.map(|all| &all.place))];
+        for (key, value) in [("young", young), ("poisson", poisson)] {
+            only_one(table, &[(key, value.map(|value| &value.place)), tensor, matrix])?;
+        }
+        if let Some(constants) = anisotropic.filter(|constants| constants.len() != 21) {
             let message = format!("an anisotropic material has 21 constants, not {}", constants.len());
             return Err(Flaw::new("anisotropic", message, "", UPPER));
         }
@@ -197,7 +204,7 @@ impl Material {
                 return Err(Flaw::new("", format!("{table} has no `{key}`"), &format!("`{key}` is missing"), others));
             }
         }
-        check_isotropic(young.as_deref(), poisson.as_deref())?;
+        check_isotropic(young.map(|young| &young.value), poisson.map(|poisson| &poisson.value))?;
         match axes {
             None => Ok(()),
             Some(_) => Err(Flaw::new(
@@ -210,24 +217,24 @@ impl Material {
     }
 
     /// Return the elastic constants; `near` is their place if they have none.
-    pub fn elasticity(self, near: &Place) -> ElasticitySpec {
-        let zero = || Located::new(Field::Constant(0.0), near.clone());
+    pub fn elasticity(&self, near: &Place) -> ElasticitySpec {
         let (constants, place) = match (self.orthotropic, self.anisotropic) {
             (Some(Located { value, place }), _) => {
-                let Orthotropic { e1, e2, e3, nu12, nu13, nu23, g12, g13, g23 } = value;
+                let Orthotropic { e1, e2, e3, nu12, nu13, nu23, g12, g13, g23 } = value.clone();
                 (Constants::Orthotropic(Box::new([e1, e2, e3, nu12, nu13, nu23, g12, g13, g23])), place)
             }
             (None, Some(Located { value, place })) => {
-                let mut values = value.into_iter();
-                let next = |_| values.next().unwrap_or(Field::Constant(0.0));
-                (Constants::Anisotropic(Box::new(std::array::from_fn(next))), place)
+                let at = |k: usize| value.get(k).cloned().unwrap_or(Field::Constant(0.0));
+                (Constants::Anisotropic(Box::new(std::array::from_fn(at))), place)
             }
             (None, None) => {
-                let [young, poisson] = [self.young, self.poisson].map(|field| field.unwrap_or_else(zero));
-                (Constants::Isotropic { young: young.value, poisson: poisson.value }, young.place)
+                let value =
+                    |field: Option<&Located<Field>>| field.map_or(Field::Constant(0.0), |field| field.value.clone());
+                let constants = Constants::Isotropic { young: value(self.young), poisson: value(self.poisson) };
+                (constants, self.young.map_or(near, |young| &young.place))
             }
         };
-        ElasticitySpec { constants, axes: self.axes.map(|axes| axes.value), place }
+        ElasticitySpec { constants, axes: self.axes.map(|axes| axes.value.clone()), place: place.clone() }
     }
 }
 

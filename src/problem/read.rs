@@ -374,8 +374,8 @@ impl<'de, L: Deserialize<'de>, T: Deserialize<'de>> Deserialize<'de> for Form<L,
     }
 }
 
-/// The smallest absolute value of a number that is not zero; its reciprocal is the largest. Energies contain squares of loads and
-/// displacements, and their rounding errors are 1e-32 times as large.
+/// The smallest absolute value of a number that is not zero; its reciprocal is the largest. Energies contain squares of loads and displacements, 1e-220
+/// and more, and roundoff is 1e-16 of a force and as much of a displacement: 1e-252 in an energy, where the least normal double is 2e-308.
 const LEAST: f64 = 1e-110;
 
 /// A number or an expression. The data of the scene are known when it is read.
@@ -453,7 +453,7 @@ impl JsonSchema for Field {
 pub struct Vector(pub [Field; 3]);
 
 impl Vector {
-    /// Return the vector of components, of which there must be as many as `count`.
+    /// Return the vector with these components. There must be `count` of them.
     fn of(components: Located<Vec<Located<Field>>>, count: usize) -> Checked<Self> {
         let Located { value: items, place } = components;
         if items.len() != count {
