@@ -49,7 +49,7 @@ pub use crate::problem::{
     RegionSpec, RobinRule, SolverSpec, SpringKind, SpringSpec, Start, StopRule, Support, Units, Zone,
 };
 pub use crate::run::recorder::Recorder;
-pub use crate::scene::{AdaptSpec, Most, OutputSpec, Precision, Scene, load};
+pub use crate::scene::{AdaptSpec, Most, OutputSpec, Precision, Quantity, Scene, load};
 
 use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;

@@ -16,6 +16,7 @@ use crate::linalg::axpy;
 use crate::model::field::residual;
 use crate::model::layer::meeting_slopes;
 use crate::model::{Field, Layer, LinearStep, Model};
+use crate::scene::Quantity;
 use held::HoldingSprings;
 pub use pressure::{Cause, Guess, softness};
 use pressure::{LayerError, PressureErrors, SAFETY};
@@ -44,18 +45,29 @@ pub struct Estimate {
     pub guesses: Vec<Option<Guess>>,
     /// Relative error of the normal displacements of all contact surfaces, prescribed ones included, measured likewise.
     pub displacement: f64,
+    /// Relative error of the sum of the pressures of each pair, with the factor `SAFETY`.
+    pub force: Vec<f64>,
 }
 
 impl Estimate {
-    /// Return the largest of the errors of pressures and displacements.
-    pub fn largest(&self) -> f64 {
-        self.pressure.iter().copied().fold(self.displacement, f64::max)
+    /// Return the largest of the errors of these quantities.
+    pub fn largest(&self, of: Quantity) -> f64 {
+        self.with_pressures(of, self.pressure.iter().copied())
     }
 
-    /// Return the largest of the errors of displacements, and of pressures beside sharp ends of contacts.
-    pub fn largest_beside_ends(&self) -> f64 {
+    /// Return the same with the errors of pressures beside sharp ends of contacts.
+    pub fn largest_beside_ends(&self, of: Quantity) -> f64 {
         let beside = |(whole, end): (&f64, &f64)| (whole * whole - end * end).max(0.0).sqrt();
-        self.pressure.iter().zip(&self.ends).map(beside).fold(self.displacement, f64::max)
+        self.with_pressures(of, self.pressure.iter().zip(&self.ends).map(beside))
+    }
+
+    fn with_pressures(&self, of: Quantity, pressures: impl Iterator<Item = f64>) -> f64 {
+        match of {
+            Quantity::All => pressures.fold(self.displacement, f64::max),
+            Quantity::Pressures => pressures.fold(0.0, f64::max),
+            Quantity::Displacements => self.displacement,
+            Quantity::Forces => self.force.iter().copied().fold(0.0, f64::max),
+        }
     }
 
     /// Return the pair with the largest error at its sharp ends, and the error.
@@ -125,6 +137,7 @@ pub fn estimate(
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
         pressure: pressures.relative,
+        force: pressures.force,
         ends: pressures.ends,
         guesses: pressures.guesses,
         pressure_error: pressures.error,

@@ -15,7 +15,7 @@ use crate::petsc::Session;
 use crate::problem::history::History;
 use crate::problem::{MeshSource, MethodName};
 use crate::run::{self, Begin, Built, Clock, Done, report};
-use crate::scene::{AdaptSpec, Scene};
+use crate::scene::{AdaptSpec, Quantity, Scene};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -246,8 +246,8 @@ impl AdaptiveRun {
         if !done.outcome.status.is_solved() || self.limit.is_some() {
             return false;
         }
-        let (asked, error) = (goal.error.value, estimate.largest());
-        if error <= asked || self.has_costly_end(done, estimate, asked) {
+        let (asked, error) = (goal.error.value, estimate.largest(goal.of));
+        if error <= asked || self.has_costly_end(done, estimate, &goal) {
             return self.end_meshes();
         }
         if self.rounds.len() >= goal.rounds {
@@ -272,7 +272,7 @@ impl AdaptiveRun {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
         // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
         let degree = (0..model.meshed()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
-        let share = (AIM * goal.error.value / estimate.largest()).max(LEAST).powf(2.0 * degree / (degree + 1.0));
+        let share = (AIM * goal.error.value / estimate.largest(goal.of)).max(LEAST).powf(2.0 * degree / (degree + 1.0));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);
@@ -289,11 +289,15 @@ impl AdaptiveRun {
     ///
     /// Without a layer the pressure is K r^(lambda - 1) at the distance r from the end, and facets of size h miss the order h^(lambda - 1/2) of it. A
     /// punch with right angles has lambda = 0.774: a half of the error takes facets of a thirteenth.
-    fn has_costly_end(&mut self, done: &Done, estimate: &Estimate, asked: f64) -> bool {
+    fn has_costly_end(&mut self, done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> bool {
+        if !matches!(goal.of, Quantity::All | Quantity::Pressures) {
+            return false;
+        }
         let Some((pair, error)) = estimate.largest_end() else { return false };
+        let asked = goal.error.value;
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         let own = MeshError { cells, error };
-        let beside = estimate.largest_beside_ends();
+        let beside = estimate.largest_beside_ends(goal.of);
         let Some(before) = self.last_end.replace(own).filter(|_| beside <= asked && error > 0.0) else { return false };
         let needed = own.cells_for(before, asked);
         if needed <= COSTLY * cells {
@@ -318,7 +322,12 @@ impl AdaptiveRun {
         let [.., first, _, last] = &self.rounds[..] else { return None };
         let error = |round: &RoundReport| MeshError {
             cells: round.cells as f64,
-            error: round.pressure.max(round.displacement),
+            error: match goal.of {
+                Quantity::All => round.pressure.max(round.displacement),
+                Quantity::Pressures => round.pressure,
+                Quantity::Displacements => round.displacement,
+                Quantity::Forces => round.force,
+            },
         };
         let asked = goal.error.value;
         let cells = error(last).cells_for(error(first), asked).max(GROWTH * last.cells as f64);
@@ -337,8 +346,9 @@ impl AdaptiveRun {
         self.rounds.push(RoundReport {
             cells: discrete.bodies.iter().map(|body| body.cells).sum(),
             dofs: discrete.bodies.iter().map(|body| body.dofs).sum(),
-            pressure: estimate.pressure.iter().copied().fold(0.0, f64::max),
+            pressure: estimate.largest(Quantity::Pressures),
             displacement: estimate.displacement,
+            force: estimate.largest(Quantity::Forces),
             energy: estimate.energy,
             iterations: done.outcome.iterations,
             seconds: total - self.seconds,

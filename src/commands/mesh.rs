@@ -10,17 +10,18 @@ use crate::mesh::{Group, Loaded, Mesh, MeshOrigin};
 use crate::output::report::readable;
 use crate::output::terminal::ProgressLine;
 use crate::output::{say, write_whole};
-use crate::problem::Order;
+use crate::problem::{MeshSource, Order};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
 use serde::Serialize;
+use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The command line of `winkler mesh`.
 #[derive(clap::Args)]
 pub struct MeshArgs {
-    /// Scene file (TOML)
+    /// Scene file (TOML), or a file with a shape or a mesh, whose groups a scene can name
     #[arg(value_name = "SCENE")]
     scene: PathBuf,
     /// Replace a key of the scene, for example mesh.set.n=64; may be repeated
@@ -80,10 +81,9 @@ struct GroupFacts {
 /// # Errors
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
-    let scene = crate::scene::load(&request.scene, &request.overrides)?;
-    let facts = match scene.dimension.value {
-        2 => load::<2>(&scene, interrupt, request)?,
-        _ => load::<3>(&scene, interrupt, request)?,
+    let facts = match request.scene.extension().is_none_or(|ending| ending == "toml") {
+        true => of_scene(interrupt, request)?,
+        false => of_file(interrupt, request)?,
     };
     match request.json {
         true => say(format_args!("{:#}", serde_json::json!(facts)))?,
@@ -92,35 +92,79 @@ pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
     Ok(0)
 }
 
-/// Load the mesh, write it if a file was asked for, and return what is to be printed.
-fn load<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
-    let began = Instant::now();
+/// Return the facts of a scene's mesh.
+fn of_scene(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
+    let scene = crate::scene::load(&request.scene, &request.overrides)?;
+    match scene.dimension.value {
+        2 => checked::<2>(&scene, interrupt, request),
+        _ => checked::<3>(&scene, interrupt, request),
+    }
+}
+
+/// Load the mesh of a scene and check its bodies.
+fn checked<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
+    let (facts, mesh) = load::<D>(&scene.mesh, order, interrupt, request)?;
+    let verified = verify(scene, &Serial, || Ok(mesh))?;
+    Ok(MeshFacts {
+        title: scene.title.clone(),
+        warnings: [facts.warnings, verified.notes.clone()].concat(),
+        splits: verified.splits(),
+        bodies: bodies(&verified)?,
+        groups: group_facts(&verified.mesh),
+        ..facts
+    })
+}
+
+/// Return the facts of a mesh, or of a shape or script that Gmsh meshes: in space, or in the plane where it has no cells in space.
+fn of_file(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
+    if let Some(set) = request.overrides.first() {
+        return Err(Error::new(
+            Kind::Usage,
+            format!("`--set {set}` changes a scene, and `{}` is none", request.scene.display()),
+        )
+        .help("write a scene with this file as its mesh"));
+    }
+    let source = MeshSource::of_argument(&request.scene)?;
+    let facts = |dimension: usize| match dimension {
+        2 => load::<2>(&source, Order::P1, interrupt, request).map(|(facts, _)| facts),
+        _ => load::<3>(&source, Order::P1, interrupt, request).map(|(facts, _)| facts),
+    };
+    facts(3).or_else(|error| facts(2).map_err(|_| error))
+}
+
+/// Load a mesh, and write it if a file was asked for. Return it with the facts that need no scene.
+fn load<const D: usize>(
+    source: &MeshSource,
+    order: Order,
+    interrupt: &Interrupt,
+    request: &MeshArgs,
+) -> Result<(MeshFacts, Mesh<D>)> {
+    let began = Instant::now();
     let line = (!request.json).then(|| ProgressLine::new("mesh", None));
-    let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(&scene.mesh, order, interrupt)?;
+    let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(source, order, interrupt)?;
     drop(line);
     let seconds = began.elapsed().as_secs_f64();
     request.output.as_ref().map_or(Ok(()), |path| write(path, &file, D))?;
-    let verified = verify(scene, &Serial, || Ok(mesh))?;
-    let mesh = &verified.mesh;
     let of_mesh = [in_parts(mesh.split), made_straight(mesh.straightened)];
-    Ok(MeshFacts {
-        title: scene.title.clone(),
+    let facts = MeshFacts {
+        title: request.scene.display().to_string(),
         file,
         origin: match origin {
-            MeshOrigin::File => "the scene's own file",
+            MeshOrigin::File => "the file itself",
             MeshOrigin::Cache => "from the cache",
             MeshOrigin::Gmsh => "made by Gmsh",
         },
-        warnings: [notes, verified.notes.clone()].concat().into_iter().chain(of_mesh.into_iter().flatten()).collect(),
+        warnings: notes.into_iter().chain(of_mesh.into_iter().flatten()).collect(),
         seconds,
         dimension: D,
         order: mesh.order.degree(),
         nodes: mesh.points.len(),
-        splits: verified.splits(),
-        bodies: bodies(&verified)?,
-        groups: mesh.groups.iter().map(|group| group_facts(mesh, group)).collect(),
-    })
+        splits: Vec::new(),
+        bodies: Vec::new(),
+        groups: group_facts(&mesh),
+    };
+    Ok((facts, mesh))
 }
 
 fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
@@ -150,10 +194,13 @@ fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
     Ok(bodies)
 }
 
-fn group_facts<const D: usize>(mesh: &Mesh<D>, group: &Group) -> GroupFacts {
-    let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
-    let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
-    GroupFacts { name: group.name.to_string(), dimension: group.dimension, simplices: group.len(), low, high }
+fn group_facts<const D: usize>(mesh: &Mesh<D>) -> Vec<GroupFacts> {
+    let of_group = |group: &Group| {
+        let points = group.connectivity.iter().map(|&point| mesh.in_scene(mesh.points[point as usize]));
+        let [low, high] = bounds(points).map(|corner| corner[..D].to_vec());
+        GroupFacts { name: group.name.to_string(), dimension: group.dimension, simplices: group.len(), low, high }
+    };
+    mesh.groups.iter().map(of_group).collect()
 }
 
 /// Return the facts as lines for people.
@@ -167,8 +214,13 @@ fn in_lines(facts: &MeshFacts) -> String {
     }
     lines.extend(facts.warnings.iter().map(|warning| format!("  warning: {warning}")));
     let corner = |x: &[f64]| x.iter().map(|&x| readable(x, 4)).collect::<Vec<_>>().join(", ");
-    for group in facts.groups.iter().filter(|group| group.dimension < facts.dimension) {
-        let kind = ["points", "lines", "triangles"][group.dimension];
+    // bodies have lines of their own
+    let is_listed = |group: &&GroupFacts| group.dimension < facts.dimension || facts.bodies.is_empty();
+    let mut listed: Vec<&GroupFacts> = facts.groups.iter().filter(is_listed).collect();
+    // shapes have many points, which few look for
+    listed.sort_by_key(|group| Reverse(group.dimension));
+    for group in listed {
+        let kind = ["points", "lines", "triangles", "tetrahedra"][group.dimension];
         let (low, high) = (corner(&group.low), corner(&group.high));
         lines.push(format!("  group {}: {} {kind}, ({low}) to ({high})", group.name, group.simplices));
     }

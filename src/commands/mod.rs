@@ -116,7 +116,8 @@ pub struct SceneArgs {
     /// Estimate the error of the discretisation (short for --set estimate=true)
     #[arg(long)]
     estimate: bool,
-    /// Adapt the mesh until the estimated error of pressures and displacements is at most this (short for --set adapt.error=E)
+    /// Adapt the mesh until the estimated errors of pressures and displacements, or of what adapt.of says, are at most this (short for --set
+    /// adapt.error=E)
     #[arg(long, value_name = "E", allow_hyphen_values = true)]
     tolerance: Option<String>,
     /// Print the report as JSON

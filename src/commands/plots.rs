@@ -80,12 +80,14 @@ pub fn units(scene: &Scene) -> Option<Units> {
 
 /// Return the units of a scene as they stand behind the numbers of the closing lines.
 pub fn unit_words(scene: &Scene) -> UnitWords {
-    let is_plane = scene.dimension.value == 2 && scene.plane != Plane::Axisymmetric;
-    units(scene).map_or(UnitWords::default(), |units| UnitWords {
+    let has_thickness = scene.dimension.value == 2 && scene.plane != Plane::Axisymmetric;
+    let without = UnitWords { is_plane: scene.dimension.value == 2, ..UnitWords::default() };
+    units(scene).map_or(without.clone(), |units| UnitWords {
         length: format!(" {}", units.length),
-        extent: format!(" {}{}", units.length, if is_plane { "" } else { "²" }),
+        extent: format!(" {}{}", units.length, if has_thickness { "" } else { "²" }),
         stress: format!(" {}", units.stress),
         force: format!(" {}", units.force),
+        ..without
     })
 }
 

@@ -47,6 +47,8 @@ pub struct EstimatedSolution {
     pressure: Vec<f64>,
     /// Relative error of the normal displacements.
     displacement: f64,
+    /// Relative errors of the sums of the pressures, one for each pair.
+    force: Vec<f64>,
     /// The solution, one table for each pair.
     tables: Vec<ContactTable>,
 }
@@ -54,7 +56,12 @@ pub struct EstimatedSolution {
 impl EstimatedSolution {
     /// Return the errors of an estimate together with its solution.
     pub fn new(estimate: &Estimate, tables: Vec<ContactTable>) -> Self {
-        Self { pressure: estimate.pressure.clone(), displacement: estimate.displacement, tables }
+        Self {
+            pressure: estimate.pressure.clone(),
+            displacement: estimate.displacement,
+            force: estimate.force.clone(),
+            tables,
+        }
     }
 
     /// Correct the estimate of the next mesh, whose solution is `tables`, by the difference of both solutions.
@@ -72,8 +79,17 @@ impl EstimatedSolution {
             *error *= excess;
             estimate.ends[i] *= excess;
         }
+        for (i, error) in estimate.force.iter_mut().enumerate() {
+            let [old, new] = [&self.tables[i], &tables[i]].map(force);
+            *error *= excess(&L2Norms { difference: (new - old).abs(), old, new }, *error, self.force[i]);
+        }
         estimate.displacement *= excess(&norms.displacement, estimate.displacement, self.displacement);
     }
+}
+
+/// Return the sum of the sizes of a pair's pressures.
+fn force(table: &ContactTable) -> f64 {
+    table.weight.iter().zip(&table.pressure).map(|(area, p)| area * p.abs()).sum()
 }
 
 /// Return the names of a pair's bodies, the same whichever of them carries the points.

@@ -1,6 +1,7 @@
 //! The files of the results of a run: tables, plots, fields, those of each load step included, the page, and the report, which lists all files.
 
 use super::adapt::AdaptiveRun;
+use super::interpolate::PointTree;
 use super::plots::{self, Plots};
 use crate::contact::ContactPair;
 use crate::discretize::BodyInfo;
@@ -106,7 +107,7 @@ impl ResultFiles<'_> {
     fn page(&self, report: &Report, recovered: &All, shown: &[usize], plots: &Plots) -> Result<()> {
         let (done, discrete) = (self.done, &self.done.built.discrete);
         let own = discrete.bodies.iter().zip(recovered).enumerate().filter_map(|(body, (info, recovered))| {
-            Some((body, Surface::of_body(recovered.as_ref()?.as_ref().ok()?.field(info))))
+            Some((body, Surface::of_body(recovered.as_ref()?.as_ref().ok()?.field(info), &info.points)))
         });
         let parts: Vec<(usize, Surface)> =
             gather(&*done.model().exchange, own.collect::<Vec<_>>())?.into_iter().flatten().collect();
@@ -120,10 +121,13 @@ impl ResultFiles<'_> {
         // in the plane contact surfaces are lines, which have plots
         let in_space = shown.iter().filter(|_| scene.dimension.value == 3);
         let names = stems(done);
+        let mut bodies: Vec<Surface> = of_bodies.into_iter().map(Surface::join).collect();
+        mark(&mut bodies, done);
         let page = Page {
             report,
             units: plots::units(scene),
-            bodies: of_bodies.into_iter().map(Surface::join).collect(),
+            bodies,
+            marks: &done.built.marks,
             contacts: in_space
                 .map(|&i| Surface::of_contact(report::contact_surface(&names[i], done, i, &displacement[i])))
                 .collect(),
@@ -147,6 +151,19 @@ impl ResultFiles<'_> {
         names.sort();
         names.dedup();
         names
+    }
+}
+
+/// Mark supports, loads, springs and contact surfaces of the bodies.
+fn mark(bodies: &mut [Surface], done: &Done) {
+    let (model, layer) = (done.model(), &done.outcome.layer);
+    for (index, body) in bodies.iter_mut().enumerate() {
+        let own: Vec<usize> = (0..model.pairs.len()).filter(|&i| model.pairs[i].bodies.contains(&index)).collect();
+        let points: Vec<[f64; 3]> = own.iter().flat_map(|&i| &model.pairs[i].position).copied().collect();
+        let pressure: Vec<f64> = own.iter().flat_map(|&i| &layer.pressure[model.range(i)]).copied().collect();
+        let tree = PointTree::new(&points);
+        let is_closed = |x| tree.inverse_distances(&x, 1).iter().any(|&(q, _)| pressure[q] != 0.0);
+        body.mark(done.built.marks.iter().filter(|mark| mark.body == index), &is_closed);
     }
 }
 

@@ -81,6 +81,13 @@ impl ContactSurface {
         &self.points
     }
 
+    /// Return the contact points on the corners of facets without a partner, each once or more.
+    pub fn beside_uncovered(&self) -> impl Iterator<Item = usize> {
+        let facets = self.connectivity.chunks_exact(self.cell.stride()).zip(&self.cover);
+        let nodes = facets.filter(|(_, cover)| **cover == 0.0).flat_map(|(facet, _)| facet);
+        nodes.flat_map(|&node| &self.sources[node as usize]).map(|(q, _)| *q)
+    }
+
     /// Return the mesh with arrays of values at the contact points. Points of the mesh without a contact point get NaN. Extrapolated values stay between those from which they
     /// come, so that a pressure is never negative nor above its peak.
     pub fn grid(&self, name: String, arrays: Vec<FieldArray>) -> UnstructuredGrid {

@@ -6,6 +6,7 @@
 mod axis;
 mod fields;
 pub mod folder;
+mod mark;
 pub mod plot;
 pub mod report;
 pub mod tables;
@@ -15,6 +16,7 @@ pub mod vtu;
 
 pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGrid};
 pub use folder::{Folder, make_folder, safe_name, write_whole};
+pub use mark::{Mark, Role};
 pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,

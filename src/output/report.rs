@@ -146,6 +146,8 @@ pub struct EstimateReport {
     pub displacement: f64,
     /// Error of the pressures at the contact points of each pair, root of mean squares.
     pub pressure: Vec<f64>,
+    /// Error of the sum of the pressures of each pair.
+    pub force: Vec<f64>,
     /// Fraction of the squared energy error in each body, in the order of the scene.
     pub bodies: Vec<f64>,
 }
@@ -161,6 +163,9 @@ pub struct RoundReport {
     pub pressure: f64,
     /// Error of the normal displacements at the contact points.
     pub displacement: f64,
+    /// Error of the sums of pressures, the largest of the pairs.
+    #[serde(default)]
+    pub force: f64,
     /// Error in the energy norm.
     pub energy: f64,
     /// Iterations.
@@ -443,17 +448,37 @@ pub struct UnitWords {
     pub stress: String,
     /// Unit of forces.
     pub force: String,
+    /// Whether vectors have two components: in the plane and of revolution.
+    pub is_plane: bool,
+}
+
+impl UnitWords {
+    /// Return the components of a vector of the scene.
+    fn components<'v>(&self, v: &'v [f64; 3]) -> &'v [f64] {
+        &v[..if self.is_plane { 2 } else { 3 }]
+    }
+
+    fn point(&self, x: [f64; 3]) -> String {
+        vector(self.components(&x), 0.0, 4)
+    }
+
+    /// Return a force among forces of the size `scale`.
+    fn vector(&self, v: [f64; 3], scale: f64) -> String {
+        vector(self.components(&v), scale, 6)
+    }
 }
 
 impl RoundReport {
     /// Heads of the columns of [`Self::line`].
-    pub const HEADS: &str = "  mesh      cells       dofs   pressure  displacement     energy  iterations   seconds";
+    pub const HEADS: &str =
+        "  mesh      cells       dofs   pressure  displacement      force     energy  iterations   seconds";
 
     /// Return the mesh with this number, its estimated errors and its cost as a line for the terminal.
     pub fn line(&self, number: usize) -> String {
-        let [pressure, displacement, energy] = [self.pressure, self.displacement, self.energy].map(|e| sci(e, 2));
+        let errors = [self.pressure, self.displacement, self.force, self.energy];
+        let [pressure, displacement, force, energy] = errors.map(|error| sci(error, 2));
         format!(
-            "  {number:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {energy:>10} {:>11} {:>9}",
+            "  {number:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {force:>10} {energy:>10} {:>11} {:>9}",
             self.cells,
             self.dofs,
             self.iterations,
@@ -471,10 +496,23 @@ impl Report {
             lines.extend(self.steps.iter().enumerate().map(|(index, step)| self.step_line(index + 1, step, units)));
         }
         lines.extend(self.left_out.iter().map(|left_out| format!("  {left_out}")));
-        lines.extend(busiest(&self.pairs, LISTED).into_iter().map(|i| pair_line(&self.pairs[i], units)));
-        lines.extend(self.balance_lines(units));
+        let listed = busiest(&self.pairs, LISTED).into_iter().map(|i| &self.pairs[i]);
+        // where loads push bodies without end, or against nothing, there is no state of them to tell
+        if !self.has_no_state() {
+            lines.extend(listed.map(|pair| pair_line(pair, self.is_bonded(pair), units)));
+            lines.extend(self.balance_lines(units));
+        }
         lines.extend(warning_lines(&self.warnings, "report.json"));
         lines.join("\n")
+    }
+
+    fn is_bonded(&self, pair: &PairReport) -> bool {
+        self.settings["contact"][pair.contact]["bond"] == true
+    }
+
+    /// Return whether the run ended since the loads have no equilibrium.
+    fn has_no_state(&self) -> bool {
+        matches!(self.status.as_str(), "underconstrained" | "unbounded")
     }
 
     /// Return the line with the counters, errors and times.
@@ -485,11 +523,11 @@ impl Report {
             (None, None) => String::new(),
         };
         format!(
-            "  {}: {} iterations, {} sweeps, {} factorizations, residual {}{error}, {} dofs, {} s",
+            "  {}: {}, {}, {}, residual {}{error}, {} dofs, {} s",
             self.method,
-            self.iterations,
-            self.sweeps,
-            self.factorizations,
+            counted(self.iterations, "iteration"),
+            counted(self.sweeps, "sweep"),
+            counted(self.factorizations, "factorization"),
             sci(self.residual.unwrap_or(f64::NAN), 2),
             self.dofs,
             seconds(self.times.get("total").copied().unwrap_or(f64::NAN)),
@@ -499,11 +537,12 @@ impl Report {
     /// Return the line on the estimated error of the discretisation.
     fn discretization_line(&self) -> Option<String> {
         let error = self.discretization_error.as_ref()?;
-        let pressures: Vec<String> = error.pressure.iter().map(|&error| sci(error, 1)).collect();
+        let words = |errors: &[f64]| errors.iter().map(|&error| sci(error, 1)).collect::<Vec<_>>().join(" and ");
         Some(format!(
-            "  estimated discretisation error: pressure {}, displacement {}, energy norm {}",
-            pressures.join(" and "),
+            "  estimated discretisation error: pressure {}, displacement {}, force {}, energy norm {}",
+            words(&error.pressure),
             sci(error.displacement, 1),
+            words(&error.force),
             sci(error.energy, 1)
         ))
     }
@@ -512,12 +551,14 @@ impl Report {
     fn step_line(&self, number: usize, step: &StepReport, units: &UnitWords) -> String {
         let UnitWords { stress, force, .. } = units;
         let pairs = match step.pairs.len() {
+            _ if self.has_no_state() && number == self.steps.len() => "no equilibrium".to_owned(),
             ..=LISTED => {
                 let pairs = step.pairs.iter().zip(&self.pairs).map(|(at, pair)| {
                     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
-                    let (peak, sum) = (readable(at.peak_pressure, 6), vector(at.force));
+                    let (peak, sum) = (readable(at.peak_pressure, 6), units.vector(at.force, 0.0));
+                    let closed = if self.is_bonded(pair) { "compressed" } else { "closed" };
                     format!(
-                        "{a} - {b}: force on `{on}` {sum}{force}, peak pressure {peak}{stress}, {} points closed",
+                        "{a} - {b}: force on `{on}` {sum}{force}, peak pressure {peak}{stress}, {} points {closed}",
                         at.closed
                     )
                 });
@@ -531,7 +572,7 @@ impl Report {
         };
         let factors = step.factors.iter().map(|(name, factor)| format!("{name} {}", readable(*factor, 4)));
         let factors = factors.collect::<Vec<_>>().join(", ");
-        format!("  step {number}, {factors}: {} iterations, {}: {pairs}", step.iterations, step.status)
+        format!("  step {number}, {factors}: {}, {}: {pairs}", counted(step.iterations, "iteration"), step.status)
     }
 
     /// Return the words on the largest displacement and von Mises stress of all bodies, empty where none is known.
@@ -566,13 +607,16 @@ impl Report {
 /// Return the words on the largest displacement and von Mises stress, followed by a semicolon; empty where a field is not known.
 fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units: &UnitWords) -> String {
     let (Some(displacement), Some(von_mises)) = (displacement, von_mises) else { return String::new() };
+    if displacement == 0.0 && von_mises == 0.0 {
+        return "at rest; ".to_owned();
+    }
     let UnitWords { length, stress, .. } = units;
     let (displacement, von_mises) = (sci(displacement, 3), readable(von_mises, 6));
     format!("displacement up to {displacement}{length}, von Mises stress up to {von_mises}{stress}{place}; ")
 }
 
 /// Return the line of a pair, which its surfaces name in the order of the scene.
-fn pair_line(pair: &PairReport, units: &UnitWords) -> String {
+fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
     // a bonded pair may pull everywhere
     if pair.peak_pressure <= 0.0 && pair.force[0] == [0.0; 3] || pair.peak_pressure.is_nan() {
@@ -580,18 +624,20 @@ fn pair_line(pair: &PairReport, units: &UnitWords) -> String {
     }
     let UnitWords { extent, stress, force, length, .. } = units;
     let moved = |ObstacleReport { approach, tilt, moment, .. }: &ObstacleReport| {
-        let turned = || format!(", tilt {}, moment {}", vector(*tilt), vector(*moment));
+        let turned = || format!(", tilt {}, moment {}", vector(tilt, 0.0, 6), vector(moment, 0.0, 6));
         let turned = if *tilt == [0.0; 3] { String::new() } else { turned() };
         format!(", approach {}{length}{turned}", sci(*approach, 5))
     };
     let offset = pair.offset.map(|offset| format!(", offset {}{length}", sci(offset, 5)));
     let more = pair.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
     let what = if pair.extent.is_area() { "area" } else { "length" };
+    let [closed, open] = if is_bonded { ["compressed", "pulled"] } else { ["in contact", "open"] };
+    let scale = pair.peak_pressure.abs() * (pair.extent.contact() + pair.extent.open());
     format!(
-        "  {a} - {b}: force on `{on}` {}{force}{more}, peak pressure {}{stress} at {}, {what} in contact {}{extent}, open {}{extent}",
-        vector(pair.force[0]),
+        "  {a} - {b}: force on `{on}` {}{force}{more}, peak pressure {}{stress} at {}, {what} {closed} {}{extent}, {open} {}{extent}",
+        units.vector(pair.force[0], scale),
         readable(pair.peak_pressure, 6),
-        point(pair.peak_at),
+        units.point(pair.peak_at),
         readable(pair.extent.contact(), 6),
         readable(pair.extent.open(), 6)
     )
@@ -603,9 +649,12 @@ pub const UNSETTLED: f64 = 0.5;
 
 /// Return the line of a body with its reactions and imbalances.
 fn balance_line(body: &BodyReport, units: &UnitWords) -> String {
-    let BalanceReport { supports, springs, rigid, force_imbalance, moment_imbalance, .. } = &body.balance;
+    let BalanceReport { loads, contacts, supports, springs, rigid, force_imbalance, moment_imbalance, .. } =
+        &body.balance;
+    let all = [loads, contacts].into_iter().chain(supports).chain(springs).chain(rigid);
+    let scale = all.flat_map(|part| part.force).fold(0.0, |most: f64, f| most.max(f.abs()));
     let named = |verb: &str, parts: &mut dyn Iterator<Item = &ForceReport>| {
-        let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, vector(part.force))).collect();
+        let all: Vec<_> = parts.map(|part| format!("{} {}", part.on, units.vector(part.force, scale))).collect();
         if all.is_empty() { String::new() } else { format!("{verb} {}{}; ", all.join(", "), units.force) }
     };
     let reactions = named("held by", &mut supports.iter().chain(springs)) + &named("rigid", &mut rigid.iter());
@@ -613,7 +662,7 @@ fn balance_line(body: &BodyReport, units: &UnitWords) -> String {
     let doubt = change.map_or(String::new(), |change| {
         format!(", not to be trusted: it changes by {:.0} % within a cell there", 100.0 * change)
     });
-    let place = body.max_von_mises_at.map_or(String::new(), |x| format!(" at {}{doubt}", point(x)));
+    let place = body.max_von_mises_at.map_or(String::new(), |x| format!(" at {}{doubt}", units.point(x)));
     let fields = largest(body.max_displacement, body.max_von_mises, &place, units);
     format!(
         "  {}: {fields}{reactions}imbalance {} of forces, {} of moments",
@@ -632,12 +681,25 @@ pub fn warning_lines(warnings: &[String], others: &str) -> Vec<String> {
     lines
 }
 
-fn point(x: [f64; 3]) -> String {
-    format!("({})", x.map(|x| readable(x, 4)).join(", "))
+/// Return a number with its noun, `1 sweep` or `2 sweeps`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-fn vector(v: [f64; 3]) -> String {
-    format!("({})", v.map(|v| readable(v, 6)).join(", "))
+/// Share of the largest component, or of other forces beside it, below which a component is the roundoff of a sum over nodes, and is printed as
+/// zero. Files have all digits.
+const ROUNDOFF: f64 = 1e-9;
+
+/// Return a point of the scene for a message.
+pub fn place(x: [f64; 3]) -> String {
+    vector(&x, 0.0, 4)
+}
+
+/// Return a vector with this number of digits, whose roundoff is that of numbers of the size `scale`.
+fn vector(v: &[f64], scale: f64, digits: usize) -> String {
+    let largest = v.iter().fold(scale, |most: f64, v| most.max(v.abs()));
+    let shown = |v: &f64| readable(if v.abs() < ROUNDOFF * largest { 0.0 } else { *v }, digits);
+    format!("({})", v.iter().map(shown).collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::geometry::Geometry;
 use super::order::Order;
 use super::read::{Check, Either, Flaw, Form, at_least_one, file, kept, only_one, place, place_of, positive};
-use crate::error::{Error, Kind, Located, Place, Result as Checked};
+use crate::error::{Error, Kind, Located, Place, Result as Checked, Source};
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -89,6 +89,17 @@ impl MeshSource {
         let place = Place::here(&file.display().to_string());
         let (places, file) = (vec![place.clone(); set.len()], Located::new(file.to_owned(), place));
         Self::Geo { file, set, places, sizes: None, guard: Guard::default() }
+    }
+
+    /// Return the mesh of a file that was typed as an argument: a script or shape for Gmsh, or a mesh.
+    ///
+    /// # Errors
+    /// There is no such file.
+    pub fn of_argument(path: &Path) -> Checked<Self> {
+        let text = path.display().to_string();
+        let place =
+            Place { span: 0..text.len(), source: Arc::new(Source { name: "argument".to_owned(), text: text.clone() }) };
+        MeshKeys::of_name(Located::new(text, place)).source()
     }
 
     /// Return a mesh file with named groups: `.msh` of Gmsh, or a format that Gmsh converts.

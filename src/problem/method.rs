@@ -49,8 +49,9 @@ impl MethodSpec {
     }
 }
 
-/// Write those defaults of `[method]` into its table that depend on other keys: the method and coefficient of the paper where its keys are used, and the
-/// tolerance of the residual.
+/// Write those defaults of `[method]` into its table that depend on other keys. The scene calls this after the overrides of the command line and
+/// before serde reads the table, so that the echo in the report has them like typed keys. They are the method and coefficient of the paper where its
+/// keys are used, and the tolerance of the residual.
 pub fn complete(method: &mut Spanned<DeValue<'_>>) {
     // what is written here has no place in the text
     let span = method.span().end..method.span().end;

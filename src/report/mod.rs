@@ -5,7 +5,7 @@ mod surface;
 pub use surface::Surface;
 
 use crate::output::{
-    BodyReport, ForceReport, ObstacleReport, PairReport, Plot, Report, RoundReport, UNSETTLED, trimmed,
+    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -27,6 +27,8 @@ pub struct Page<'a> {
     pub units: Option<Units>,
     /// Surfaces of all bodies.
     pub bodies: Vec<Surface>,
+    /// Places that are marked on them.
+    pub marks: &'a [Mark],
     /// Contact surfaces in space.
     pub contacts: Vec<Surface>,
     /// Pressures along contacts in the plane.
@@ -124,6 +126,7 @@ impl Page<'_> {
             fields = self.fields(),
             section = if is_space { SECTION } else { "" },
             names = names(&self.bodies),
+            marks = marks(self.marks),
             pressures = format_args!("<div class=\"figures\">{figures}</div>"),
             contacts = self.contact_table(),
             steps = approach.map_or(String::new(), |figure| format!("<h2>Load steps</h2>{figure}")),
@@ -171,9 +174,10 @@ impl Page<'_> {
         }
         if let Some(error) = &report.discretization_error {
             text += &format!(
-                " Estimated error of the mesh: pressure {}, displacement {}, energy norm {}.",
+                " Estimated error of the mesh: pressure {}, displacement {}, force {}, energy norm {}.",
                 vector(&error.pressure),
                 digits(error.displacement),
+                vector(&error.force),
                 digits(error.energy)
             );
         }
@@ -190,6 +194,7 @@ impl Page<'_> {
         ];
         if !self.contacts.is_empty() {
             options.push(("pressure", self.label("contact pressure", |units| &units.stress)));
+            options.push(("opening", self.label("gap of contacts", |units| &units.length)));
         }
         options.iter().map(|(value, text)| format!("<option value=\"{value}\">{}</option>", escape(text))).collect()
     }
@@ -244,10 +249,18 @@ impl Page<'_> {
         if self.report.rounds.is_empty() {
             return String::new();
         }
-        let columns =
-            ["#cells", "#dofs", "#error of pressures", "#of displacements", "#in energy", "#iterations", "#seconds"];
+        let columns = [
+            "#cells",
+            "#dofs",
+            "#error of pressures",
+            "#of displacements",
+            "#of forces",
+            "#in energy",
+            "#iterations",
+            "#seconds",
+        ];
         let row = |round: &RoundReport| {
-            let errors = [round.pressure, round.displacement, round.energy].map(digits);
+            let errors = [round.pressure, round.displacement, round.force, round.energy].map(digits);
             let counts = [round.cells, round.dofs].map(|count| count.to_string());
             [&counts[..], &errors, &[round.iterations.to_string(), digits(round.seconds)]].concat()
         };
@@ -312,6 +325,31 @@ fn names(bodies: &[Surface]) -> String {
         format!("<label><input type=\"checkbox\" value=\"{k}\" checked> {}</label>", escape(&body.name))
     };
     format!("<div class=\"tools\">{}</div>", bodies.iter().enumerate().map(name).collect::<String>())
+}
+
+/// Return the legend of the marked places, with the names of their groups.
+fn marks(marks: &[Mark]) -> String {
+    let kinds = [
+        (Role::Support, "<i class=\"support\"></i> supports"),
+        (Role::Load, "<i class=\"load\"></i> loads"),
+        (Role::Spring, "<i class=\"spring\"></i> springs"),
+        (Role::Contact, "<i class=\"closed\"></i> closed and <i class=\"open\"></i> open contact"),
+    ];
+    let of_kind = |(role, words): (Role, &str)| {
+        let mut on: Vec<&str> = marks.iter().filter(|mark| mark.role == role).map(|mark| mark.on.as_str()).collect();
+        on.sort_unstable();
+        on.dedup();
+        let more = if on.len() > NAMES { ", ..." } else { "" };
+        let names = escape(&on[..on.len().min(NAMES)].join(", "));
+        if on.is_empty() { String::new() } else { format!("<span>{words}: {names}{more}</span>") }
+    };
+    let all: String = kinds.into_iter().map(of_kind).collect();
+    match all.is_empty() {
+        true => all,
+        false => {
+            format!("<div class=\"tools marks\"><label><input type=\"checkbox\" checked> Marks</label>{all}</div>")
+        }
+    }
 }
 
 /// Return the table of the bodies as the scene describes them.

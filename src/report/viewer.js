@@ -1,4 +1,9 @@
 // Bodies in space: drag turns, shift or right button moves, wheel or two fingers zoom. In the plane drag moves.
+// Colours of marked places, and the direction of their hatching.
+const MARKS = Object.fromEntries([
+  ["support", "#00a5ff", 1], ["load", "#e8000b", -1], ["spring", "#ff9500", 1], ["closed", "#ff2fd0", -1], ["open", "#111111", -1],
+].map(([name, color, hatch]) => [name, { color: [1, 3, 5].map(k => parseInt(color.slice(k, k + 2), 16) / 255), hatch }]));
+
 (() => {
   const data = JSON.parse(document.getElementById("view").textContent);
   const figure = document.getElementById("bodies"), canvas = figure.querySelector("canvas");
@@ -10,25 +15,29 @@
   const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
   const program = twgl.createProgramInfo(gl, [`#version 300 es
     in vec3 point, displacement; in float value, known;
-    uniform mat4 view; uniform float scale, travels; uniform vec2 travel;
+    uniform mat4 view; uniform float scale, travels; uniform vec2 travel; uniform vec3 nudge;
     // the value, and the share of nodes that have one
     out vec2 shade; out vec3 place;
     void main() {
       place = point + scale * displacement;
       float far = (length(displacement) - travel.x) / (travel.y - travel.x);
       shade = travels > 0.5 ? vec2(far, 1.0) : vec2(value * 65535.0 / 65534.0, known);
-      gl_Position = view * vec4(place, 1.0);
+      gl_Position = view * vec4(place, 1.0) + vec4(nudge, 0.0);
+      gl_PointSize = 9.0;
     }`, `#version 300 es
     precision highp float;
     in vec2 shade; in vec3 place; out vec4 color;
-    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform float squares, opens;
+    uniform vec3 colors[12], toward; uniform vec4 cut, ink; uniform vec2 ends; uniform float squares, opens, hatch;
     void main() {
       if (dot(place, cut.xyz) > cut.w) discard;
+      // marked surfaces are hatched
+      if (hatch != 0.0 && mod(gl_FragCoord.x + hatch * gl_FragCoord.y, 10.0) > 4.0) discard;
       vec3 normal = normalize(cross(dFdx(place), dFdy(place)));
       float light = 0.55 + 0.45 * abs(dot(normal, toward));
       // nodes without a value take part in none: the others alone make it
       float value = shade.x / max(shade.y, 1e-6);
-      int band = clamp(int((squares > 0.5 ? sqrt(max(value, 0.0)) : value) * 12.0), 0, 11);
+      float share = max((value - ends.x) / (ends.y - ends.x), 0.0);
+      int band = clamp(int((squares > 0.5 ? sqrt(share) : share) * 12.0), 0, 11);
       // beyond a section the inner side of the surface is seen, which is grey like points without a value
       bool inner = cut.xyz != vec3(0.0) && !gl_FrontFacing;
       bool none = shade.y < 0.5 || (opens > 0.5 && value < 0.5 / 65534.0);
@@ -47,19 +56,23 @@
     return new Uint32Array([...edges.values()].flat());
   };
   const part = (part, kind) => {
-    const values = new Uint16Array(bytes(part.value)), known = Uint8Array.from(values, v => v === 65535 ? 0 : 255);
     const arrays = {
       point: { numComponents: 3, data: new Float32Array(bytes(part.points)) },
       displacement: { numComponents: 3, data: new Float32Array(bytes(part.displacement)) },
-      value: { numComponents: 1, data: values.map(v => v === 65535 ? 0 : v), normalize: true },
-      known: { numComponents: 1, data: known, normalize: true },
       indices: new Uint32Array(bytes(part.triangles)),
     };
-    const buffer = twgl.createBufferInfoFromArrays(gl, arrays);
+    const made = more => twgl.createBufferInfoFromArrays(gl, { ...arrays, ...more });
+    const field = text => {
+      const values = new Uint16Array(bytes(text)), known = Uint8Array.from(values, v => v === 65535 ? 0 : 255);
+      const value = { numComponents: 1, data: values.map(v => v === 65535 ? 0 : v), normalize: true };
+      return { values, buffer: made({ value, known: { numComponents: 1, data: known, normalize: true } }) };
+    };
+    const fields = { value: field(part.value), opening: part.opening ? field(part.opening) : null };
+    const indices = list => list.length ? made({ indices: list }) : null;
     // bodies in the plane have outlines
-    const lines = data.space ? [] : rim(arrays.indices, arrays.value.data.length);
-    const outline = lines.length ? twgl.createBufferInfoFromArrays(gl, { ...arrays, indices: lines }) : null;
-    return { kind, name: part.name, shown: true, buffer, outline, arrays, values };
+    const outline = indices(data.space ? [] : rim(arrays.indices, arrays.point.data.length / 3));
+    const marks = part.marks.map(([name, kinds]) => ({ name, buffers: kinds.map(kind => indices(new Uint32Array(bytes(kind)))) }));
+    return { kind, name: part.name, shown: true, fields, outline, arrays, marks };
   };
   const parts = [...data.bodies.map(b => part(b, "body")), ...data.surfaces.map(s => part(s, "surface"))];
   const middle = data.low.map((low, k) => (low + data.high[k]) / 2);
@@ -76,6 +89,16 @@
     Object.assign(eye, { turn, rise, zoom: 0.5 * size / fits || 1, right: 0, up: 0 });
   };
   const [what, across] = figure.querySelectorAll("select"), [scale, depth] = figure.querySelectorAll("input[type=range]");
+  const typed = figure.querySelectorAll("input[type=number]"), marked = figure.querySelector(".marks input");
+  // fields of contact surfaces; all others are those of bodies
+  const ofContact = () => what.value === "pressure" || what.value === "opening";
+  const isDrawn = part => part.shown && ofContact() === (part.kind === "surface");
+  const fieldOf = part => part.fields[what.value === "opening" ? "opening" : "value"];
+  // the ends of the colours: those that were typed, or the smallest and the largest value
+  const ends = () => {
+    const own = [...typed].map((input, k) => input.value.trim() === "" || !Number.isFinite(+input.value) ? data[what.value][k] : +input.value);
+    return own[0] < own[1] ? own : data[what.value];
+  };
   const shown = figure.querySelector("output"), bar = figure.querySelector(".bar"), open = figure.querySelector(".open");
   const factor = () => scale.value / 50 * data.scale;
   // the plane of the section: what lies beyond it along x, y or z is not drawn
@@ -86,6 +109,8 @@
   };
   const number = v => Number(v.toPrecision(3)).toString();
   const axes = figure.querySelector(".axes"), under = figure.querySelector(".under");
+  // in the plane no axis points to the left or down
+  if (!data.space) axes.setAttribute("viewBox", "-12 -68 80 80");
 
   let waiting = false;
   const redraw = () => { if (!waiting) { waiting = true; requestAnimationFrame(draw); } };
@@ -110,24 +135,38 @@
       return `<line x2="${22 * right}" y2="${22 * up}"/><text x="${31 * right}" y="${31 * up}">${name}</text>`;
     }).join("");
     gl.useProgram(program.program);
-    const pressure = what.value === "pressure";
+    const contact = ofContact(), [low, high] = data[what.value];
     // the colour of the text around
     const ink = [...getComputedStyle(figure).color.match(/\d+/g).slice(0, 3).map(part => part / 255), 1];
-    const lit = { view: eye.view, toward, colors, cut: section(), scale: factor(), travel: data.travel };
-    for (const part of parts) {
-      if (!part.shown || pressure !== (part.kind === "surface")) continue;
-      twgl.setBuffersAndAttributes(gl, program, part.buffer);
-      twgl.setUniforms(program, { ...lit, travels: what.value === "travel" ? 1 : 0, squares: what.value === "stress" ? 1 : 0, opens: pressure ? 1 : 0, ink: [0, 0, 0, 0] });
-      twgl.drawBufferInfo(gl, part.buffer);
-      if (!part.outline) continue;
-      twgl.setBuffersAndAttributes(gl, program, part.outline);
-      twgl.setUniforms(program, { ink });
-      twgl.drawBufferInfo(gl, part.outline, gl.LINES);
+    const lit = { view: eye.view, toward, colors, cut: section(), scale: factor(), travel: data.travel, nudge: [0, 0, 0], hatch: 0 };
+    const shares = ends().map(end => (end - low) / (high - low));
+    const draw = (buffer, uniforms, kind) => {
+      twgl.setBuffersAndAttributes(gl, program, buffer);
+      twgl.setUniforms(program, uniforms);
+      twgl.drawBufferInfo(gl, buffer, kind);
+    };
+    for (const part of parts.filter(isDrawn)) {
+      const { buffer } = fieldOf(part);
+      const [travels, squares] = ["travel", "stress"].map(value => what.value === value ? 1 : 0);
+      draw(buffer, { ...lit, ends: shares, travels, squares, opens: contact ? 1 : 0, ink: [0, 0, 0, 0] });
+      if (part.outline) draw(part.outline, { ink }, gl.LINES);
+      if (marked?.checked) drawMarks(part, draw);
     }
     shown.textContent = "× " + number(factor());
   }
+  // lines are drawn beside each other to be as wide as five pixels, and all marks lie a little before their surfaces
+  function drawMarks(part, draw) {
+    const before = -1e-4, [right, up] = [2 / canvas.width, 2 / canvas.height], wide = [-2, -1, 0, 1, 2];
+    for (const { name, buffers: [triangles, lines, points] } of part.marks) {
+      const { color, hatch } = MARKS[name], ink = [...color, 1];
+      if (triangles) draw(triangles, { ink, hatch, nudge: [0, 0, before] });
+      for (const [x, y] of lines ? wide.flatMap(x => wide.map(y => [x, y])) : [])
+        draw(lines, { ink, hatch: 0, nudge: [x * right, y * up, before] }, gl.LINES);
+      if (points) draw(points, { ink, hatch: 0, nudge: [0, 0, 2 * before] }, gl.POINTS);
+    }
+  }
   function legend() {
-    const [low, high] = data[what.value];
+    const [low, high] = ends();
     bar.replaceChildren(...data.colors.map((color, k) => {
       const cell = document.createElement("span");
       cell.style.background = color;
@@ -135,17 +174,18 @@
       cell.textContent = k % 3 ? "" : number(low + (high - low) * share);
       return cell;
     }), "to " + number(high));
-    open.hidden = what.value !== "pressure";
+    typed.forEach((input, k) => { input.placeholder = number(data[what.value][k]); });
+    open.hidden = !ofContact();
+    open.lastElementChild.textContent = what.value === "opening" ? "closed" : "open: no pressure";
     if (depth) depth.hidden = !across.value;
     redraw();
   }
 
   // the nearest point of what is drawn at a place of the picture (-1 to 1 to the right and up): its part, its place before deformation and its value
   const hit = (right, up) => {
-    const pressure = what.value === "pressure", cut = section(), times = factor(), view = eye.view;
+    const cut = section(), times = factor(), view = eye.view;
     let best = null;
-    for (const part of parts) {
-      if (!part.shown || pressure !== (part.kind === "surface")) continue;
+    for (const part of parts.filter(isDrawn)) {
       const { point: { data: points }, displacement: { data: moves }, indices } = part.arrays;
       const count = points.length / 3, screen = new Float64Array(3 * count);
       const moved = (node, k) => points[3 * node + k] + times * moves[3 * node + k];
@@ -171,9 +211,9 @@
   };
   // the value of a hit in words
   const told = ({ part, nodes, shares, place }) => {
-    const [low, high] = data[what.value];
+    const [low, high] = data[what.value], { values } = fieldOf(part);
     const size = node => Math.hypot(...part.arrays.displacement.data.subarray(3 * node, 3 * node + 3));
-    const value = node => what.value === "travel" ? size(node) : part.values[node] === 65535 ? NaN : low + part.values[node] / 65534 * (high - low);
+    const value = node => what.value === "travel" ? size(node) : values[node] === 65535 ? NaN : low + values[node] / 65534 * (high - low);
     const mean = nodes.reduce((sum, node, k) => sum + shares[k] * value(node), 0);
     const at = place.slice(0, data.space ? 3 : 2).map((x, k) => number(x + data.origin[k])).join(", ");
     return `${part.name} at (${at}): ${Number.isNaN(mean) ? "open" : number(mean)} (${what.selectedOptions[0].text})`;
@@ -215,10 +255,13 @@
   });
   canvas.addEventListener("wheel", e => { e.preventDefault(); eye.zoom *= Math.exp(-e.deltaY * 0.001); redraw(); }, { passive: false });
   canvas.addEventListener("contextmenu", e => e.preventDefault());
-  for (const choice of [what, across]) choice?.addEventListener("change", legend);
+  what.addEventListener("change", () => { typed.forEach(input => { input.value = ""; }); legend(); });
+  across?.addEventListener("change", legend);
+  typed.forEach(input => input.addEventListener("input", legend));
+  marked?.addEventListener("change", redraw);
   for (const slider of [scale, depth]) slider?.addEventListener("input", redraw);
   figure.querySelector("button").addEventListener("click", () => { reset(); redraw(); });
-  for (const box of figure.querySelectorAll("input[type=checkbox]"))
+  for (const box of figure.querySelectorAll("input[type=checkbox][value]"))
     box.addEventListener("change", () => { parts[box.value].shown = box.checked; redraw(); });
   new ResizeObserver(redraw).observe(canvas);
   reset();

@@ -8,13 +8,14 @@ use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, StepSpecs, Verified, point};
+use crate::discretize::{self, StepSpecs, Verified};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
 use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, Joint, LinearStep};
+use crate::output;
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::Order;
@@ -151,8 +152,14 @@ where
         let mut warnings = warnings::of_problem(session, &discrete);
         warnings.extend(self.of_mesh());
         warnings.extend(inner.applied_once());
+        let has_page = scene.output.report && session.rank() == 0;
         let built = Built {
             scene: scene.clone(),
+            marks: if has_page {
+                discretize::marks(&verified.mesh, &bodies, &discrete.model.pairs)
+            } else {
+                Vec::new()
+            },
             discrete,
             splits: verified.splits(),
             mesh: read.as_ref().map(|read| read.digest.clone()),
@@ -271,7 +278,7 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     let model = &mut discrete.model;
     let estimate = estimate::estimate(&*meshes, model, done.method.linear(), iterate, layer, done.share)?;
     if let Some((body, place)) = estimate::lost_at(&*meshes, &discrete.model, &estimate) {
-        let (name, place) = (&discrete.bodies[body].name, point(place));
+        let (name, place) = (&discrete.bodies[body].name, output::report::place(place));
         done.warnings.push(format!(
             "the estimated error of the mesh is a guess: it is as large as the solution; of all bodies `{name}` has most of it, at {place}: make \
              cells smaller there, or less flat"

@@ -35,7 +35,7 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     report.warnings.extend(too_large);
     for i in 0..model.pairs.len() {
         report.warnings.extend(warnings::beyond_law(done, i).into_iter().chain(warnings::by_chords(done, i)));
-        report.warnings.extend(warnings::tilted(done, i));
+        report.warnings.extend(warnings::tilted(done, i).into_iter().chain(warnings::cut_short(done, i)));
     }
     report.warnings.extend(warnings::nothing_touches(done));
     let approaches = results::approaches(done, recovered);
@@ -218,6 +218,7 @@ pub fn discretization_error(estimate: &Estimate) -> EstimateReport {
         nodal: estimate.nodal,
         displacement: estimate.displacement,
         pressure: estimate.pressure.clone(),
+        force: estimate.force.clone(),
         bodies: estimate.bodies.iter().map(fraction).collect(),
     }
 }

@@ -292,7 +292,7 @@ fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
         force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
         approach,
         extent: Extent::new(pair.measure, &pair.weight, c),
-        peak_pressure: layer.pressure[range].iter().copied().fold(0.0, f64::max),
+        peak_pressure: layer.pressure[range].iter().copied().fold(f64::NEG_INFINITY, f64::max),
         peak_compression: peak(c),
         closed: c.iter().filter(|c| **c > 0.0).count(),
         obstacle: obstacle(done, i),

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
 use crate::model::{BodySlot, Model};
-use crate::output::{BodyField, StepReport};
+use crate::output::{BodyField, Mark, StepReport};
 use crate::problem::method::Linear;
 use crate::scene::Scene;
 use crate::solver::options::Chosen;
@@ -28,6 +28,8 @@ pub struct Built {
     pub mesh: Option<String>,
     /// The file itself, on this rank.
     pub mesh_file: Option<PathBuf>,
+    /// Places that the page of the run marks, on the first rank; none without a page.
+    pub marks: Vec<Mark>,
     /// The solver of linear steps.
     pub linear: Linear,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.

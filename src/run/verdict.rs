@@ -6,6 +6,7 @@ use super::stages::Done;
 use crate::ddm::{Inaccuracy, Outcome, Status};
 use crate::error::Kind;
 use crate::model::{Mechanism, Model, Moved};
+use crate::output::report::readable;
 use crate::output::{StepReport, sci};
 
 /// Return the name of a status in `report.json`.
@@ -101,9 +102,9 @@ fn unbalanced_mechanism(Mechanism { bodies, motion, work, support, .. }: &Mechan
     let names = in_words(bodies.iter().map(|body| &model.bodies[*body].name));
     let (who, whose) = if bodies.len() == 1 { ("body", "its") } else { ("bodies", "them together in their") };
     format!(
-        "{who} {names}: neither a support nor a spring nor contact holds {whose} {motion}, and loads work on it ({} of what \
-         forces of their sizes could): add a support {support}, or balance the loads",
-        sci(*work, 1)
+        "{who} {names}: neither a support nor a spring nor contact holds {whose} {motion}, and loads work on it ({} % of what \
+         forces of their sizes could do): add a support {support}, or balance the loads",
+        readable(100.0 * work, 1)
     )
 }
 

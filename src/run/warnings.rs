@@ -6,11 +6,11 @@ use super::results::peak;
 use super::stages::Done;
 use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, LostPieces};
-use crate::discretize::{ContactInfo, Discrete, point};
+use crate::discretize::{ContactInfo, Discrete};
 use crate::estimate::{Cause, Estimate, softness};
 use crate::linalg;
 use crate::model::Mechanism;
-use crate::output::report::readable;
+use crate::output::report::{place, readable};
 use crate::output::{BalanceReport, sci};
 use crate::petsc::Session;
 use std::f64::consts::PI;
@@ -98,7 +98,7 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
     for i in 0..discrete.model.pairs.len() {
         let [a, b] = discrete.surfaces(i);
         if let Some(guess) = estimate.guesses[i] {
-            let place = point(guess.place);
+            let place = place(guess.place);
             let reason = match guess.cause {
                 Cause::Rim => {
                     format!(
@@ -126,7 +126,6 @@ fn names(contact: &ContactInfo) -> [&str; 2] {
 fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (pair, contact) in pairs.iter().zip(contacts) {
-        warnings.extend(left_out(pair, contact));
         warnings.extend(lost(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         if overlap < 0.0 {
@@ -140,16 +139,20 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
     warnings
 }
 
-/// Return the warning of facets that a pair excludes, if any.
-fn left_out(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
-    let ([a, b], without) = (names(contact), pair.uncovered());
+/// Return the warning of facets without a partner at which the contact of pair `i` ends under pressure. Where a surface turns away from the other
+/// one, or goes on beyond it, such facets are usual, and `check` counts them.
+pub fn cut_short(done: &Done, i: usize) -> Option<String> {
+    let (pair, contact) = (&done.model().pairs[i], &done.built.discrete.contacts[i]);
+    let pressure = &done.outcome.layer.pressure[done.model().range(i)];
+    let [a, b] = names(contact);
     let distance = contact.spec.distance.map_or(String::new(), |distance| format!(" and `distance` = {distance}"));
-    let within = format!("within `angle` = {}{distance}", contact.spec.angle);
-    (without > 0).then(|| {
+    contact.surface.beside_uncovered().any(|q| pressure[q] != 0.0).then(|| {
         format!(
-            "{a} - {b}: {without} of {} facets of `{}` have no partner {within}",
+            "{a} - {b}: {} of {} facets of `{}` have no partner within `angle` = {}{distance}, and there is pressure beside them",
+            pair.uncovered(),
             pair.cover.len(),
-            pair.surfaces[0]
+            pair.surfaces[0],
+            contact.spec.angle
         )
     })
 }
@@ -201,11 +204,14 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
 /// Return the warning of pieces of a pair that the search for common points has lost, if any.
 fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
     let [a, b] = names(contact);
-    pair.lost.map(|LostPieces { pieces, share, at: [x, y, z] }| {
+    pair.lost.map(|LostPieces { pieces, share, at }| {
         format!(
-            "{a} - {b}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near ({x}, {y}, {z}): they \
+            "{a} - {b}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near {}: they \
              carry no pressure; look at the mesh there, and refine what is strongly curved",
-            pair.surfaces[0], share, pair.measure
+            pair.surfaces[0],
+            share,
+            pair.measure,
+            place(at)
         )
     })
 }
@@ -292,7 +298,8 @@ fn most_compressed(done: &Done, i: usize) -> Option<Compressed> {
     compressed.max_by(|a, b| a.most.total_cmp(&b.most))
 }
 
-/// Add the warnings of contacts that reach the end of a pair, which the key `distance` has cut short. A pair has one warning, that of the first load step.
+/// Add the warnings of contacts that reach the end of a pair, which the key `distance` has cut short. A pair has one warning, that of the first load
+/// step.
 pub fn note_ends(done: &mut Done) {
     if !done.outcome.status.is_solved() {
         return;

@@ -10,7 +10,7 @@ mod spec;
 #[cfg(test)]
 mod tests;
 
-pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Scene, remove, schema};
+pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Quantity, Scene, remove, schema};
 
 use crate::error::{Error, Kind, Located, Result, Source};
 use crate::problem::data::{DataKeys, library};

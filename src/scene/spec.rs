@@ -95,8 +95,11 @@ fn known_data<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Library, D::
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptSpec {
-    /// largest relative error of pressures and displacements: 0.01 is one per cent
+    /// largest relative error of what `of` says: 0.01 is one per cent
     pub error: Located<f64>,
+    /// which errors count: "all" (pressures and displacements), "pressures", "displacements" or "forces" of contacts
+    #[serde(default)]
+    pub of: Quantity,
     /// most cells of a mesh
     #[serde(default = "cells")]
     #[schemars(range(min = 1))]
@@ -105,6 +108,21 @@ pub struct AdaptSpec {
     #[serde(default = "rounds")]
     #[schemars(range(min = 1))]
     pub rounds: usize,
+}
+
+/// The results whose errors adapt the mesh.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Quantity {
+    /// Pressures and displacements at the contact points.
+    #[default]
+    All,
+    /// Pressures at the contact points.
+    Pressures,
+    /// Normal displacements at the contact points.
+    Displacements,
+    /// The normal force of each pair, the sum of its pressures.
+    Forces,
 }
 
 fn cells() -> usize {

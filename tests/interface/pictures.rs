@@ -97,6 +97,20 @@ fn a_plane_run_has_a_page_of_its_own() {
     }
     assert_eq!((&view["space"], view["surfaces"].as_array().map(Vec::len)), (&json!(false), Some(0)));
     assert!(!page.contains(">Section <"));
+    // what acts is marked: each kind once a body, with the names of the groups, and contact ends within the surfaces
+    let kinds = |body: &Value| -> Vec<String> {
+        let marks = body["marks"].as_array().expect("marks").iter();
+        marks.map(|mark| mark[0].as_str().expect("a kind").to_owned()).collect()
+    };
+    assert_eq!(kinds(&view["bodies"][0]), ["closed", "open", "support"]);
+    assert_eq!(kinds(&view["bodies"][1]), ["closed", "load", "open", "support"]);
+    assert!(page.contains("supports: lower_axis, lower_face, upper_axis<") && page.contains("loads: upper_face<"));
+    let lines = |body: usize, kind: usize| {
+        let text = view["bodies"][body]["marks"][kind][1][1].as_str().expect("base64");
+        STANDARD.decode(text).expect("base64").len() / 8
+    };
+    // 16 facets on each contact surface of length 4, which is closed up to x = 3.45
+    assert_eq!([lines(0, 0), lines(0, 1), lines(1, 0), lines(1, 2)], [14, 2, 14, 2]);
     assert!(run.report["memory"]["iterate"].as_f64().expect("memory") > 1.0);
     if let Some(dom) = opened(&run.folder.join("report.html")) {
         assert!(dom.contains("Run it again"));
@@ -120,6 +134,9 @@ fn the_mouse_reads_values() {
         const canvas = document.querySelector('canvas'), box = canvas.getBoundingClientRect();
         const [clientX, clientY] = [box.left + box.width / 2, box.top + box.height / 4];
         canvas.dispatchEvent(new PointerEvent('pointermove', { clientX, clientY }));
+        const ends = document.querySelectorAll('input[type=number]');
+        [ends[0].value, ends[1].value] = [5, 11];
+        ends[1].dispatchEvent(new Event('input'));
     }, 100)</script></body>";
     let path = run.folder.join("pointed.html");
     fs::write(&path, html.replacen("<head>", frames, 1).replacen("</body>", pointing, 1)).expect("a page");
@@ -127,6 +144,11 @@ fn the_mouse_reads_values() {
         let under = dom.split("class=\"under\">").nth(1).and_then(|rest| rest.split('<').next()).expect("a line");
         // the middle of the upper block lies a quarter below the upper end of the picture
         assert!(under.starts_with("upper at (2") && under.ends_with(" (von Mises stress)"), "{under}");
+        let bar = dom.split("class=\"bar\">").nth(1).and_then(|rest| rest.split("</div>").next()).expect("a bar");
+        assert!(
+            bar.contains(">5</span>") && bar.ends_with("to 11"),
+            "colours begin and end with what was typed: {bar}"
+        );
         let axes = dom.split("class=\"axes\"").nth(1).and_then(|rest| rest.split("</svg>").next()).expect("axes");
         assert!(axes.contains(">x</text>") && axes.contains(">y</text>") && !axes.contains(">z</text>"), "{axes}");
     }

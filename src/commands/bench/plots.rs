@@ -14,7 +14,7 @@ pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)>
         let chart = Chart { rows: &rows, bench, title: &scene.title };
         let list = [
             ("time-error", chart.time_error()),
-            ("time-dofs", chart.against_dofs(|row| row.seconds, "wall time, s")),
+            ("time-dofs", chart.against_dofs(|row| chart.time(row), chart.time_label())),
             ("memory-dofs", chart.against_dofs(|row| row.memory_mb, "peak memory, MB")),
         ];
         let file = |what: &str| match bench.names.len() {
@@ -39,20 +39,34 @@ impl Chart<'_> {
         has_points.then(|| Plot { title: self.title.to_owned(), x: PlotAxis::log(x), y: PlotAxis::log(y), series })
     }
 
+    /// Return whether all runs are on one rank. Their CPU time is then that of an idle machine, whatever else runs on it.
+    fn is_serial(&self) -> bool {
+        self.rows.iter().all(|measured| self.bench.plan.value(&measured.case, "ranks") == "1")
+    }
+
+    /// Return the time of a run that plots show.
+    fn time(&self, row: &Row) -> Option<f64> {
+        if self.is_serial() { row.cpu_seconds } else { row.seconds }
+    }
+
+    fn time_label(&self) -> &'static str {
+        if self.is_serial() { "CPU time, s" } else { "wall time, s" }
+    }
+
     /// Return the plot of time against error. The dashed line joins the runs that no other run beats in both.
     fn time_error(&self) -> Option<Plot> {
-        let mut series = self.series(|row| Some((row.error?, row.seconds?)));
+        let mut series = self.series(|row| Some((row.error?, self.time(row)?)));
         let all: Vec<(f64, f64)> = series.iter().flat_map(|series| series.points.iter().copied()).collect();
         series.push(Series::new("Pareto front", pareto(all), Style::Dashed).color(Color::Grey));
         let mut of = self.rows.iter().map(|measured| measured.row.error_of.as_str()).filter(|of| !of.is_empty());
         let first = of.next()?;
         // keys other than those of the mesh may give several references
         let of = if of.all(|other| other == first) { first } else { "pressure, finest mesh" };
-        self.plot(&format!("relative error ({of})"), "wall time, s", series)
+        self.plot(&format!("relative error ({of})"), self.time_label(), series)
     }
 
     /// Return the plot of a number against the dofs, with the exponent of the fitted power law in the name of each curve.
-    fn against_dofs(&self, number: fn(&Row) -> Option<f64>, label: &str) -> Option<Plot> {
+    fn against_dofs(&self, number: impl Fn(&Row) -> Option<f64>, label: &str) -> Option<Plot> {
         let mut series = self.series(|row| Some((row.dofs? as f64, number(row)?)));
         for series in &mut series {
             let power = exponent(&series.points).map(|power| format!(" (dofs^{power:.2})"));
