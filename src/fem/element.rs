@@ -165,6 +165,17 @@ pub fn interpolate<const D: usize>(x: &[[f64; D]], phi: &[f64]) -> [f64; D] {
     std::array::from_fn(|i| x.iter().zip(phi).map(|(x, phi)| phi * x[i]).sum())
 }
 
+/// Return the derivative of the map to an element with nodes `x` by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes
+/// smaller by as much.
+pub fn tangent<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64], k: usize) -> [f64; D] {
+    if order == Order::P1 {
+        // Most facets are straight, and this is needed several times for each two facets that may touch.
+        return std::array::from_fn(|i| x[k + 1][i] - x[0][i]);
+    }
+    let d = derivatives(order, l);
+    std::array::from_fn(|i| x.iter().zip(&d).map(|(x, d)| (d[k + 1] - d[0]) * x[i]).sum())
+}
+
 /// A quadrature rule on a simplex: barycentric points and weights that sum to one (multiply by length, area or volume).
 #[derive(Debug, Clone, Default)]
 pub struct Rule {

@@ -197,10 +197,8 @@ impl<const D: usize> Facets<D> {
 /// Return the outer normal times the length (2D) or area (3D) of a facet with node coordinates `x`, at barycentric point `l`. An
 /// integral over the facet uses weights that sum to one.
 pub fn area_vector<const D: usize>(order: Order, x: &[[f64; D]], l: &[f64]) -> [f64; D] {
-    let d = element::derivatives(order, l);
-    let tangent =
-        |c: usize| -> [f64; D] { std::array::from_fn(|i| (0..x.len()).map(|n| (d[n][c] - d[n][0]) * x[n][i]).sum()) };
-    let t = tangent(1);
-    let vector = if D == 2 { [t[1], -t[0], 0.0] } else { cross(pad(t), pad(tangent(2))).map(|v| 0.5 * v) };
+    let tangent = |k: usize| element::tangent(order, x, l, k);
+    let t = tangent(0);
+    let vector = if D == 2 { [t[1], -t[0], 0.0] } else { cross(pad(t), pad(tangent(1))).map(|v| 0.5 * v) };
     std::array::from_fn(|c| vector[c])
 }

@@ -1,7 +1,7 @@
 //! Laws of a known form: linear and power, and cubic and exponential ones, which are expressions.
 
 use super::expression::ExpressionLaw;
-use super::{LayerLaw, PerPoint, Response};
+use super::{LayerLaw, PerPoint, Response, search};
 use crate::error::{Error, Kind, Result, shown};
 use crate::linalg::portable::pow;
 use crate::problem::layer::{LayerSpec, Parameter};
@@ -114,5 +114,19 @@ impl LayerLaw for Power {
             tangent: if self.exponent == 1.0 { 1.0 / self.b } else { self.exponent * pressure / c },
             energy: pressure * c / (self.exponent + 1.0),
         }
+    }
+
+    /// In closed form for p = (c/B)^2, since the search takes a tenth of the time of `blocks` with 1000 blocks.
+    fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
+        if self.exponent == 2.0 && s > 0.0 && s < f64::INFINITY {
+            2.0 * s / (1.0 + (1.0 + 4.0 * (s / self.b) / self.b / rho).sqrt())
+        } else {
+            search(self, point, s, rho)
+        }
+    }
+
+    fn compression(&self, _point: usize, pressure: f64) -> f64 {
+        // The comparison is false for NaN, which is then returned as it is.
+        if pressure <= 0.0 { 0.0 } else { self.b * pow(pressure, self.exponent.recip()) }
     }
 }

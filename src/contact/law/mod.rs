@@ -7,7 +7,7 @@
 //!
 //! With p = 0 for c <= 0 a law is a maximal monotone graph of points (c, p). A point is found from its compression
 //! ([`LayerLaw::response`]), from its pressure ([`LayerLaw::compression`]) or from a line of slope -rho that meets the graph
-//! ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws), for all laws by one root finder (`numeric`).
+//! ([`LayerLaw::resolvent`], or [`resolve`] for smoothed laws), by one root finder (`numeric`) where a law has no closed form.
 //! [`LayerLaw::duality_gap`] measures the distance of any (c, p) from the graph. These methods handle the open layer and the ends of
 //! the range.
 
@@ -95,17 +95,7 @@ pub trait LayerLaw: std::fmt::Debug {
     /// Both c and p/rho grow with s, but not by more than s does. The equation holds to the rounding of p(c), which is a few
     /// times 1e-16 s times the exponent of the law at c.
     fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
-        // All comparisons are false for NaN, which is then returned as it is.
-        if !(s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY) {
-            return s;
-        }
-        let sum = |c: f64| {
-            let (pressure, tangent) = self.pressure_and_tangent(point, c);
-            (c + pressure / rho, 1.0 + tangent / rho)
-        };
-        // A law that is NaN from some compression on has a rigid stop there.
-        let (Ok(c) | Err(c)) = numeric::root(s, [0.0, s], s, sum);
-        c
+        search(self, point, s, rho)
     }
 
     /// Return the compression at which the layer has this pressure. It is 0 for `pressure <= 0` and infinite for a pressure that
@@ -147,6 +137,21 @@ pub trait LayerLaw: std::fmt::Debug {
         // NaN comes from values that overflow or lie beyond the end of a law.
         if pressure < 0.0 && !self.is_bonded() || gap.is_nan() { f64::INFINITY } else { gap.max(0.0) }
     }
+}
+
+/// Return [`LayerLaw::resolvent`] by a search for the root.
+fn search(law: &(impl LayerLaw + ?Sized), point: usize, s: f64, rho: f64) -> f64 {
+    // All comparisons are false for NaN, which is then returned as it is.
+    if !(s > 0.0 && s < f64::INFINITY && rho < f64::INFINITY) {
+        return s;
+    }
+    let sum = |c: f64| {
+        let (pressure, tangent) = law.pressure_and_tangent(point, c);
+        (c + pressure / rho, 1.0 + tangent / rho)
+    };
+    // A law that is NaN from some compression on has a rigid stop there.
+    let (Ok(c) | Err(c)) = numeric::root(s, [0.0, s], s, sum);
+    c
 }
 
 /// A law with a parameter that varies over the surface: one law for each contact point.

@@ -78,8 +78,7 @@ impl<const D: usize> Facet<D> {
 
     /// Return the derivative of x by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes smaller by as much.
     pub fn tangent(&self, k: usize, l: &[f64; D]) -> [f64; D] {
-        let d = element::derivatives(self.order, l);
-        std::array::from_fn(|c| (0..self.x.len()).map(|n| (d[n][k + 1] - d[n][0]) * self.x[n][c]).sum())
+        element::tangent(self.order, &self.x, l, k)
     }
 
     /// Return where the line x + t n meets the surface, as barycentric coordinates and t, at most `beside` outside of the facet; `None` if it
