@@ -353,3 +353,17 @@ fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
     }
     if full > 0.0 { TOLERANCE * f64::sqrt(left / full) } else { TOLERANCE }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_quantity_has_its_errors() {
+        let (pressure, ends, force) = (vec![1.0, 5.0], vec![0.0, 3.0], vec![3.0, 0.5]);
+        let estimate = Estimate { pressure, ends, force, displacement: 2.0, ..Estimate::default() };
+        let all = [Quantity::All, Quantity::Pressures, Quantity::Displacements, Quantity::Forces];
+        assert_eq!(all.map(|of| estimate.largest(of)), [5.0, 5.0, 2.0, 3.0]);
+        assert_eq!(all.map(|of| estimate.largest_beside_ends(of)), [4.0, 4.0, 2.0, 3.0]);
+    }
+}
