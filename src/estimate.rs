@@ -27,6 +27,8 @@ pub struct Estimate {
     /// Part of each cell of each body in the error of displacements at the loads: its squared energy error, and the energy of the strip at its
     /// straight facets. Empty for a body of another rank.
     pub cells: Vec<Vec<f64>>,
+    /// Power of its size with which the energy error of each of these cells falls.
+    pub rates: Vec<Vec<f64>>,
     /// Squared energy error of each body.
     pub bodies: Vec<f64>,
     /// Squared energy error of each layer between its contact points.
@@ -113,7 +115,7 @@ pub fn estimate(
     local.cells.iter_mut().zip(&local.strips).for_each(|(cells, strips)| axpy(1.0, strips, cells));
     let held = HoldingSprings::of(model, layer);
     held.balance(meshes, model, &mut local.loads);
-    let LocalErrors { cells, mut loads, layers, mean_error, .. } = local;
+    let LocalErrors { cells, rates, mut loads, layers, mean_error, .. } = local;
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
@@ -143,6 +145,7 @@ pub fn estimate(
         pressure_error: pressures.error,
         displacement: if error == 0.0 { 0.0 } else { SAFETY * f64::sqrt(error / whole) },
         cells,
+        rates,
         bodies,
         layers,
     })
@@ -220,6 +223,8 @@ type RecoveredBodies<'a> = [Option<Box<dyn RecoveredFields + 'a>>];
 struct LocalErrors {
     /// Squared energy error of each cell of each body that this rank owns.
     cells: Vec<Vec<f64>>,
+    /// Power of its size with which the energy error of each of these cells falls.
+    rates: Vec<Vec<f64>>,
     /// Energy of the strip at the straight facets of each of these cells.
     strips: Vec<Vec<f64>>,
     /// The load on the discrete problem, at the nodes of each body that this rank owns.
@@ -235,13 +240,14 @@ impl LocalErrors {
     fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
-        let (cells, strips, loads) = (none(), none(), none());
-        let mut local = Self { cells, strips, loads, layers: Vec::new(), mean_error: Vec::new() };
+        let (cells, rates, strips, loads) = (none(), none(), none(), none());
+        let mut local = Self { cells, rates, strips, loads, layers: Vec::new(), mean_error: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
-                let Errors { cells, strips, mut load } = recovered.errors(work_on_missed[body]);
+                let Errors { cells, rates, strips, mut load } = recovered.errors(work_on_missed[body]);
                 load.iter_mut().zip(meshes.missed_load(body)).for_each(|(load, missed)| *load += missed);
-                (local.cells[body], local.strips[body], local.loads[body]) = (cells, strips, load);
+                (local.cells[body], local.rates[body]) = (cells, rates);
+                (local.strips[body], local.loads[body]) = (strips, load);
             }
         }
         local

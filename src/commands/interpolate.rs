@@ -1,6 +1,6 @@
 //! Values at scattered points: brought to other points, and compared with the values there.
 
-use crate::linalg::range;
+use crate::linalg::{dot, minus, range};
 use nalgebra::DMatrix;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -61,6 +61,26 @@ impl PointTree {
         let nearest = nearest.iter().enumerate();
         nearest.map(|(i, (near, squared))| (near.data, inverse[(0, i)] * far * far / squared)).collect()
     }
+
+    /// Return the weights of the values of the nearest points of a curve in the value at a point of the polynomial of a degree through them, over the way
+    /// along the line to the farthest of them. Of points with one place the first counts.
+    pub fn polynomial(&self, at: &[f64; 3], degree: usize) -> Weights {
+        let nearest: Vec<_> = self.0.nearest_neighbor_iter_with_distance_2(*at).take(degree + 1).collect();
+        let Some((farthest, squared)) = nearest.last() else { return Vec::new() };
+        let line = minus(*farthest.geom(), *at);
+        let mut places: Vec<(usize, f64)> = Vec::new();
+        for (near, _) in &nearest {
+            let place = dot(&line, &minus(*near.geom(), *at)) / squared;
+            if places.iter().all(|(_, other)| (place - other).abs() > 1e-9) {
+                places.push((near.data, place));
+            }
+        }
+        let weight = |&(point, place): &(usize, f64)| {
+            let others = places.iter().map(|(_, other)| *other).filter(|other| *other != place);
+            (point, others.map(|other| other / (other - place)).product())
+        };
+        places.iter().map(weight).collect()
+    }
 }
 
 /// Return the sum of values with their weights.
@@ -104,5 +124,23 @@ impl Squares {
     /// Return the norms.
     pub fn norms(&self) -> L2Norms {
         L2Norms { difference: self.difference.sqrt(), old: self.old.sqrt(), new: self.new.sqrt() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A polynomial of the degree is met, also where two points have one place.
+    #[test]
+    fn polynomials_on_a_line_are_met() {
+        let places = [0.0, 0.1, 0.3, 0.3, 0.55, 0.7, 0.9, 1.0];
+        let tree = PointTree::new(&places.map(|s| [2.0 * s, 1.0 - s, 0.5]));
+        let quartic = |s: f64| 1.0 - 2.0 * s + s.powi(4);
+        let values = places.map(quartic);
+        for s in [0.0, 0.05, 0.41, 0.66, 0.97] {
+            let weights = tree.polynomial(&[2.0 * s, 1.0 - s, 0.5], 5);
+            assert!((mean(&weights, &values) - quartic(s)).abs() < 1e-12, "{s}: {weights:?}");
+        }
     }
 }

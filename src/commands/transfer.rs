@@ -69,11 +69,13 @@ impl EstimatedSolution {
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
     /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
     /// nothing is compared.
-    pub fn correct(&self, tables: &[ContactTable], estimate: &mut Estimate) {
+    ///
+    /// `degrees` are those of the bodies that carry the points, one for each pair.
+    pub fn correct(&self, tables: &[ContactTable], degrees: &[usize], estimate: &mut Estimate) {
         if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
             return;
         }
-        let norms = norms(&self.tables, tables);
+        let norms = norms(&self.tables, tables, degrees);
         for (i, error) in estimate.pressure.iter_mut().enumerate() {
             let excess = excess(&norms.pressure[i], *error, self.pressure[i]);
             *error *= excess;
@@ -115,14 +117,18 @@ struct SolutionNorms {
 
 /// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
 ///
-/// The values of `new` are brought to these points by planes through the nearest points: they bend by less than what the old mesh leaves out.
-fn norms(old: &[ContactTable], new: &[ContactTable]) -> SolutionNorms {
+/// The values of `new` are brought to these points by planes through the nearest points: they bend by less than what the old mesh leaves out. On curves
+/// with elements of a degree above two, polynomials of this degree through the nearest points do so.
+fn norms(old: &[ContactTable], new: &[ContactTable], degrees: &[usize]) -> SolutionNorms {
     let (mut pressure, mut displacement) = (Vec::new(), Squares::default());
-    for (old, new) in old.iter().zip(new) {
+    for ((old, new), &degree) in old.iter().zip(new).zip(degrees) {
         let scattered = PointTree::new(&new.points);
         let mut of_pair = Squares::default();
         for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
-            let weights = scattered.plane(point, DAMPED);
+            let weights = match degree {
+                1 | 2 => scattered.plane(point, DAMPED),
+                _ => scattered.polynomial(point, degree),
+            };
             of_pair.add(*area, old.pressure[q], clamped_mean(&weights, &new.pressure));
             for (new, old) in new.displacement.iter().zip(&old.displacement) {
                 displacement.add(*area, old[q], clamped_mean(&weights, new));
@@ -155,7 +161,11 @@ mod tests {
                 ..Estimate::default()
             };
             let mut later = estimate(0.05);
-            EstimatedSolution::new(&estimate(of_earlier), vec![table(5, 1.0)]).correct(&[table(5, 1.1)], &mut later);
+            EstimatedSolution::new(&estimate(of_earlier), vec![table(5, 1.0)]).correct(
+                &[table(5, 1.1)],
+                &[1],
+                &mut later,
+            );
             assert_eq!(later.pressure, [0.1]);
             later.displacement
         };
@@ -175,15 +185,15 @@ mod tests {
 
     #[test]
     fn linear_functions_do_not_differ_and_others_by_what_they_do() {
-        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)]);
+        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)], &[1]);
         // but for the weight of the slopes
         assert!(same.pressure[0].difference < 2e-3 * same.pressure[0].new, "{:?}", same.pressure);
-        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)]);
+        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)], &[1]);
         let L2Norms { difference, old, new } = off.pressure[0];
         assert!((difference / new - 0.1).abs() < 2e-3 && (old / new - 1.1).abs() < 2e-3, "{:?}", off.pressure);
         assert!((off.displacement.difference / off.displacement.new - 0.1).abs() < 2e-3);
         // fewer points than a plane through the nearest ones takes
-        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)]).pressure[0];
+        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)], &[1]).pressure[0];
         assert!((few.difference / few.new - 0.2).abs() < 1e-12, "{few:?}");
     }
 }

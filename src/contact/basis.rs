@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// The nodes of a facet that carry a pressure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Carriers {
     /// All nodes.
     Nodes,
@@ -17,8 +17,17 @@ pub enum Carriers {
     Vertices,
     /// The mid-edges of a quadratic triangle.
     MidEdges,
-    /// All nodes of an edge of order three or more but this local one, which lies on the axis of revolution.
-    OffAxis(usize),
+    /// Nodes of an edge of order three or more, moved to the covered part of it.
+    Part(Part),
+}
+
+/// The covered part of an edge of order three or more, with points at its Gauss-Lobatto points.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// Its ends, of 0 to 1 along the edge.
+    ends: [f64; 2],
+    /// Local node on the axis of revolution, which carries no point.
+    without: Option<usize>,
 }
 
 impl Carriers {
@@ -27,17 +36,42 @@ impl Carriers {
     pub fn interpolation<const D: usize>(self, order: Order, l: &[f64; D]) -> Values {
         match self {
             Self::Nodes => element::values(order, l),
-            Self::OffAxis(without) => {
-                // the polynomial of one degree less through the other nodes
-                let (mut shape, highest) = (element::values(order, l), lagrange::of(order, D).highest());
-                let on_axis = std::mem::take(&mut shape[without]);
-                let others = shape.iter_mut().zip(&highest).enumerate().filter(|(i, _)| *i != without);
-                others.for_each(|(_, (shape, c))| *shape -= on_axis * c / highest[without]);
+            Self::Part(part) => {
+                let mut shape = part.values(order, l);
+                if let Some(without) = part.without {
+                    // the polynomial of one degree less through the other nodes
+                    let highest = lagrange::of(order, D).highest();
+                    let on_axis = std::mem::take(&mut shape[without]);
+                    let others = shape.iter_mut().zip(&highest).enumerate().filter(|(i, _)| *i != without);
+                    others.for_each(|(_, (shape, c))| *shape -= on_axis * c / highest[without]);
+                }
                 shape
             }
             Self::Vertices => element::values(Order::P1, l),
             Self::MidEdges => (0..D).map(|_| 0.0).chain((0..D).map(|edge| 1.0 - 2.0 * l[opposite(edge)])).collect(),
         }
+    }
+}
+
+impl Part {
+    /// Return the part of an edge that these integration points cover: from the first to the last piece, which reach beyond their outer Gauss points.
+    fn covered<const D: usize>(chunk: &[IntegrationPoint<D>]) -> Self {
+        let mut ends = [1.0f64, 0.0f64];
+        for piece in chunk.chunk_by(|p, q| p.facet_b == q.facet_b) {
+            let (first, last) = (piece[0].at_a[1], piece[piece.len() - 1].at_a[1]);
+            let margin = lagrange::gauss(piece.len())[0].0;
+            let beyond = if piece.len() > 1 { margin / (1.0 - 2.0 * margin) * (last - first) } else { 0.0 };
+            ends = [ends[0].min(first - beyond), ends[1].max(last + beyond)];
+        }
+        // an end at a vertex has the point of the vertex
+        let ends = ends.map(|end| if (end - end.round()).abs() <= ROUNDING { end.round() } else { end });
+        Self { ends, without: None }
+    }
+
+    /// Return the values of the shape functions of the part at a point of the edge.
+    fn values<const D: usize>(&self, order: Order, l: &[f64; D]) -> Values {
+        let along = (l[1] - self.ends[0]) / (self.ends[1] - self.ends[0]);
+        element::values(order, &[1.0 - along, along])
     }
 }
 
@@ -50,8 +84,9 @@ fn opposite(edge: usize) -> usize {
 pub(super) enum PressureBasis {
     /// The dual basis mu = C phi of the covered part, with one function for each node and the shape functions phi.
     Dual(DMatrix<f64>),
-    /// The same on an edge of order three or more with this local node on the axis of revolution. Its function is zero, since int r phi is.
-    OffAxis(DMatrix<f64>, usize),
+    /// The same on an edge of order three or more with the shape functions of the covered part. The function of a node on the axis of revolution is zero,
+    /// since int r phi is.
+    Part(DMatrix<f64>, Part),
     /// Hat functions: the barycentric coordinate mu_i = l_i at vertex i, zero at mid-edges.
     Hats,
     /// The dual basis of the whole flat triangle at the mid-edges, zero at the vertices.
@@ -84,10 +119,14 @@ impl PressureBasis {
         if order == Order::P2 && D == 3 {
             return Self::MidEdges.or_hats(order, &(D..2 * D).collect::<Vec<_>>(), chunk);
         }
+        let mut part = (D == 2 && order > Order::P2).then(|| Part::covered(chunk));
+        if part.is_some_and(|part| part.ends[1] - part.ends[0] <= ROUNDING) {
+            return Self::Hats;
+        }
         let mut mass = DMatrix::zeros(count, count);
         let mut integral = vec![0.0; count];
         for point in chunk {
-            let phi = element::values(order, &point.at_a);
+            let phi = part.map_or_else(|| element::values(order, &point.at_a), |part| part.values(order, &point.at_a));
             for i in 0..count {
                 integral[i] += point.weight * phi[i];
                 for j in 0..count {
@@ -98,13 +137,14 @@ impl PressureBasis {
         let Some(factor) = mass.cholesky() else { return Self::Hats };
         let mut dual = factor.inverse();
         let none = |i: &usize| integral[*i].abs() <= ROUNDING * integral.iter().sum::<f64>();
-        let on_axis = (0..D).find(|i| order > Order::P2 && none(i));
+        let on_axis = (0..D).find(|i| part.is_some() && none(i));
         for (i, mut row) in dual.row_iter_mut().enumerate() {
             row *= if on_axis == Some(i) { 0.0 } else { integral[i] };
         }
         let carriers: Vec<usize> = (0..count).filter(|i| on_axis != Some(*i)).collect();
-        let basis = match on_axis {
-            Some(node) => Self::OffAxis(dual, node),
+        part.iter_mut().for_each(|part| part.without = on_axis);
+        let basis = match part {
+            Some(part) => Self::Part(dual, part),
             None => Self::Dual(dual),
         };
         basis.or_hats(order, &carriers, chunk)
@@ -114,7 +154,7 @@ impl PressureBasis {
     fn or_hats<const D: usize>(self, order: Order, nodes: &[usize], chunk: &[IntegrationPoint<D>]) -> Self {
         let [mut integral, mut size] = [(); 2].map(|()| vec![0.0; element::node_count(D, order)]);
         for point in chunk {
-            let phi = element::values(order, &point.at_a);
+            let phi = self.shapes(order, &point.at_a);
             for &i in nodes {
                 let mu = point.weight * self.value(i, &phi, &point.at_a);
                 integral[i] += mu;
@@ -127,12 +167,20 @@ impl PressureBasis {
         if nodes.iter().all(steady) { self } else { Self::Hats }
     }
 
-    /// Return mu of local node `i` at barycentric point `l`, where `phi` are the values of the shape functions.
+    /// Return mu of local node `i` at barycentric point `l`, where `phi` are the values of the shape functions of [`PressureBasis::shapes`].
     pub fn value<const D: usize>(&self, i: usize, phi: &[f64], l: &[f64; D]) -> f64 {
         match self {
-            Self::Dual(c) | Self::OffAxis(c, _) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
+            Self::Dual(c) | Self::Part(c, _) => c.row(i).iter().zip(phi).map(|(c, phi)| c * phi).sum(),
             Self::Hats => l.get(i).copied().unwrap_or(0.0),
             Self::MidEdges => i.checked_sub(D).map_or(0.0, |edge| at_mid_edge(edge, phi)),
+        }
+    }
+
+    /// Return the values at barycentric point `l` of the shape functions that the functions of this basis are made of.
+    pub fn shapes<const D: usize>(&self, order: Order, l: &[f64; D]) -> Values {
+        match self {
+            Self::Part(_, part) => part.values(order, l),
+            _ => element::values(order, l),
         }
     }
 
@@ -140,7 +188,7 @@ impl PressureBasis {
     pub fn carriers(&self) -> Carriers {
         match self {
             Self::Dual(_) => Carriers::Nodes,
-            Self::OffAxis(_, node) => Carriers::OffAxis(*node),
+            Self::Part(_, part) => Carriers::Part(*part),
             Self::Hats => Carriers::Vertices,
             Self::MidEdges => Carriers::MidEdges,
         }

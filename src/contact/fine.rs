@@ -34,7 +34,7 @@ pub struct FinePoint {
     /// Whether the contact points of this facet are at mid-edges.
     pub at_edges: bool,
     /// Degree of the pressure on this facet as a polynomial. It is that of the elements in the plane where facets are
-    /// fully covered; on a part of a facet, and in space, its values do not show more than a mean, which counts as one.
+    /// fully covered or of order three or more; on a part of another facet, and in space, its values do not show more than a mean, which counts as one.
     pub degree: usize,
     /// Contact point nearest to the point, for laws that differ from point to point.
     pub nearest: usize,
@@ -119,7 +119,11 @@ impl<const D: usize> Fine<D> {
             size: size_under(a, point),
             at_rim: at_rim[point.facet_a],
             at_edges: pair.cover[point.facet_a].carriers == Some(Carriers::MidEdges),
-            degree: if D == 2 && pair.cover[point.facet_a].is_whole() { a.facets.order.degree() } else { 1 },
+            degree: match pair.cover[point.facet_a].carriers {
+                Some(Carriers::Part(_)) => a.facets.order.degree(),
+                _ if D == 2 && pair.cover[point.facet_a].is_whole() => a.facets.order.degree(),
+                _ => 1,
+            },
             nearest: 0,
         };
         let mut points = FinePoints {
@@ -160,8 +164,8 @@ impl FinePoints {
                 row
             };
             for (point, fine) in chunk.iter().zip(&mut each) {
-                let phi = element::values(self.order, &point.at_a);
-                let mu = (0..nodes.len()).map(|i| basis.value(i, &phi, &point.at_a));
+                let shapes = basis.shapes(self.order, &point.at_a);
+                let mu = (0..nodes.len()).map(|i| basis.value(i, &shapes, &point.at_a));
                 self.pressing.push_row(row(mu.collect()));
                 let interpolation = row(basis.carriers().interpolation(self.order, &point.at_a));
                 let nearest = interpolation.iter().max_by(|p, q| p.1.total_cmp(&q.1));

@@ -145,11 +145,12 @@ fn integrate<const D: usize>(
         let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets);
         carriers[facet] = Some(basis.carriers());
         for point in chunk {
-            let phi = element::values(a.facets.order, &point.at_a);
+            let (phi, shapes) =
+                (element::values(a.facets.order, &point.at_a), basis.shapes(a.facets.order, &point.at_a));
             let psi = element::values(b.facets.order, &point.at_b);
             let others = b.on_facet(point.facet_b);
             for (i, &node) in nodes.iter().enumerate() {
-                let mu = point.weight * basis.value(i, &phi, &point.at_a);
+                let mu = point.weight * basis.value(i, &shapes, &point.at_a);
                 if mu == 0.0 {
                     continue;
                 }

@@ -318,8 +318,11 @@ fn affine<const D: usize>(
         element::gradients(corners, &element::derivatives(Order::P1, &centre[..=D])).ok_or(Defect::Inverted(cell))?;
     let at = space.in_scene(element::interpolate(corners, &centre));
     let material = elasticity.at(cell, at).map_err(|flaw| Defect::Elasticity(elasticity.region(cell), at, flaw))?;
-    let pairs = material.blocks_of(&gradient[1..], measure);
-    for (block, products) in blocks.iter_mut().zip(lagrange::of(space.order, D + 1).products()) {
+    let (pairs, stride) = (material.blocks_of(&gradient[1..], measure), space.stride);
+    for (index, (block, products)) in blocks.iter_mut().zip(lagrange::of(space.order, D + 1).products()).enumerate() {
+        if index % stride < index / stride {
+            continue;
+        }
         for (pair, product) in pairs.iter().zip(products.as_flattened()) {
             for (sum, term) in block.as_flattened_mut().iter_mut().zip(pair.as_flattened()) {
                 *sum += product * term;
@@ -332,12 +335,39 @@ fn affine<const D: usize>(
 /// Add the symmetric stiffness matrix of a cell to a matrix.
 fn scatter<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
     let stride = nodes.len();
+    if nodes.iter().all(|node| node.row.is_empty()) {
+        return scatter_free(graph, nodes, blocks, matrix);
+    }
     for (a, of_a) in nodes.iter().enumerate() {
         for (b, of_b) in nodes.iter().enumerate().skip(a) {
             let block = SMatrix::from_fn(|i, j| blocks[a * stride + b][i][j]);
             graph.add_moved([of_a, of_b], block, matrix);
             if a != b {
                 graph.add_moved([of_b, of_a], block.transpose(), matrix);
+            }
+        }
+    }
+}
+
+/// Add the symmetric stiffness matrix of a cell whose nodes have their own dofs. Rows of the graph are sorted, so that one walk finds all nodes of the cell.
+fn scatter_free<const D: usize>(graph: &NodeGraph, nodes: &[Node<D>], blocks: &[[[f64; D]; D]], matrix: &mut Csr) {
+    let stride = nodes.len();
+    let mut sorted: Vec<usize> = (0..stride).collect();
+    sorted.sort_unstable_by_key(|&a| nodes[a].node);
+    for (a, of_a) in nodes.iter().enumerate().filter(|(_, of_a)| graph.has(of_a.node)) {
+        let (from, to) = (graph.ptr[of_a.node as usize] as usize, graph.ptr[of_a.node as usize + 1] as usize);
+        let (row, length) = (&graph.col[from..to], D * (to - from));
+        let mut place = 0;
+        for &b in &sorted {
+            while row[place] != nodes[b].node {
+                place += 1;
+            }
+            let block = &blocks[a.min(b) * stride + a.max(b)];
+            for i in 0..D {
+                let at = &mut matrix.values[D * D * from + i * length + D * place..][..D];
+                for (j, value) in at.iter_mut().enumerate() {
+                    *value += if a <= b { block[i][j] } else { block[j][i] };
+                }
             }
         }
     }

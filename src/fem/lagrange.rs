@@ -80,6 +80,21 @@ impl Lagrange {
         (0..psi.len()).map(value).collect()
     }
 
+    /// Return, for each degree up to that of the functions, the mean square over the triangle of the part of a function in the orthogonal polynomials of this
+    /// degree. `at` gives the value of the function at a node.
+    ///
+    /// The mean square of psi_nm is 1/((2n + 1)(n + m + 1)).
+    pub fn by_degree(&self, at: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut squares = vec![0.0; self.degree + 1];
+        let (mut n, mut m) = (0, 0);
+        for j in 0..self.nodes.len() {
+            let part: f64 = (0..self.nodes.len()).map(|i| at(i) * self.coefficients[(i, j)]).sum();
+            squares[n + m] += part * part / ((2 * n + 1) * (n + m + 1)) as f64;
+            (n, m) = if n + m < self.degree { (n, m + 1) } else { (n + 1, 0) };
+        }
+        squares
+    }
+
     /// Return the coefficient of the highest power in each function of a line, up to a common factor.
     pub fn highest(&self) -> Vec<f64> {
         (0..self.nodes.len()).map(|i| self.coefficients[(i, self.degree)]).collect()

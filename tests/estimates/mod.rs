@@ -4,5 +4,6 @@ mod bound;
 mod carrier;
 mod effectivity;
 mod estimate;
+mod orders;
 mod parts;
 mod regions;

@@ -229,7 +229,7 @@ fn what_makes_no_sense_is_refused() {
         (&["--over", "mesh.set.n"][..], 2, "KEY=V1,V2"),
         (&["--over", "solver=mumps,hypre"], 2, "--solver"),
         (&["--ranks", "0"], 2, "begin at 1"),
-        (&["--order", "3"], 2, "order 3"),
+        (&["--order", "9"], 2, "order 9"),
         (&["--timeout", "0"], 2, "no time"),
         (&["--against", "nowhere"], 6, "nowhere"),
         (&["--against", "/"], 2, "0 contact tables"),

@@ -183,7 +183,8 @@ fn a_killed_run_goes_on_to_the_same_end() {
     let newton = ["--method", "newton", "--set", "mesh.set.n=8", "--set", "method.stop={residual=1e-10}"];
     let steps = [&newton[..], &["--set", "method.steps=40"]].concat();
     let swept = [&SHORT[..], &["--set", "method.steps=[0.5,1]"]].concat();
-    let cases: [(&Path, &[&str], f64); 2] = [(&groove, &swept, 1e-6), (&held, &steps, 1e-8)];
+    let high = [&steps[..], &["--set", "body.0.order=4", "--set", "body.1.order=5"]].concat();
+    let cases: [(&Path, &[&str], f64); 3] = [(&groove, &swept, 1e-6), (&held, &steps, 1e-8), (&held, &high, 1e-8)];
     for (scene, args, most) in cases {
         let whole = solve(scene, args).converged();
         let rows = whole.history().rows();

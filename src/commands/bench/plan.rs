@@ -88,8 +88,9 @@ impl Benchmark {
         if request.ranks.contains(&0) || request.repeat == 0 {
             return Err(usage("`--ranks` and `--repeat` begin at 1"));
         }
-        if let Some(order) = request.orders.iter().find(|order| !matches!(order, 1 | 2)) {
-            return Err(usage(format!("there are no elements of order {order}")).help("--order 1,2"));
+        if let Some(order) = request.orders.iter().find(|order| Order::new(**order).is_none()) {
+            let most = format!("--order 1,2 in space, up to {} in the plane", Order::HIGHEST);
+            return Err(usage(format!("there are no elements of order {order}")).help(most));
         }
         let common = &request.overrides;
         let scenes = request.scenes.iter().map(|path| crate::scene::load(path, common)).collect::<Result<Vec<_>>>()?;

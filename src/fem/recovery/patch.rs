@@ -3,10 +3,9 @@
 use crate::fem::{Space, length, minus};
 use crate::problem::order::Order;
 use nalgebra::DMatrix;
-use smallvec::SmallVec;
 
-/// A list of one entry a monomial. Those of degree 3 in space fit without an allocation.
-type Terms<T> = SmallVec<[T; 20]>;
+/// A list of one entry a monomial: there are 55 of degree 9 in the plane, and 20 of degree 3 in space.
+type Terms<T> = [T; 55];
 
 /// The monomials up to a degree, lower ones first. Each but the first is an earlier one times a coordinate.
 pub(super) struct Monomials {
@@ -35,11 +34,11 @@ impl Monomials {
         Self { degree, made }
     }
 
-    /// Return the values of the monomials at a point.
+    /// Return the values of the monomials at a point. Entries behind them are one.
     fn at<const D: usize>(&self, x: &[f64; D]) -> Terms<f64> {
-        let mut values = Terms::from_elem(1.0, 1);
-        for &(of, i) in &self.made[1..] {
-            values.push(values[of] * x[i]);
+        let mut values = [1.0; 55];
+        for (k, &(of, i)) in self.made.iter().enumerate().skip(1) {
+            values[k] = values[of] * x[i];
         }
         values
     }
@@ -79,13 +78,14 @@ impl<const D: usize> Patch<D> {
             }
             _ => size,
         };
-        let (mut gram, mut right) = (DMatrix::<f64>::zeros(n, n), vec![[0.0; D]; n]);
+        // row by row, and only up to the diagonal
+        let (mut gram, mut right) = (vec![0.0; n * n], vec![[0.0; D]; n]);
         let mut add = |x: [f64; D], u: [f64; D], weight: f64| {
             let row = monomials.at(&std::array::from_fn::<f64, D, _>(|i| (x[i] - centre[i]) / size));
-            for i in 0..n {
+            for (i, (sums, right)) in gram.chunks_exact_mut(n).zip(&mut right).enumerate() {
                 let scaled = weight * row[i];
-                (0..=i).for_each(|j| gram[(i, j)] += scaled * row[j]);
-                (0..D).for_each(|c| right[i][c] += scaled * u[c]);
+                sums[..=i].iter_mut().zip(&row).for_each(|(sum, value)| *sum += scaled * value);
+                (0..D).for_each(|c| right[c] += scaled * u[c]);
             }
         };
         for &node in nodes {
@@ -100,8 +100,8 @@ impl<const D: usize> Patch<D> {
             }
         }
         // The matrix is scaled to a diagonal of ones.
-        let scale: Vec<f64> = (0..n).map(|i| gram[(i, i)].sqrt().recip()).collect();
-        let factor = DMatrix::from_fn(n, n, |i, j| scale[i] * scale[j] * gram[(i.max(j), i.min(j))]).cholesky()?;
+        let scale: Vec<f64> = (0..n).map(|i| gram[i * n + i].sqrt().recip()).collect();
+        let factor = DMatrix::from_fn(n, n, |i, j| scale[i] * scale[j] * gram[i.max(j) * n + i.min(j)]).cholesky()?;
         let pivots = factor.l_dirty().diagonal();
         if pivots.min() <= DETERMINED {
             return None;
@@ -115,17 +115,17 @@ impl<const D: usize> Patch<D> {
     #[inline]
     pub fn jet(&self, monomials: &Monomials, x: &[f64; D]) -> ([f64; D], [[f64; D]; D]) {
         let local: [f64; D] = std::array::from_fn(|i| (x[i] - self.centre[i]) / self.size);
-        let (mut values, mut slopes) = (Terms::from_elem(1.0, 1), Terms::from_elem([0.0; D], 1));
+        let (mut values, mut slopes): (Terms<f64>, Terms<[f64; D]>) = ([1.0; 55], [[0.0; D]; 55]);
         let (mut value, mut gradient) = (self.terms[0], [[0.0; D]; D]);
         for (k, term) in self.terms.iter().enumerate().skip(1) {
             let (of, i) = monomials.made[k];
-            let mut slope = slopes[of].map(|slope| slope * local[i]);
-            slope[i] += values[of];
-            values.push(values[of] * local[i]);
-            slopes.push(slope);
+            let (value_of, mut slope) = (values[of], slopes[of]);
+            (0..D).for_each(|j| slope[j] *= local[i]);
+            slope[i] += value_of;
+            (values[k], slopes[k]) = (value_of * local[i], slope);
             for c in 0..D {
                 value[c] += term[c] * values[k];
-                (0..D).for_each(|j| gradient[c][j] += term[c] * slopes[k][j]);
+                (0..D).for_each(|j| gradient[c][j] += term[c] * slope[j]);
             }
         }
         gradient.as_flattened_mut().iter_mut().for_each(|slope| *slope /= self.size);
