@@ -97,7 +97,7 @@ where
         Ok(shared)
     })?;
     let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
-    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(scene, specs.contacts)).collect();
+    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(specs.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
         factory.adopt(plan)?;

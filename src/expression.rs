@@ -7,7 +7,7 @@ mod tests;
 
 pub use grammar::KnownNames;
 
-use crate::data::{Data, Library};
+use crate::data::Data;
 use crate::error::{Error, Place, Result};
 use grammar::Text;
 use program::{Dual, MOST_VARIABLES, Operation, Program, Values};
@@ -75,7 +75,7 @@ impl Expression {
 
     /// Return whether the expression uses no variable.
     pub fn is_constant(&self) -> bool {
-        self.program.variables().next().is_none()
+        self.program.variables().next().is_none() && self.program.factors().next().is_none()
     }
 
     /// Return whether it depends on no variable except the first.
@@ -142,22 +142,14 @@ impl fmt::Debug for Field {
 }
 
 impl Field {
-    /// Parse an expression in x, y, in space also z, and with `iteration` also k: see `Expression::parse`. An expression without variables
-    /// becomes a constant.
+    /// Parse an expression whose variables are coordinates and the iteration: see `Expression::parse`. An expression without variables becomes
+    /// a constant.
     ///
     /// # Errors
     /// Those of `Expression::parse`, and a constant that is not finite.
-    pub fn parse(text: &str, place: &Place, dimension: usize, iteration: bool, data: &Library) -> Result<Self> {
-        let names: Vec<_> = COORDINATES
-            .into_iter()
-            .filter(|name| match *name {
-                "z" => dimension == 3,
-                "k" => iteration,
-                _ => true,
-            })
-            .collect();
-        let slot = |variable: usize| coordinate(names[variable]).unwrap_or(variable);
-        let expression = Expression::parse_with(text, place, KnownNames { variables: &names, data }, slot)?;
+    pub fn parse(text: &str, place: &Place, scope: KnownNames) -> Result<Self> {
+        let slot = |variable: usize| coordinate(scope.variables[variable]).unwrap_or(variable);
+        let expression = Expression::parse_with(text, place, scope, slot)?;
         if !expression.is_constant() {
             return Ok(Field::Expression(expression));
         }
@@ -185,6 +177,22 @@ impl Field {
             Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], k as f64]),
             Field::Function(function) => function(x),
         }
+    }
+
+    /// Return the field of a load step with these factors.
+    pub fn in_step(&self, factors: &[f64]) -> Self {
+        match self {
+            Field::Expression(expression) if self.factors().next().is_some() => {
+                let program = Arc::new(expression.program.in_step(factors));
+                Field::Expression(Expression { program, ..expression.clone() })
+            }
+            other => other.clone(),
+        }
+    }
+
+    /// Return the indices of the factors of load steps that it uses.
+    pub fn factors(&self) -> impl Iterator<Item = usize> {
+        self.expression().into_iter().flat_map(|expression| expression.program.factors())
     }
 
     /// Return whether it is a number, the same everywhere.
@@ -256,6 +264,16 @@ impl Field {
             .label(format!("gives {value} there"))
             .help("keep roots, logarithms and fractional powers to where they are defined, say with max(0, ...)")
     }
+}
+
+/// Return the names of the coordinates, and of the `iteration` if it counts.
+pub fn coordinates(dimension: usize, iteration: bool) -> Vec<&'static str> {
+    let is_known = |name: &&str| match *name {
+        "z" => dimension == 3,
+        "k" => iteration,
+        _ => true,
+    };
+    COORDINATES.into_iter().filter(is_known).collect()
 }
 
 /// Return the index of a variable of a field.

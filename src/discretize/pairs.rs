@@ -43,10 +43,10 @@ pub struct ContactFacts {
 }
 
 impl ContactFacts {
-    /// Return the facts of the pair, including its description in the scene, whose named `contacts` have the factors of a step.
-    pub fn info(self, scene: &Scene, contacts: &[ContactSpec]) -> ContactInfo {
+    /// Return the facts of the pair, including its description in the scene, whose `contacts` have the factors of a step.
+    pub fn info(self, contacts: &[ContactSpec]) -> ContactInfo {
         let Self { entry, names, swapped, chords, ends, surface } = self;
-        ContactInfo { spec: entry.spec(scene, contacts, names), swapped, chords, ends, surface }
+        ContactInfo { spec: entry.spec(contacts, names), swapped, chords, ends, surface }
     }
 }
 
@@ -74,19 +74,23 @@ impl ContactInfo {
 
 impl ContactEntry {
     /// Return the scene's description of a pair of this table. `between` has the names of the pair.
-    fn spec(self, scene: &Scene, contacts: &[ContactSpec], names: [String; 2]) -> ContactSpec {
-        let rules: Vec<&ContactSpec> = scene.rules().collect();
+    fn spec(self, contacts: &[ContactSpec], names: [String; 2]) -> ContactSpec {
         let mut spec = match self {
             ContactEntry::Named(number) => contacts[number].clone(),
-            ContactEntry::Found(rule) => rules[rule].clone(),
+            ContactEntry::Found(rule) => rules(contacts)[rule].clone(),
         };
         spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value = own);
         spec
     }
 }
 
+/// Return the rules among contacts.
+fn rules(contacts: &[ContactSpec]) -> Vec<&ContactSpec> {
+    contacts.iter().filter(|contact| contact.is_rule()).collect()
+}
+
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found; and the rigid parts, obstacles and
-/// offsets. `contacts` are the named ones, with the factors of a step. `fine` requests integration points.
+/// offsets. `specs` are the contacts with the factors of a step. `fine` requests integration points.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
@@ -101,7 +105,7 @@ pub fn all<const D: usize>(
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
-    let rules: Vec<&ContactSpec> = scene.rules().collect();
+    let rules = rules(specs);
     let named = || specs.iter().enumerate().filter(|(_, spec)| !spec.is_rule());
     let mut found = named().map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
@@ -143,7 +147,7 @@ fn named<'a, const D: usize>(
         return Ok(SurfacePair { entry, bodies, sides: [side, obstacle], far: Default::default() });
     }
     let (second, on_second) = surface(1)?;
-    if first == second && !(spec.bond && spec.preload.is_some()) {
+    if first == second && spec.preload.is_none() {
         let message = format!("both surfaces belong to body `{}`", parts[first].spec.name.value);
         return Err(Error::scene(&spec.between[1].place, message)
             .help("contact of a body with itself is out of scope; make two bodies of it"));
@@ -170,7 +174,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
     /// Choose the side that carries the points.
     fn new(scene: &Scene, specs: &[ContactSpec], parts: &[SceneBody<D>], pair: SurfacePair<'a, D>) -> Self {
         let SurfacePair { entry, bodies, sides: [first, second], far: [far_first, far_second] } = pair;
-        let spec = entry.spec(scene, specs, [first.name, second.name].map(str::to_owned));
+        let spec = entry.spec(specs, [first.name, second.name].map(str::to_owned));
         let swapped = !spec.obstacle
             && carrier::is_second(parts, bodies, [&first.facets, &second.facets], spec.table, &scene.carriers);
         let ((body_a, a, far), (body_b, b)) = match swapped {
@@ -197,7 +201,14 @@ impl<'a, const D: usize> Opposite<'a, D> {
         if !self.spec.obstacle && self.a.towards(&self.b, &common) {
             common = cut(&self.a, &self.b, &self.reach);
         }
-        if self.spec.is_touching() {
+        // head and nut of a bolt look away from each other, and its preload draws them together
+        let is_through = self.spec.preload.is_some() && common.points.is_empty();
+        if is_through {
+            self.reach = Reach::anywhere(&self.a, &self.b, self.spec.angle);
+            common = cut(&self.a, &self.b, &self.reach);
+        }
+        let is_touching = self.spec.is_touching() || is_through;
+        if is_touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
         let Self { entry, spec, bodies, a, b, swapped, far, .. } = self;
@@ -232,11 +243,11 @@ impl<'a, const D: usize> Opposite<'a, D> {
             true => {
                 let [mut at_a, at_b] = [jumps(0, &a), jumps(1, &b)];
                 at_a.extend(a.layer_jumps(&law)?);
-                Some(Fine::new(&a, &b, &common, &pair, &gap, spec.is_touching(), [&at_a, &at_b]))
+                Some(Fine::new(&a, &b, &common, &pair, &gap, is_touching, [&at_a, &at_b]))
             }
             false => None,
         };
-        let chords = if spec.is_touching() { None } else { Chords::of(&a, &b, &common, &pair) };
+        let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         Ok(Some(Contact { pair, fine, facts: ContactFacts { entry, names, swapped, chords, ends, surface } }))
     }

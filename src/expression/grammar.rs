@@ -177,6 +177,10 @@ impl<'a> Parser<'a> {
             self.code.push(Operation::Variable(place));
             return Ok(());
         }
+        if let Some(factor) = self.scope.factors.iter().position(|known| known == name) {
+            self.code.push(Operation::Factor(factor));
+            return Ok(());
+        }
         if self.functions().any(|known| known == name) {
             return Err(self
                 .text
@@ -208,7 +212,9 @@ impl<'a> Parser<'a> {
     /// Return the list of all names that an expression may use, for a message.
     fn known(&self) -> String {
         let functions: Vec<_> = self.functions().collect();
-        format!("known are {}, pi, and the functions {}", self.scope.variables.join(", "), functions.join(", "))
+        let factors = self.scope.factors.iter().map(String::as_str);
+        let variables: Vec<_> = self.scope.variables.iter().copied().chain(factors).collect();
+        format!("known are {}, pi, and the functions {}", variables.join(", "), functions.join(", "))
     }
 
     /// Read the parenthesis that closes the one at `open`.
@@ -361,6 +367,8 @@ impl Text<'_> {
 pub struct KnownNames<'a> {
     /// Names of the variables, at most four.
     pub variables: &'a [&'static str],
+    /// Names of the factors of the load steps.
+    pub factors: &'a [String],
     /// Functions from files.
     pub data: &'a Library,
 }
@@ -369,6 +377,6 @@ impl<'a> KnownNames<'a> {
     /// Return a scope of variables alone.
     pub fn of(variables: &'a [&'static str]) -> Self {
         static NONE: Library = Library::new();
-        Self { variables, data: &NONE }
+        Self { variables, factors: &[], data: &NONE }
     }
 }

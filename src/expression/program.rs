@@ -19,6 +19,8 @@ pub(super) enum Operation {
     Number(f64),
     /// A variable, by its index among the values.
     Variable(usize),
+    /// A factor of the load steps, by its index. Its number is known in each step ([`Program::in_step`]).
+    Factor(usize),
     Unary(&'static Unary),
     Binary(&'static Binary),
     /// A function from a file, which takes as many values as it has arguments.
@@ -74,7 +76,7 @@ impl Program {
         let (mut held, mut depth) = (0, 0);
         for step in &steps {
             held = match step {
-                Operation::Number(_) | Operation::Variable(_) => held + 1,
+                Operation::Number(_) | Operation::Variable(_) | Operation::Factor(_) => held + 1,
                 Operation::Unary(_) => held,
                 Operation::Binary(_) => held - 1,
                 Operation::Data(data) => held + 1 - data.arguments(),
@@ -107,6 +109,10 @@ impl Program {
                 }
                 Operation::Variable(place) => {
                     stack[top] = variables[*place];
+                    top += 1;
+                }
+                Operation::Factor(_) => {
+                    stack[top] = T::constant(f64::NAN);
                     top += 1;
                 }
                 Operation::Unary(function) => stack[top - 1] = stack[top - 1].one(function),
@@ -148,6 +154,25 @@ impl Program {
     pub(super) fn variables(&self) -> impl Iterator<Item = usize> {
         self.steps.iter().filter_map(|step| match step {
             Operation::Variable(variable) => Some(*variable),
+            _ => None,
+        })
+    }
+}
+
+impl Program {
+    /// Return the program with these numbers in the places of the factors.
+    pub(super) fn in_step(&self, factors: &[f64]) -> Self {
+        let known = |step: &Operation| match step {
+            Operation::Factor(factor) => Operation::Number(factors[*factor]),
+            other => other.clone(),
+        };
+        Self { steps: self.steps.iter().map(known).collect(), depth: self.depth }
+    }
+
+    /// Return the indices of the factors that it uses.
+    pub(super) fn factors(&self) -> impl Iterator<Item = usize> {
+        self.steps.iter().filter_map(|step| match step {
+            Operation::Factor(factor) => Some(*factor),
             _ => None,
         })
     }

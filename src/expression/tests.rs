@@ -1,5 +1,5 @@
 use super::*;
-use crate::data::{DataSpec, Detrend, Interpolation, Outside};
+use crate::data::{DataSpec, Detrend, Interpolation, Library, Outside};
 use crate::error::Source;
 use crate::linalg::portable;
 
@@ -12,6 +12,24 @@ fn place(text: &str) -> Place {
 
 fn parse(text: &str) -> Result<Expression> {
     Expression::parse(text, &place(text), KnownNames::of(VARIABLES))
+}
+
+fn field_of(text: &str, dimension: usize, iteration: bool) -> Result<Field> {
+    let variables = coordinates(dimension, iteration);
+    Field::parse(text, &place(text), KnownNames::of(&variables))
+}
+
+/// Factors of load steps become numbers in each step.
+#[test]
+fn factors_are_known_in_each_step() {
+    let (text, factors) = ("depth * (x - shift)^2", ["depth".to_owned(), "shift".to_owned()]);
+    let scope = KnownNames { factors: &factors, ..KnownNames::of(&["x", "y"]) };
+    let field = Field::parse(text, &place(text), scope).unwrap();
+    assert!(field.eval([3.0, 0.0, 0.0]).is_nan());
+    assert_eq!(field.factors().collect::<Vec<_>>(), [0, 1]);
+    assert_eq!(field.in_step(&[2.0, 1.0]).eval([3.0, 0.0, 0.0]), 8.0);
+    let error = Field::parse("deep", &place("deep"), scope).expect_err("no factor").to_string();
+    assert!(error.contains("known are x, y, depth, shift, pi"), "{error}");
 }
 
 fn value(text: &str, values: [f64; 4]) -> f64 {
@@ -140,7 +158,7 @@ fn variables_take_their_own_values() {
     let expression = Expression::parse(text, &place(text), KnownNames::of(&["c", "a"])).unwrap();
     assert_eq!(expression.eval(&[3.0, 5.0]), 305.0);
     let zone = "x > 1 && k < 5";
-    let field = Field::parse(zone, &place(zone), 2, true, &Library::new()).unwrap();
+    let field = field_of(zone, 2, true).unwrap();
     assert_eq!([4, 5].map(|k| field.is_true_at([2.0, 0.0, 0.0], k).unwrap()), [true, false]);
 }
 
@@ -201,12 +219,12 @@ fn long_expressions_have_their_value_and_deep_ones_are_refused() {
 #[test]
 fn a_value_that_is_not_finite_is_refused_with_its_point() {
     let text = "sqrt(x - 1) + y";
-    let field = Field::parse(text, &place(text), 2, false, &Library::new()).unwrap();
+    let field = field_of(text, 2, false).unwrap();
     assert_eq!(field.eval_finite("gap", [5.0, 1.0, 0.0]).unwrap(), 3.0);
     let error = field.eval_finite("gap", [0.5, 2.0, 0.0]).expect_err("NaN");
     assert_eq!(error.message(), "gap is not a finite number at x = 0.5, y = 2");
     let zone = "log(x) < z*k";
-    let field = Field::parse(zone, &place(zone), 3, true, &Library::new()).unwrap();
+    let field = field_of(zone, 3, true).unwrap();
     assert!(field.is_true_at([1.0, 9.0, 2.0], 1).unwrap());
     assert!(!field.is_true_at([1.0, 9.0, 2.0], 0).unwrap());
     let error = field.is_true_at([-1.0, 9.0, 2.0], 3).expect_err("NaN");
@@ -216,12 +234,12 @@ fn a_value_that_is_not_finite_is_refused_with_its_point() {
 #[test]
 fn fields_without_variables_are_constants() {
     let text = "2*pi - 2*pi";
-    assert!(Field::parse(text, &place(text), 2, false, &Library::new()).unwrap().is_zero());
-    let error = Field::parse("1/0", &place("1/0"), 2, false, &Library::new()).expect_err("infinite");
+    assert!(field_of(text, 2, false).unwrap().is_zero());
+    let error = field_of("1/0", 2, false).expect_err("infinite");
     assert_eq!(error.message(), "the expression is not a finite number but inf");
-    let error = Field::parse("x*z", &place("x*z"), 2, false, &Library::new()).expect_err("z in a plane problem");
+    let error = field_of("x*z", 2, false).expect_err("z in a plane problem");
     assert_eq!(error.message(), "unknown variable `z`");
-    let error = Field::parse("x*k", &place("x*k"), 3, false, &Library::new()).expect_err("k in a gap");
+    let error = field_of("x*k", 3, false).expect_err("k in a gap");
     assert_eq!(error.message(), "unknown variable `k`");
 }
 
@@ -279,7 +297,7 @@ fn derivatives_of_data_agree_with_differences() {
     };
     let library = Library::from([("f".to_owned(), Arc::new(Data::new(spec)))]);
     let text = "f(c*x, 1 + x - 0.5*c)^2 + c*f(1, c)";
-    let law = Expression::parse(text, &place, KnownNames { variables: &["c", "x"], data: &library }).unwrap();
+    let law = Expression::parse(text, &place, KnownNames { data: &library, ..KnownNames::of(&["c", "x"]) }).unwrap();
     for values in [[0.7, 1.1], [1.2, 0.3]] {
         for variable in 0..2 {
             let (value, slope) = law.eval_by(variable, &values);

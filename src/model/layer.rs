@@ -125,7 +125,8 @@ pub fn contact_slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64>
         let slot = &model.bodies[body];
         slot.modulus * foundation.max(slot.depth.recip())
     };
-    let largest = (0..model.bodies.len()).map(|body| stiffness(body, 0.0)).fold(f64::MIN_POSITIVE, f64::max);
+    let meshed = (0..model.bodies.len()).filter(|&body| !model.bodies[body].is_rigid);
+    let largest = meshed.map(|body| stiffness(body, 0.0)).fold(f64::MIN_POSITIVE, f64::max);
     let mut slopes = Vec::with_capacity(points);
     for (i, pair) in model.pairs.iter().enumerate() {
         let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.weight[q]).sum();

@@ -150,6 +150,8 @@ pub struct Model {
     pub weight: Vec<f64>,
     /// d of all points, n: the gaps, less the part that prescribed displacements close.
     pub gap: Vec<f64>,
+    /// The Robin term that the bodies carry, omega psi kappa of all contact rows, 2n; empty before the first.
+    pub robin: Vec<f64>,
     /// The mechanism because of which there is no solution, if one is known beforehand.
     pub mechanism: Option<Mechanism>,
     /// Connection to the other ranks.
@@ -164,7 +166,8 @@ impl Model {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
-        let mut model = Self { bodies, pairs, offset, weight, gap: Vec::new(), mechanism: None, exchange };
+        let (gap, robin) = (Vec::new(), Vec::new());
+        let mut model = Self { bodies, pairs, offset, weight, gap, robin, mechanism: None, exchange };
         model.scale_gaps(1.0);
         model
     }
@@ -207,11 +210,14 @@ impl Model {
     }
 
     /// Return the stiffness by which the sweeps hold bodies at every contact row, as a trace vector (2n): that of the nodes under the row, or, for a
-    /// rigid part, of those before it.
+    /// rigid part, of those before it; that of a unit spring where supports prescribe those.
     pub fn holding_stiffness(&self) -> Vec<f64> {
         let (points, mut all) = (self.points(), self.row_stiffness());
         for segment in self.bodies.iter().filter(|slot| slot.is_rigid).flat_map(|slot| &slot.segments) {
-            self.range(segment.pair).for_each(|q| all[points + q] = all[points + q].max(all[q]));
+            for q in self.range(segment.pair) {
+                let before = all[points + q].max(all[q]);
+                all[points + q] = if before > 0.0 { before } else { self.weight[q] };
+            }
         }
         all
     }
@@ -334,6 +340,7 @@ impl Model {
     /// # Errors
     /// Failures of the solver library.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
+        self.robin = weight.to_vec();
         for body in 0..self.bodies.len() {
             let rows = self.of_body(body, weight);
             if let Some(local) = self.bodies[body].local.as_mut() {

@@ -5,7 +5,7 @@ use super::geometry::{Geometry, Plane};
 use super::layer::LayerSpec;
 use super::load::{echo_of, moment_of};
 use super::pattern;
-use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, checked, kept, positive};
+use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, checked, kept, of_steps, positive};
 use crate::error::{Error, Located, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -40,10 +40,10 @@ pub struct ContactSpec {
     ///
     /// Largest distance (a length, > 0) of facets that face each other; any distance if `None`.
     pub distance: Option<f64>,
-    /// gap besides the distance of the meshes
+    /// gap besides the distance of the meshes; it may use factors of load steps
     ///
     /// Gap (a length) that is added to the distance of the meshes.
-    #[serde(default = "no_gap")]
+    #[serde(default = "no_gap", deserialize_with = "of_steps")]
     pub gap: Field,
     /// largest angle in degrees between normals that face each other
     ///
@@ -88,6 +88,8 @@ pub struct ContactSpec {
     /// point about which an obstacle turns; the middle of its surface without this key
     pub at: Option<Point>,
     /// force for which the first load step finds the offset of the gap, which later steps keep; a tension where the pair is bonded
+    ///
+    /// Its two surfaces may be of one body, and may look away from each other, as head and nut of a bolt without a mesh.
     pub preload: Option<f64>,
     /// column of the table of load steps with the factor of these forces and motions
     pub path: Option<Located<String>>,

@@ -35,7 +35,7 @@ pub struct History {
     pub table: Option<Located<PathBuf>>,
     /// Whether some loads have no factor and stay constant.
     pub constant: bool,
-    /// Whether no two steps are of one leg, as where a step locks what it finds.
+    /// Whether no two steps are of one leg, as where a step locks what it finds, or where factors change gaps.
     pub apart: bool,
     /// Number of steps that were solved before this process started.
     pub begun: usize,
@@ -56,6 +56,11 @@ impl History {
         let step = |(number, share): (usize, f64)| LoadStep { time: (number + 1) as f64, factors: vec![share] };
         let steps = shares.into_iter().enumerate().map(step).collect();
         Self { names: vec![COMMON.to_owned()], steps, ..Self::default() }
+    }
+
+    /// Return the names of the factors in expressions. Without load steps the common factor is 1.
+    pub fn factor_names(&self) -> Vec<String> {
+        if self.is_empty() { vec![COMMON.to_owned()] } else { self.names.clone() }
     }
 
     /// Return whether there are no steps, but one run under the full loads.
@@ -116,9 +121,12 @@ impl History {
         column.map_or(1.0, |column| self.steps[step].factors[column])
     }
 
-    /// Give all loads and prescribed displacements the factors of the last step of the leg of `step`. Without such a step, leave them.
+    /// Give all loads, prescribed displacements and gaps the factors of the last step of the leg of `step`. Without such a step these are 1.
     pub fn apply(&self, step: usize, bodies: &mut [BodySpec], contacts: &mut [ContactSpec]) {
-        let Some(last) = self.leg(step).next_back().filter(|_| step < self.steps.len()) else { return };
+        let last = self.leg(step).next_back().filter(|_| step < self.steps.len());
+        let factors = last.map_or(vec![1.0; self.names.len().max(1)], |last| self.steps[last].factors.clone());
+        contacts.iter_mut().for_each(|contact| contact.gap = contact.gap.in_step(&factors));
+        let Some(last) = last else { return };
         for contact in contacts {
             contact.factor = match contact.preload {
                 Some(_) => self.preload_factor(last, contact),
@@ -250,13 +258,19 @@ impl History {
                 return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
-        if let Some(unused) = columns().find(|name| all().all(|path| path.value != **name)) {
+        let is_in_gap = |name: &str| {
+            let mut factors = contacts.iter().flat_map(|contact| contact.gap.factors());
+            factors.any(|factor| self.names[factor] == name)
+        };
+        let is_unused = |name: &&str| all().all(|path| path.value != **name) && !is_in_gap(name);
+        if let Some(unused) = columns().find(is_unused) {
             return Err(Error::scene(
                 &table.place,
                 format!("no load, support or contact has the path `{unused}` of this table"),
             )
             .help(format!(
-                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact; `{COMMON}` is the column of all lines without"
+                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact, or the variable `{unused}` in a gap; `{COMMON}` is the column of \
+                 all lines without"
             )));
         }
         let common = self.names.iter().any(|name| name == COMMON);

@@ -8,7 +8,7 @@
 use super::geometry::{Geometry, Plane};
 use crate::data::Library;
 use crate::error::{Error, Kind, Located, Place, Result as Checked, Source, shown};
-use crate::expression::{Expression, Field, KnownNames};
+use crate::expression::{Expression, Field, KnownNames, coordinates};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, IgnoredAny, MapAccess, SeqAccess, Unexpected, Visitor};
@@ -57,12 +57,20 @@ pub struct Context {
     pub folder: PathBuf,
     /// Functions from files, by name.
     pub data: Library,
+    /// Names of the factors of the load steps.
+    pub factors: Vec<String>,
 }
 
 impl Default for Context {
     fn default() -> Self {
         let geometry = Geometry { dimension: 3, plane: Plane::Strain };
-        Self { geometry, sources: Sources::default(), folder: PathBuf::new(), data: Library::new() }
+        Self {
+            geometry,
+            sources: Sources::default(),
+            folder: PathBuf::new(),
+            data: Library::new(),
+            factors: Vec::new(),
+        }
     }
 }
 
@@ -382,16 +390,34 @@ const LEAST: f64 = 1e-110;
 impl<'de> Deserialize<'de> for Field {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let Located { value, place } = Located::<Form>::deserialize(deserializer)?;
-        field(value, &place)
+        field(value, &place, condition)
     }
 }
 
-/// Return the field of a value that is no list and no table.
-fn field<E: de::Error, L, T>(value: Form<L, T>, place: &Place) -> Result<Field, E> {
+/// Read a number or an expression in the coordinates and the factors of the load steps, for `#[serde(deserialize_with)]`.
+///
+/// # Errors
+/// Those of serde, and texts that are no expression.
+pub fn of_steps<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Field, D::Error> {
+    let Located { value, place } = Located::<Form>::deserialize(deserializer)?;
+    field(value, &place, |text, place, _| {
+        CONTEXT.with_borrow(|Context { geometry, data, factors, .. }| {
+            let variables = coordinates(geometry.dimension, false);
+            Field::parse(text, place, KnownNames { variables: &variables, factors, data })
+        })
+    })
+}
+
+/// Return the field of a value that is no list and no table. `parse` compiles an expression.
+fn field<E: de::Error, L, T>(
+    value: Form<L, T>,
+    place: &Place,
+    parse: impl Fn(&str, &Place, bool) -> Checked<Field>,
+) -> Result<Field, E> {
     let field = match value {
         Form::Integer(value) => Field::Constant(value as f64),
         Form::Number(value) => Field::Constant(value),
-        Form::Text(text) => condition(&text, place, false).map_err(kept)?,
+        Form::Text(text) => parse(&text, place, false).map_err(kept)?,
         other => return Err(kept(other.instead_of_field(place))),
     };
     let number = if let Field::Constant(value) = field { value } else { 0.0 };
@@ -414,7 +440,10 @@ fn field<E: de::Error, L, T>(value: Form<L, T>, place: &Place) -> Result<Field, 
 /// # Errors
 /// A text that is no expression.
 pub fn condition(text: &str, place: &Place, iteration: bool) -> Checked<Field> {
-    CONTEXT.with_borrow(|Context { geometry, data, .. }| Field::parse(text, place, geometry.dimension, iteration, data))
+    CONTEXT.with_borrow(|Context { geometry, data, .. }| {
+        let variables = coordinates(geometry.dimension, iteration);
+        Field::parse(text, place, KnownNames { variables: &variables, factors: &[], data })
+    })
 }
 
 /// Compile an expression in the coordinates, behind `first`.
@@ -424,7 +453,7 @@ pub fn condition(text: &str, place: &Place, iteration: bool) -> Checked<Field> {
 pub fn expression(text: &str, place: &Place, first: &[&'static str]) -> Checked<Expression> {
     CONTEXT.with_borrow(|Context { geometry, data, .. }| {
         let variables = [first, &["x", "y", "z"][..geometry.dimension]].concat();
-        Expression::parse(text, place, KnownNames { variables: &variables, data })
+        Expression::parse(text, place, KnownNames { variables: &variables, factors: &[], data })
     })
 }
 
@@ -538,7 +567,7 @@ impl<'de> Deserialize<'de> for OneOrVector {
             Form::List(items) => {
                 Vector::of(Located::new(items, place), geometry().dimension).map(Self::Vector).map_err(kept)
             }
-            value => field(value, &place).map(Self::One),
+            value => field(value, &place, condition).map(Self::One),
         }
     }
 }

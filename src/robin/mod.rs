@@ -2,6 +2,7 @@
 //! body. Starts from a trace, linear steps, and bounds of the spectrum of G^-1 F1'' are made of sweeps alone. Where a function says nothing else, its
 //! errors are failures of the solver library.
 
+mod obstacle;
 pub mod spectrum;
 pub mod sweep;
 mod sweeps;

@@ -1,6 +1,7 @@
 //! One sweep (41): every body solves its own linear problem, independently of the others. A sweep needs the Robin coefficient, and a start, which is
 //! a trace extended into every body.
 
+use super::obstacle::{self, Obstacles, is_obstacle};
 use crate::error::{Error, Result};
 use crate::exchange::{self, ASKS, asks};
 use crate::linalg::{Blocks, axpy, dot};
@@ -46,6 +47,8 @@ const SUMS: usize = 6;
 pub struct Sweeper {
     /// Sweeps made.
     pub sweeps: usize,
+    /// The motions of obstacles.
+    obstacles: Option<Obstacles>,
 }
 
 impl Sweeper {
@@ -54,12 +57,34 @@ impl Sweeper {
     pub fn sweep(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, asked: u8) -> Result<Sweep> {
         let products = model.multiply(&iterate.states);
         let (residual, energy) = residual(model, products, iterate, &layer.force);
-        self.solve(model, residual, energy, None, asked)
+        let sweep = self.solve(model, residual, energy, None, asked)?;
+        self.with_obstacles(model, sweep, None)
     }
 
     /// Apply G^-1 to any residual as a preconditioner; the result keeps the residual. `product` of the result is `other`'z.
     pub fn precondition(&mut self, model: &mut Model, residual: Vec<Vec<f64>>, other: &[Vec<f64>]) -> Result<Sweep> {
-        self.solve(model, residual, Energy::default(), Some(other), 0)
+        let sweep = self.solve(model, residual, Energy::default(), Some(other), 0)?;
+        self.with_obstacles(model, sweep, Some(other))
+    }
+
+    /// Solve in every body for any residual, while obstacles stay.
+    pub(super) fn of_bodies(&mut self, model: &mut Model, residual: Vec<Vec<f64>>) -> Result<Sweep> {
+        self.solve(model, residual, Energy::default(), None, 0)
+    }
+
+    /// Add the part of a correction by which obstacles move, and bodies follow them.
+    fn with_obstacles(&mut self, model: &mut Model, mut sweep: Sweep, other: Option<&[Vec<f64>]>) -> Result<Sweep> {
+        let known = self.obstacles.take();
+        match Obstacles::update(known, self, model)? {
+            Ok(obstacles) => self.obstacles = obstacles,
+            Err(failure) => sweep.failed = Some(sweep.failed.unwrap_or(failure)),
+        }
+        let Some(obstacles) = &self.obstacles else { return Ok(sweep) };
+        let share = obstacles.share(model, &sweep.residual);
+        sweep.decrement += share.works.dot(&share.amounts);
+        sweep.product += other.map_or(0.0, |other| obstacles.works(model, other).dot(&share.amounts));
+        obstacles.add_to(&share.amounts, &mut sweep.correction);
+        Ok(sweep)
     }
 
     /// Solve in every body that lives on this rank, and sum the results over the ranks in one message. With `other` the solves are those of a preconditioner.
@@ -76,6 +101,9 @@ impl Sweeper {
         let (mut sums, mut failed) = ([0.0; SUMS], vec![0.0; bodies]);
         (sums[1], sums[2]) = (energy.strain, energy.potential);
         for index in 0..bodies {
+            if is_obstacle(model, index) {
+                continue;
+            }
             let Some(body) = model.bodies[index].local.as_mut() else { continue };
             let (r, z) = (&residual[index], &mut corrections[index]);
             let solved = if other.is_some() { body.precondition(r, z)? } else { body.solve(r, z)? };
@@ -139,15 +167,19 @@ impl Coefficient {
         }
         let points = tangents(&self.zone, model, layer, k).map_err(Error::common)?;
         let tangent = [&points[..], &points[..]].concat();
-        Ok(match &self.rule {
+        let mut weight = match &self.rule {
             RobinRule::Tangent => tangent,
-            RobinRule::Frozen => self.frozen.insert(constrained(model, tangent)).clone(),
             RobinRule::Floor(floor) => {
                 let points = model.points();
                 tangent.into_iter().enumerate().map(|(i, w)| w.max(floor * model.weight[i % points])).collect()
             }
-            RobinRule::Auto => constrained(model, tangent),
-        })
+            RobinRule::Frozen | RobinRule::Auto => constrained(model, tangent),
+        };
+        obstacle::join(model, &mut weight);
+        if self.rule == RobinRule::Frozen {
+            self.frozen = Some(weight.clone());
+        }
+        Ok(weight)
     }
 }
 

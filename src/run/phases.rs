@@ -53,8 +53,8 @@ pub fn build_after(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    if scene.contacts.iter().any(|contact| contact.preload.is_some()) {
-        // a step keeps offsets in its gaps, which are those of one leg
+    if scene.contacts.iter().any(|contact| contact.preload.is_some() || contact.gap.factors().next().is_some()) {
+        // the gaps of a model are those of one leg
         Rc::make_mut(&mut scene).method.steps.apart = true;
     }
     let mut kept = Vec::new();
@@ -192,7 +192,13 @@ where
     [[f64; D]; D]: Plain,
 {
     fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
-        set_up(&self.session, self.build(step, condensed, clock)?, begin, clock)
+        let built = self.build(step, condensed, clock);
+        set_up(
+            &self.session,
+            built.map_err(|error| error.because(format!("it is in load step {}", step + 1)))?,
+            begin,
+            clock,
+        )
     }
 }
 
@@ -311,8 +317,8 @@ fn serves(last: &Built, scene: &Scene) -> bool {
     });
     last.condensed.len() == last.discrete.bodies.len()
         && old_meshes == new_meshes
-        // tables of factors change the loads of bodies
-        && both.iter().all(|scene| !scene.method.steps.is_table())
+        // tables of factors change the loads of bodies, and steps that are legs of their own change gaps
+        && both.iter().all(|scene| !scene.method.steps.is_table() && !scene.method.steps.apart)
         && old_joint == new_joint
 }
 

@@ -128,7 +128,8 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
     for (pair, contact) in pairs.iter().zip(contacts) {
         warnings.extend(lost(pair, contact));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
-        if overlap < 0.0 {
+        // the gap of an obstacle says how far it reaches into the body
+        if overlap < 0.0 && !contact.spec.obstacle {
             let [a, b] = names(contact);
             warnings.push(format!(
                 "{a} - {b}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",

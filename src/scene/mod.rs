@@ -15,6 +15,7 @@ pub use spec::{AdaptSpec, Most, OutputSpec, Precision, Quantity, Scene, remove, 
 use crate::error::{Error, Kind, Located, Result, Source};
 use crate::problem::data::{DataKeys, library};
 use crate::problem::geometry::{Geometry, Plane};
+use crate::problem::history::History;
 use crate::problem::method;
 use crate::problem::read::{Context, Sources, within};
 use overrides::Typed;
@@ -79,12 +80,21 @@ struct Head {
     plane: Option<Located<Plane>>,
     #[serde(default)]
     data: BTreeMap<Spanned<String>, DataKeys>,
+    #[serde(default)]
+    method: Stepped,
+}
+
+/// The load steps.
+#[derive(Default, Deserialize)]
+struct Stepped {
+    #[serde(default)]
+    steps: History,
 }
 
 /// Read a scene: first what expressions and vectors depend on, then all.
 fn read(reader: &Reader<'_>, context: Context) -> Result<Scene> {
-    let (geometry, data) = within(context.clone(), || {
-        let Head { dimension, plane, data } = reader.read()?;
+    let (geometry, data, factors) = within(context.clone(), || {
+        let Head { dimension, plane, data, method } = reader.read()?;
         if ![2, 3].contains(&dimension.value) {
             let message = format!("`dimension` is {}", dimension.value);
             return Err(Error::scene(&dimension.place, message).label("must be 2 or 3"));
@@ -95,9 +105,9 @@ fn read(reader: &Reader<'_>, context: Context) -> Result<Scene> {
                 .help("remove it, or set dimension = 2"));
         }
         let plane = plane.map_or(Plane::Strain, |plane| plane.value);
-        Ok((Geometry { dimension: dimension.value, plane }, library(data)?))
+        Ok((Geometry { dimension: dimension.value, plane }, library(data)?, method.steps.factor_names()))
     })?;
-    within(Context { geometry, data, ..context }, || reader.read())
+    within(Context { geometry, data, factors, ..context }, || reader.read())
 }
 
 /// Return the folder of examples, if the source that the program was built from is still there.

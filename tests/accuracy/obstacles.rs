@@ -209,6 +209,25 @@ fn a_sphere_in_space() {
     }
 }
 
+/// On a first mesh with one point in contact a force leaves no error of its pressure; a second mesh shows that this is a guess.
+#[test]
+fn a_mesh_is_adapted_to_an_obstacle() {
+    let run = solve(case("indenter"), &["--tolerance", "2e-2"]).converged();
+    close("peak", run.number("pairs/0/peak_pressure"), 1399.16, 0.02);
+    close("area", run.number("pairs/0/contact_area"), PI, 0.05);
+}
+
+/// An obstacle on a surface that a support holds: the layer alone gives way, by F/(k A).
+#[test]
+fn an_obstacle_on_a_held_surface() {
+    let held = footing("force = 10").text.replace("on = \"high\"", "on = \"low\"");
+    let held = scene(BLOCK, &held.replace("z = 0", "x = 0, y = 0, z = 0"));
+    for method in METHODS {
+        let run = solve_here(&held.path, &[&format!("method={method}")]).converged();
+        close(method, run.number("pairs/0/obstacle/approach"), 10.0 / (1e3 * 4.0), 1e-9);
+    }
+}
+
 /// What the tables of a run have of an obstacle.
 #[test]
 fn obstacles_are_in_all_tables() {
@@ -233,6 +252,86 @@ fn obstacles_are_in_all_tables() {
     let at = |y: f64| (0..table.rows()).find(|&q| table["y"][q] == y).expect("a point on the edge");
     let [near, far] = [at(0.0), at(2.0)].map(|q| table["u_n_obstacle"][q]);
     assert!((near.abs() - 2e-3).abs() < 1e-15 && far.abs() < 1e-15, "{near} {far}");
+}
+
+/// A wave that grows and moves before a block: its gap has the factors of the load steps. Each step is the solution of a scene with numbers in their places,
+/// by every method and on three ranks; a step whose gap has no value ends the run with its number.
+#[test]
+fn a_gap_changes_with_the_factors_of_load_steps() {
+    let text = |gap: &str, table: &str| {
+        format!(
+            "dimension = 2\nmesh = {{ geo = \"mesh.geo\", set = {{ n = 32 }} }}\n[[body]]\nname = \"body\"\nyoung = 1e5\npoisson = 0.3\n\
+             fix = [{{ on = \"low\", x = 0, y = 0 }}]\n[[contact]]\non = \"high\"\nobstacle = true\ngap = \"{gap}\"\napproach = 2e-3\n\
+             layer = {{ linear = {{ stiffness = 1e6 }} }}\n[method]\n{table}\n"
+        )
+    };
+    let wave = |depth: &str, shift: &str| format!("{depth} * (1 + cos(pi*(x - {shift})))");
+    let (name, table) = ("steps = { table = \"wave.csv\" }", "depth, shift\n1e-3, 0\n4e-3, 0\n4e-3, 0.3\n2e-3, -0.5\n");
+    let moving = |gap: &str, table: &str| {
+        let scene = scene(RECTANGLE, &text(gap, name));
+        std::fs::write(scene.path.with_file_name("wave.csv"), table).expect("a table");
+        scene
+    };
+    let moving_wave = moving(&wave("depth", "shift"), table);
+    let alone = table.lines().skip(1).map(|line| {
+        let (depth, shift) = line.split_once(", ").expect("two factors");
+        solve_here(&scene(RECTANGLE, &text(&wave(depth, &format!("({shift})")), "")).path, &[]).converged()
+    });
+    let alone: Vec<Report> = alone.collect();
+    let mut forces: Vec<f64> = alone.iter().map(|run| run.number("pairs/0/obstacle/force")).collect();
+    let checked = |run: &Report| {
+        for (step, run_alone) in alone.iter().enumerate() {
+            for path in ["pairs/0/obstacle/force", "pairs/0/peak_pressure"] {
+                close(path, run.number(&format!("steps/{step}/{path}")), run_alone.number(path), 1e-6);
+            }
+        }
+        close("area", run.number("pairs/0/contact_length"), alone[3].number("pairs/0/contact_length"), 1e-6);
+    };
+    for method in METHODS {
+        let words = method.trim_matches(['{', '}']);
+        let words = if words.is_empty() { String::new() } else { format!("{words},") };
+        let steps =
+            format!("method={{{words}steps={{table='{}'}}}}", moving_wave.path.with_file_name("wave.csv").display());
+        checked(&solve_here(&moving_wave.path, &[&steps]).converged());
+    }
+    checked(&solve_on(3, &moving_wave.path, &["--set", "solver=hypre"]).converged());
+    forces.dedup_by(|a, b| (*a / *b - 1.0).abs() < 1e-3);
+    assert_eq!(forces.len(), 4, "{forces:?}");
+    // without load steps the common factor is 1, and equal steps have it
+    let grown = scene(RECTANGLE, &text(&wave("4e-3 * factor", "0"), ""));
+    close("one", solve_here(&grown.path, &[]).converged().number("pairs/0/obstacle/force"), forces[1], 1e-9);
+    let half = solve_here(&scene(RECTANGLE, &text(&wave("2e-3", "0"), "")).path, &["contact.0.approach=1e-3"]);
+    let steps = solve_here(&grown.path, &["method.steps=2"]).converged();
+    close("half", steps.number("steps/0/pairs/0/obstacle/force"), half.number("pairs/0/obstacle/force"), 1e-6);
+    for (gap, table, words) in [
+        ("depth * sqrt(1.1 - shift - x)", "depth, shift\n1, 0\n1, 0.5\n", "it is in load step 2"),
+        ("depth * x", "depth, shift\n1, 0\n", "the variable `shift` in a gap"),
+        ("deep * x", "depth\n1\n", "unknown variable `deep`"),
+    ] {
+        let error = try_here(&moving(gap, table).path, &[]).err().unwrap_or_else(|| panic!("{gap} is accepted"));
+        assert!(error.render(false).contains(words), "{gap}: {}", error.render(false));
+    }
+}
+
+/// By plain sweeps, an obstacle under a force takes the iterations of one that is moved as far, however stiff the layer is.
+#[test]
+fn sweeps_move_obstacles_with_their_bodies() {
+    for stiffness in ["1e5", "1e8"] {
+        for words in ["gamma=0.6", "gamma=1", "gamma='line-search'", "gamma='aitken'", "gamma='aitken',robin='auto'"] {
+            let with = |key: &str| {
+                let law = format!("layer={{linear={{stiffness={stiffness}}}}}");
+                let contact = format!("contact.0={{on='top',obstacle=true,gap='x^2/100',{law},{key}}}");
+                let run = solve_here(case("indenter"), &[&contact, &format!("method={{name='robin',{words}}}")]);
+                run.converged()
+            };
+            let loaded = with("force=2930.4");
+            let reached = loaded.number("pairs/0/obstacle/approach");
+            let moved = with(&format!("approach={reached}"));
+            close("force", moved.number("pairs/0/obstacle/force"), 2930.4, 1e-5);
+            let counts = [&loaded, &moved].map(|run| run.count("iterations"));
+            assert!(counts[0] <= counts[1] + 4, "{stiffness} {words}: {counts:?}");
+        }
+    }
 }
 
 /// Motions without resistance and without direction are refused by name.

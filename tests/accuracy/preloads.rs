@@ -1,7 +1,7 @@
 //! Pairs that are pressed by a force, and bolts that keep their preload.
 
 use crate::common::here::solve_here;
-use crate::common::{Scene, case, solve_on};
+use crate::common::{Run, Scene, case, solve_on};
 
 fn close(what: &str, ours: f64, exact: f64, tolerance: f64) {
     assert!((ours / exact - 1.0).abs() < tolerance, "{what}: {ours}, closed form {exact}");
@@ -104,4 +104,59 @@ fn a_clamp_is_one_body() {
     let offsets: Vec<f64> = methods.iter().map(offset).collect();
     assert!(offsets[0] < -10.0 / 1e4, "{offsets:?}");
     offsets.iter().for_each(|other| close("offset", *other, offsets[0], 1e-6));
+}
+
+/// A run of load steps whose last one did not end goes on with the offset that its first step has found, and with the gaps of its step, on any ranks.
+#[test]
+fn a_preload_is_kept_over_a_restart() {
+    let wave = "[[contact]]\non = \"crown\"\nobstacle = true\ngap = \"1e-4 * (1 + service) * x^2\"\nlayer = { linear = { stiffness = 1e4 } }\n";
+    let scene = Scene::edited("bolt", "[method]", &format!("{wave}[method]"));
+    let steps = "method.steps={table='more.csv'}";
+    std::fs::write(scene.path.with_file_name("more.csv"), "service\n0\n40\n80\n120\n").expect("a table");
+    for (ranks, then) in [(1, 3), (3, 1)] {
+        let solver = ["--set", "solver=mumps", "--set", steps];
+        let whole = solve_on(ranks, &scene.path, &solver).converged();
+        let ended = solve_on(ranks, &scene.path, &[&solver[..], &["--set", "method.stop.iterations=1"]].concat());
+        assert_eq!(ended["status"], "iteration-limit", "{}", ended.said());
+        let folder = ended.folder.display().to_string();
+        let rest = solve_on(then, &scene.path, &[&solver[..], &["--restart", &folder]].concat());
+        assert_eq!(rest["status"], "converged", "{}", rest.said());
+        for path in ["offset", "force/1"] {
+            for step in 0..4 {
+                let of = |run: &Run| run.number(&format!("steps/{step}/pairs/0/{path}"));
+                close(path, of(&rest), of(&whole), 1e-9);
+            }
+        }
+        close("peak", rest.number("pairs/0/peak_pressure"), whole.number("pairs/0/peak_pressure"), 1e-9);
+    }
+}
+
+/// Two plates under a bolt without a mesh, between the faces under its head and its nut, which look away from each other. The bolt has the stiffness Kb, and
+/// the plates in series with their layer have Kp: the preload F rises by S Kb/(Kb + Kp) under the service load S that pulls the plates apart.
+#[test]
+fn a_bolt_between_outer_faces() {
+    let scene = Scene::new(
+        "dimension = 2\nmesh = \"plates.geo\"\n[[body]]\nname = \"lower\"\nyoung = 1e5\npoisson = 0\nfix = [{ on = \"pin\", x = 0 }, { on = \"nut\", y = 0 }]\n\
+         [[body]]\nname = \"upper\"\nyoung = 1e5\npoisson = 0\nfix = [{ on = \"pin\", x = 0 }]\nload = [{ on = \"head\", pressure = -1, path = \"service\" }]\n\
+         [[contact]]\nbetween = [\"head\", \"nut\"]\npreload = 100\nlayer = { linear = { stiffness = 1e4 } }\n\
+         [[contact]]\nbetween = [\"joint_upper\", \"joint_lower\"]\nlayer = { linear = { stiffness = 1e5 } }\n\
+         [method]\nsteps = { table = \"service.csv\" }\n",
+    );
+    let script = "For i In {0:1}
+        Point(4*i+1)={0,i,0}; Point(4*i+2)={2,i,0}; Point(4*i+3)={2,i+1,0}; Point(4*i+4)={0,i+1,0};
+        Line(4*i+1)={4*i+1,4*i+2}; Line(4*i+2)={4*i+2,4*i+3}; Line(4*i+3)={4*i+3,4*i+4}; Line(4*i+4)={4*i+4,4*i+1};
+        Curve Loop(i+1)={4*i+1,4*i+2,4*i+3,4*i+4}; Plane Surface(i+1)={i+1};
+        EndFor
+        Mesh.MeshSizeMax=0.5;
+        Physical Surface(\"lower\")={1}; Physical Surface(\"upper\")={2}; Physical Curve(\"pin\")={4,8};
+        Physical Curve(\"nut\")={1}; Physical Curve(\"joint_lower\")={3}; Physical Curve(\"joint_upper\")={5}; Physical Curve(\"head\")={7};\n";
+    std::fs::write(scene.path.with_file_name("plates.geo"), script).expect("a script");
+    std::fs::write(scene.path.with_file_name("service.csv"), "service\n0\n20\n30\n").expect("a table");
+    // of the width 2
+    let (bolt, plates) = (2e4, 2.0 / (2.0 / 1e5 + 1.0 / 1e5));
+    let run = solve_here(&scene.path, &[]).converged();
+    for (step, service) in [0.0, 40.0, 60.0].into_iter().enumerate() {
+        let force = run.number(&format!("steps/{step}/pairs/0/force/1"));
+        close("force", force.abs(), 100.0 + service * bolt / (bolt + plates), 1e-6);
+    }
 }

@@ -2,7 +2,6 @@
 
 use super::numeric::integral;
 use super::{LayerLaw, Response};
-use crate::data::Library;
 use crate::error::{Error, Place, Result, Source, shown};
 use crate::expression::{Expression, KnownNames};
 use crate::linalg::portable::pow;
@@ -45,7 +44,7 @@ impl ExpressionLaw {
     pub fn text(text: &str) -> Result<Expression> {
         let source = Source { name: "a law of a layer".into(), text: text.to_owned() };
         let place = Place { span: 0..text.len(), source: Arc::new(source) };
-        Expression::parse(text, &place, KnownNames { variables: &["c", "x", "y"], data: &Library::default() })
+        Expression::parse(text, &place, KnownNames::of(&["c", "x", "y"]))
     }
 
     /// Make a known law of two parameters, which is a straight line beyond `end`.
