@@ -260,7 +260,8 @@ impl Field {
         }
         let given = |name: &&str| Some(format!("{name} = {}", values.get(coordinate(name)?)?));
         let point: Vec<_> = expression.variables.iter().filter_map(given).collect();
-        Error::scene(&expression.place, format!("{what} is not a finite number at {}", point.join(", ")))
+        let at = if point.is_empty() { String::new() } else { format!(" at {}", point.join(", ")) };
+        Error::scene(&expression.place, format!("{what} is not a finite number{at}"))
             .label(format!("gives {value} there"))
             .help("keep roots, logarithms and fractional powers to where they are defined, say with max(0, ...)")
     }

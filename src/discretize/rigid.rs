@@ -79,11 +79,12 @@ impl<'a> Obstacle<'a> {
     /// Return the motions that the scene leaves free, with the work of its forces on each.
     fn motions(&self) -> Vec<Motion> {
         let (spec, mut motions) = (self.spec, Vec::new());
-        if let Some(force) = spec.force {
-            motions.push(Motion { name: "approach".to_owned(), trace: self.approaching(), work: spec.factor * force });
+        if let Some(force) = spec.force() {
+            motions.push(Motion { name: "approach".to_owned(), trace: self.approaching(), work: force });
         }
-        for axis in spec.moment.iter().flat_map(|_| self.axes()) {
-            let work = spec.moment.map_or(0.0, |moment| spec.factor * dot(&moment.0, &axis));
+        let moment = spec.moment();
+        for axis in moment.iter().flat_map(|_| self.axes()) {
+            let work = moment.map_or(0.0, |moment| dot(&moment, &axis));
             motions.push(Motion { name: "tilt".to_owned(), trace: self.turning(axis), work });
         }
         motions
@@ -91,20 +92,19 @@ impl<'a> Obstacle<'a> {
 
     /// Return by how much the motions close each point that the scene prescribes, n.
     fn prescribed(&self) -> Vec<f64> {
-        let (approach, tilt) = (self.spec.approach.unwrap_or(0.0), self.spec.tilt.map_or([0.0; 3], |tilt| tilt.0));
+        let (approach, tilt) = (self.spec.approach().unwrap_or(0.0), self.spec.tilt().unwrap_or_default());
         let both = self.approaching().into_iter().zip(self.turning(tilt));
-        both.map(|(closing, turn)| self.spec.factor * (approach * closing + turn)).collect()
+        both.map(|(closing, turn)| approach * closing + turn).collect()
     }
 
     /// Return the approach and the turn of the obstacle, from the amounts of its free motions. `share` is the factor of prescribed motions.
     pub fn moved(&self, amounts: &[f64], share: f64) -> (f64, [f64; 3]) {
         let mut amounts = amounts.iter();
-        let given = share * self.spec.factor;
         let approach = match self.spec.force {
             Some(_) => amounts.next().copied().unwrap_or(0.0),
-            None => given * self.spec.approach.unwrap_or(0.0),
+            None => share * self.spec.approach().unwrap_or(0.0),
         };
-        let mut turn = self.spec.tilt.map_or([0.0; 3], |tilt| tilt.0.map(|c| given * c));
+        let mut turn = self.spec.tilt().unwrap_or_default().map(|c| share * c);
         if self.spec.moment.is_some() {
             for (axis, a) in self.axes().into_iter().zip(amounts) {
                 (0..3).for_each(|c| turn[c] += a * axis[c]);
@@ -128,7 +128,7 @@ impl<'a> Obstacle<'a> {
             )
             .help("name a part of the surface, or let the gap change: gap = \"...\""));
         }
-        let moment = spec.moment.map_or([0.0; 3], |moment| moment.0);
+        let moment = spec.moment().unwrap_or_default();
         if !self.pair.along_curve && self.along(moment).abs() > 1e-9 * length(moment) {
             let message =
                 format!("a moment on the obstacle before `{name}` about its mean normal {}", point(self.normal));
@@ -143,6 +143,7 @@ impl<'a> Obstacle<'a> {
 /// # Errors
 /// See [`Obstacle`]: a surface without a mean normal, and a moment about it.
 pub fn part(pair: &mut ContactPair, spec: &ContactSpec, number: usize, index: usize) -> Result<Option<BodySlot>> {
+    spec.check_step()?;
     if spec.obstacle {
         let obstacle = Obstacle::new(pair, spec);
         obstacle.check()?;
@@ -152,9 +153,10 @@ pub fn part(pair: &mut ContactPair, spec: &ContactSpec, number: usize, index: us
         (pair.rows[1], pair.nodal[1]) = (Csr::without_columns(pair.len()), Csr::without_columns(pair.len()));
         return Ok(Some(BodySlot::rigid(&spec.between[1].value, number, pair.len(), motions)));
     }
-    let Some(force) = spec.force.or(spec.preload) else { return Ok(None) };
+    let preload = spec.preload.map(|preload| spec.factor * preload);
+    let Some(force) = spec.force().or(preload) else { return Ok(None) };
     let pulls = spec.bond && spec.preload.is_some();
-    let work = spec.factor * if pulls { -force } else { force };
+    let work = if pulls { -force } else { force };
     let motion = Motion { name: "offset".to_owned(), trace: vec![1.0; pair.len()], work };
     let name = format!("gap of {} - {}", spec.between[0].value, spec.between[1].value);
     Ok(Some(BodySlot::rigid(&name, number, pair.len(), vec![motion])))

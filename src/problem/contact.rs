@@ -3,10 +3,10 @@
 use super::body::{check_name, one, plain_pattern};
 use super::geometry::{Geometry, Plane};
 use super::layer::LayerSpec;
-use super::load::{echo_of, moment_of};
+use super::load::{axial_of, echo_of};
 use super::pattern;
-use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, checked, kept, of_steps, positive};
-use crate::error::{Error, Located, shown};
+use super::read::{Check, Either, Flaw, Form, OneOrVector, Vector, by_factors, checked, kept, of_steps, positive};
+use crate::error::{Error, Located, Result as Checked, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -78,12 +78,16 @@ pub struct ContactSpec {
     #[serde(default)]
     pub obstacle: bool,
     /// how far an obstacle moves towards the surface, along its mean normal; 0 without `force`
-    pub approach: Option<f64>,
+    #[serde(default, deserialize_with = "by_factors")]
+    pub approach: Option<Field>,
     /// how far an obstacle turns, in radians: about z in the plane, in space a vector; 0 without `moment`
+    #[serde(default, deserialize_with = "by_factors")]
     pub tilt: Option<Axial>,
     /// total of the normal forces, for which the gap changes by an offset; force on an obstacle along the mean normal
-    pub force: Option<f64>,
+    #[serde(default, deserialize_with = "by_factors")]
+    pub force: Option<Field>,
     /// moment on an obstacle about `at`, under which it turns: a number in the plane, in space a vector
+    #[serde(default, deserialize_with = "by_factors")]
     pub moment: Option<Axial>,
     /// point about which an obstacle turns; the middle of its surface without this key
     pub at: Option<Point>,
@@ -172,8 +176,58 @@ impl ContactSpec {
 
     /// Return whether forces or prescribed motions of the pair act without a path.
     pub fn acts(&self) -> bool {
-        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(|axial| axial.0);
-        self.path.is_none() && [self.approach, self.force].into_iter().flatten().chain(turns).any(|value| value != 0.0)
+        self.path.is_none() && self.given().any(|field| !field.is_zero())
+    }
+
+    /// Iterate over the forces and motions that are given.
+    fn given(&self) -> impl Iterator<Item = &Field> {
+        let turns = [&self.tilt, &self.moment].into_iter().flatten().flat_map(|axial| &axial.0);
+        [&self.approach, &self.force].into_iter().flatten().chain(turns)
+    }
+
+    /// Iterate over the indices of the factors of load steps in its expressions.
+    pub fn factors(&self) -> impl Iterator<Item = usize> {
+        self.given().chain([&self.gap]).flat_map(Field::factors)
+    }
+
+    /// Give its expressions the factors of a load step.
+    pub fn set_factors(&mut self, factors: &[f64]) {
+        let turns = [&mut self.tilt, &mut self.moment].into_iter().flatten().flat_map(|axial| &mut axial.0);
+        let numbers = [&mut self.approach, &mut self.force].into_iter().flatten();
+        numbers.chain(turns).chain([&mut self.gap]).for_each(|field| *field = field.in_step(factors));
+    }
+
+    /// Check that forces and motions are numbers in a load step.
+    ///
+    /// # Errors
+    /// One that is not finite.
+    pub fn check_step(&self) -> Checked<()> {
+        self.given().try_for_each(|field| field.eval_finite("the force or motion", [0.0; 3]).map(drop))
+    }
+
+    /// Return the approach that is given in the present load step.
+    pub fn approach(&self) -> Option<f64> {
+        self.approach.as_ref().map(|field| self.in_step(field))
+    }
+
+    /// Return the force that is given in the present load step.
+    pub fn force(&self) -> Option<f64> {
+        self.force.as_ref().map(|field| self.in_step(field))
+    }
+
+    /// Return the turn that is given in the present load step.
+    pub fn tilt(&self) -> Option<[f64; 3]> {
+        self.tilt.as_ref().map(|axial| axial.0.each_ref().map(|field| self.in_step(field)))
+    }
+
+    /// Return the moment that is given in the present load step.
+    pub fn moment(&self) -> Option<[f64; 3]> {
+        self.moment.as_ref().map(|axial| axial.0.each_ref().map(|field| self.in_step(field)))
+    }
+
+    /// Return a force or motion in the present load step. An expression has the factors that it names, and no other.
+    fn in_step(&self, field: &Field) -> f64 {
+        if field.is_constant() { self.factor * number(field) } else { number(field) }
     }
 
     /// Complete the two surfaces of a contact that was read: an obstacle is the second one.
@@ -249,8 +303,8 @@ impl ContactSpec {
             let help = "facets of different bodies that face each other at most that far apart form pairs";
             return Err(Flaw::new("", "[[contact]] has no `distance`", "`distance` is missing", help));
         }
-        let totals = [("force", self.force), ("preload", self.preload)];
-        if let Some((key, _)) = totals.iter().find(|(_, value)| value.is_some()) {
+        let totals = [("force", self.force.is_some()), ("preload", self.preload.is_some())];
+        if let Some((key, _)) = totals.iter().find(|(_, is_given)| *is_given) {
             let help = "name the two surfaces: between = [\"one\", \"other\"]";
             return Err(Flaw::new(*key, format!("`{key}` for pairs that are found"), "", help));
         }
@@ -284,17 +338,17 @@ impl ContactSpec {
 
     /// Check the forces and motions of obstacles and offsets.
     fn check_forces(&self, geometry: Geometry) -> Result<(), Flaw> {
-        let turn = |axial: &Option<Axial>| axial.map_or_else(Vec::new, |axial| axial.0.to_vec());
-        let number = |value: Option<f64>| value.into_iter().collect::<Vec<f64>>();
+        let turn = |axial: &Option<Axial>| axial.as_ref().map(|axial| axial.0.to_vec());
+        let number = |field: &Option<Field>| field.clone().map(|field| vec![field]);
         let mut given = vec![
-            ("approach", number(self.approach)),
-            ("force", number(self.force)),
-            ("preload", number(self.preload)),
+            ("approach", number(&self.approach)),
+            ("force", number(&self.force)),
+            ("preload", self.preload.map(|preload| vec![Field::Constant(preload)])),
             ("tilt", turn(&self.tilt)),
             ("moment", turn(&self.moment)),
-            ("at", self.at.map_or_else(Vec::new, |at| at.0.to_vec())),
+            ("at", self.at.map(|at| at.0.map(Field::Constant).to_vec())),
         ];
-        given.retain(|(_, values)| !values.is_empty());
+        given.retain(|(_, values)| values.is_some());
         let of = |keys: &[&str]| given.iter().map(|(key, _)| *key).filter(|key| keys.contains(key)).collect::<Vec<_>>();
         if let (false, [key, ..]) = (self.obstacle, &of(&["approach", "tilt", "moment", "at"])[..]) {
             let help = "on = \"top\", obstacle = true";
@@ -311,11 +365,15 @@ impl ContactSpec {
             let message = "an obstacle that turns in an axisymmetric scene";
             return Err(Flaw::new(*key, message, "it moves along the axis alone", ""));
         }
-        for (key, values) in &given {
+        for (key, fields) in &given {
+            // expressions are known in each load step
+            let is_constant = |field: &&Field| field.is_constant();
+            let values: Vec<f64> = fields.iter().flatten().filter(is_constant).map(self::number).collect();
             if let Some(value) = values.iter().find(|value| !value.is_finite()) {
                 return Err(Flaw::new(*key, format!("`{key}` is {value}"), "", ""));
             }
-            if values[0] < 0.0 && (*key == "preload" || *key == "force" && !self.bond) {
+            if values.first().is_some_and(|value| *value < 0.0) && (*key == "preload" || *key == "force" && !self.bond)
+            {
                 let help = "a force > 0 presses; only a bonded pair can be pulled";
                 return Err(Flaw::new(*key, format!("a negative `{key}`"), "", help));
             }
@@ -364,19 +422,24 @@ fn is_with_obstacle(between: &[Located<String>; 2]) -> bool {
 }
 
 /// A rotation or a moment: about z in the plane, a vector in space.
-#[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
+#[derive(Debug, Clone, JsonSchema)]
 #[schemars(with = "OneOrVector")]
-pub struct Axial(pub [f64; 3]);
+pub struct Axial(pub [Field; 3]);
+
+/// Return the number that a field without coordinates has in a load step.
+fn number(field: &Field) -> f64 {
+    field.eval([0.0; 3])
+}
 
 impl<'de> Deserialize<'de> for Axial {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        moment_of(Located::deserialize(deserializer)?).map(Self).map_err(kept)
+        axial_of(Located::deserialize(deserializer)?).map(Self).map_err(kept)
     }
 }
 
 impl Serialize for Axial {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        echo_of(self.0).serialize(serializer)
+        echo_of(self.0.clone()).serialize(serializer)
     }
 }
 

@@ -121,11 +121,11 @@ impl History {
         column.map_or(1.0, |column| self.steps[step].factors[column])
     }
 
-    /// Give all loads, prescribed displacements and gaps the factors of the last step of the leg of `step`. Without such a step these are 1.
+    /// Give all loads, prescribed displacements and contacts the factors of the last step of the leg of `step`. Without such a step these are 1.
     pub fn apply(&self, step: usize, bodies: &mut [BodySpec], contacts: &mut [ContactSpec]) {
         let last = self.leg(step).next_back().filter(|_| step < self.steps.len());
         let factors = last.map_or(vec![1.0; self.names.len().max(1)], |last| self.steps[last].factors.clone());
-        contacts.iter_mut().for_each(|contact| contact.gap = contact.gap.in_step(&factors));
+        contacts.iter_mut().for_each(|contact| contact.set_factors(&factors));
         let Some(last) = last else { return };
         for contact in contacts {
             contact.factor = match contact.preload {
@@ -258,18 +258,18 @@ impl History {
                 return Err(Error::scene(&path.place, message).suggest(&path.value, columns(), otherwise));
             }
         }
-        let is_in_gap = |name: &str| {
-            let mut factors = contacts.iter().flat_map(|contact| contact.gap.factors());
+        let is_variable = |name: &str| {
+            let mut factors = contacts.iter().flat_map(ContactSpec::factors);
             factors.any(|factor| self.names[factor] == name)
         };
-        let is_unused = |name: &&str| all().all(|path| path.value != **name) && !is_in_gap(name);
+        let is_unused = |name: &&str| all().all(|path| path.value != **name) && !is_variable(name);
         if let Some(unused) = columns().find(is_unused) {
             return Err(Error::scene(
                 &table.place,
                 format!("no load, support or contact has the path `{unused}` of this table"),
             )
             .help(format!(
-                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact, or the variable `{unused}` in a gap; `{COMMON}` is the column of \
+                "path = \"{unused}\" in a line of `load` or `fix`, or in a contact, or the variable `{unused}` in its gap, force or motion; `{COMMON}` is the column of \
                  all lines without"
             )));
         }

@@ -3,7 +3,7 @@
 
 use super::geometry::{Geometry, Plane};
 use super::pattern;
-use super::read::{Check, Flaw, OneOrVector, Refused, Vector, constant, geometry, only_one, place, positive};
+use super::read::{Check, Flaw, OneOrVector, Refused, Vector, geometry, only_one, place, positive};
 use crate::error::{Error, Kind, Located, Result as Checked};
 use crate::expression::Field;
 use schemars::JsonSchema;
@@ -283,7 +283,7 @@ impl From<Load> for LoadKeys {
     fn from(Load { on, kind, path, factor: _ }: Load) -> Self {
         let keys = LoadKeys { on, pressure: None, traction: None, force: None, moment: None, rigid: None, path };
         let total = |force: [f64; 3]| Some(Located::from(Vector::from(force)));
-        let about = |moment: [f64; 3]| Some(Located::from(echo_of(moment)));
+        let about = |moment: [f64; 3]| Some(Located::from(echo_of(moment.map(Field::Constant))));
         match kind {
             LoadKind::Pressure(pressure) => Self { pressure: Some(pressure.into()), ..keys },
             LoadKind::Traction(traction) => Self { traction: Some(Vector(traction).into()), ..keys },
@@ -340,21 +340,28 @@ fn check_moment(moment: [f64; 3], geometry: Geometry) -> Result<(), Flaw> {
     Ok(())
 }
 
-/// Return a moment (x, y, z): a number in the plane, a vector in space.
-pub(super) fn moment_of(moment: Located<OneOrVector>) -> Checked<[f64; 3]> {
-    let numbers = match (&moment.value, geometry().is_plane()) {
-        (OneOrVector::One(field), true) => constant(field).map(|about_z| [0.0, 0.0, about_z]),
-        (OneOrVector::Vector(vector), false) => vector.numbers(),
+/// Return a moment (x, y, z) of numbers: see [`axial_of`].
+fn moment_of(moment: Located<OneOrVector>) -> Checked<[f64; 3]> {
+    let place = moment.place.clone();
+    Vector::from(axial_of(moment)?).numbers().map_err(|error| error.or_at(&place))
+}
+
+/// Return a moment or a rotation (x, y, z): a number in the plane, a vector in space.
+pub(super) fn axial_of(moment: Located<OneOrVector>) -> Checked<[Field; 3]> {
+    let zero = || Field::Constant(0.0);
+    let fields = match (moment.value, geometry().is_plane()) {
+        (OneOrVector::One(about_z), true) => Ok([zero(), zero(), about_z]),
+        (OneOrVector::Vector(vector), false) => Ok(vector.0),
         (_, true) => Err(Error::new(Kind::Scene, "a moment is a number in the plane").help("moment = M, about z")),
         (_, false) => Err(Error::new(Kind::Scene, "a moment is a vector in space").help("moment = [MX, MY, MZ]")),
     };
-    numbers.map_err(|error| error.or_at(&moment.place))
+    fields.map_err(|error| error.or_at(&moment.place))
 }
 
 /// Return a moment as [`moment_of`] reads it.
-pub(super) fn echo_of(moment: [f64; 3]) -> OneOrVector {
-    match geometry().is_plane() {
-        true => OneOrVector::One(Field::Constant(moment[2])),
-        false => OneOrVector::Vector(moment.into()),
+pub(super) fn echo_of(moment: [Field; 3]) -> OneOrVector {
+    match (geometry().is_plane(), moment) {
+        (true, [_, _, about_z]) => OneOrVector::One(about_z),
+        (false, moment) => OneOrVector::Vector(moment.into()),
     }
 }

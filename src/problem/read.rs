@@ -59,17 +59,26 @@ pub struct Context {
     pub data: Library,
     /// Names of the factors of the load steps.
     pub factors: Vec<String>,
+    /// The names that expressions of the key that is read may have.
+    pub names: Names,
+}
+
+/// The kinds of names in an expression.
+#[derive(Debug, Clone, Copy)]
+pub struct Names {
+    coordinates: bool,
+    factors: bool,
 }
 
 impl Default for Context {
     fn default() -> Self {
-        let geometry = Geometry { dimension: 3, plane: Plane::Strain };
         Self {
-            geometry,
+            geometry: Geometry { dimension: 3, plane: Plane::Strain },
             sources: Sources::default(),
             folder: PathBuf::new(),
             data: Library::new(),
             factors: Vec::new(),
+            names: Names { coordinates: true, factors: false },
         }
     }
 }
@@ -390,8 +399,17 @@ const LEAST: f64 = 1e-110;
 impl<'de> Deserialize<'de> for Field {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let Located { value, place } = Located::<Form>::deserialize(deserializer)?;
-        field(value, &place, condition)
+        field(value, &place)
     }
+}
+
+/// Read something whose expressions may have the factors of the load steps, and with `coordinates` these, too.
+fn stepped<T>(coordinates: bool, read: impl FnOnce() -> T) -> T {
+    let set = |names| CONTEXT.with_borrow_mut(|context| std::mem::replace(&mut context.names, names));
+    let before = set(Names { coordinates, factors: true });
+    let result = read();
+    set(before);
+    result
 }
 
 /// Read a number or an expression in the coordinates and the factors of the load steps, for `#[serde(deserialize_with)]`.
@@ -399,25 +417,23 @@ impl<'de> Deserialize<'de> for Field {
 /// # Errors
 /// Those of serde, and texts that are no expression.
 pub fn of_steps<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Field, D::Error> {
-    let Located { value, place } = Located::<Form>::deserialize(deserializer)?;
-    field(value, &place, |text, place, _| {
-        CONTEXT.with_borrow(|Context { geometry, data, factors, .. }| {
-            let variables = coordinates(geometry.dimension, false);
-            Field::parse(text, place, KnownNames { variables: &variables, factors, data })
-        })
-    })
+    stepped(true, || Field::deserialize(deserializer))
 }
 
-/// Return the field of a value that is no list and no table. `parse` compiles an expression.
-fn field<E: de::Error, L, T>(
-    value: Form<L, T>,
-    place: &Place,
-    parse: impl Fn(&str, &Place, bool) -> Checked<Field>,
-) -> Result<Field, E> {
+/// Read something whose expressions have the factors of the load steps alone, for `#[serde(deserialize_with)]`.
+///
+/// # Errors
+/// Those of serde, and texts that are no expression.
+pub fn by_factors<'de, T: Deserialize<'de>, D: Deserializer<'de>>(deserializer: D) -> Result<T, D::Error> {
+    stepped(false, || T::deserialize(deserializer))
+}
+
+/// Return the field of a value that is no list and no table.
+fn field<E: de::Error, L, T>(value: Form<L, T>, place: &Place) -> Result<Field, E> {
     let field = match value {
         Form::Integer(value) => Field::Constant(value as f64),
         Form::Number(value) => Field::Constant(value),
-        Form::Text(text) => parse(&text, place, false).map_err(kept)?,
+        Form::Text(text) => condition(&text, place, false).map_err(kept)?,
         other => return Err(kept(other.instead_of_field(place))),
     };
     let number = if let Field::Constant(value) = field { value } else { 0.0 };
@@ -435,14 +451,15 @@ fn field<E: de::Error, L, T>(
     Ok(field)
 }
 
-/// Compile an expression in the coordinates, and with `iteration` in the iteration k, too.
+/// Compile an expression in the coordinates, and with `iteration` in the iteration k, too; or in what else the key that is read may have.
 ///
 /// # Errors
 /// A text that is no expression.
 pub fn condition(text: &str, place: &Place, iteration: bool) -> Checked<Field> {
-    CONTEXT.with_borrow(|Context { geometry, data, .. }| {
-        let variables = coordinates(geometry.dimension, iteration);
-        Field::parse(text, place, KnownNames { variables: &variables, factors: &[], data })
+    CONTEXT.with_borrow(|Context { geometry, data, factors, names, .. }| {
+        let variables = if names.coordinates { coordinates(geometry.dimension, iteration) } else { Vec::new() };
+        let factors = if names.factors { &factors[..] } else { &[] };
+        Field::parse(text, place, KnownNames { variables: &variables, factors, data })
     })
 }
 
@@ -511,7 +528,7 @@ impl Vector {
 ///
 /// # Errors
 /// An expression in the coordinates.
-pub fn constant(field: &Field) -> Checked<f64> {
+fn constant(field: &Field) -> Checked<f64> {
     match field {
         Field::Constant(value) => Ok(*value),
         field => Err(Error::new(Kind::Scene, "a total force or moment does not depend on the place")
@@ -567,7 +584,7 @@ impl<'de> Deserialize<'de> for OneOrVector {
             Form::List(items) => {
                 Vector::of(Located::new(items, place), geometry().dimension).map(Self::Vector).map_err(kept)
             }
-            value => field(value, &place, condition).map(Self::One),
+            value => field(value, &place).map(Self::One),
         }
     }
 }

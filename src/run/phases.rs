@@ -53,7 +53,7 @@ pub fn build_after(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    if scene.contacts.iter().any(|contact| contact.preload.is_some() || contact.gap.factors().next().is_some()) {
+    if scene.contacts.iter().any(|contact| contact.preload.is_some() || contact.factors().next().is_some()) {
         // the gaps of a model are those of one leg
         Rc::make_mut(&mut scene).method.steps.apart = true;
     }

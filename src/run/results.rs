@@ -302,10 +302,10 @@ fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
 
 /// Return what the table of load steps has of a pair beside the columns of all pairs.
 pub fn columns(spec: &ContactSpec) -> PairColumns {
-    match spec.force.or(spec.preload) {
+    match spec.force.is_some() || spec.preload.is_some() {
         _ if spec.obstacle => PairColumns::Obstacle,
-        Some(_) => PairColumns::Offset,
-        None => PairColumns::None,
+        true => PairColumns::Offset,
+        false => PairColumns::None,
     }
 }
 
@@ -323,7 +323,7 @@ pub fn obstacle(done: &Done, i: usize) -> Option<ObstacleReport> {
 /// Return the offset of the gap of pair `i` that was found for its force or preload; none without such.
 pub fn offset(done: &Done, i: usize) -> Option<f64> {
     let (model, spec) = (done.model(), &done.built.discrete.contacts[i].spec);
-    let has_offset = !spec.obstacle && spec.force.or(spec.preload).is_some();
+    let has_offset = !spec.obstacle && (spec.force.is_some() || spec.preload.is_some());
     let closing = has_offset.then(|| model.rigid_closing(i, &done.outcome.iterate.rigid))?;
     Some(model.pairs[i].offset + closing[0])
 }

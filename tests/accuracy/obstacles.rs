@@ -313,6 +313,36 @@ fn a_gap_changes_with_the_factors_of_load_steps() {
     }
 }
 
+/// A footing under a constant force and a moment that grows: it lifts off beyond the kernel of its section. An expression has the factors that it names alone.
+#[test]
+fn a_moment_grows_under_a_constant_force() {
+    let text = |keys: &str, steps: &str| {
+        let held = footing(keys).text;
+        format!("{held}[method]\nsteps = {steps}\n")
+    };
+    let growing = text("force = \"10\"\nmoment = [\"6*push\", 0, 0]", "{ table = \"push.csv\" }");
+    let growing = scene(BLOCK, &growing);
+    std::fs::write(growing.path.with_file_name("push.csv"), "push\n0.25\n1\n").expect("a table");
+    let run = solve_here(&growing.path, &[]).converged();
+    // on a square of side 2: F/A (1 + 3 e) within the kernel, beyond it the contact is 3 (1 - e) long
+    for (step, peak) in [(0, 2.5 * (1.0 + 3.0 * 0.15)), (1, 2.0 * 10.0 / (3.0 * 0.4 * 2.0))] {
+        let path = |key: &str| format!("steps/{step}/pairs/0/{key}");
+        close("force", run.number(&path("obstacle/force")), 10.0, 1e-7);
+        close("peak", run.number(&path("peak_pressure")), peak, 0.01);
+    }
+    let equal = solve_here(&scene(BLOCK, &text("force = \"20*factor\"", "2")).path, &[]).converged();
+    let forces = [0, 1].map(|step| equal.number(&format!("steps/{step}/pairs/0/obstacle/force")));
+    close("half", forces[0], 10.0, 1e-9);
+    close("whole", forces[1], 20.0, 1e-9);
+    for (keys, words) in
+        [("force = \"10*x\"", "unknown variable `x`"), ("force = \"1/(factor - 0.5)\"", "not a finite number")]
+    {
+        let error =
+            try_here(&scene(BLOCK, &text(keys, "2")).path, &[]).err().unwrap_or_else(|| panic!("{keys} is accepted"));
+        assert!(error.render(false).contains(words), "{keys}: {}", error.render(false));
+    }
+}
+
 /// By plain sweeps, an obstacle under a force takes the iterations of one that is moved as far, however stiff the layer is.
 #[test]
 fn sweeps_move_obstacles_with_their_bodies() {
