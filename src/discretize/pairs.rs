@@ -185,15 +185,8 @@ impl<'a, const D: usize> Opposite<'a, D> {
         Self { entry, spec, bodies: [body_a, body_b], a, b, swapped, far, reach }
     }
 
-    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair that was found have no common
-    /// piece.
-    fn assemble(
-        mut self,
-        laws: &OwnLaws,
-        parts: &[SceneBody<D>],
-        cut: Cut<D>,
-        fine: bool,
-    ) -> Result<Option<Contact<D>>> {
+    /// Return what both surfaces have in common, and whether the gap of the scene alone counts.
+    fn common(&mut self, cut: Cut<D>) -> (Intersection<D>, bool) {
         let mut common = match self.spec.obstacle {
             true => Intersection::of_one(&self.a),
             false => cut(&self.a, &self.b, &self.reach),
@@ -211,6 +204,19 @@ impl<'a, const D: usize> Opposite<'a, D> {
         if is_touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
+        (common, is_touching)
+    }
+
+    /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair that was found have no common
+    /// piece.
+    fn assemble(
+        mut self,
+        laws: &OwnLaws,
+        parts: &[SceneBody<D>],
+        cut: Cut<D>,
+        fine: bool,
+    ) -> Result<Option<Contact<D>>> {
+        let (common, is_touching) = self.common(cut);
         let Self { entry, spec, bodies, a, b, swapped, far, .. } = self;
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::of_pair(&spec, laws, position);

@@ -278,7 +278,7 @@ const CASES: &[Case] = &[
     ("force = [0, ", "force = [0, 0, ", "\"-9.81e-6 * (1 + y)\"", "a vector has 2 components here, not 3", "dimension"),
     ("traction = [\"2*x\", -10]", "traction = []", "[]", "a vector has 2 components here, not 0", ""),
     // Expressions.
-    ("(x - 4)^2", "(u - 4)^2", "u", "unknown variable `u`", "known are x, y, pi"),
+    ("(x - 4)^2", "(u - 4)^2", "u", "unknown variable `u`", "known are x, y, factor, pi"),
     ("max(0", "maximum(0", "maximum", "unknown function `maximum`", "max, min"),
     ("\"2*x\"", "\"1/0\"", "\"1/0\"", "the expression is not a finite number but inf", ""),
     ("\"2*x\"", "\"2*\\u0078 + q\"", "\"2*\\u0078 + q\"", "unknown variable `q`", ""),
