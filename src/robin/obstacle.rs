@@ -10,7 +10,6 @@
 //!
 //! which is solved by z = G^-1 r - X a and a = S^-1 (s - X'r), with the columns X = G^-1 B'W N and the stiffness S of the motions (-X, 1).
 
-use super::sweep::Sweeper;
 use crate::error::Result;
 use crate::linalg::dot;
 use crate::model::field::{Field, local_dot};
@@ -54,6 +53,10 @@ pub(super) fn join(model: &Model, weight: &mut [f64]) {
     }
 }
 
+/// Solves G_s z_s = r_s in every body but obstacles, with the Robin term that the model carries.
+pub(super) type SolveBodies<'a> =
+    dyn FnMut(&mut Model, Vec<Vec<f64>>) -> Result<std::result::Result<Field, Failure>> + 'a;
+
 /// The motions of all obstacles with the bodies that follow them, for one Robin term.
 #[derive(Debug, Clone)]
 pub(super) struct Obstacles {
@@ -76,7 +79,7 @@ impl Obstacles {
     /// costs a solve in every body. Collective.
     pub fn update(
         known: Option<Self>,
-        sweeper: &mut Sweeper,
+        solve: &mut SolveBodies,
         model: &mut Model,
     ) -> Result<std::result::Result<Option<Self>, Failure>> {
         let motions = motions(model);
@@ -85,7 +88,7 @@ impl Obstacles {
         }
         let mut columns = Vec::new();
         for motion in &motions {
-            match Self::column(*motion, sweeper, model)? {
+            match Self::column(*motion, solve, model)? {
                 Ok(column) => columns.push(column),
                 Err(failure) => return Ok(Err(failure)),
             }
@@ -103,7 +106,7 @@ impl Obstacles {
     /// Return (-X, 1) of a motion.
     fn column(
         motion: ObstacleMotion,
-        sweeper: &mut Sweeper,
+        solve: &mut SolveBodies,
         model: &mut Model,
     ) -> Result<std::result::Result<Field, Failure>> {
         let (alone, range) = (motion.alone(model), model.range(motion.pair));
@@ -112,10 +115,10 @@ impl Obstacles {
         range.for_each(|q| force[q] = -model.robin[q] * trace[q]);
         let mut residual = Field::zero(model).states;
         add_forces(model, &force, &mut residual);
-        let sweep = sweeper.of_bodies(model, residual)?;
-        let mut column = sweep.correction;
-        column.add(1.0, &alone);
-        Ok(sweep.failed.map_or(Ok(column), Err))
+        Ok(solve(model, residual)?.map(|mut column| {
+            column.add(1.0, &alone);
+            column
+        }))
     }
 
     /// Return S: twice the energies of bodies and springs. One message.

@@ -67,15 +67,14 @@ impl Sweeper {
         self.with_obstacles(model, sweep, Some(other))
     }
 
-    /// Solve in every body for any residual, while obstacles stay.
-    pub(super) fn of_bodies(&mut self, model: &mut Model, residual: Vec<Vec<f64>>) -> Result<Sweep> {
-        self.solve(model, residual, Energy::default(), None, 0)
-    }
-
     /// Add the part of a correction by which obstacles move, and bodies follow them.
     fn with_obstacles(&mut self, model: &mut Model, mut sweep: Sweep, other: Option<&[Vec<f64>]>) -> Result<Sweep> {
         let known = self.obstacles.take();
-        match Obstacles::update(known, self, model)? {
+        let mut solve = |model: &mut Model, residual: Vec<Vec<f64>>| {
+            let sweep = self.solve(model, residual, Energy::default(), None, 0)?;
+            Ok(sweep.failed.map_or(Ok(sweep.correction), Err))
+        };
+        match Obstacles::update(known, &mut solve, model)? {
             Ok(obstacles) => self.obstacles = obstacles,
             Err(failure) => sweep.failed = Some(sweep.failed.unwrap_or(failure)),
         }

@@ -305,7 +305,7 @@ fn a_gap_changes_with_the_factors_of_load_steps() {
     close("half", steps.number("steps/0/pairs/0/obstacle/force"), half.number("pairs/0/obstacle/force"), 1e-6);
     for (gap, table, words) in [
         ("depth * sqrt(1.1 - shift - x)", "depth, shift\n1, 0\n1, 0.5\n", "it is in load step 2"),
-        ("depth * x", "depth, shift\n1, 0\n", "the variable `shift` in a gap"),
+        ("depth * x", "depth, shift\n1, 0\n", "the variable `shift` in its gap"),
         ("deep * x", "depth\n1\n", "unknown variable `deep`"),
     ] {
         let error = try_here(&moving(gap, table).path, &[]).err().unwrap_or_else(|| panic!("{gap} is accepted"));
