@@ -56,7 +56,8 @@ def mesh_of(largest, first, ratio, end):
     from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint
     import ngsolve
 
-    parts = [graded(0, 3, largest, first, ratio, "r"), graded(3, end, largest, first, ratio, "lr")[1:], graded(end, 4, largest, first, ratio, "l")[1:]]
+    parts = [graded(0, 3, largest, first, ratio, "r")]
+    parts += [graded(3, end, largest, first, ratio, "lr")[1:], graded(end, 4, largest, first, ratio, "l")[1:]]
     xs, lower = np.concatenate(parts), graded(0, 1, max(largest, 0.34), first, ratio, "r")
     ys, top = np.concatenate((lower, (2 - lower[::-1])[1:])), len(lower)
     mesh = Mesh()
@@ -183,6 +184,9 @@ def solve(order, largest, first, ratio, stiffness, power, end, file):
     rule = IntegrationRule([((1 + node) / 2,) for node in nodes], [1.0] * (order + 1))
     points = mesh.MapToAllElements(rule, mesh.Boundaries("contact"))
     places, pressures = np.asarray(x(points)).reshape(-1, order + 1), np.asarray(pressure(points)).reshape(-1, order + 1)
+    # edges may run either way
+    along = np.argsort(places, axis=1)
+    places, pressures = (np.take_along_axis(values, along, axis=1) for values in (places, pressures))
     rows = np.argsort(places[:, 0])
     areas = 0.5 * (places[:, -1:] - places[:, :1]) * weights
     np.save(file, np.stack((places[rows], pressures[rows], areas[rows])))
@@ -206,6 +210,7 @@ def between(reference, at):
 
 def error(reference, places, pressures, areas):
     """Return the relative error of pressures at their points, in the mean square."""
+    places, pressures, areas = (values.ravel() for values in (places, pressures, areas))
     exact = between(reference, places)
     return float(((areas * (pressures - exact) ** 2).sum() / (areas * exact**2).sum()) ** 0.5)
 
