@@ -4,28 +4,44 @@ use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// The messages between the ranks of a run. Calls are collective unless they say otherwise.
+/// The messages between the ranks of a run. Calls are collective unless they say otherwise. A single process has no messages: it is the default.
 pub trait Exchange {
     /// Replace `values` by their sum over the ranks (MPI_Allreduce). All ranks get the same numbers, as MPI guarantees. If every body lives on one
     /// rank, every entry is non-zero on one rank only, so that sums are exact.
-    fn sum(&self, values: &mut [f64]);
+    fn sum(&self, _values: &mut [f64]) {}
     /// Return the number of ranks.
-    fn ranks(&self) -> usize;
+    fn ranks(&self) -> usize {
+        1
+    }
     /// Return the number of this rank, from 0.
-    fn rank(&self) -> usize;
+    fn rank(&self) -> usize {
+        0
+    }
     /// Return the bytes of every rank, in the order of the ranks (MPI_Allgather).
-    fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>>;
+    fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
+        vec![mine]
+    }
     /// Return the bytes of the first rank (MPI_Bcast).
-    fn broadcast(&self, mine: Vec<u8>) -> Vec<u8>;
-    /// Send `mine[k]` to rank k, and return the bytes from every rank, in the order of the ranks (MPI_Alltoall).
-    fn all_to_all(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>>;
+    fn broadcast(&self, mine: Vec<u8>) -> Vec<u8> {
+        mine
+    }
     /// Send bytes to one other rank, which has to receive them from this one. Not collective.
-    fn send(&self, to: usize, bytes: &[u8]);
+    fn send(&self, _to: usize, _bytes: &[u8]) {}
     /// Receive the bytes that another rank sends to this one. Not collective.
-    fn receive(&self, from: usize) -> Vec<u8>;
-    /// Return the number of sums, gathers and exchanges between several ranks so far.
-    fn messages(&self) -> usize;
+    fn receive(&self, _from: usize) -> Vec<u8> {
+        Vec::new()
+    }
+    /// Return the number of sums and gathers between several ranks so far.
+    fn messages(&self) -> usize {
+        0
+    }
 }
+
+/// The exchange of a single process.
+#[derive(Debug, Default)]
+pub struct Serial;
+
+impl Exchange for Serial {}
 
 /// Data that can go from rank to rank.
 pub trait Plain: Serialize + DeserializeOwned {}
@@ -62,22 +78,9 @@ pub fn all_gather<T: Plain>(exchange: &dyn Exchange, mine: T) -> Vec<T> {
     if exchange.ranks() == 1 {
         return vec![mine];
     }
+    // the bytes of each are freed before the next
+    let received = |bytes: Vec<u8>| unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"));
     exchange.all_gather(pack(&mine)).into_iter().map(received).collect()
-}
-
-/// Send `mine[k]` to rank k, and return the values from every rank, in the order of the ranks (all_to_all). Collective.
-pub fn all_to_all<T: Plain>(exchange: &dyn Exchange, mine: Vec<T>) -> Vec<T> {
-    if exchange.ranks() == 1 {
-        return mine;
-    }
-    // values are packed and dropped one after the other, which limits the memory
-    let packed = mine.into_iter().map(|mine| pack(&mine)).collect();
-    exchange.all_to_all(packed).into_iter().map(received).collect()
-}
-
-/// Return the data of a message; the bytes are freed.
-fn received<T: DeserializeOwned>(bytes: Vec<u8>) -> T {
-    unpack(&bytes).unwrap_or_else(|_| unreachable!("ranks run one program"))
 }
 
 /// Signals that end a run. They are bits of one number, and are summed over the ranks in messages that ranks send anyway.
@@ -123,36 +126,6 @@ pub fn unpack<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
     })
 }
 
-/// The exchange of a single process, which has no messages.
-#[derive(Debug, Default)]
-pub struct Serial;
-
-impl Exchange for Serial {
-    fn sum(&self, _values: &mut [f64]) {}
-    fn ranks(&self) -> usize {
-        1
-    }
-    fn rank(&self) -> usize {
-        0
-    }
-    fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
-        vec![mine]
-    }
-    fn broadcast(&self, mine: Vec<u8>) -> Vec<u8> {
-        mine
-    }
-    fn all_to_all(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
-        mine
-    }
-    fn send(&self, _to: usize, _bytes: &[u8]) {}
-    fn receive(&self, _from: usize) -> Vec<u8> {
-        Vec::new()
-    }
-    fn messages(&self) -> usize {
-        0
-    }
-}
-
 /// Ranks that are threads of a test.
 #[cfg(test)]
 pub mod crowd {
@@ -162,7 +135,7 @@ pub mod crowd {
 
     struct SharedMemory {
         barrier: Barrier,
-        slots: Mutex<Vec<Vec<Vec<u8>>>>,
+        slots: Mutex<Vec<Vec<u8>>>,
         sent: Mutex<HashMap<[usize; 2], VecDeque<Vec<u8>>>>,
         news: Condvar,
     }
@@ -202,17 +175,14 @@ pub mod crowd {
             self.rank
         }
         fn all_gather(&self, mine: Vec<u8>) -> Vec<Vec<u8>> {
-            self.all_to_all(vec![mine; self.ranks])
+            self.common.slots.lock().expect("slots")[self.rank] = mine;
+            self.common.barrier.wait();
+            let all = self.common.slots.lock().expect("slots").clone();
+            self.common.barrier.wait();
+            all
         }
         fn broadcast(&self, mine: Vec<u8>) -> Vec<u8> {
             self.all_gather(mine).swap_remove(0)
-        }
-        fn all_to_all(&self, mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
-            self.common.slots.lock().expect("slots")[self.rank] = mine;
-            self.common.barrier.wait();
-            let all = self.common.slots.lock().expect("slots").iter().map(|of| of[self.rank].clone()).collect();
-            self.common.barrier.wait();
-            all
         }
         fn send(&self, to: usize, bytes: &[u8]) {
             self.common.sent.lock().expect("sent").entry([self.rank, to]).or_default().push_back(bytes.to_vec());
@@ -226,9 +196,6 @@ pub mod crowd {
                     None => sent = self.common.news.wait(sent).expect("sent"),
                 }
             }
-        }
-        fn messages(&self) -> usize {
-            0
         }
     }
 }

@@ -1,10 +1,9 @@
 //! Owner ranks of bodies, and messages between ranks by the `mpi` crate.
 
 use crate::error::{Error, Result};
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, all_gather};
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
-use mpi::point_to_point::send_receive_into;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::Cell;
 
@@ -66,32 +65,6 @@ impl Exchange for Ranks {
         self.broadcast(0, mine)
     }
 
-    fn all_to_all(&self, mut mine: Vec<Vec<u8>>) -> Vec<Vec<u8>> {
-        let (world, rank, ranks) = (self.session.world(), self.session.rank(), self.session.size());
-        self.count_message();
-        let lengths: Vec<u64> = mine.iter().map(|bytes| bytes.len() as u64).collect();
-        let mut theirs = vec![0_u64; ranks];
-        world.all_to_all_into(&lengths[..], &mut theirs[..]);
-        // all ranks take as many rounds as the longest message of any rank needs
-        let (my_longest, mut longest) = (lengths.iter().copied().max().unwrap_or(0), 0u64);
-        world.all_reduce_into(&my_longest, &mut longest, SystemOperation::max());
-        let mut all = vec![Vec::new(); ranks];
-        all[rank] = std::mem::take(&mut mine[rank]);
-        for step in 1..ranks {
-            let [to, from] = [(rank + step) % ranks, (rank + ranks - step) % ranks];
-            let (sent, mut received) = (std::mem::take(&mut mine[to]), vec![0; theirs[from] as usize]);
-            let [target, source] = [to, from].map(|rank| world.process_at_rank(rank as i32));
-            // a chunk may be exchanged for a shorter or an empty one
-            for chunk in 0..(longest as usize).div_ceil(CHUNK) {
-                let part = |length: usize| (chunk * CHUNK).min(length)..((chunk + 1) * CHUNK).min(length);
-                let taken = part(received.len());
-                send_receive_into(&sent[part(sent.len())], &target, &mut received[taken], &source);
-            }
-            all[from] = received;
-        }
-        all
-    }
-
     fn send(&self, to: usize, bytes: &[u8]) {
         let to = self.session.world().process_at_rank(to as i32);
         to.send(&(bytes.len() as u64));
@@ -140,23 +113,12 @@ pub fn collectively<T>(session: &Session, result: Result<T>) -> Result<T> {
     if session.size() == 1 {
         return result;
     }
-    let none = i32::MAX;
     // an error without a message comes from another rank, which has the message
-    let has_message = result.as_ref().is_err_and(|error| !error.is_silent());
-    let mine = if has_message { session.rank() as i32 } else { none };
-    let mut first = none;
-    session.world().all_reduce_into(&mine, &mut first, SystemOperation::min());
-    if first == none {
-        return result;
-    }
-    let mine = match &result {
-        Err(error) if session.rank() as i32 == first => error.kind().exit_code(),
-        _ => 0,
-    };
-    let mut code = 0;
-    session.world().all_reduce_into(&mine, &mut code, SystemOperation::max());
+    let mine = result.as_ref().err().filter(|error| !error.is_silent()).map(|error| error.kind().exit_code());
+    let all = all_gather(&Ranks::new(session), mine).into_iter().enumerate();
+    let Some((first, code)) = all.filter_map(|(rank, code)| Some((rank, code?))).next() else { return result };
     match result {
-        Err(error) if session.rank() as i32 == first => Err(error.agreed()),
+        Err(error) if session.rank() == first => Err(error.agreed()),
         _ => Err(Error::silent(code)),
     }
 }

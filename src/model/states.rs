@@ -1,7 +1,7 @@
 //! The dofs of a body: its contact rows, its prescribed values, the rigid motions that supports and springs leave free, and how its dofs are distributed over the
 //! ranks.
 
-use crate::exchange::{Exchange, Serial, all_to_all};
+use crate::exchange::{Exchange, Serial, all_gather};
 use crate::linalg::{Csr, axpy, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -67,8 +67,13 @@ impl States {
     /// Return the undeformed state: zero on free dofs, prescribed values on supports.
     pub fn rest(&self) -> Vec<f64> {
         let mut u = vec![0.0; self.dofs];
-        self.prescribed.iter().for_each(|&(dof, value)| u[dof] = value);
+        self.prescribe(&mut u);
         u
+    }
+
+    /// Set the prescribed values in displacements.
+    pub fn prescribe(&self, u: &mut [f64]) {
+        self.prescribed.iter().for_each(|&(dof, value)| u[dof] = value);
     }
 
     /// Return the contact rows in the columns of the matrix that has the rows of K.
@@ -164,14 +169,13 @@ fn alone() -> Rc<dyn Exchange> {
 impl Distribution {
     /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every rank. Collective.
     pub fn near(&self, own: &[f64]) -> Vec<f64> {
-        let requested = all_to_all(&*self.exchange, self.near.iter().map(|(_, rows)| rows.clone()).collect());
-        let value = |row: u32| own[row as usize - self.first];
-        let answers = requested.into_iter().map(|rows| rows.into_iter().map(value).collect::<Vec<f64>>());
         let ghosts: usize = self.near.iter().map(|(positions, _)| positions.len()).sum();
         let mut known = vec![0.0; self.places.len() + ghosts];
         self.places.iter().zip(own).for_each(|(&at, &value)| known[at as usize] = value);
-        for ((positions, _), values) in self.near.iter().zip(all_to_all(&*self.exchange, answers.collect())) {
-            positions.iter().zip(values).for_each(|(&at, value)| known[at as usize] = value);
+        for ((positions, rows), (first, values)) in
+            self.near.iter().zip(all_gather(&*self.exchange, (self.first, own.to_vec())))
+        {
+            positions.iter().zip(rows).for_each(|(&at, &row)| known[at as usize] = values[row as usize - first]);
         }
         known
     }
