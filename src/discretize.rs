@@ -59,6 +59,8 @@ pub struct Discrete {
     pub mechanisms: Vec<Mechanism>,
     /// The meshes, kept only if an estimate of the error was requested.
     pub meshes: Option<Rc<dyn Meshes>>,
+    /// Factor of the loads and prescribed displacements that the model has, relative to those that it was made with.
+    pub factor: f64,
     /// Number of stiffness matrices assembled on this rank.
     pub assemblies: usize,
     /// Number of stiffness matrices reused from an earlier scene.
@@ -122,7 +124,7 @@ where
     slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, assemblies, assemblies_avoided })
+    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, factor: 1.0, assemblies, assemblies_avoided })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
@@ -154,7 +156,14 @@ impl Discrete {
         for slot in model.bodies.iter_mut().filter(|slot| slot.is_rigid && slot.segments[0].pair == i) {
             (slot.local, slot.motions) = (None, Vec::new());
         }
-        model.scale_gaps(1.0);
+        model.set_gaps();
+    }
+
+    /// Give the loads and prescribed displacements this factor.
+    pub fn scale_loads(&mut self, factor: f64) {
+        let ratio = factor / self.factor;
+        self.factor = factor;
+        self.model.scale_loads(ratio);
     }
 
     /// Return which surface carries the contact points of each pair.
@@ -192,12 +201,12 @@ impl Discrete {
     }
 }
 
-/// Return the trace (2n) with which the scene starts at the share `factor` of the loads. It is relative to the rigid motions that
+/// Return the trace (2n) with which the scene starts. It is relative to the rigid motions that
 /// supports impose. The result is `None` if the program is to find the start.
 ///
 /// # Errors
 /// The start is not finite at a contact point.
-pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<Vec<f64>>> {
+pub fn start(scene: &Scene, discrete: &Discrete) -> Result<Option<Vec<f64>>> {
     let model = &discrete.model;
     let points = model.points();
     let mut trace = vec![0.0; 2 * points];
@@ -207,7 +216,7 @@ pub fn start(scene: &Scene, discrete: &Discrete, factor: f64) -> Result<Option<V
         Start::Normal(field) => {
             let positions = model.pairs.iter().flat_map(|pair| &pair.position);
             for (q, &x) in positions.enumerate() {
-                let value = field.eval_finite("the start", x)? / factor;
+                let value = field.eval_finite("the start", x)?;
                 trace[q] = value;
                 trace[points + q] = value;
             }

@@ -89,8 +89,7 @@ impl Estimate {
 /// direct solver. With 0.01 they differ by 5 %.
 const TOLERANCE: f64 = 0.01;
 
-/// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies, and `share` is the factor of prescribed
-/// displacements to which the iterate belongs. Collective.
+/// Estimate the error of an iterate with its layer state. `step` solves for the response of the bodies. Collective.
 ///
 /// # Errors
 /// Failures of the solver library.
@@ -100,14 +99,13 @@ pub fn estimate(
     step: &mut dyn LinearStep,
     iterate: &Field,
     layer: &Layer,
-    share: f64,
 ) -> Result<Estimate> {
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
     let mut local = LocalErrors::of_bodies(meshes, &recovered, &work_on_missed(meshes, model, layer, &recovered));
     for pair in 0..model.pairs.len() {
-        local.add_pair(meshes, model, layer, &recovered, (pair, &rigid_closing(model, iterate, share, pair)));
+        local.add_pair(meshes, model, layer, &recovered, (pair, &rigid_closing(model, iterate, pair)));
     }
     drop(recovered);
     let mut bodies: Vec<f64> = local.cells.iter().take(model.meshed()).map(|cells| cells.iter().sum()).collect();
@@ -130,7 +128,7 @@ pub fn estimate(
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
     let both = [0, 1].into_iter().flat_map(|side| (0..model.pairs.len()).map(move |pair| (pair, side)));
-    let trace: Vec<f64> = both.flat_map(|(pair, side)| model.displacement(&trace, pair, side, share)).collect();
+    let trace: Vec<f64> = both.flat_map(|(pair, side)| model.displacement(&trace, pair, side)).collect();
     let square = |values: &[f64]| -> f64 {
         values.iter().zip(model.weight.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
     };
@@ -166,12 +164,12 @@ fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<
     Ok(all)
 }
 
-/// Return by how much an obstacle or an offset closes the points of a pair, n. `share` is the factor of prescribed motions.
-fn rigid_closing(model: &Model, iterate: &Field, share: f64, index: usize) -> Vec<f64> {
+/// Return by how much an obstacle or an offset closes the points of a pair, n.
+fn rigid_closing(model: &Model, iterate: &Field, index: usize) -> Vec<f64> {
     let (pair, mut closing) = (&model.pairs[index], model.rigid_closing(index, &iterate.rigid));
     closing.iter_mut().for_each(|closing| *closing += pair.offset);
     if model.bodies[pair.bodies[1]].is_rigid {
-        axpy(share, &pair.prescribed[1], &mut closing);
+        axpy(1.0, &pair.prescribed[1], &mut closing);
     }
     closing
 }

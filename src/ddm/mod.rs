@@ -16,6 +16,6 @@ mod step;
 mod stop;
 
 pub use forcing::respond;
-pub use run::{Observer, Row, Silent};
-pub use solve::{InitialGuess, Method, Outcome, Settings, Solution, first_springs, solve};
+pub use run::{Observer, Outcome, Row, Silent};
+pub use solve::{InitialGuess, Method, Solution, first_springs, solve};
 pub use stop::{Inaccuracy, Status};

@@ -14,7 +14,7 @@
 
 use super::bound::{EXACT, Reached, compression_roundoff};
 use super::forcing::{Forcing, Spring, resisting};
-use super::run::{LoopEnd, Row, Run};
+use super::run::{Outcome, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength, WholeStep};
 use super::stop::{Attained, Stagnation, Status};
@@ -50,7 +50,7 @@ pub(super) fn iterate(
     u: Field,
     states: Layer,
     is_near: bool,
-) -> Result<LoopEnd> {
+) -> Result<Outcome> {
     let (progress, tolerance, foreign) = (Progress::new(run.model), run.stop.tolerance(), linear.sweeps());
     let (stagnation, start) = (Stagnation::default(), Some(u.clone()));
     let mut newton =
@@ -130,7 +130,7 @@ struct Measured {
     f1: f64,
     factorizations: usize,
     inner_iterations: usize,
-    /// See [`LoopEnd::unbalanced`].
+    /// See [`Outcome::unbalanced`].
     unbalanced: f64,
     /// Requests from outside, of all ranks.
     asked: u8,
@@ -282,27 +282,23 @@ impl Newton<'_, '_> {
             factorizations: sums[3] as usize + joint.factorizations,
             inner_iterations: sums[4] as usize + joint.inner_iterations,
             unbalanced,
-            asked: exchange::asked(&sums[SUMS..]),
+            asked: exchange::asked(&sums[sums.len() - ASKS..]),
             reached,
         })
     }
 
     /// Sum the numbers of an iterate over the ranks: u'Ku, u'Ku/2 - f'u, the squared energy norm of the unbalanced forces `rest` of each node, the work of the
     /// bodies' solvers, and requests from outside.
-    fn sum(&self, rest: &[Vec<f64>], energy: Energy) -> [f64; SUMS + ASKS] {
+    fn sum(&self, rest: &[Vec<f64>], energy: Energy) -> Vec<f64> {
         let model = &*self.run.model;
-        let mut sums = [0.0; SUMS + ASKS];
-        sums[..3].copy_from_slice(&[
-            energy.strain,
-            energy.potential,
-            unbalanced(model, rest, &self.states.springs(model)),
-        ]);
-        sums[SUMS..].copy_from_slice(&asks(self.run.observer.asked()));
+        let unbalanced = unbalanced(model, rest, &self.states.springs(model));
+        let mut sums = vec![energy.strain, energy.potential, unbalanced, 0.0, 0.0];
         for body in model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.states().leads()) {
             let counts = body.counts();
             sums[3] += counts.factorizations as f64;
             sums[4] += counts.inner_iterations as f64;
         }
+        sums.extend(asks(self.run.observer.asked()));
         model.exchange.sum(&mut sums);
         sums
     }
@@ -398,22 +394,19 @@ impl Newton<'_, '_> {
     }
 
     /// End the run at the last iterate.
-    fn end(self, status: Status, iterate: StepResult, measured: &Measured) -> LoopEnd {
-        LoopEnd {
+    fn end(self, status: Status, iterate: StepResult, measured: &Measured) -> Outcome {
+        Outcome {
             strain: measured.strain,
             unbalanced: measured.unbalanced,
             answer: self.progress.answers(self.run.model),
             sweeps: self.linear.sweeps() - self.foreign,
-            ..LoopEnd::at_start(status, self.u, iterate.resolved)
+            ..Outcome::at_start(status, self.u, iterate.resolved)
         }
     }
 
     /// End the run because a linear step failed.
-    fn end_without_step(self, status: Status) -> LoopEnd {
+    fn end_without_step(self, status: Status) -> Outcome {
         let sweeps = self.linear.sweeps() - self.foreign;
-        LoopEnd { sweeps, ..LoopEnd::at_start(status, self.u, self.states) }
+        Outcome { sweeps, ..Outcome::at_start(status, self.u, self.states) }
     }
 }
-
-/// Numbers in the message of a step, besides requests from outside.
-const SUMS: usize = 5;

@@ -8,7 +8,7 @@
 //! ```
 
 use super::gamma::{GammaRule, Iterate};
-use super::run::{LoopEnd, Row, Run};
+use super::run::{Outcome, Row, Run};
 use super::stop::Status;
 use crate::error::Result;
 use crate::model::field::{Field, unbalanced};
@@ -33,7 +33,7 @@ pub(super) fn iterate(
     coefficient: &mut Coefficient,
     mut u: Field,
     wants_interval: bool,
-) -> Result<LoopEnd> {
+) -> Result<Outcome> {
     let (mut sweeper, mut settling) = (Sweeper::default(), Settling::default());
     let mut last: Option<LastStep> = None;
     for k in 0.. {
@@ -41,7 +41,7 @@ pub(super) fn iterate(
         let weight = coefficient.weight(run.model, &layer, k)?;
         if let Some(moved) = underconstrained(run.model, &weight) {
             u.retrace(run.model);
-            return Ok(LoopEnd::at_start(Status::Underconstrained(moved), u, layer));
+            return Ok(Outcome::at_start(Status::Underconstrained(moved), u, layer));
         }
         run.model.robin(&weight)?;
         let sweep = sweeper.sweep(run.model, &u, &layer, run.observer.asked())?;
@@ -63,12 +63,12 @@ pub(super) fn iterate(
             run.model.exchange.sum(&mut left);
             // updates add to states and traces separately, so that they come to differ by rounding
             u.retrace(run.model);
-            return Ok(LoopEnd {
+            return Ok(Outcome {
                 strain: sweep.strain,
                 unbalanced: run.scale.relative(left[0], sweep.strain + layer.work),
                 sweeps: sweeper.sweeps,
                 interval,
-                ..LoopEnd::at_start(status, u, layer)
+                ..Outcome::at_start(status, u, layer)
             });
         }
         u.advance(run.model, gamma, &sweep.correction);

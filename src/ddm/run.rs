@@ -3,10 +3,10 @@
 use super::bound::Scale;
 use super::stop::{Status, relative_increment};
 use crate::linalg::axpy;
-use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::rigid;
+use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
 use crate::robin::spectrum::Interval;
 use serde::{Deserialize, Serialize};
@@ -24,29 +24,59 @@ pub(super) struct Run<'a> {
     pub rows: Vec<Row>,
 }
 
-/// How a loop ended.
-pub(super) struct LoopEnd {
+/// The result of a run: its last iterate, with its errors and history.
+#[derive(Clone)]
+pub struct Outcome {
+    /// How the run ended.
     pub status: Status,
+    /// Updates made.
+    pub iterations: usize,
+    /// Sweeps made.
+    pub sweeps: usize,
     /// The last iterate.
     pub iterate: Field,
-    /// Its layers.
+    /// The layers at that iterate.
     pub layer: Layer,
-    /// u'Ku.
-    pub strain: f64,
-    /// Energy norm of f - K u - B' omega p of each node alone, relative to the energy of bodies and layers.
+    /// History, one row per iterate.
+    pub rows: Vec<Row>,
+    /// Name of the method.
+    pub method: &'static str,
+    /// Counters of what was done for all bodies together, besides the counters of the bodies.
+    pub joint: BodyCounts,
+    /// The solver of all bodies together; empty if each body had its own.
+    pub linear_step: String,
+    /// Largest error of a pressure by rounding of gaps and displacements, relative to the scale of errors of pressures.
+    pub rounding: f64,
+    /// Energy norm of the forces f - K u - B' omega p of each node alone, relative to the energy of bodies and layers. It is computed with K itself,
+    /// and is about a lower bound of the error that the forces cause.
     pub unbalanced: f64,
-    /// Stiffness per area with which the bodies answer an error of a compression, n.
-    pub answer: Vec<f64>,
-    pub sweeps: usize,
     /// The interval (33) of gamma, if it was asked for and can be found.
     pub interval: Option<Interval>,
+    /// u'Ku.
+    pub strain: f64,
+    /// Stiffness per area with which the bodies answer an error of a compression, n.
+    pub answer: Vec<f64>,
 }
 
-impl LoopEnd {
-    /// Return the end of a run that has made no step.
-    pub fn at_start(status: Status, iterate: Field, layer: Layer) -> Self {
-        let answer = vec![f64::INFINITY; layer.pressure.len()];
-        Self { status, iterate, layer, strain: 0.0, unbalanced: 0.0, answer, sweeps: 0, interval: None }
+impl Outcome {
+    /// Return the outcome of a run that has made no step. What a loop does not know is empty, until the run ends.
+    pub(super) fn at_start(status: Status, iterate: Field, layer: Layer) -> Self {
+        Self {
+            status,
+            iterations: 0,
+            sweeps: 0,
+            iterate,
+            answer: vec![f64::INFINITY; layer.pressure.len()],
+            layer,
+            rows: Vec::new(),
+            method: "",
+            joint: BodyCounts::default(),
+            linear_step: String::new(),
+            rounding: 0.0,
+            unbalanced: 0.0,
+            interval: None,
+            strain: 0.0,
+        }
     }
 }
 

@@ -3,19 +3,18 @@
 use super::bound::{EXACT, Scale, pressure_roundoff};
 use super::forcing::resisting;
 use super::gamma::GammaRule;
-use super::run::{LoopEnd, Observer, Row, Run};
+use super::run::{Observer, Outcome, Run};
 use super::start::{self, RigidStart};
 use super::stop::{Inaccuracy, Status};
 use super::{newton, robin};
 use crate::error::Result;
 use crate::linalg::axpy;
+use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
 use crate::model::rigid::{self, Motions, Moved};
-use crate::model::{BodyCounts, Model};
 use crate::problem::method::StopRule;
-use crate::robin::spectrum::Interval;
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
 use nalgebra::DVector;
 use std::time::Instant;
@@ -52,67 +51,29 @@ impl Method {
     }
 }
 
-/// Settings of a run besides the model and the method.
-pub struct Settings {
-    /// The rule that ends the run.
-    pub stop: StopRule,
-    /// Whether to find the interval (33) of gamma at the end, which takes some sweeps.
-    pub interval: bool,
-    /// The start.
-    pub start: InitialGuess,
-}
-
-/// The result of a run: its last iterate, with its errors and history.
-#[derive(Clone)]
-pub struct Outcome {
-    /// How the run ended.
-    pub status: Status,
-    /// Updates made.
-    pub iterations: usize,
-    /// Sweeps made.
-    pub sweeps: usize,
-    /// The last iterate.
-    pub iterate: Field,
-    /// The layers at that iterate.
-    pub layer: Layer,
-    /// History, one row per iterate.
-    pub rows: Vec<Row>,
-    /// Name of the method.
-    pub method: &'static str,
-    /// Counters of what was done for all bodies together, besides the counters of the bodies.
-    pub joint: BodyCounts,
-    /// The solver of all bodies together; empty if each body had its own.
-    pub linear_step: String,
-    /// Largest error of a pressure by rounding of gaps and displacements, relative to the scale of errors of pressures.
-    pub rounding: f64,
-    /// Energy norm of the forces f - K u - B' omega p of each node alone, relative to the energy of bodies and layers. It is computed with K itself, and is
-    /// about a lower bound of the error that the forces cause.
-    pub unbalanced: f64,
-    /// The interval (33) of gamma, if it was asked for and can be found.
-    pub interval: Option<Interval>,
-}
-
-/// Run a method on a model from its start until a rule ends it.
+/// Run a method on a model from its start until a rule ends it. With `wants_interval` the interval (33) of gamma is found at the end, which takes
+/// some sweeps.
 pub fn solve(
     model: &mut Model,
     method: &mut Method,
-    settings: Settings,
+    stop: &StopRule,
+    wants_interval: bool,
+    start: InitialGuess,
     observer: &mut dyn Observer,
 ) -> Result<Outcome> {
-    let Settings { stop, interval, start } = settings;
     let (began, scale) = (Instant::now(), Scale::default());
     let found = match &start {
         InitialGuess::Found(rigid) => Ok((**rigid).clone()),
         _ => find_start(model),
     };
     let gap = model.gap.clone();
-    let mut run = Run { model, stop: &stop, observer, began, gap, scale, rows: Vec::new() };
+    let mut run = Run { model, stop, observer, began, gap, scale, rows: Vec::new() };
     let end = match found {
-        Ok(rigid) => run.iterate(method, start, &rigid, interval)?,
+        Ok(rigid) => run.iterate(method, start, &rigid, wants_interval)?,
         Err(status) => {
             let rest = Field::rest(run.model);
             let layer = Layer::at(run.model, &rest.trace);
-            LoopEnd::at_start(status, rest, layer)
+            Outcome::at_start(status, rest, layer)
         }
     };
     Ok(run.conclude(end, method))
@@ -126,17 +87,14 @@ impl Run<'_> {
         start: InitialGuess,
         rigid: &RigidStart,
         wants_interval: bool,
-    ) -> Result<LoopEnd> {
+    ) -> Result<Outcome> {
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
-        let FirstStates { states, amounts } = first_states(self.model, &start, rigid);
+        let RigidStart { places: states, amounts, mut trace } = first_states(self.model, &start, rigid);
         let is_known = matches!(start, InitialGuess::Known(_));
-        let mut trace = match &start {
-            InitialGuess::Trace(given) => given.clone(),
-            InitialGuess::Known(solution) if !solution.field.trace.is_empty() => solution.field.trace.clone(),
-            _ => rigid.trace.clone(),
-        };
         let known = match start {
-            InitialGuess::Known(solution) if !solution.field.states.is_empty() => Some(solution.field),
+            InitialGuess::Known(solution) if !solution.field.states.is_empty() => {
+                Some(solution.field.supported(self.model))
+            }
             _ => None,
         };
         let is_near = is_known && known.is_none();
@@ -156,7 +114,7 @@ impl Run<'_> {
                     axpy(-1.0, &fallen, &mut trace);
                     match extend(self.model, &trace)? {
                         Ok(bent) => u = Field { rigid: sums(&u.rigid, &bent.rigid), ..bent },
-                        Err(failure) => return Ok(LoopEnd::at_start(Status::InnerSolver(failure), u, states)),
+                        Err(failure) => return Ok(Outcome::at_start(Status::InnerSolver(failure), u, states)),
                     }
                 }
                 robin::iterate(self, &mut **rule, coefficient, u, wants_interval)
@@ -174,7 +132,7 @@ impl Run<'_> {
     }
 
     /// Return the result of a run whose loop has ended.
-    fn conclude(mut self, mut end: LoopEnd, method: &mut Method) -> Outcome {
+    fn conclude(mut self, mut end: Outcome, method: &mut Method) -> Outcome {
         axpy(1.0, &rigid::trace(self.model, &end.iterate.rigid), &mut end.iterate.trace);
         self.model.gap = std::mem::take(&mut self.gap);
         let surfaces = surface_slopes(self.model);
@@ -185,23 +143,18 @@ impl Run<'_> {
             end.status = self.judge(&end, rounding);
         }
         Outcome {
-            status: end.status,
             iterations: self.rows.last().map_or(0, |row| row.iteration),
-            sweeps: end.sweeps,
-            iterate: end.iterate,
-            layer: end.layer,
             rows: self.rows,
             method: method.name(),
             joint: method.linear().counts(),
             linear_step: method.linear().describe(),
             rounding,
-            unbalanced: end.unbalanced,
-            interval: end.interval,
+            ..end
         }
     }
 
     /// Return the status of a run that ended as solved, from what is left of the forces, and what roundoff makes of the pressures.
-    fn judge(&self, end: &LoopEnd, rounding: f64) -> Status {
+    fn judge(&self, end: &Outcome, rounding: f64) -> Status {
         let energy = end.strain + end.layer.work;
         if self.scale.is_out_of_range(energy, end.layer.peak()) {
             return Status::OutOfRange { energy };
@@ -271,7 +224,7 @@ impl From<Option<Vec<f64>>> for InitialGuess {
 /// the one that is found.
 pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>> {
     let rigid = find_start(model).ok()?;
-    let springs = resisting(model, &first_states(model, begin, &rigid).states).all;
+    let springs = resisting(model, &first_states(model, begin, &rigid).places).all;
     if let InitialGuess::Automatic = begin {
         *begin = InitialGuess::Found(Box::new(rigid));
     }
@@ -298,23 +251,19 @@ fn follows(model: &Model) -> Option<Moved> {
     all.iter().map(|motion| motions.names(motion)).find(has_rigid)?.into_iter().next()
 }
 
-/// The states from which Newton's method begins, and the amounts of the free motions of all bodies that belong to them.
-struct FirstStates {
-    states: Layer,
-    amounts: DVector<f64>,
-}
-
-/// Return the first states of a start, where `rigid` is the automatic one.
-fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> FirstStates {
-    let of = |rigid: &RigidStart| FirstStates { states: rigid.places.clone(), amounts: rigid.amounts.clone() };
+/// Return where a run begins: first states, the amounts of the free motions of all bodies that belong to them, and a trace. `rigid` is the automatic
+/// start.
+fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> RigidStart {
     match begin {
-        InitialGuess::Automatic | InitialGuess::Found(_) => of(rigid),
-        InitialGuess::Trace(trace) => match start::find(model, Some(trace)) {
-            Ok(rigid) => of(&rigid),
-            Err(_) => FirstStates { states: start::at(model, trace), amounts: rigid.amounts.clone() },
-        },
+        InitialGuess::Automatic | InitialGuess::Found(_) => rigid.clone(),
+        InitialGuess::Trace(trace) => {
+            let at_rest = |_| RigidStart { places: start::at(model, trace), ..rigid.clone() };
+            RigidStart { trace: trace.clone(), ..start::find(model, Some(trace)).unwrap_or_else(at_rest) }
+        }
         InitialGuess::Known(solution) => {
-            FirstStates { states: Layer::new(model, solution.compression.clone()), amounts: rigid.amounts.clone() }
+            let trace = Some(&solution.field.trace).filter(|trace| !trace.is_empty()).unwrap_or(&rigid.trace);
+            let places = Layer::new(model, solution.compression.clone());
+            RigidStart { places, trace: trace.clone(), ..rigid.clone() }
         }
     }
 }

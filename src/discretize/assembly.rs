@@ -11,7 +11,7 @@ use crate::fem::rigid::{self, AtDofs};
 use crate::fem::{ElasticBody, Prolongation, Split};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Distribution, Loads};
+use crate::model::{Body, BodySlot, Distribution};
 use crate::problem::order::Order;
 use crate::problem::{BodySpec, Plane};
 use std::cell::OnceCell;
@@ -71,22 +71,22 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// [`Discrete::share`](super::Discrete::share).
     fn give_solver(&mut self, part: &mut SceneBody<D>, slot: &mut BodySlot, owner: usize) -> Result<()> {
         let mesh = &part.mesh;
-        let loads = Loads { force: mesh.load_vector(), prescribed: mesh.prescribed.clone() };
+        let load = mesh.load_vector();
         let kept = self.factory.kept(&slot.name).filter(|_| mesh.share.is_none());
-        if let Some(before) = reload(kept, &loads)? {
+        if let Some(before) = reload(kept, &load, &mesh.prescribed)? {
             self.avoided += 1;
             (slot.local, slot.scale, slot.row_stiffness) = (before.local, before.scale, before.row_stiffness);
         } else {
             self.assemblies += usize::from(owner == self.rank);
-            self.assemble(part, loads, slot)?;
+            self.assemble(part, load, slot)?;
         }
         slot.scale = if owner == self.rank { slot.scale } else { 0.0 };
         Ok(())
     }
 
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact rows.
-    fn assemble(&mut self, part: &mut SceneBody<D>, loads: Loads, slot: &mut BodySlot) -> Result<()> {
-        let Loads { force, prescribed } = loads;
+    fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
+        let prescribed = part.mesh.prescribed.clone();
         let mut left: Vec<Vec<f64>> = part.mesh.left.iter().map(|motion| part.mesh.dofs_of(motion)).collect();
         left.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
         part.mesh.graph();
@@ -95,7 +95,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         if let Some(share) = &share {
             graph = graph.of(|node| share.is_own::<D>(node));
         }
-        let mut body = part.assemble(self.mesh, &graph, force, prescribed)?;
+        let mut body = part.assemble(self.mesh, &graph, load, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
@@ -126,10 +126,10 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
 }
 
 /// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
-fn reload(kept: Option<BodySlot>, loads: &Loads) -> Result<Option<BodySlot>> {
+fn reload(kept: Option<BodySlot>, load: &[f64], prescribed: &[(usize, f64)]) -> Result<Option<BodySlot>> {
     let Some(mut slot) = kept else { return Ok(None) };
     let serves = match slot.local.as_mut() {
-        Some(body) => body.reload(loads)?,
+        Some(body) => body.reload(load, prescribed)?,
         None => false,
     };
     Ok(serves.then_some(slot))

@@ -23,8 +23,8 @@ pub trait Post {
     /// Return the integral of the rotation vector (x, y, z) over the cells that this rank writes.
     fn rotation(&self, v: &[f64]) -> [f64; 3];
 
-    /// Return the forces on the owned nodes under the forces omega p of the contact rows of the body.
-    fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance;
+    /// Return the forces on the owned nodes under `factor` times the loads and the forces omega p of the contact rows of the body.
+    fn balance(&self, v: &[f64], force: &[f64], factor: f64) -> ForceBalance;
 
     /// Return the contribution of owned nodes to the displacement of the body towards each of its contact surfaces.
     fn approach(&self, v: &[f64]) -> Vec<f64>;
@@ -158,13 +158,14 @@ impl<const D: usize> Post for OnPart<D> {
     }
 
     /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
-    fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance {
+    fn balance(&self, v: &[f64], force: &[f64], factor: f64) -> ForceBalance {
         let u = self.nodal(v);
         let mut contact = vec![0.0; u.len()];
         self.mesh.nodal_rows.add_transpose(-1.0, force, &mut contact);
         let space = &self.mesh.space;
         let mut sum = Resultants { size: [0.0; 2], part: self };
-        let load = self.mesh.load.all(space.nodes.len());
+        let mut load = self.mesh.load.all(space.nodes.len());
+        load.iter_mut().for_each(|force| *force *= factor);
         let parts = vec![sum.of(&load), sum.of(&contact)];
         let mut known: Vec<f64> = load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
         let mut springs = Vec::new();

@@ -31,15 +31,6 @@ pub struct ReducedLoad {
     pub work: f64,
 }
 
-/// New loads of a body whose K stays.
-#[derive(Debug)]
-pub struct Loads {
-    /// f, one entry a dof.
-    pub force: Vec<f64>,
-    /// Prescribed (dof, value), sorted by dof.
-    pub prescribed: Vec<(usize, f64)>,
-}
-
 /// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
 /// If the body is distributed over ranks, K has the dofs that this rank owns, and its columns are those of the distributed matrix that has its rows. A condensed
@@ -297,19 +288,28 @@ impl Body {
         self.robin.iter_mut().for_each(RobinMatrix::begin_anew);
     }
 
-    /// Replace the loads of a condensed body and keep what was made of K. Return false, with nothing changed, if the body is not condensed, or other dofs are
-    /// prescribed.
-    pub fn reload(&mut self, loads: &Loads) -> Result<bool> {
+    /// Replace the loads f and the `prescribed` (dof, value) of a condensed body and keep what was made of K. Return false, with nothing changed, if
+    /// the body is not condensed, or other dofs are prescribed.
+    pub fn reload(&mut self, load: &[f64], prescribed: &[(usize, f64)]) -> Result<bool> {
         let Some(interior) = &mut self.interior else { return Ok(false) };
         let dofs = |prescribed: &[(usize, f64)]| prescribed.iter().map(|entry| entry.0).collect::<Vec<_>>();
-        let fits = interior.schur.is_some() && dofs(&interior.whole.prescribed) == dofs(&loads.prescribed);
+        let fits = interior.schur.is_some() && dofs(&interior.whole.prescribed) == dofs(prescribed);
         if fits {
-            interior.whole.reload(loads.force.clone(), loads.prescribed.clone());
+            interior.whole.reload(load.to_vec(), prescribed.to_vec());
             interior.load = interior.interface.turn(&interior.whole.load);
             let stiffness = std::mem::take(&mut self.elastic.stiffness);
             self.elastic = ElasticBody { stiffness, ..interior.loads()? };
         }
         Ok(fits)
+    }
+
+    /// Multiply all loads and prescribed values.
+    pub fn scale_loads(&mut self, ratio: f64) {
+        let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &mut self.elastic;
+        let interior = self.interior.iter_mut().flat_map(|interior| &mut interior.load);
+        load.iter_mut().chain(lifting).chain(interior).for_each(|force| *force *= ratio);
+        self.states.prescribed.iter_mut().for_each(|(_, value)| *value *= ratio);
+        [strain_constant, energy_constant].into_iter().for_each(|energy| *energy *= ratio * ratio);
     }
 
     /// Return one line about the inner solver.

@@ -26,6 +26,14 @@ impl Field {
         Self::of(model, |body| body.states().rest())
     }
 
+    /// Return the field with the displacements that supports prescribe.
+    #[must_use]
+    pub fn supported(mut self, model: &Model) -> Field {
+        let bodies = model.bodies.iter().map(|slot| slot.local.as_ref()).zip(&mut self.states);
+        bodies.for_each(|(body, u)| body.into_iter().for_each(|body| body.states().prescribe(u)));
+        self
+    }
+
     /// Return the field without displacement of any body.
     pub fn zero(model: &Model) -> Field {
         Self::of(model, |body| vec![0.0; body.states().dofs])

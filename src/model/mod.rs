@@ -15,7 +15,7 @@ pub mod rigid;
 pub mod states;
 
 pub use crate::solver::BodyCounts;
-pub use body::{Body, Loads};
+pub use body::Body;
 pub use field::Field;
 pub use joint::Joint;
 pub use layer::Layer;
@@ -168,14 +168,26 @@ impl Model {
         let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
         let (gap, robin) = (Vec::new(), Vec::new());
         let mut model = Self { bodies, pairs, offset, weight, gap, robin, mechanism: None, exchange };
-        model.scale_gaps(1.0);
+        model.set_gaps();
         model
     }
 
-    /// Set all gaps to 1/`factor` of those between the meshes. Displacements are then in units of `factor`.
-    pub fn scale_gaps(&mut self, factor: f64) {
-        let gaps = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(move |q| free_gap(pair, q, factor)));
-        self.gap = gaps.collect();
+    /// Multiply all loads and prescribed displacements.
+    pub fn scale_loads(&mut self, ratio: f64) {
+        for slot in &mut self.bodies {
+            let sprung = slot.sprung.iter_mut().flat_map(|sprung| &mut sprung.motions);
+            slot.motions.iter_mut().chain(sprung).for_each(|motion| motion.work *= ratio);
+            slot.imposed.iter_mut().for_each(|u| *u *= ratio);
+            slot.local.iter_mut().for_each(|body| body.scale_loads(ratio));
+        }
+        let prescribed = self.pairs.iter_mut().flat_map(|pair| &mut pair.prescribed).flatten();
+        prescribed.for_each(|u| *u *= ratio);
+        self.set_gaps();
+    }
+
+    /// Set all gaps from those of the pairs and what prescribed displacements close.
+    pub fn set_gaps(&mut self) {
+        self.gap = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(move |q| free_gap(pair, q))).collect();
     }
 
     /// Subtract the closings of a trace vector (2n) from the gaps.
@@ -260,10 +272,10 @@ impl Model {
         self.offset[i]..self.offset[i + 1]
     }
 
-    /// Return the outer normal displacements of a side of pair `i`, one for each of its points: those of `trace`, and `share` times the prescribed ones.
-    pub fn displacement(&self, trace: &[f64], i: usize, side: usize, share: f64) -> Vec<f64> {
+    /// Return the outer normal displacements of a side of pair `i`, one for each of its points: those of `trace`, and the prescribed ones.
+    pub fn displacement(&self, trace: &[f64], i: usize, side: usize) -> Vec<f64> {
         let free = &trace[side * self.points()..][self.range(i)];
-        free.iter().zip(&self.pairs[i].prescribed[side]).map(|(free, prescribed)| free + share * prescribed).collect()
+        free.iter().zip(&self.pairs[i].prescribed[side]).map(|(free, prescribed)| free + prescribed).collect()
     }
 
     /// Return the ranges of a trace vector that belong to the rows of a body, in the order of the rows.
@@ -351,9 +363,9 @@ impl Model {
     }
 }
 
-/// Return the gap at local point `q` of a pair in units of `factor`, less the part that prescribed displacements close.
-fn free_gap(pair: &ContactPair, q: usize, factor: f64) -> f64 {
-    (pair.gap[q] - pair.offset) / factor - pair.prescribed[0][q] - pair.prescribed[1][q]
+/// Return the gap at local point `q` of a pair, less the part that prescribed displacements close.
+fn free_gap(pair: &ContactPair, q: usize) -> f64 {
+    pair.gap[q] - pair.offset - pair.prescribed[0][q] - pair.prescribed[1][q]
 }
 
 /// A model for tests that need points but no bodies.

@@ -47,19 +47,12 @@ struct Planned {
 
 /// What all ranks have of a body of the plan.
 #[derive(Clone, Serialize, Deserialize)]
-struct BodyOutline {
+pub struct BodyOutline {
     name: String,
     order: Order,
     dofs: usize,
     /// Interface dofs of a condensed body, until it is made.
     interface: Option<InterfaceDofs>,
-}
-
-/// The plan of the first rank, and what it knows of the bodies.
-#[derive(Serialize, Deserialize)]
-pub struct Decisions {
-    plan: Plan,
-    bodies: Vec<BodyOutline>,
 }
 
 impl<'a> SolverFactory<'a> {
@@ -226,9 +219,9 @@ fn typed_of(chosen: &Chosen) -> Typed {
 }
 
 impl Factory for SolverFactory<'_> {
-    type SolverPlan = Decisions;
+    type SolverPlan = (Plan, Vec<BodyOutline>);
 
-    fn plan(&mut self, outlines: &[Outline]) -> Result<Decisions> {
+    fn plan(&mut self, outlines: &[Outline]) -> Result<Self::SolverPlan> {
         preset::check(self.asked.preset, HAS_HYPRE)?;
         let (mut facts, mut bodies) = (Vec::new(), Vec::new());
         for &Outline { name, dimension, order, cells, facets, rows, prescribed, motions } in outlines {
@@ -249,10 +242,10 @@ impl Factory for SolverFactory<'_> {
             body.interface = body.interface.take().filter(|_| plan.preset == Preset::Condensed);
         }
         self.follow(plan.clone(), bodies.clone());
-        Ok(Decisions { plan, bodies })
+        Ok((plan, bodies))
     }
 
-    fn adopt(&mut self, Decisions { plan, bodies }: Decisions) -> Result<()> {
+    fn adopt(&mut self, (plan, bodies): Self::SolverPlan) -> Result<()> {
         self.follow(plan, bodies);
         Ok(())
     }

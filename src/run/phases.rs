@@ -62,6 +62,7 @@ pub fn build_after(
         if serves(&last, &scene) {
             let discrete = &mut last.discrete;
             discrete.model.exchange = Rc::new(Ranks::new(session));
+            discrete.scale_loads(1.0);
             let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
             discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
             discrete.assemblies = 0;
@@ -236,7 +237,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     }
     let mut start = match start {
         Some(start) => start,
-        None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete, 1.0)?.into(),
+        None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete)?.into(),
         None => InitialGuess::Automatic,
     };
     let mut full = start.clone();
@@ -282,7 +283,7 @@ pub fn estimate(done: &mut Done, clock: &mut Clock) -> Result<Option<Estimate>> 
     let discrete = &mut done.built.discrete;
     let Some(meshes) = discrete.meshes.clone().filter(|_| good) else { return Ok(None) };
     let model = &mut discrete.model;
-    let estimate = estimate::estimate(&*meshes, model, done.method.linear(), iterate, layer, done.share)?;
+    let estimate = estimate::estimate(&*meshes, model, done.method.linear(), iterate, layer)?;
     if let Some((body, place)) = estimate::lost_at(&*meshes, &discrete.model, &estimate) {
         let (name, place) = (&discrete.bodies[body].name, output::report::place(place));
         done.warnings.push(format!(

@@ -2,7 +2,7 @@
 
 use super::results;
 use super::stages::{All, Done, Prepared};
-use crate::ddm::{self, Observer, Row, Settings, Silent};
+use crate::ddm::{self, Observer, Row, Silent};
 use crate::error::Result;
 use crate::exchange::ASKS;
 use crate::interrupt::{self, ENDING, Interrupt};
@@ -22,9 +22,10 @@ impl Recorder for Requests {}
 /// Solve until a rule or a signal ends the run. `full` is whether this is the full load. There the interval of gamma is computed if the scene requests it.
 pub fn solve(ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
     let Prepared { mut built, mut method, start, steps, earlier, warnings } = ready;
-    let (stop, interval) = (built.scene.method.stop.clone(), built.scene.method.interval && full);
-    let outcome = ddm::solve(&mut built.discrete.model, &mut method, Settings { stop, interval, start }, keep)?;
-    let mut done = Done { built, method, outcome, share: 1.0, steps, earlier, warnings, recovered: None };
+    let wants_interval = built.scene.method.interval && full;
+    let stop = &built.scene.method.stop;
+    let outcome = ddm::solve(&mut built.discrete.model, &mut method, stop, wants_interval, start, keep)?;
+    let mut done = Done { built, method, outcome, steps, earlier, warnings, recovered: None };
     done.recovered = Some(results::recover(&done));
     Ok(done)
 }

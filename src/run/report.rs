@@ -270,7 +270,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     let (pair, range) = (&model.pairs[i], model.range(i));
     let sides = done.built.discrete.sides(i);
     let displacement = |side: usize| {
-        let mut u = model.displacement(&outcome.iterate.trace, i, side, done.share);
+        let mut u = model.displacement(&outcome.iterate.trace, i, side);
         if side == 1 && !done.built.discrete.contacts[i].spec.obstacle {
             // the offset of a gap is no displacement
             axpy(-1.0, &model.rigid_closing(i, &outcome.iterate.rigid), &mut u);

@@ -26,22 +26,19 @@ use std::rc::Rc;
 pub fn recover(done: &Done) -> Rc<All> {
     done.recovered.clone().unwrap_or_else(|| {
         let local = |(index, slot): (usize, &BodySlot)| {
-            slot.local.as_ref().map(|body| recover_body(slot, body, &done.outcome.iterate, index, done.share))
+            slot.local.as_ref().map(|body| recover_body(slot, body, &done.outcome.iterate, index))
         };
         Rc::new(done.model().bodies.iter().take(done.model().meshed()).enumerate().map(local).collect())
     })
 }
 
-/// Return the displacements of a body at a share of the loads. Collective.
-fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize, share: f64) -> Result<Recovered> {
-    // bodies expect displacements at the full load
-    let at_full_load = |values: &[f64]| values.iter().map(|u| u / share).collect::<Vec<f64>>();
-    let (bent, amounts) = (at_full_load(&iterate.states[index]), at_full_load(&iterate.rigid[index]));
-    let mut state = body.recover(&body.states().join(&bent, &amounts))?;
+/// Return the displacements of a body. Collective.
+fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize) -> Result<Recovered> {
+    let (bent, amounts) = (&iterate.states[index], &iterate.rigid[index]);
+    let state = body.recover(&body.states().join(bent, amounts))?;
     // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take the same branch
     let is_whole = slot.sprung.is_some() || amounts.iter().all(|a| *a == 0.0);
-    let mut bent = if is_whole { state.clone() } else { body.recover(&bent)? };
-    bent.iter_mut().chain(&mut state).for_each(|u| *u *= share);
+    let bent = if is_whole { state.clone() } else { body.recover(bent)? };
     Ok(Recovered::new(state, bent))
 }
 
@@ -251,22 +248,20 @@ pub fn step(
     recovered: &All,
     history: &History,
     number: usize,
-    iterations: usize,
     status: &str,
     message: String,
 ) -> StepReport {
     let approaches = approaches(done, recovered);
     let balances = balances(done, recovered);
     let names = done.built.discrete.bodies.iter().map(|body| &body.name);
-    let last = done.outcome.rows.last();
     let step = &history.steps[number];
     StepReport {
         time: step.time,
         factors: history.names.iter().cloned().zip(step.factors.iter().copied()).collect(),
         status: status.to_owned(),
         message,
-        iterations,
-        residual: last.map(|row| row.residual).filter(|residual| residual.is_finite()),
+        iterations: done.outcome.iterations,
+        residual: done.outcome.rows.last().map(|row| row.residual).filter(|residual| residual.is_finite()),
         pairs: approaches.into_iter().enumerate().map(|(i, approach)| pair(done, i, approach)).collect(),
         reactions: reactions(names.zip(balances)),
     }
@@ -313,7 +308,7 @@ pub fn columns(spec: &ContactSpec) -> PairColumns {
 pub fn obstacle(done: &Done, i: usize) -> Option<ObstacleReport> {
     let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.contacts[i].spec);
     let found = spec.obstacle.then(|| Obstacle::new(pair, spec))?;
-    let (approach, tilt) = found.moved(&done.outcome.iterate.rigid[pair.bodies[1]], done.share);
+    let (approach, tilt) = found.moved(&done.outcome.iterate.rigid[pair.bodies[1]], done.built.discrete.factor);
     let force = &done.outcome.layer.force[done.model().range(i)];
     let (force, moment) = (resultant(force, &pair.resultant[1]), resultant(force, &pair.moment[1]));
     let moment = found.moment(force, moment).map(|component| 0.0 - component);
@@ -385,12 +380,10 @@ fn names(info: &BodyInfo) -> Vec<String> {
 /// Write this rank's part of the resultants on a body, and of the sums of sizes of forces and moments, to `mine`.
 fn add_forces(done: &Done, body: usize, recovered: &Recovered, mine: &mut [f64]) {
     let (model, info) = (done.model(), &done.built.discrete.bodies[body]);
-    // bodies expect values at the full load
-    let full = |values: &[f64]| values.iter().map(|v| v / done.share).collect::<Vec<_>>();
     let force = model.at_rows(body, &done.outcome.layer.force);
-    let ForceBalance { parts, size } = info.post().balance(&full(&recovered.bent), &full(&force));
+    let ForceBalance { parts, size } = info.post().balance(&recovered.bent, &force, done.built.discrete.factor);
     let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
-    mine.iter_mut().zip(numbers).for_each(|(mine, number)| *mine = done.share * number);
+    mine.iter_mut().zip(numbers).for_each(|(mine, number)| *mine = number);
 }
 
 /// Return the report of the forces on a body from the numbers of its resultants, and the sums of sizes of forces and moments.

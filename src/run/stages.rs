@@ -2,7 +2,7 @@
 
 use crate::ddm::{InitialGuess, Method, Outcome, Row};
 use crate::discretize::{BodyInfo, Discrete};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
 use crate::model::{BodySlot, Model};
@@ -85,8 +85,6 @@ pub struct Done {
     pub method: Method,
     /// The outcome.
     pub outcome: Outcome,
-    /// Factor of the loads and prescribed displacements to which the outcome belongs.
-    pub share: f64,
     /// Load steps so far.
     pub steps: Vec<StepReport>,
     /// Iteration rows of the load steps before.
@@ -143,16 +141,6 @@ impl Recovered {
 
 /// The displacements of every body: none for bodies of other ranks, or the failure of the solver that recovers the interior.
 pub type All = Vec<Option<Result<Recovered>>>;
-
-/// Return the displacements of all bodies, multiplied by a factor.
-pub fn scaled(all: &All, factor: f64) -> All {
-    let times = |v: &[f64]| v.iter().map(|u| factor * u).collect();
-    let scaled = |recovered: &Result<Recovered>| match recovered {
-        Ok(Recovered { state, bent, .. }) => Ok(Recovered::new(times(state), times(bent))),
-        Err(error) => Err(Error::new(error.kind(), error.message())),
-    };
-    all.iter().map(|recovered| recovered.as_ref().map(scaled)).collect()
-}
 
 /// The clock of a run, which measures its phases.
 #[derive(Clone)]

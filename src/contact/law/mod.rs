@@ -27,8 +27,6 @@ pub use forms::Power;
 pub use make::{LawMaker, OwnLaws, make, of_pair};
 pub use table::Table;
 
-use std::rc::Rc;
-
 /// The response of a layer at one point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Response {
@@ -173,55 +171,6 @@ impl<L: LayerLaw> LayerLaw for PerPoint<L> {
 
     fn end(&self, point: usize) -> f64 {
         self.0[point].end(0)
-    }
-}
-
-/// The law p(s c)/s for a law p and a factor s > 0.
-///
-/// If bodies under s times their loads have displacements that are divided by s, these satisfy the equations of the full loads.
-/// This is then the law of the layer between them.
-#[derive(Debug)]
-pub struct Scaled {
-    /// The law p.
-    pub law: Rc<dyn LayerLaw>,
-    /// The factor s.
-    pub factor: f64,
-}
-
-impl LayerLaw for Scaled {
-    fn compressed(&self, point: usize, c: f64) -> Response {
-        self.response(point, c)
-    }
-
-    fn response(&self, point: usize, c: f64) -> Response {
-        let s = self.factor;
-        let Response { pressure, tangent, energy } = self.law.response(point, s * c);
-        Response { pressure: pressure / s, tangent, energy: energy / (s * s) }
-    }
-
-    fn is_bonded(&self) -> bool {
-        self.law.is_bonded()
-    }
-
-    fn resolvent(&self, point: usize, s: f64, rho: f64) -> f64 {
-        self.law.resolvent(point, self.factor * s, rho) / self.factor
-    }
-
-    fn compression(&self, point: usize, pressure: f64) -> f64 {
-        self.law.compression(point, self.factor * pressure) / self.factor
-    }
-
-    fn pressure(&self, point: usize, c: f64) -> f64 {
-        self.law.pressure(point, self.factor * c) / self.factor
-    }
-
-    fn pressure_and_tangent(&self, point: usize, c: f64) -> (f64, f64) {
-        let (pressure, tangent) = self.law.pressure_and_tangent(point, self.factor * c);
-        (pressure / self.factor, tangent)
-    }
-
-    fn end(&self, point: usize) -> f64 {
-        self.law.end(point) / self.factor
     }
 }
 
