@@ -1,4 +1,4 @@
-//! The step from a scene and its mesh to a [`Model`]. Geometry ends here: nothing below knows the space dimension.
+//! The step from a scene and its mesh to a [`Model`]. Geometry ends here: a model has no space dimension.
 
 mod approach;
 mod assembly;

@@ -57,9 +57,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
     let given = given.map_or_else(|| model.imposed(), <[f64]>::to_vec);
     let gap = model.compression(&given).into_iter().map(|c| -c).collect();
     let (work, slope) = (motions.loads(), surface_slopes(model));
-    let mut ground = motions.blocks();
-    let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
-    sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
+    let ground = motions.ground(model);
     let mut rigid = Rigid { model, motions: &motions, work, slope, gap, ground };
     let mut amounts = DVector::zeros(motions.count());
     if !amounts.is_empty() {

@@ -158,8 +158,7 @@ fn between(from: &[f64], to: &[f64], t: f64) -> Vec<f64> {
     from.iter().zip(to).map(|(from, to)| from + t * (to - from)).collect()
 }
 
-/// Steps of the laws themselves that are not taken whole before the laws are smoothed. With one, 58 slender scenes took 335 steps, with two 321, both with an
-/// earlier rule for the fall of mu.
+/// Steps of the laws themselves that are not taken whole before the laws are smoothed. With one, 58 slender scenes took 335 steps, with two 321.
 const SHORTENED: usize = 2;
 
 /// Ratio of mu at the beginning to the mean squared distance D of the states, and of D to mu where the path is lost. D counts the mismatch of

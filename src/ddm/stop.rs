@@ -119,7 +119,8 @@ impl Stagnation {
     /// Note a step. Return whether the run stagnates.
     pub fn note(&mut self, step: Attained) -> bool {
         let is_far = step.error.powi(2) > EXACT;
-        let is_better = step.error < if is_far { FALLS } else { NEAR_FALLS } * self.best;
+        let share = if is_far { FALLS } else { NEAR_FALLS };
+        let is_better = step.error < share * self.best;
         if is_better {
             self.best = step.error;
         }

@@ -164,7 +164,7 @@ impl Partition {
             prescribed: body.prescribed.iter().filter_map(prescribed_here).collect(),
             is_owned: true,
             graph: OnceCell::new(),
-            share: Some(self.share::<D>(number, nodes, &body.rows, rank)),
+            share: Some(self.share::<D>(number, &nodes, &body.rows, rank)),
         }
     }
 
@@ -194,13 +194,13 @@ impl Partition {
         Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(held.frame.leaders()))
     }
 
-    /// Return the distribution of the dofs of a body for a rank that has these `nodes`. `rows` are the contact rows of the body.
-    fn share<const D: usize>(&self, number: usize, nodes: Vec<u32>, rows: &Csr, rank: usize) -> Share {
+    /// Return the share of a rank that has these `nodes` of a body. `rows` are the contact rows of the body.
+    fn share<const D: usize>(&self, number: usize, nodes: &[u32], rows: &Csr, rank: usize) -> Share {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
         let (mut own, mut places) = (Vec::new(), Vec::new());
-        for (place, &node) in (0..).zip(&nodes) {
+        for (place, &node) in (0..).zip(nodes) {
             let owner = self.owner(number, node);
             if owner == rank {
                 own.extend(dofs(node));
@@ -227,7 +227,7 @@ impl Partition {
             leads: self.leader(number) == rank,
             exchange: Rc::new(Serial),
         };
-        let coarse = (0..).zip(&nodes).map(|(place, &node)| (place, self.coarse.of_node[number][node as usize]));
+        let coarse = (0..).zip(nodes).map(|(place, &node)| (place, self.coarse.of_node[number][node as usize]));
         let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
         Share {
             distribution,
@@ -236,7 +236,6 @@ impl Partition {
             coarse_count: self.coarse.sum(0..self.ranks),
             own_coarse: self.coarse.counts[rank][number],
             number: nodes.iter().map(|&node| numbers[node as usize]).collect(),
-            nodes,
         }
     }
 }

@@ -10,9 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Share {
     /// Dofs of this rank.
     pub distribution: Distribution,
-    /// Nodes that this rank has, sorted, as numbered in the body.
-    pub nodes: Vec<u32>,
-    /// Number of each of these nodes in the matrix with the rows of the body.
+    /// Numbers of the nodes that this rank has, in the matrix with the rows of the body.
     pub number: Vec<u32>,
     /// Local indices of the coarse nodes among the nodes of this rank; empty if no interpolation is requested.
     pub coarse_nodes: Vec<u32>,

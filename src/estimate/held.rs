@@ -35,9 +35,7 @@ impl HoldingSprings {
             return none();
         }
         let all = Motions::with_springs(model);
-        let mut ground = all.blocks();
-        let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
-        sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
+        let ground = all.ground(model);
         let (loads, acting) = (all.loads(), all.sizes(&layer.force));
         let only_holds = |motion: &DVector<f64>| {
             let could = motion.iter().zip(acting.iter()).map(|(amount, size)| (amount * size).abs()).sum::<f64>();

@@ -246,10 +246,9 @@ impl Body {
         self.robin_matrix()?.set_up()
     }
 
-    /// Set the relative tolerance of iterative solves, unless the user has set one. Return false if solves do not depend on
-    /// it.
-    pub fn precision(&mut self, rtol: f64) -> Result<bool> {
-        self.robin_matrix()?.solver_mut().precision(rtol)
+    /// Set the relative tolerance of iterative solves, unless the user has set one.
+    pub fn set_tolerance(&mut self, rtol: f64) -> Result<()> {
+        self.robin_matrix()?.solver_mut().set_tolerance(rtol)
     }
 
     /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`Solved`].

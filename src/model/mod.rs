@@ -338,13 +338,13 @@ impl Model {
         self.bodies.iter_mut().zip(v).map(product).collect()
     }
 
-    /// Set the relative tolerance of solves in every body. Return whether the solves of some body depend on it.
+    /// Set the relative tolerance of iterative solves in every body, unless the user has set one.
     ///
     /// # Errors
     /// Failures of the solver library.
-    pub fn precision(&mut self, rtol: f64) -> Result<bool> {
+    pub fn set_tolerance(&mut self, rtol: f64) -> Result<()> {
         let mut bodies = self.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-        bodies.try_fold(false, |depends, body| Ok(body.precision(rtol)? || depends))
+        bodies.try_for_each(|body| body.set_tolerance(rtol))
     }
 
     /// Set the Robin term of every body: `weight` = omega psi kappa at each contact row, as a trace vector (37)-(38).

@@ -96,6 +96,14 @@ impl<'a> Motions<'a> {
         Blocks::new(&self.first.windows(2).map(|ends| ends[1] - ends[0]).collect::<Vec<usize>>())
     }
 
+    /// Return the stiffness E'KE of the springs to the ground. The matrix has a row and column of blocks for each body.
+    pub fn ground(&self, model: &Model) -> Blocks {
+        let mut ground = self.blocks();
+        let sprung = model.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.sprung.as_ref()?)));
+        sprung.for_each(|(body, sprung)| ground.add(body, body, &sprung.stiffness));
+        ground
+    }
+
     /// Return (B E)' diag(`weight`) (B E) for springs at the points, one entry a point. The matrix has a row and column of blocks for each body.
     pub fn springs(&self, weight: &[f64]) -> Blocks {
         let mut springs = self.blocks();

@@ -54,14 +54,14 @@ impl LinearStep for Sweeps {
 
     fn solve(&mut self, system: System) -> Result<LinearResult> {
         let System { model, places, springs, residual, enough } = system;
-        model.precision(ROUGH)?;
+        model.set_tolerance(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
             let weight = coefficient.weight(model, places, self.systems)?;
             model.robin(&weight)?;
         }
         self.systems += 1;
         let before = self.sweeper.sweeps;
-        let found = match gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)? {
+        let found = match conjugate_gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)? {
             Ok(found) => found,
             Err(failure) => return Ok(Err(failure)),
         };
@@ -95,7 +95,7 @@ pub(super) struct CgResult {
 /// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. `springs`
 /// are omega kappa at the points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
 /// not see the slow modes.
-pub(super) fn gradients(
+pub(super) fn conjugate_gradients(
     model: &mut Model,
     sweeper: &mut Sweeper,
     springs: &[f64],

@@ -250,11 +250,8 @@ impl InnerSolver for Krylov {
         Ok(solved)
     }
 
-    fn precision(&mut self, rtol: f64) -> Result<bool> {
-        if self.free {
-            self.ksp.set_tolerance(rtol)?;
-        }
-        Ok(self.free)
+    fn set_tolerance(&mut self, rtol: f64) -> Result<()> {
+        if self.free { self.ksp.set_tolerance(rtol) } else { Ok(()) }
     }
 
     fn accuracy(&self) -> f64 {

@@ -132,9 +132,9 @@ pub trait InnerSolver {
         self.solve(r, z)
     }
 
-    /// Set the relative tolerance of solves, unless the user has set one. Return false if solves do not depend on it.
-    fn precision(&mut self, _rtol: f64) -> Result<bool> {
-        Ok(false)
+    /// Set the relative tolerance of iterative solves, unless the user has set one.
+    fn set_tolerance(&mut self, _rtol: f64) -> Result<()> {
+        Ok(())
     }
 
     /// Return the relative error of the last solve in the energy norm, at most: zero for a direct solver.

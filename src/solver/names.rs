@@ -43,9 +43,12 @@ pub(super) fn bare<'a>(name: &'a str, bodies: &[&str]) -> &'a str {
 
 /// Return whether a name without prefix is one of the common ones, or a control of MUMPS.
 pub(super) fn is_common(bare: &str) -> bool {
-    COMMON.split_whitespace().any(|known| known.eq_ignore_ascii_case(bare))
-        || bare.starts_with("mat_mumps_icntl_")
-        || bare.starts_with("mat_mumps_cntl_")
+    COMMON.split_whitespace().any(|known| known.eq_ignore_ascii_case(bare)) || is_control_of_mumps(bare)
+}
+
+/// Return whether a name without prefix is a control of MUMPS.
+pub(super) fn is_control_of_mumps(bare: &str) -> bool {
+    bare.starts_with("mat_mumps_icntl_") || bare.starts_with("mat_mumps_cntl_")
 }
 
 /// Return the common name that is meant, perhaps with the prefix of a body, if one is near enough for a typing mistake.

@@ -10,7 +10,7 @@
 //!    bodies with the same options share a prefix, such as `hypre_bodies`, since the table holds only 512 options.
 //! 3. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before it starts.
 
-use super::names::{self, WHOLE, looks, nest_of};
+use super::names::{self, WHOLE, is_control_of_mumps, looks, nest_of};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
 use crate::parallel::Ranks;
@@ -129,8 +129,7 @@ impl Chosen {
 
     /// Return the controls of MUMPS that the user wrote, and mark them as read.
     pub fn controls_of_mumps(&self, session: &Session) -> Vec<(&str, &str)> {
-        let is_control = |name: &str| name.starts_with("mat_mumps_icntl_") || name.starts_with("mat_mumps_cntl_");
-        let controls: Vec<_> = self.all_typed().filter(|(name, _)| is_control(name)).collect();
+        let controls: Vec<_> = self.all_typed().filter(|(name, _)| is_control_of_mumps(name)).collect();
         for (name, _) in &controls {
             let _ = [format!("-{}_{name}", self.prefix), format!("-{name}")].map(|name| session.options().has(&name));
         }
@@ -149,8 +148,7 @@ impl Chosen {
     /// Return whether the user wrote an option that chooses or steers the solver or its matrix: then the user wants a KSP of PETSc. Controls of
     /// MUMPS and options that only [look](looks) at a solver do not count.
     pub fn asks_for_ksp(&self) -> bool {
-        let is_control = |name: &str| name.starts_with("mat_mumps_icntl_") || name.starts_with("mat_mumps_cntl_");
-        self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control(name))
+        self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control_of_mumps(name))
     }
 
     /// Return whether the user wrote an option for this solver alone.
