@@ -42,16 +42,16 @@ pub struct Reached {
 
 /// Return the energy that the pressures give the layers and the surfaces under them, sum omega p^2 (1/kappa + 1/rho0). The energy of the whole
 /// bodies may be much larger, and an error that is small relative to that one may be large for the pressures.
-pub(super) fn contact_energy(model: &Model, places: &Layer) -> f64 {
+pub(super) fn contact_energy(model: &Model, layer: &Layer) -> f64 {
     let slopes = surface_slopes(model);
-    let at = |q: usize| places.force[q] * places.pressure[q] * (places.tangent[q].recip() + slopes[q].recip());
-    (0..slopes.len()).filter(|&q| places.force[q] != 0.0).map(at).sum()
+    let at = |q: usize| layer.force[q] * layer.pressure[q] * (layer.tangent[q].recip() + slopes[q].recip());
+    (0..slopes.len()).filter(|&q| layer.force[q] != 0.0).map(at).sum()
 }
 
 /// Return the part of [`contact_energy`] that is in the surfaces, sum omega p^2 / rho0.
-pub(super) fn surface_energy(model: &Model, places: &Layer) -> f64 {
+pub(super) fn surface_energy(model: &Model, layer: &Layer) -> f64 {
     let slopes = surface_slopes(model);
-    (0..slopes.len()).map(|q| places.force[q] * places.pressure[q] / slopes[q]).sum()
+    (0..slopes.len()).map(|q| layer.force[q] * layer.pressure[q] / slopes[q]).sum()
 }
 
 /// Return the compression within c -+ `roundoff` at which the pressure of a law is nearest to p.
@@ -61,7 +61,7 @@ fn nearest(law: &dyn LayerLaw, point: usize, c: f64, roundoff: f64, p: f64) -> f
 }
 
 impl Reached {
-    /// Measure an iterate with u'Ku = `strain` after the linear step `step`. `state` is its equilibrium, `places` are the resolved states on the
+    /// Measure an iterate with u'Ku = `strain` after the linear step `step`. `state` is its equilibrium, `layer` has the resolved states on the
     /// laws.
     ///
     /// A compression is known only to its roundoff. Of the admissible values, the one that is closest to the law is used: a stiff law would answer
@@ -73,7 +73,7 @@ impl Reached {
         strain: f64,
         step: &LinearSolution,
         state: &Equilibrium,
-        places: &Layer,
+        layer: &Layer,
     ) -> Self {
         let Equilibrium { compression, roundoff, pressure, rho } = *state;
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
@@ -81,23 +81,23 @@ impl Reached {
             for q in model.range(i) {
                 let (point, weight, p) = (q - model.offset[i], model.weight[q], pressure[q]);
                 let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
-                let changed = (p - places.pressure[q]).powi(2) / rho[q];
+                let changed = (p - layer.pressure[q]).powi(2) / rho[q];
                 mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
                 let is_on_side = p >= 0.0 || pair.law.is_bonded();
                 gap += weight * if is_on_side { pair.law.duality_gap(point, c, p) } else { changed };
                 is_bound &= is_on_side;
             }
         }
-        let (linear, energy) = (step.error, strain + places.work);
+        let (linear, energy) = (step.error, strain + layer.work);
         let absolute = (2.0 * gap).sqrt() + linear;
-        let contact = if linear > 0.0 { contact_energy(model, places) } else { 0.0 };
+        let contact = if linear > 0.0 { contact_energy(model, layer) } else { 0.0 };
         let missed = if linear > 0.0 { scale.relative(linear * linear, contact) } else { 0.0 };
-        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&places.pressure, strain) };
+        let mismatch = if mismatch == 0.0 { 0.0 } else { mismatch / scale.peak(&layer.pressure, strain) };
         Self {
             error: scale.relative(absolute * absolute, energy),
             is_bound,
             pressure: mismatch.max(missed),
-            imbalance: scale.imbalance(model, &places.force, strain),
+            imbalance: scale.imbalance(model, &layer.force, strain),
         }
     }
 
@@ -106,18 +106,18 @@ impl Reached {
         self.is_bound &= unbalanced <= EXACT;
     }
 
-    /// Add twice what is left of equilibrium after a step from the states `before` to `places`. The solution `more` with the same matrix shows it.
+    /// Add twice what is left of equilibrium after a step from the states `before` to `layer`. The solution `more` with the same matrix shows it.
     pub(super) fn add_unbalanced(
         &mut self,
         (scale, strain): (&Scale, f64),
         more: &LinearSolution,
         before: &Layer,
-        places: &Layer,
+        layer: &Layer,
     ) {
-        let missed = scale.relative(more.energy + more.error * more.error, strain + places.work);
+        let missed = scale.relative(more.energy + more.error * more.error, strain + layer.work);
         let closing = more.field.closing();
         let change = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
-        let change = if change == 0.0 { 0.0 } else { change / scale.peak(&places.pressure, strain) };
+        let change = if change == 0.0 { 0.0 } else { change / scale.peak(&layer.pressure, strain) };
         self.error += 2.0 * missed;
         self.pressure += 2.0 * change;
     }
@@ -284,11 +284,11 @@ mod tests {
     fn a_gap_in_closed_form() {
         let model = two_pairs();
         // with p = 2, 4, 4, 1
-        let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
+        let layer = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
         let (c, rho, scale) = ([0.5, 1.0, 2.0, 3.0], [2.0, 0.5, 0.25, 3.0], Scale::default());
         let exact = step(vec![0.0; 8], 0.0, 0.0);
-        let of = |p: [f64; 4]| Reached::new(&model, &scale, 5.0, &exact, &state(&c, &p, &rho), &places);
-        let energy = |reached: &Reached| reached.error.powi(2) * (5.0 + places.work) / 2.0;
+        let of = |p: [f64; 4]| Reached::new(&model, &scale, 5.0, &exact, &state(&c, &p, &rho), &layer);
+        let energy = |reached: &Reached| reached.error.powi(2) * (5.0 + layer.work) / 2.0;
         let beside = of([2.0, 5.0, 1.0, 9.0]);
         close(energy(&beside), 2.0 / 4.0 + 3.0 * 1.0 * 3.0);
         assert!(beside.is_bound && beside.imbalance == 0.0);
@@ -302,17 +302,17 @@ mod tests {
     #[test]
     fn errors_in_closed_form() {
         let model = two_pairs();
-        let places = Layer::new(&model, vec![0.5, -1.0, 2.0, 1.0]);
+        let layer = Layer::new(&model, vec![0.5, -1.0, 2.0, 1.0]);
         let slopes = surface_slopes(&model);
-        let at = |q: usize| WEIGHT[q] * places.pressure[q].powi(2) * (1.0 / places.tangent[q] + 1.0 / slopes[q]);
-        let contact = contact_energy(&model, &places);
+        let at = |q: usize| WEIGHT[q] * layer.pressure[q].powi(2) * (1.0 / layer.tangent[q] + 1.0 / slopes[q]);
+        let contact = contact_energy(&model, &layer);
         close(contact, at(0) + at(2) + at(3));
         // the first pressure is 4 c - 0.4
         let (scale, p, rho) = (Scale::default(), [1.6, 0.0, 4.0, 1.0], [1.0; 4]);
         let (gap, all): (f64, f64) = (0.5 * 0.4f64.powi(2) / 4.0, 5.0 + 0.5 * 1.0 + 3.0 * 8.0 + 0.25);
         let of = |error| {
             let step = step(vec![0.0; 8], 0.0, error);
-            Reached::new(&model, &scale, 5.0, &step, &state(&places.compression, &p, &rho), &places)
+            Reached::new(&model, &scale, 5.0, &step, &state(&layer.compression, &p, &rho), &layer)
         };
         let inexact = of(0.3);
         close(inexact.error, ((2.0 * gap).sqrt() + 0.3) / all.sqrt());
@@ -330,7 +330,7 @@ mod tests {
         assert!(exact.is_bound);
         // a further step that closes the points by 0.01, -0.03, 0 and 0.02
         let more = step(vec![0.01, -0.01, 0.0, 0.0, 0.0, -0.02, 0.0, 0.02], 0.05, 0.1);
-        exact.add_unbalanced((&scale, 5.0), &more, &places, &places);
+        exact.add_unbalanced((&scale, 5.0), &more, &layer, &layer);
         close(exact.error, ((2.0 * gap).sqrt() + 2.0 * 0.06f64.sqrt()) / all.sqrt());
         close(exact.pressure, 0.1 + 2.0 * 0.04 / 4.0);
     }

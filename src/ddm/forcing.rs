@@ -21,7 +21,7 @@ const DELAY: usize = 3;
 /// the laws (Ern and Vohralík, Adaptive inexact Newton methods, 2013). Both are known after each iteration of the linear solver.
 pub(super) struct Forcing<'a> {
     /// Layer states from which the step is taken.
-    places: &'a Layer,
+    layer: &'a Layer,
     /// Slopes on which the laws are resolved, n.
     rho: &'a [f64],
     /// Relative error that ends the run, or half the digits if none does.
@@ -40,21 +40,21 @@ impl<'a> Forcing<'a> {
     /// Return the test for the step from these layer states and compressions (n), in a run that ends at a tolerance, by a solver with this
     /// [`roughest`](crate::model::linear::LinearStep::roughest) step.
     pub fn new(
-        places: &'a Layer,
+        layer: &'a Layer,
         before: Vec<f64>,
         rho: &'a [f64],
         (tolerance, scale): (f64, &'a Scale),
         roughest: f64,
     ) -> Self {
-        Self { places, rho, tolerance, scale, roughest, pressures: VecDeque::from([places.linear(&before)]), before }
+        Self { layer, rho, tolerance, scale, roughest, pressures: VecDeque::from([layer.linear(&before)]), before }
     }
 
     /// Whether a step is solved well enough: the pressures change by less than their distance from the laws, or by less than the error that ends
     /// the run.
     pub fn is_enough(&mut self, model: &Model, trial: &Trial) -> bool {
         let c: Vec<f64> = self.before.iter().zip(trial.closing).map(|(c, closing)| c + closing).collect();
-        let p = self.places.linear(&c);
-        let resolved = Layer::resolve(model, &c, &p, self.rho, &self.places.smoothing);
+        let p = self.layer.linear(&c);
+        let resolved = Layer::resolve(model, &c, &p, self.rho, &self.layer.smoothing);
         let (mut change, mut largest_change, mut distance, mut peak) = (0.0, 0.0f64, 0.0, 0.0f64);
         for (q, old) in self.pressures[0].iter().enumerate() {
             let here = (p[q] - old).abs();
@@ -79,11 +79,11 @@ impl<'a> Forcing<'a> {
 }
 
 /// Return the response w of the bodies and their layers to small loads r, (K + B' diag(omega kappa) B) w = r, and its squared energy norm. The
-/// layers are in the states `places`. `loads` is r, one entry per dof of each body that lives on this rank. The relative error of w may be `share`.
+/// layers are in the states `layer`. `loads` is r, one entry per dof of each body that lives on this rank. The relative error of w may be `share`.
 pub fn respond(
     model: &mut Model,
     step: &mut dyn LinearStep,
-    places: &Layer,
+    layer: &Layer,
     loads: &[Vec<f64>],
     share: f64,
 ) -> Result<std::result::Result<(Field, f64), Failure>> {
@@ -99,9 +99,9 @@ pub fn respond(
         work[0] += reduced.work;
     }
     model.exchange.sum(&mut work);
-    let springs = resisting(model, places);
+    let springs = resisting(model, layer);
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(share);
-    let system = System { model, places, springs: &springs.all, residual: &residual, enough: &mut enough };
+    let system = System { model, layer, springs: &springs.all, residual: &residual, enough: &mut enough };
     Ok(step.solve(system)?.map(|solution| (solution.field, solution.energy + work[0])))
 }
 
@@ -125,14 +125,14 @@ pub struct Spring {
     pub stiffness: f64,
 }
 
-/// Return the springs omega kappa of a linear step from `places`, n, with one more for every rigid motion of the bodies together that is otherwise
+/// Return the springs omega kappa of a linear step from `layer`, n, with one more for every rigid motion of the bodies together that is otherwise
 /// unresisted: a contact that is still open may stop it.
 ///
 /// The additional spring is at one point, and nowhere else. Forces may be in balance on the motion, for example where bodies rest and could turn about
 /// the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry forces. Of the points that the motion closes
 /// at least half as much as any, it is that of the least gap: over a wide one it would tie the body to another that a support carries along.
-pub fn resisting(model: &Model, places: &Layer) -> Springs {
-    let (motions, mut all, mut added) = (Motions::of(model), places.springs(model), Vec::new());
+pub fn resisting(model: &Model, layer: &Layer) -> Springs {
+    let (motions, mut all, mut added) = (Motions::of(model), layer.springs(model), Vec::new());
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
         let mut free = motions.springs(&all).factor().kernel();
@@ -144,7 +144,7 @@ pub fn resisting(model: &Model, places: &Layer) -> Springs {
         while let Some(motion) = free.pop() {
             let closing = motions.closing(&motion);
             let half = 0.5 * closing.iter().fold(0.0, |most: f64, s| most.max(s.abs()));
-            let near = |p: &usize, q: &usize| places.compression[*p].total_cmp(&places.compression[*q]);
+            let near = |p: &usize, q: &usize| layer.compression[*p].total_cmp(&layer.compression[*q]);
             let Some(at) = (0..closing.len()).filter(|&q| closing[q].abs() >= half).max_by(near) else {
                 break;
             };
@@ -171,10 +171,10 @@ mod tests {
     #[test]
     fn a_step_ends_when_pressures_have_settled() {
         let model = two_pairs();
-        let places = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
+        let layer = Layer::new(&model, vec![0.5, 1.0, 2.0, 1.0]);
         let (rho, scale, half) = ([2.0, 0.5, 0.25, 3.0], Scale::default(), f64::EPSILON.sqrt());
         let asked = |closings: &[[f64; 4]], tolerance: f64, error: f64| -> Vec<bool> {
-            let mut forcing = Forcing::new(&places, places.compression.clone(), &rho, (tolerance, &scale), 0.5);
+            let mut forcing = Forcing::new(&layer, layer.compression.clone(), &rho, (tolerance, &scale), 0.5);
             let trial = |closing| Trial { closing, energy: 1.0, error };
             closings.iter().map(|closing| forcing.is_enough(&model, &trial(closing))).collect()
         };

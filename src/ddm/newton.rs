@@ -154,7 +154,7 @@ impl Newton<'_, '_> {
         let mut enough = |model: &Model, trial: &Trial| forcing.is_enough(model, trial);
         self.linear.solve(System {
             model,
-            places: states,
+            layer: states,
             springs: &springs.all,
             residual: &residual,
             enough: &mut enough,
@@ -228,7 +228,7 @@ impl Newton<'_, '_> {
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(roughest);
         let system = System {
             model: &mut *model,
-            places: &layer,
+            layer: &layer,
             springs: &springs.all,
             residual: &residual,
             enough: &mut enough,
@@ -306,17 +306,17 @@ impl Newton<'_, '_> {
     /// Look at the equilibrium of an iterate once more: one linear system, with the matrix of the step, for the forces that are left. Add twice the size of
     /// its solution to the errors, since roundoff may do as much again. Return the solution, none if the system is not solved.
     fn look(&mut self, iterate: &StepResult, measured: &mut Measured) -> Result<Option<LinearSolution>> {
-        let (run, places) = (&mut *self.run, &self.states);
-        let springs = resisting(run.model, places);
+        let (run, layer) = (&mut *self.run, &self.states);
+        let springs = resisting(run.model, layer);
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
         let before = self.linear.counts();
         let system =
-            System { model: run.model, places, springs: &springs.all, residual: &measured.rest, enough: &mut enough };
+            System { model: run.model, layer, springs: &springs.all, residual: &measured.rest, enough: &mut enough };
         let Ok(more) = self.linear.solve(system)? else { return Ok(None) };
         let counts = self.linear.counts();
         measured.inner_iterations += counts.inner_iterations - before.inner_iterations;
         measured.factorizations += counts.factorizations - before.factorizations;
-        measured.reached.add_unbalanced((&run.scale, measured.strain), &more, places, &iterate.resolved);
+        measured.reached.add_unbalanced((&run.scale, measured.strain), &more, layer, &iterate.resolved);
         Ok(Some(more))
     }
 
@@ -365,7 +365,7 @@ impl Newton<'_, '_> {
 
     /// Complete the row of an iterate. Return the first body with a displacement that is not finite.
     fn record(&mut self, iterate: &StepResult, measured: &Measured) -> Option<usize> {
-        let places = &iterate.resolved;
+        let layer = &iterate.resolved;
         let row = Row {
             iteration: self.run.rows.len() + 1,
             residual: measured.reached.worst(),
@@ -373,7 +373,7 @@ impl Newton<'_, '_> {
             is_bound: measured.reached.is_bound,
             gamma: iterate.part.length,
             energy: measured.f1,
-            closed: places.closed,
+            closed: layer.closed,
             sweeps: self.linear.sweeps() - self.foreign,
             factorizations: measured.factorizations,
             inner_iterations: measured.inner_iterations,

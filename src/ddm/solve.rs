@@ -89,7 +89,7 @@ impl Run<'_> {
         wants_interval: bool,
     ) -> Result<Outcome> {
         self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
-        let RigidStart { places: states, amounts, mut trace } = first_states(self.model, &start, rigid);
+        let RigidStart { layer: states, amounts, mut trace } = first_states(self.model, &start, rigid);
         let is_known = matches!(start, InitialGuess::Known(_));
         let known = match start {
             InitialGuess::Known(solution) if !solution.field.states.is_empty() => {
@@ -224,7 +224,7 @@ impl From<Option<Vec<f64>>> for InitialGuess {
 /// the one that is found.
 pub fn first_springs(model: &Model, begin: &mut InitialGuess) -> Option<Vec<f64>> {
     let rigid = find_start(model).ok()?;
-    let springs = resisting(model, &first_states(model, begin, &rigid).places).all;
+    let springs = resisting(model, &first_states(model, begin, &rigid).layer).all;
     if let InitialGuess::Automatic = begin {
         *begin = InitialGuess::Found(Box::new(rigid));
     }
@@ -257,13 +257,13 @@ fn first_states(model: &Model, begin: &InitialGuess, rigid: &RigidStart) -> Rigi
     match begin {
         InitialGuess::Automatic | InitialGuess::Found(_) => rigid.clone(),
         InitialGuess::Trace(trace) => {
-            let at_rest = |_| RigidStart { places: start::at(model, trace), ..rigid.clone() };
+            let at_rest = |_| RigidStart { layer: start::at(model, trace), ..rigid.clone() };
             RigidStart { trace: trace.clone(), ..start::find(model, Some(trace)).unwrap_or_else(at_rest) }
         }
         InitialGuess::Known(solution) => {
             let trace = Some(&solution.field.trace).filter(|trace| !trace.is_empty()).unwrap_or(&rigid.trace);
-            let places = Layer::new(model, solution.compression.clone());
-            RigidStart { places, trace: trace.clone(), ..rigid.clone() }
+            let layer = Layer::new(model, solution.compression.clone());
+            RigidStart { layer, trace: trace.clone(), ..rigid.clone() }
         }
     }
 }

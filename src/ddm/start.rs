@@ -32,7 +32,7 @@ pub struct RigidStart {
     /// Amounts a of the free motions of all bodies.
     pub amounts: DVector<f64>,
     /// States of the layers.
-    pub places: Layer,
+    pub layer: Layer,
     /// Traces of E a minus the deflection of the surfaces (2n): B u - d is the compression of the layer states.
     pub trace: Vec<f64>,
 }
@@ -67,7 +67,7 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
         rigid.slope = contact_slopes(model, |q| approach[q] > 0.0);
         amounts = rigid.descend(amounts).map_err(|motion| motions.names(&motion))?;
     }
-    let places = rigid.states(&amounts);
+    let layer = rigid.states(&amounts);
     let mut trace = motions.trace(model, &amounts);
     axpy(1.0, &given, &mut trace);
     let (points, rows) = (model.points(), model.row_stiffness());
@@ -75,10 +75,10 @@ pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Move
         // the points belong to side a, so its surface can deflect at each of them independently
         let side = if rows[q] > 0.0 { q } else { points + q };
         if rows[side] > 0.0 {
-            trace[side] -= places.pressure[q] / rigid.slope[q];
+            trace[side] -= layer.pressure[q] / rigid.slope[q];
         }
     }
-    Ok(RigidStart { amounts, places, trace })
+    Ok(RigidStart { amounts, layer, trace })
 }
 
 /// Return the layer states for a trace (2n) of rigid surfaces, which approach each other by B u - d.
@@ -117,8 +117,8 @@ impl Rigid<'_> {
     }
 
     /// Return omega Pi'' (n): springs of law and surfaces in series.
-    fn springs(&self, places: &Layer) -> Vec<f64> {
-        let series = |q: usize| self.model.weight[q] * in_series(places.tangent[q], self.slope[q]);
+    fn springs(&self, layer: &Layer) -> Vec<f64> {
+        let series = |q: usize| self.model.weight[q] * in_series(layer.tangent[q], self.slope[q]);
         (0..self.slope.len()).map(series).collect()
     }
 
@@ -142,16 +142,16 @@ impl Rigid<'_> {
         let of_pair = |(i, pair): (usize, &ContactPair)| vec![pair.law.is_bonded(); self.model.range(i).len()];
         let bonded: Vec<bool> = self.model.pairs.iter().enumerate().flat_map(of_pair).collect();
         for _ in 0..STEPS {
-            let places = self.states(&amounts);
-            let push = self.motions.work(&places.force);
-            let acting = self.motions.sizes(&places.force);
+            let layer = self.states(&amounts);
+            let push = self.motions.work(&layer.force);
+            let acting = self.motions.sizes(&layer.force);
             let pull = self.ground.multiply(&amounts);
             let lacking = &self.work - &push - &pull;
             let zero = |i: usize| PART * (acting[i].max(self.work[i].abs()).max(PART * largest));
             if (0..lacking.len()).all(|i| lacking[i].abs() <= zero(i)) {
                 break;
             }
-            let step = self.solve(&self.springs(&places), &lacking);
+            let step = self.solve(&self.springs(&layer), &lacking);
             let closing = self.motions.closing(&step);
             let (gain, resisted) = (step.dot(&self.work), step.dot(&self.ground.multiply(&step)));
             let gains = gain > PART * step.amax() * largest;
@@ -167,7 +167,7 @@ impl Rigid<'_> {
                 let force = self.states(&(&amounts + t * &step)).force;
                 dot(&force, &closing) + first_slope + t * resisted
             };
-            let first = dot(&places.force, &closing) + first_slope;
+            let first = dot(&layer.force, &closing) + first_slope;
             match field::zero(slope, first, SEARCH) {
                 Ok(t) => amounts += t * &step,
                 Err(Unbounded) if gains => return Err(step),

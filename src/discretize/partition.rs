@@ -199,12 +199,12 @@ impl Partition {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
-        let (mut own, mut places) = (Vec::new(), Vec::new());
+        let (mut own, mut owned_positions) = (Vec::new(), Vec::new());
         for (place, &node) in (0..).zip(nodes) {
             let owner = self.owner(number, node);
             if owner == rank {
                 own.extend(dofs(node));
-                places.extend(dofs(place));
+                owned_positions.extend(dofs(place));
             } else {
                 others[owner].0.extend(dofs(place));
                 others[owner].1.extend(dofs(numbers[node as usize]));
@@ -219,8 +219,8 @@ impl Partition {
             first: D * (start + before),
             start: D * start,
             own,
-            places,
-            near: others,
+            owned_positions,
+            ghosts: others,
             products: self.products[number].clone(),
             total,
             rows: rows.of_columns(total, column),

@@ -28,7 +28,7 @@ impl Share {
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
         let whole = whole(&self.coarse_nodes);
         let mut rows = Csr::new(D * self.coarse_count);
-        for &dof in &self.distribution.places {
+        for &dof in &self.distribution.owned_positions {
             let number = |j: usize| D * self.coarse_number[j / D] as usize + j % D;
             rows.push_row(whole.rows.row(dof as usize).map(|(j, weight)| (number(j), weight)));
         }
@@ -44,7 +44,7 @@ impl Share {
     /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
     /// rows.
     pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
-        let own = &self.distribution.places;
+        let own = &self.distribution.owned_positions;
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;
         let mut starts = vec![0];
         let mut row = Vec::new();

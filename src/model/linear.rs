@@ -15,7 +15,7 @@ pub struct System<'a> {
     /// Bodies with K and B.
     pub model: &'a mut Model,
     /// The state of the layers.
-    pub places: &'a Layer,
+    pub layer: &'a Layer,
     /// omega kappa at the points, n.
     pub springs: &'a [f64],
     /// r, one state for each local body.

@@ -49,8 +49,8 @@ impl States {
         let products = match &distribution {
             None => DMatrix::from_fn(count, count, |i, j| dot(&motions[i], &motions[j])),
             Some(distribution) => {
-                let place = |dof: usize| distribution.places.binary_search(&(dof as u32)).ok();
-                rows = rows.of_columns(distribution.places.len(), place);
+                let place = |dof: usize| distribution.owned_positions.binary_search(&(dof as u32)).ok();
+                rows = rows.of_columns(distribution.owned_positions.len(), place);
                 motions.iter_mut().for_each(|motion| *motion = distribution.of_known(motion));
                 distribution.products.clone()
             }
@@ -116,7 +116,7 @@ impl States {
     pub fn recover(&self, u: &[f64]) -> Vec<f64> {
         match &self.distribution {
             None => u.to_vec(),
-            Some(distribution) => distribution.near(u),
+            Some(distribution) => distribution.with_ghosts(u),
         }
     }
 
@@ -142,9 +142,9 @@ pub struct Distribution {
     /// The dofs that this rank owns, sorted.
     pub own: Vec<u32>,
     /// Their positions among the dofs of the owned and ghost nodes of this rank, sorted.
-    pub places: Vec<u32>,
+    pub owned_positions: Vec<u32>,
     /// For each other rank, the ghost dofs that it owns: their positions among the dofs of the owned and ghost nodes, and their rows in the matrix.
-    pub near: Vec<(Vec<u32>, Vec<u32>)>,
+    pub ghosts: Vec<(Vec<u32>, Vec<u32>)>,
     /// Products, over all dofs of the body, of the rigid motions that its supports leave free.
     pub products: DMatrix<f64>,
     /// Row of the first owned dof of the body in the matrix; the others follow.
@@ -168,12 +168,12 @@ fn alone() -> Rc<dyn Exchange> {
 
 impl Distribution {
     /// Return the values at the dofs of the owned and ghost nodes of this rank, from those at the owned dofs of every rank. Collective.
-    pub fn near(&self, own: &[f64]) -> Vec<f64> {
-        let ghosts: usize = self.near.iter().map(|(positions, _)| positions.len()).sum();
-        let mut known = vec![0.0; self.places.len() + ghosts];
-        self.places.iter().zip(own).for_each(|(&at, &value)| known[at as usize] = value);
+    pub fn with_ghosts(&self, own: &[f64]) -> Vec<f64> {
+        let ghosts: usize = self.ghosts.iter().map(|(positions, _)| positions.len()).sum();
+        let mut known = vec![0.0; self.owned_positions.len() + ghosts];
+        self.owned_positions.iter().zip(own).for_each(|(&at, &value)| known[at as usize] = value);
         for ((positions, rows), (first, values)) in
-            self.near.iter().zip(all_gather(&*self.exchange, (self.first, own.to_vec())))
+            self.ghosts.iter().zip(all_gather(&*self.exchange, (self.first, own.to_vec())))
         {
             positions.iter().zip(rows).for_each(|(&at, &row)| known[at as usize] = values[row as usize - first]);
         }
@@ -182,7 +182,7 @@ impl Distribution {
 
     /// Return the values at owned dofs from those at the dofs of owned and ghost nodes.
     pub fn of_known(&self, known: &[f64]) -> Vec<f64> {
-        self.places.iter().map(|&at| known[at as usize]).collect()
+        self.owned_positions.iter().map(|&at| known[at as usize]).collect()
     }
 }
 

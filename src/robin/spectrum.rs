@@ -70,7 +70,8 @@ fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
         body.into_iter().for_each(|body| body.states().rows.add_transpose(1.0, &model.of_body(index, &rows), load));
     }
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(LANCZOS.1);
-    let found = conjugate_gradients(model, &mut Sweeper::default(), springs, &load, (&mut enough, LANCZOS.0), f64::INFINITY)?;
+    let found =
+        conjugate_gradients(model, &mut Sweeper::default(), springs, &load, (&mut enough, LANCZOS.0), f64::INFINITY)?;
     Ok(found.ok().and_then(|found| found.spectrum))
 }
 

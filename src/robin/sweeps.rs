@@ -53,15 +53,16 @@ impl LinearStep for Sweeps {
     }
 
     fn solve(&mut self, system: System) -> Result<LinearResult> {
-        let System { model, places, springs, residual, enough } = system;
+        let System { model, layer, springs, residual, enough } = system;
         model.set_tolerance(ROUGH)?;
         if let Some(coefficient) = &mut self.coefficient {
-            let weight = coefficient.weight(model, places, self.systems)?;
+            let weight = coefficient.weight(model, layer, self.systems)?;
             model.robin(&weight)?;
         }
         self.systems += 1;
         let before = self.sweeper.sweeps;
-        let found = match conjugate_gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)? {
+        let found = match conjugate_gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)?
+        {
             Ok(found) => found,
             Err(failure) => return Ok(Err(failure)),
         };
