@@ -25,7 +25,7 @@ fn at(table: &Table, column: &str, order: usize, x: f64) -> f64 {
 #[test]
 fn adapted_meshes_of_high_order() {
     let stop = "method={stop={residual=1e-10}}";
-    let of_scene = [&orders(8)[..], &["mesh.set.n=1".to_owned(), stop.to_owned()]].concat();
+    let of_scene = [&orders(8)[..], &["mesh.set.n=4".to_owned(), stop.to_owned()]].concat();
     let sets: Vec<&str> = of_scene.iter().map(String::as_str).collect();
     let fine = solve_here(case("groove-held").with_file_name("graded.toml"), &sets).converged().contact();
     for (order, tolerance) in [(3, "1e-3"), (4, "1e-4"), (6, "1e-5")] {

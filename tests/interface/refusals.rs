@@ -346,7 +346,7 @@ fn a_body_that_nothing_holds() {
     let run = solve(pushed_aside(), &[]);
     failed(&run, &["underconstrained"], &["`upper`", "translation along x", "support with x = 0"]);
     // not even contact, at first
-    let apart = Scene::edited("patch", "start = { normal = 1e-4 }", "start = \"zero\"");
+    let apart = Scene::edited("patch", "start = { normal = 1e-4 }", "start = { normal = -1e-2 }");
     failed(&solve(&apart, &[]), &["underconstrained"], &["`upper`", "iteration 0", "method.start"]);
 }
 

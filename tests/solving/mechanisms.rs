@@ -349,7 +349,7 @@ fn loads_that_quadrature_puts_out_of_balance() {
         .split_once("work on it (")
         .and_then(|(_, rest)| rest.split(' ').next()?.parse::<f64>().ok());
     // the upper pressure that balances the lower one
-    let share = share.expect("a share");
+    let share = share.expect("a share in per cent") / 100.0;
     let ratio = (1.0 + share) / (1.0 - share);
     let run = [ratio, ratio.recip()].map(|factor| solve(pressed(10.0 * factor), &[]));
     let run = run.into_iter().find(|run| run.code == 0).expect("one of them balances").converged();
