@@ -118,11 +118,12 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     assert!(answer.status == "converged" && answer.iterations <= 8, "{} {}", answer.iterations, answer.message);
     // springs of 1e-169 are rounding beside the one that keeps the next body: both motions get one
     assert_eq!(bench.run(132111, 727, &["auto"]).0[0].1.status, "converged");
-    // a layer of 1e14 would answer the rounding of compressions with 1e-7 of the largest pressure: pressures are those of the linear steps
+    // a layer of 1e14 would answer the rounding of compressions with 1e-7 of the largest pressure: pressures are those of the linear steps. Roundoff ends the
+    // run, three steps after the last progress, and a last digit may pass for progress once more
     let case = wide::scene(132118, 113, Path::new(env!("CARGO_MANIFEST_DIR")));
     let (verdict, answer) = &bench.solve(case, &["auto"]).0[0];
     assert!(!matches!(verdict, Verdict::Wrong(_)), "{verdict:?}, {}", answer.message);
-    assert!(answer.claims && answer.iterations <= 10, "{} {}", answer.iterations, answer.message);
+    assert!(answer.claims && answer.iterations <= 13, "{} {}", answer.iterations, answer.message);
     // the laws are met to rounding, but a body of tiny forces lacks a share of its balance
     let case = wide::scene(428015, 186, Path::new(env!("CARGO_MANIFEST_DIR")));
     let answer = &bench.solve(case, &["auto"]).0[0].1;
