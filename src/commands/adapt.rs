@@ -46,8 +46,8 @@ struct Pace {
     least: f64,
     /// Least ratio of its cells to the present ones.
     growth: f64,
-    /// Power of the error of nodal values that the squared energy error follows; none for that of smooth solutions.
-    power: Option<f64>,
+    /// Power of the error of nodal values that the squared energy error follows.
+    power: f64,
 }
 
 /// Power of the energy error with which pressures converge where elements have an order above two and meshes are graded to singular places: 1.2 to 1.6 on
@@ -56,11 +56,13 @@ const NODAL: f64 = 1.4;
 
 impl Pace {
     /// Return the pace for elements of a degree. Above two, most cells lie at singular places, and a mesh that is graded to them has as many cells as the one
-    /// before, with a tenth of its error or less: orders of 4 and 6 take four meshes of `groove-held` to 1e-6.
+    /// before, with a tenth of its error or less: orders of 4 and 6 take four meshes of `groove-held` to 1e-6. Up to two the error of nodal values is taken to
+    /// be one order better than that in energy, with elements of degree p as h^(p+1) and h^p.
     fn of(degree: usize) -> Self {
+        let p = degree as f64;
         match degree {
-            1 | 2 => Self { first_cells: FIRST_CELLS, least: LEAST, growth: GROWTH, power: None },
-            _ => Self { first_cells: FIRST_CELLS / degree, least: 0.5 * LEAST, growth: 1.0, power: Some(2.0 / NODAL) },
+            1 | 2 => Self { first_cells: FIRST_CELLS, least: LEAST, growth: GROWTH, power: 2.0 * p / (p + 1.0) },
+            _ => Self { first_cells: FIRST_CELLS / degree, least: 0.5 * LEAST, growth: 1.0, power: 2.0 / NODAL },
         }
     }
 }
@@ -180,9 +182,9 @@ impl AdaptiveRun {
         }
     }
 
-    /// Return how the meshes of this run follow each other.
+    /// Return how the meshes of this run follow each other: as those of the least order, which has most of the error.
     fn pace(&self) -> Pace {
-        Pace::of(self.scene.bodies.iter().map(|body| body.order.degree()).max().unwrap_or(1))
+        Pace::of(self.scene.bodies.iter().map(|body| body.order.degree()).min().unwrap_or(1))
     }
 
     /// Return whether meshes are adapted to an error.
@@ -309,11 +311,8 @@ impl AdaptiveRun {
     /// Return the sizes of the next mesh; none if it would have more cells than allowed.
     fn next_sizes(&self, done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> Option<Sizes> {
         let (meshes, model) = (done.built.discrete.meshes.as_ref()?, done.model());
-        // the error of nodal values is taken to be one order better than that in energy, with elements of degree p as h^(p+1) and h^p
-        let degree = (0..model.meshed()).map(|body| meshes.degree(body)).min().unwrap_or(1) as f64;
         let pace = self.pace();
-        let power = pace.power.unwrap_or(2.0 * degree / (degree + 1.0));
-        let share = (AIM * goal.error.value / estimate.largest(goal.of)).max(pace.least).powf(power);
+        let share = (AIM * goal.error.value / estimate.largest(goal.of)).max(pace.least).powf(pace.power);
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         // a mesher does not make as many cells as its sizes predict: the mesh of this round gives the ratio
         let excess = self.predicted_cells.map_or(1.0, |predicted| predicted / cells);

@@ -3,7 +3,7 @@
 //! ```text
 //! limit    on curved boundaries a size is at most TURN times the radius of curvature
 //! join     surfaces have one size where they touch
-//! grade    sizes of nodes that an edge connects differ by at most GROWTH times its length
+//! grade    sizes of nodes that an edge connects differ by at most the growth of the grading times its length
 //! cover    the boundary gets a layer of cells outside, as thick as facets may lie below a curved boundary
 //! ```
 //!
@@ -31,14 +31,32 @@ pub struct Sizes {
     pub cells: f64,
 }
 
-/// Smallest and largest ratio of a new size to the old one. Errors of a mesh predict those of cells a few times smaller, but not
-/// of cells an order of magnitude smaller. With 0.08 instead of 0.25, `groove-held` to 1e-3 and `hertz-sphere` to 2e-2 took the
-/// same number of meshes, the last ones of the same size within 7 %.
-const RANGE: (f64, f64) = (0.25, 2.0);
+/// How much the sizes of the cells of a body may differ from those of the mesh before, and from each other.
+#[derive(Debug)]
+struct Grading {
+    /// Smallest and largest ratio of a new size to the old one.
+    range: [f64; 2],
+    /// Largest growth of the size along a length. Neighbouring cells then differ by a factor of about 1 + growth.
+    growth: f64,
+    /// Whether most of the error is in few cells at singular places.
+    is_steep: bool,
+}
 
-/// The same for elements of an order above two, whose cells far from singular places become larger while the others become smaller. With 0.15 and 0.35
-/// instead of 0.25, `groove-held` of order 6 takes three and five meshes to 1e-6 instead of four, and 1.4 and 1.5 times the time.
-const HIGH_RANGE: (f64, f64) = (0.25, 4.0);
+/// The grading of orders one and two. Errors of a mesh predict those of cells a few times smaller, but not of cells an order of magnitude smaller. With 0.08
+/// instead of 0.25, `groove-held` to 1e-3 and `hertz-sphere` to 2e-2 took the same number of meshes, the last ones of the same size within 7 %. With
+/// a growth of 1 and 2 these had the same size within 5 %; with 0.5 the worst cells of the meshes of both flanges are as good as those of the scripts' own
+/// meshes (mean ratio 0.31 to 0.38 at least).
+const EVEN: Grading = Grading { range: [0.25, 2.0], growth: 0.5, is_steep: false };
+
+/// The grading of orders above two, whose cells far from singular places become larger while the others become smaller. With 0.15 and 0.35 instead of 0.25,
+/// `groove-held` of order 6 takes three and five meshes to 1e-6 instead of four, and 1.4 and 1.5 times the time. Between the distances r and e r
+/// from a point there are about 2 pi/g^2 cells of the size g r: a growth g of 1 takes a quarter of the cells that one of 0.5 takes.
+const STEEP: Grading = Grading { range: [0.25, 4.0], growth: 1.0, is_steep: true };
+
+/// Return the grading of a body.
+fn grading(meshes: &dyn Meshes, body: usize) -> &'static Grading {
+    if meshes.degree(body) > 2 { &STEEP } else { &EVEN }
+}
 
 /// The requirements on the next mesh.
 #[derive(Debug, Clone, Copy)]
@@ -72,9 +90,9 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     };
     let errors = of_all(&estimate.cells);
     let dimension = meshes.cells(0).stride as f64 - 1.0;
-    let is_high = (0..bodies).flat_map(|body| std::iter::repeat_n(is_high(meshes, body), counts[body]));
-    let known = errors.iter().zip(of_all(&estimate.rates)).zip(is_high);
-    let all: Vec<CellError> = known.map(|((&squared, rate), is_high)| CellError { squared, rate, is_high }).collect();
+    let gradings = (0..bodies).flat_map(|body| std::iter::repeat_n(grading(meshes, body), counts[body]));
+    let known = errors.iter().zip(of_all(&estimate.rates)).zip(gradings);
+    let all: Vec<CellError> = known.map(|((&squared, rate), grading)| CellError { squared, rate, grading }).collect();
     let goal = share * errors.iter().sum::<f64>();
     let left = |level: f64| -> f64 { all.iter().map(|cell| cell.left(cell.ratio(level, dimension))).sum() };
     let cells = |level: f64| -> f64 { all.iter().map(|cell| cell.ratio(level, dimension).powf(-dimension)).sum() };
@@ -101,28 +119,26 @@ struct CellError {
     squared: f64,
     /// Power of the size with which its root falls.
     rate: f64,
-    /// Whether the elements have an order above two.
-    is_high: bool,
+    grading: &'static Grading,
 }
 
 impl CellError {
     /// Return the ratio of the new size to the old one for which s^-D new cells have the error `level` together.
     fn ratio(&self, level: f64, dimension: f64) -> f64 {
         let free = (level / self.squared.max(f64::MIN_POSITIVE)).powf(1.0 / (2.0 * self.rate + dimension));
-        let (least, most) = if self.is_high { HIGH_RANGE } else { RANGE };
+        let [least, most] = self.grading.range;
         free.clamp(least, most)
     }
 
     /// Return the squared error that remains with a ratio of sizes. Elements of high order leave most of their error in the few cells at singular places,
     /// which the smallest ratio does not bring down to that of the others: the next meshes do, and smooth cells are not to make up for it.
     fn left(&self, ratio: f64) -> f64 {
-        if self.is_high && ratio <= HIGH_RANGE.0 { 0.0 } else { self.squared * ratio.powf(2.0 * self.rate) }
+        if self.grading.is_steep && ratio <= self.grading.range[0] {
+            0.0
+        } else {
+            self.squared * ratio.powf(2.0 * self.rate)
+        }
     }
-}
-
-/// Return whether the elements of a body have an order above two.
-fn is_high(meshes: &dyn Meshes, body: usize) -> bool {
-    meshes.degree(body) > 2
 }
 
 /// Return the sizes of the meshes, but none below a smallest size. With this size everywhere the bodies together would have about
@@ -177,7 +193,7 @@ fn join(bodies: &[BodyCells], sizes: &mut [Vec<f64>], touching: &[Touching]) {
             let at: [f64; 3] =
                 std::array::from_fn(|c| vertices.iter().map(|&(node, l)| l * nodes[node as usize][c]).sum());
             for &(node, _) in vertices {
-                let most = smaller + GROWTH * length(minus(nodes[node as usize], at));
+                let most = smaller + EVEN.growth * length(minus(nodes[node as usize], at));
                 let size = &mut sizes[body][node as usize];
                 *size = size.min(most);
             }
@@ -205,9 +221,9 @@ impl NodeSize {
         self.least = self.least.min(size);
     }
 
-    /// Return the size at the corner: the geometric mean, or for elements of high order the least, since a singular place may lie anywhere in one cell.
-    fn value(&self, is_high: bool) -> f64 {
-        if is_high { self.least } else { (self.logs.0 / self.logs.1).exp() }
+    /// Return the size at the corner: the geometric mean, or with steep grading the least, since a singular place may lie anywhere in one cell.
+    fn value(&self, grading: &Grading) -> f64 {
+        if grading.is_steep { self.least } else { (self.logs.0 / self.logs.1).exp() }
     }
 }
 
@@ -222,16 +238,16 @@ fn gather(meshes: &dyn Meshes, counts: &[usize], touching: &[Touching], wanted: 
             let size = wanted(first + index, of_body.sizes[index]);
             corners.iter().for_each(|&node| of_nodes[node as usize].add(size));
         }
-        let is_high = is_high(meshes, body);
-        let mut of_nodes: Vec<f64> = of_nodes.iter().map(|sizes| sizes.value(is_high)).collect();
-        smooth(of_body, &mut of_nodes, growth(meshes, body));
+        let grading = grading(meshes, body);
+        let mut of_nodes: Vec<f64> = of_nodes.iter().map(|sizes| sizes.value(grading)).collect();
+        smooth(of_body, &mut of_nodes, grading.growth);
         sizes.push(of_nodes);
         first += count;
     }
     join(&bodies, &mut sizes, touching);
     let mut field = Sizes { stride: bodies[0].stride, corners: Vec::new(), sizes: Vec::new(), cells: 0.0 };
     for (body, (of_body, sizes)) in bodies.iter().zip(&mut sizes).enumerate() {
-        grade(of_body, sizes, growth(meshes, body));
+        grade(of_body, sizes, grading(meshes, body).growth);
         for (corners, old) in of_body.corners.chunks_exact(of_body.stride).zip(&of_body.sizes) {
             let power = of_body.stride as f64 - 1.0;
             let share = |&node: &u32| (old / sizes[node as usize]).powf(power) / of_body.stride as f64;
@@ -268,19 +284,6 @@ const TURN: f64 = std::f64::consts::PI / 6.0;
 /// Angle in radians, 60 degrees, above which neighbouring facets meet at an edge of the part. The facets of a circle of six
 /// chords differ by this angle. Gmsh divides a circle into seven or more by default (`Mesh.MinimumCirclePoints`).
 const EDGE: f64 = std::f64::consts::FRAC_PI_3;
-
-/// Largest growth of the size along a length. Neighbouring cells then differ by a factor of about 1 + GROWTH. The worst cells of
-/// the meshes of both flanges are as good as those of the scripts' own meshes (mean ratio 0.31 to 0.38 at least). With 1 and 2 instead of 0.5,
-/// `groove-held` and `hertz-sphere` took the same number of meshes, of the same size within 5 %.
-const GROWTH: f64 = 0.5;
-
-/// The same for elements of an order above two. Around a point in the plane, cells that grow with the distance from it are a quarter as many.
-const HIGH_GROWTH: f64 = 1.0;
-
-/// Return the largest growth of the size along a length in a body.
-fn growth(meshes: &dyn Meshes, body: usize) -> f64 {
-    if is_high(meshes, body) { HIGH_GROWTH } else { GROWTH }
-}
 
 /// Limit the sizes at the nodes of a body, one for each node, and grade them.
 fn smooth(cells: &BodyCells, sizes: &mut [f64], growth: f64) {
@@ -519,17 +522,17 @@ mod tests {
     fn sizes_on_curved_boundaries_are_a_twelfth_of_the_circle() {
         for cells in [disc(24), ball()] {
             let mut sizes = vec![100.0; cells.nodes.len()];
-            smooth(&cells, &mut sizes, GROWTH);
+            smooth(&cells, &mut sizes, EVEN.growth);
             let most = TURN * 2.0;
             assert!(sizes[1..].iter().all(|size| (0.66..=1.1).contains(&(size / most))), "{sizes:?} {most}");
             // From there on the size grows towards the centre.
             let least = sizes[1..].iter().copied().fold(f64::INFINITY, f64::min);
-            assert!(sizes[0] <= least + GROWTH * 2.0 + 1e-12 && sizes[0] > most);
+            assert!(sizes[0] <= least + EVEN.growth * 2.0 + 1e-12 && sizes[0] > most);
         }
         // Four chords are a square and not a circle.
         let square = disc(4);
         let mut sizes = vec![100.0; square.nodes.len()];
-        smooth(&square, &mut sizes, GROWTH);
+        smooth(&square, &mut sizes, EVEN.growth);
         assert_eq!(sizes, [100.0; 5]);
     }
 
@@ -537,7 +540,7 @@ mod tests {
     fn a_small_size_grows_by_half_of_the_way() {
         let cells = disc(4);
         let mut sizes = vec![100.0, 1.0, 100.0, 100.0, 100.0];
-        smooth(&cells, &mut sizes, GROWTH);
+        smooth(&cells, &mut sizes, EVEN.growth);
         let side = 8f64.sqrt();
         let expected = [2.0, 1.0, 1.0 + 0.5 * side, 3.0, 1.0 + 0.5 * side];
         assert!(sizes.iter().zip(expected).all(|(size, expected)| (size - expected).abs() < 1e-12), "{sizes:?}");

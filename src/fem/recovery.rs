@@ -428,7 +428,7 @@ mod tests {
             for (index, rate) in rates.iter().enumerate() {
                 let least = space.cell_nodes(index)[..3].iter().map(radius).fold(f64::INFINITY, f64::min);
                 let is_right =
-                    if least == 0.0 { (0.0..1.5).contains(&(rate - power)) } else { least < 0.4 || *rate > 4.5 };
+                    if least == 0.0 { (1.0..1.6).contains(&(rate / power)) } else { least < 0.4 || *rate > 4.5 };
                 assert!(is_right, "{power}: rate {rate} at a distance of {least}");
             }
         }

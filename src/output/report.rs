@@ -686,9 +686,9 @@ fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Share of the largest component, or of other forces beside it, below which a component is the roundoff of a sum over nodes, and is printed as
-/// zero. Files have all digits.
-const ROUNDOFF: f64 = 1e-9;
+/// Relative error of forces that no run promises to undercut: the tolerance of a run that gives none. A smaller component beside a larger one is the roundoff
+/// of a sum over nodes, and is printed as zero. Files have all digits.
+pub const DIGITS: f64 = 1e-8;
 
 /// Return a point of the scene for a message.
 pub fn place(x: [f64; 3]) -> String {
@@ -698,7 +698,7 @@ pub fn place(x: [f64; 3]) -> String {
 /// Return a vector with this number of digits, whose roundoff is that of numbers of the size `scale`.
 fn vector(v: &[f64], scale: f64, digits: usize) -> String {
     let largest = v.iter().fold(scale, |most: f64, v| most.max(v.abs()));
-    let shown = |v: &f64| readable(if v.abs() < ROUNDOFF * largest { 0.0 } else { *v }, digits);
+    let shown = |v: &f64| readable(if v.abs() < DIGITS * largest { 0.0 } else { *v }, digits);
     format!("({})", v.iter().map(shown).collect::<Vec<_>>().join(", "))
 }
 

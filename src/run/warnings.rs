@@ -10,7 +10,7 @@ use crate::discretize::{ContactInfo, Discrete};
 use crate::estimate::{Cause, Estimate, softness};
 use crate::linalg;
 use crate::model::Mechanism;
-use crate::output::report::{place, readable};
+use crate::output::report::{DIGITS, place, readable};
 use crate::output::{BalanceReport, sci};
 use crate::petsc::Session;
 use std::f64::consts::PI;
@@ -74,9 +74,6 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     let then = if *balanced > 0.0 { ";" } else { ":" };
     format!("{who}: nothing holds {together} {motion}, and {loads}{then} {end}")
 }
-
-/// Relative error of forces that no run promises to undercut.
-const DIGITS: f64 = 1e-8;
 
 /// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error of the result.
 pub fn of_fixed(name: &str, balance: &BalanceReport, error: f64) -> Option<String> {
