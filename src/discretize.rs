@@ -25,10 +25,10 @@ mod verify;
 mod whole;
 
 pub use approach::mean_normal;
-pub use assembly::{Assembled, Factory, Outline};
+pub use assembly::{Assembled, Factory};
 pub use facts::BodyInfo;
 pub use marks::marks;
-pub use pairs::ContactInfo;
+pub use pairs::ContactFacts;
 pub use post::ForceBalance;
 pub use prepare::StepSpecs;
 pub use rigid::Obstacle;
@@ -39,7 +39,7 @@ use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::model::{Body, BodySlot, Mechanism, Model};
 use crate::problem::Start;
-use crate::problem::contact::Carrier;
+use crate::problem::contact::{Carrier, ContactSpec};
 use crate::scene::Scene;
 use assembly::Assembler;
 use body::BodyMesh;
@@ -53,8 +53,10 @@ pub struct Discrete {
     pub model: Model,
     /// Bodies in the order of the scene.
     pub bodies: Vec<BodyInfo>,
-    /// Origin of each pair in the scene.
-    pub contacts: Vec<ContactInfo>,
+    /// Facts of each pair besides its arrays.
+    pub contacts: Vec<ContactFacts>,
+    /// Description of each pair in the scene. `between` names the bodies if the pair was found.
+    pub specs: Vec<ContactSpec>,
     /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
     /// The meshes, kept only if an estimate of the error was requested.
@@ -99,12 +101,12 @@ where
         Ok(shared)
     })?;
     let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
-    let contacts: Vec<ContactInfo> = contacts.into_iter().map(|contact| contact.info(specs.contacts)).collect();
+    let of_pairs: Vec<ContactSpec> = contacts.iter().map(|contact| contact.spec(specs.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
-        factory.adopt(plan)?;
-        for (pair, contact) in pairs.iter_mut().zip(&contacts) {
-            pair.law = law::of_pair(&contact.spec, &scene.laws, &pair.position)?;
+        factory.adopt(plan);
+        for (pair, spec) in pairs.iter_mut().zip(&of_pairs) {
+            pair.law = law::of_pair(spec, &scene.laws, &pair.position)?;
         }
     }
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
@@ -124,7 +126,8 @@ where
     slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    Ok(Discrete { model, bodies: infos, contacts, mechanisms, meshes, factor: 1.0, assemblies, assemblies_avoided })
+    let (bodies, specs, factor) = (infos, of_pairs, 1.0);
+    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, factor, assemblies, assemblies_avoided })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.

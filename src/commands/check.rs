@@ -69,7 +69,7 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
     let [low, high] = range(pair.gap.iter().copied());
     json!({
         "surfaces": built.discrete.surfaces(i),
-        "contact": built.discrete.contacts[i].spec.table,
+        "contact": built.discrete.specs[i].table,
         "carrier": pair.surfaces[0],
         "points": pair.len(),
         "length": pair.weight.iter().sum::<f64>(),

@@ -135,7 +135,7 @@ fn pressure_curve(label: &str, done: &Done, i: usize) -> Series {
 
 /// Return the scene's reference pressure of pair `i`, if it has one.
 fn reference_curve(done: &Done, i: usize) -> Option<Series> {
-    let field = done.built.discrete.contacts[i].spec.reference.as_ref()?;
+    let field = done.built.discrete.specs[i].reference.as_ref()?;
     let pair = &done.model().pairs[i];
     let axis = main_axis(pair);
     let points = pair.position.iter().map(|&x| (x[axis], field.eval(x))).collect();

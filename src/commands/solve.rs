@@ -294,7 +294,7 @@ impl Tables {
         let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
         let mut tables = Self { history: Some(rows), steps: None };
         if !history.is_empty() {
-            let columns = built.discrete.contacts.iter().map(|contact| results::columns(&contact.spec));
+            let columns = built.discrete.specs.iter().map(results::columns);
             let pairs: Vec<(String, PairColumns)> = results::pair_names(built).into_iter().zip(columns).collect();
             let reactions = results::reaction_names(built);
             let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));

@@ -7,13 +7,14 @@ use super::meshes::FemBody;
 use super::post::{OnPart, Post};
 use crate::error::Result;
 use crate::exchange::Plain;
-use crate::fem::rigid::{self, AtDofs};
+use crate::fem::rigid;
 use crate::fem::{ElasticBody, Prolongation, Split};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::model::{Body, BodySlot, Distribution};
-use crate::problem::order::Order;
 use crate::problem::{BodySpec, Plane};
+use crate::solver::InterfaceDofs;
+use crate::solver::cost::BodyFacts;
 use std::cell::OnceCell;
 use std::rc::Rc;
 
@@ -135,25 +136,6 @@ fn reload(kept: Option<BodySlot>, load: &[f64], prescribed: &[(usize, f64)]) -> 
     Ok(serves.then_some(slot))
 }
 
-/// What the first rank has of a body before it is assembled.
-pub struct Outline<'a> {
-    /// Name in the scene.
-    pub name: &'a str,
-    /// Space dimension, which is the number of dofs of a node.
-    pub dimension: usize,
-    /// Order of the elements.
-    pub order: Order,
-    /// Number of its cells, and of the facets on its boundary.
-    pub cells: usize,
-    pub facets: usize,
-    /// All contact rows of the body, pair by pair, with its dofs as columns.
-    pub rows: &'a Csr,
-    /// Prescribed (dof, value), sorted by dof.
-    pub prescribed: &'a [(usize, f64)],
-    /// Rigid motions of the free body.
-    pub motions: AtDofs<'a>,
-}
-
 /// A maker of the inner solvers of bodies.
 pub trait Factory {
     /// The choice of solvers of all bodies.
@@ -162,14 +144,11 @@ pub trait Factory {
     /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
     ///
     /// # Errors
-    /// PETSc refuses an option.
-    fn plan(&mut self, outlines: &[Outline]) -> Result<Self::SolverPlan>;
+    /// PETSc lacks a solver that the scene asks for.
+    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>) -> Result<Self::SolverPlan>;
 
     /// Follow the plan of the first rank on another rank.
-    ///
-    /// # Errors
-    /// PETSc refuses an option.
-    fn adopt(&mut self, plan: Self::SolverPlan) -> Result<()>;
+    fn adopt(&mut self, plan: Self::SolverPlan);
 
     /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
     /// are in increasing order. Bodies that stay whole are in no set.

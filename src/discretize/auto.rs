@@ -7,28 +7,20 @@ use crate::contact::pieces::{BoxTree, Cut, Reach};
 use crate::error::{Error, Located, Place, Result, few};
 use crate::fem::{Facets, unit};
 use crate::problem::ContactSpec;
-use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashSet};
-
-/// A table of the scene.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-pub enum ContactEntry {
-    /// Index of a contact that names its surfaces.
-    Named(usize),
-    /// Index of the rule by which the pair was found.
-    Found(usize),
-}
 
 /// Two surfaces that form a pair.
 pub struct SurfacePair<'a, const D: usize> {
-    /// The table of the scene.
-    pub entry: ContactEntry,
+    /// The contact of the scene, or the rule by which the pair was found.
+    pub spec: &'a ContactSpec,
     /// Indices of the bodies.
     pub bodies: [usize; 2],
     /// The surfaces. If the pair was found, they have the names of their bodies.
     pub sides: [Side<'a, D>; 2],
     /// Nodes of the facets of both surfaces that face each other, but are too far apart, with or without pairs.
     pub far: [BTreeSet<u32>; 2],
+    /// Whether the order of the scene was reversed, so that the first side carries the points.
+    pub swapped: bool,
 }
 
 /// Return the pairs of bodies that come near each other. Pairs in `named` are excluded; they are indices of bodies, the smaller
@@ -40,7 +32,7 @@ pub struct SurfacePair<'a, const D: usize> {
 /// # Errors
 /// A pattern matches no body.
 pub fn find<'a, const D: usize>(
-    rules: &[&ContactSpec],
+    rules: &[&'a ContactSpec],
     cut: Cut<D>,
     parts: &'a [SceneBody<D>],
     named: &HashSet<[usize; 2]>,
@@ -52,28 +44,28 @@ pub fn find<'a, const D: usize>(
         parts.iter().map(|part| part.side(&part.spec.name.value, part.mesh.space.boundary(), 180.0)).collect();
     let mut all = Vec::new();
     for possible in possible(rules, parts, &whole, named)? {
-        all.push(meeting(rules, cut, &whole, &possible));
+        all.push(meeting(cut, &whole, &possible));
     }
     all.retain(|found| found.sides[0].facets.count() > 0);
     Ok(all)
 }
 
 /// Two bodies to which a rule applies, with the facets that could have a partner.
-struct Possible<const D: usize> {
+struct Possible<'a, const D: usize> {
     /// Indices of the bodies, the smaller one first.
     bodies: [usize; 2],
     /// Facets of each body that could have a partner.
     near: [Facets<D>; 2],
-    /// Index of the last rule for the bodies.
-    rule: usize,
+    /// The last rule for the bodies.
+    rule: &'a ContactSpec,
 }
 
-fn possible<const D: usize>(
-    rules: &[&ContactSpec],
+fn possible<'a, const D: usize>(
+    rules: &[&'a ContactSpec],
     parts: &[SceneBody<D>],
     whole: &[Side<D>],
     named: &HashSet<[usize; 2]>,
-) -> Result<Vec<Possible<D>>> {
+) -> Result<Vec<Possible<'a, D>>> {
     let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
     let farthest = rules.iter().copied().map(distance).fold(0.0, f64::max);
     let searches: Vec<BoxTree<D>> = whole.iter().map(BoxTree::new).collect();
@@ -85,8 +77,8 @@ fn possible<const D: usize>(
         others.sort_unstable();
         for b in others {
             let Some(rule) = matches.iter().rposition(|rule| rule.are_for(a, b)) else { continue };
-            let spec = rules[rule];
-            let reach = Reach::between(&whole[a], &whole[b], spec.angle, spec.distance);
+            let rule = rules[rule];
+            let reach = Reach::between(&whole[a], &whole[b], rule.angle, rule.distance);
             let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
             if near.iter().all(|facets| facets.count() > 0) {
                 all.push(Possible { bodies: [a, b], near, rule });
@@ -98,12 +90,11 @@ fn possible<const D: usize>(
 
 /// Return the pair that two possible bodies form. Its surfaces have no facets if they have no common piece.
 fn meeting<'a, const D: usize>(
-    rules: &[&ContactSpec],
     cut: Cut<D>,
     whole: &[Side<'a, D>],
-    possible: &Possible<D>,
+    possible: &Possible<'a, D>,
 ) -> SurfacePair<'a, D> {
-    let spec = rules[possible.rule];
+    let spec = possible.rule;
     let near = |k: usize| {
         let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
         Side::new(name, space, possible.near[k].clone(), prescribed, frame, spec.edge)
@@ -120,19 +111,17 @@ fn meeting<'a, const D: usize>(
         (used[0][point.facet_a], used[1][point.facet_b]) = (true, true);
     }
     let sides = [a.only(&used[0]), b.only(&used[1])];
-    SurfacePair { entry: ContactEntry::Found(possible.rule), bodies: possible.bodies, sides, far }
+    SurfacePair { far, ..SurfacePair::new(spec, possible.bodies, sides) }
 }
 
-/// Check that every rule found a pair among the `found` ones.
+/// Check that every rule found a pair. `found` are the numbers of the tables of all pairs.
 ///
 /// # Errors
 /// A rule found no pair; the first such rule is reported.
-pub fn all_find_some(rules: &[&ContactSpec], found: impl Iterator<Item = ContactEntry>) -> Result<()> {
-    let of_rule = |entry| if let ContactEntry::Found(rule) = entry { Some(rule) } else { None };
-    let fruitful: BTreeSet<usize> = found.filter_map(of_rule).collect();
-    let Some(rule) = (0..rules.len()).find(|rule| !fruitful.contains(rule)) else { return Ok(()) };
-    let (bodies, place) = title(rules[rule]);
-    let message = format!("no facets of {bodies} face each other within {}", distance(rules[rule]));
+pub fn all_find_some(rules: &[&ContactSpec], found: impl Iterator<Item = usize> + Clone) -> Result<()> {
+    let Some(rule) = rules.iter().find(|rule| !found.clone().any(|table| table == rule.table)) else { return Ok(()) };
+    let (bodies, place) = title(rule);
+    let message = format!("no facets of {bodies} face each other within {}", distance(rule));
     let help = match rules.len() {
         1 => "a larger distance may find some",
         _ => "a larger distance may find some, unless later rules or contacts with names have all these pairs",

@@ -1,7 +1,7 @@
 //! Contacts of the scene on the mesh: the body that each surface bounds, the side that carries the points, and why two surfaces do not face
 //! each other.
 
-use super::auto::{self, ContactEntry, SurfacePair};
+use super::auto::{self, SurfacePair};
 use super::bodies::SceneBody;
 use super::carrier;
 use super::groups::{Owners, find_group, point};
@@ -26,67 +26,44 @@ pub struct Contact<const D: usize> {
     pub pair: ContactPair,
     /// Integration points, if they were requested.
     pub fine: Option<Fine<D>>,
-    /// What all ranks have of its origin.
     pub facts: ContactFacts,
 }
 
-/// What all ranks have of the origin of a pair; see [`ContactInfo`].
+/// Facts of a pair besides its arrays.
 #[derive(Serialize, Deserialize)]
 pub struct ContactFacts {
-    entry: ContactEntry,
+    /// Number of its table in the scene.
+    table: usize,
     /// Names of the two surfaces, which are those of the bodies if the pair was found.
     names: [String; 2],
-    swapped: bool,
-    chords: Option<Chords>,
-    ends: Vec<usize>,
-    surface: ContactSurface,
-}
-
-impl ContactFacts {
-    /// Return the facts of the pair, including its description in the scene, whose `contacts` have the factors of a step.
-    pub fn info(self, contacts: &[ContactSpec]) -> ContactInfo {
-        let Self { entry, names, swapped, chords, ends, surface } = self;
-        ContactInfo { spec: entry.spec(contacts, names), swapped, chords, ends, surface }
-    }
-}
-
-/// Facts of a pair besides its arrays.
-pub struct ContactInfo {
-    /// Description in the scene. `between` names the bodies if the pair was found.
-    pub spec: ContactSpec,
     /// The overlap of the meshes, if facets make most of it.
     pub chords: Option<Chords>,
     /// Contact points where the pair ends because the surfaces are too far apart.
     pub ends: Vec<usize>,
-    /// Whether side a, which carries the points, is the second of `spec.between`.
+    /// Whether side a, which carries the points, is the second of `names`.
     pub swapped: bool,
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
 }
 
-impl ContactInfo {
+impl ContactFacts {
+    /// Return the description of the pair by the `contacts` of the scene. `between` names the bodies if the pair was found.
+    pub fn spec(&self, contacts: &[ContactSpec]) -> ContactSpec {
+        between(&contacts[self.table], self.names.clone())
+    }
+
     /// Return which surface carries the points of a pair with these bodies, the carrier's first.
     pub fn carrier(&self, [a, b]: [usize; 2]) -> Carrier {
         let bodies = if self.swapped { [b, a] } else { [a, b] };
-        Carrier { table: self.spec.table, bodies, is_second: self.swapped }
+        Carrier { table: self.table, bodies, is_second: self.swapped }
     }
 }
 
-impl ContactEntry {
-    /// Return the scene's description of a pair of this table. `between` has the names of the pair.
-    fn spec(self, contacts: &[ContactSpec], names: [String; 2]) -> ContactSpec {
-        let mut spec = match self {
-            ContactEntry::Named(number) => contacts[number].clone(),
-            ContactEntry::Found(rule) => rules(contacts)[rule].clone(),
-        };
-        spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value = own);
-        spec
-    }
-}
-
-/// Return the rules among contacts.
-fn rules(contacts: &[ContactSpec]) -> Vec<&ContactSpec> {
-    contacts.iter().filter(|contact| contact.is_rule()).collect()
+/// Return a contact of the scene between surfaces or bodies with these names.
+fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
+    let mut spec = spec.clone();
+    spec.between.iter_mut().zip(names).for_each(|(name, own)| name.value = own);
+    spec
 }
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found; and the rigid parts, obstacles and
@@ -105,21 +82,21 @@ pub fn all<const D: usize>(
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
-    let rules = rules(specs);
-    let named = || specs.iter().enumerate().filter(|(_, spec)| !spec.is_rule());
+    let rules: Vec<&ContactSpec> = specs.iter().filter(|spec| spec.is_rule()).collect();
+    let named = || specs.iter().filter(|spec| !spec.is_rule());
     let mut found = named().map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
     found.extend(auto::find(&rules, cut, parts, &taken)?);
     let mut contacts: Vec<Contact<D>> = Vec::new();
     for pair in found {
-        contacts.extend(Opposite::new(scene, specs, parts, pair).assemble(&scene.laws, parts, cut, fine)?);
+        contacts.extend(pair.orient(scene, parts).assemble(&scene.laws, parts, cut, fine)?);
     }
     let mut rigid = Vec::new();
-    for (number, (contact, (_, spec))) in contacts.iter_mut().zip(named()).enumerate() {
+    for (number, (contact, spec)) in contacts.iter_mut().zip(named()).enumerate() {
         rigid.extend(rigid::part(&mut contact.pair, spec, number, parts.len() + rigid.len())?);
     }
-    auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.entry))?;
+    auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.table))?;
     Ok((contacts, rigid))
 }
 
@@ -128,7 +105,7 @@ pub fn all<const D: usize>(
 /// # Errors
 /// A surface is missing, or bounds no body or several. Both belong to one body.
 fn named<'a, const D: usize>(
-    (number, spec): (usize, &'a ContactSpec),
+    spec: &'a ContactSpec,
     mesh: &Mesh<D>,
     owners: &Owners,
     parts: &'a [SceneBody<D>],
@@ -143,8 +120,7 @@ fn named<'a, const D: usize>(
         let side = parts[first].side(names[0], on_first, spec.edge);
         let obstacle = Side { name: names[1], ..side.clone() };
         // the obstacle gets its number among the rigid parts, which follow the bodies, once all pairs are known
-        let (entry, bodies) = (ContactEntry::Named(number), [first, parts.len()]);
-        return Ok(SurfacePair { entry, bodies, sides: [side, obstacle], far: Default::default() });
+        return Ok(SurfacePair::new(spec, [first, parts.len()], [side, obstacle]));
     }
     let (second, on_second) = surface(1)?;
     if first == second && spec.preload.is_none() {
@@ -153,54 +129,46 @@ fn named<'a, const D: usize>(
             .help("contact of a body with itself is out of scope; make two bodies of it"));
     }
     let sides = [parts[first].side(names[0], on_first, spec.edge), parts[second].side(names[1], on_second, spec.edge)];
-    Ok(SurfacePair { entry: ContactEntry::Named(number), bodies: [first, second], sides, far: Default::default() })
+    Ok(SurfacePair::new(spec, [first, second], sides))
 }
 
-/// Two surfaces that are to be a pair.
-struct Opposite<'a, const D: usize> {
-    entry: ContactEntry,
-    spec: ContactSpec,
-    bodies: [usize; 2],
-    a: Side<'a, D>,
-    b: Side<'a, D>,
-    /// Whether side a is the second of `spec.between`.
-    swapped: bool,
-    /// Nodes of facets of side a that face side b, but are too far away.
-    far: BTreeSet<u32>,
-    reach: Reach,
-}
+impl<'a, const D: usize> SurfacePair<'a, D> {
+    /// Return the pair of these surfaces.
+    pub fn new(spec: &'a ContactSpec, bodies: [usize; 2], sides: [Side<'a, D>; 2]) -> Self {
+        Self { spec, bodies, sides, far: Default::default(), swapped: false }
+    }
 
-impl<'a, const D: usize> Opposite<'a, D> {
-    /// Choose the side that carries the points.
-    fn new(scene: &Scene, specs: &[ContactSpec], parts: &[SceneBody<D>], pair: SurfacePair<'a, D>) -> Self {
-        let SurfacePair { entry, bodies, sides: [first, second], far: [far_first, far_second] } = pair;
-        let spec = entry.spec(specs, [first.name, second.name].map(str::to_owned));
-        let swapped = !spec.obstacle
-            && carrier::is_second(parts, bodies, [&first.facets, &second.facets], spec.table, &scene.carriers);
-        let ((body_a, a, far), (body_b, b)) = match swapped {
-            true => ((bodies[1], second, far_second), (bodies[0], first)),
-            false => ((bodies[0], first, far_first), (bodies[1], second)),
-        };
-        let reach = Reach::between(&a, &b, spec.angle, spec.distance);
-        Self { entry, spec, bodies: [body_a, body_b], a, b, swapped, far, reach }
+    /// Let the first of the two sides be the one that carries the points.
+    fn orient(mut self, scene: &Scene, parts: &[SceneBody<D>]) -> Self {
+        let Self { spec, bodies, sides, .. } = &self;
+        let facets = sides.each_ref().map(|side| &side.facets);
+        if !spec.obstacle && carrier::is_second(parts, *bodies, facets, spec.table, &scene.carriers) {
+            self.swapped = true;
+            self.bodies.reverse();
+            self.sides.reverse();
+            self.far.reverse();
+        }
+        self
     }
 
     /// Return what both surfaces have in common, and whether the gap of the scene alone counts.
     fn common(&mut self, cut: Cut<D>) -> (Intersection<D>, bool) {
-        let mut common = match self.spec.obstacle {
-            true => Intersection::of_one(&self.a),
-            false => cut(&self.a, &self.b, &self.reach),
+        let (spec, [a, b]) = (self.spec, &mut self.sides);
+        let mut reach = Reach::between(a, b, spec.angle, spec.distance);
+        let mut common = match spec.obstacle {
+            true => Intersection::of_one(a),
+            false => cut(a, b, &reach),
         };
-        if !self.spec.obstacle && self.a.towards(&self.b, &common) {
-            common = cut(&self.a, &self.b, &self.reach);
+        if !spec.obstacle && a.towards(b, &common) {
+            common = cut(a, b, &reach);
         }
         // head and nut of a bolt look away from each other, and its preload draws them together
-        let is_through = self.spec.preload.is_some() && common.points.is_empty();
+        let is_through = spec.preload.is_some() && common.points.is_empty();
         if is_through {
-            self.reach = Reach::anywhere(&self.a, &self.b, self.spec.angle);
-            common = cut(&self.a, &self.b, &self.reach);
+            reach = Reach::anywhere(a, b, spec.angle);
+            common = cut(a, b, &reach);
         }
-        let is_touching = self.spec.is_touching() || is_through;
+        let is_touching = spec.is_touching() || is_through;
         if is_touching {
             common.points.iter_mut().for_each(|point| point.gap = 0.0);
         }
@@ -217,18 +185,21 @@ impl<'a, const D: usize> Opposite<'a, D> {
         fine: bool,
     ) -> Result<Option<Contact<D>>> {
         let (common, is_touching) = self.common(cut);
-        let Self { entry, spec, bodies, a, b, swapped, far, .. } = self;
+        let Self { spec, bodies, sides: [a, b], far: [far, _], swapped } = self;
+        let is_found = spec.is_rule();
+        let mut names = [a.name, b.name].map(str::to_owned);
+        let surfaces = names.clone();
+        if swapped {
+            names.reverse();
+        }
+        let spec = between(spec, names.clone());
         let gap = |x| spec.gap.eval(x);
         let law = |position: &[[f64; 3]]| law::of_pair(&spec, laws, position);
         let mut pair = match contact::assemble(&a, &b, bodies, &common, &gap, &law) {
-            Err(Fault::NoPartner) if matches!(entry, ContactEntry::Found(_)) => return Ok(None),
+            Err(Fault::NoPartner) if is_found => return Ok(None),
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
         };
-        let names = spec.between.each_ref().map(|name| name.value.clone());
-        pair.surfaces = names.clone();
-        if swapped {
-            pair.surfaces.swap(0, 1);
-        }
+        pair.surfaces = surfaces;
         let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
         if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
             let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
@@ -255,7 +226,7 @@ impl<'a, const D: usize> Opposite<'a, D> {
         };
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
-        Ok(Some(Contact { pair, fine, facts: ContactFacts { entry, names, swapped, chords, ends, surface } }))
+        Ok(Some(Contact { pair, fine, facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface } }))
     }
 }
 

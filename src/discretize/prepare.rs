@@ -2,7 +2,7 @@
 //!
 //! The factory requests facts about each body, chooses solvers, and decides which bodies share a matrix.
 
-use super::assembly::{Factory, Outline};
+use super::assembly::Factory;
 use super::bodies::parts;
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
@@ -18,8 +18,10 @@ use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
-use crate::problem::{BodySpec, ContactSpec};
+use crate::problem::{BodySpec, ContactSpec, Order};
 use crate::scene::Scene;
+use crate::solver::InterfaceDofs;
+use crate::solver::cost::{BodyFacts, compactness};
 use serde::{Deserialize, Serialize};
 
 /// The bodies and the named contacts of a scene, with the factors of a load step.
@@ -41,7 +43,7 @@ pub struct ReplicatedProblem<const D: usize, P> {
     pub pairs: Vec<ContactPair>,
     /// Rigid parts, which follow the bodies.
     pub rigid: Vec<BodySlot>,
-    /// Origin of each pair.
+    /// Facts of each pair besides its arrays.
     pub contacts: Vec<ContactFacts>,
     /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
@@ -136,22 +138,23 @@ fn plan<const D: usize, F: Factory>(
     checked: &[BodyCheck],
     factory: &mut F,
 ) -> Result<F::SolverPlan> {
-    let at: Vec<_> =
-        bodies.iter().map(|body| move |k: usize, dof: usize| body.part.mesh.dof_of(&body.free[k], dof)).collect();
-    let outline = |index: usize| {
-        let WholeBody { part, free, .. } = &bodies[index];
-        Outline {
-            name: &part.spec.name.value,
+    let of_body = |(WholeBody { part, free, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
+        let (spec, mesh) = (part.spec, &part.mesh);
+        let at = |k: usize, dof: usize| mesh.dof_of(&free[k], dof);
+        let motions = AtDofs { count: free.len(), at: &at };
+        let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed, motions);
+        let facts = BodyFacts {
+            name: spec.name.value.clone(),
             dimension: D,
-            order: part.mesh.space.order,
-            cells: part.mesh.space.cell_count(),
-            facets: checked[index].outer,
-            rows: &part.mesh.rows,
-            prescribed: &part.mesh.prescribed,
-            motions: AtDofs { count: free.len(), at: &at[index] },
-        }
+            dofs: mesh.space.dofs(),
+            interface: interface.dofs.len(),
+            is_quadratic: mesh.space.order > Order::P1,
+            compactness: compactness(mesh.space.cell_count(), checked.outer),
+            ..BodyFacts::default()
+        };
+        (facts, interface)
     };
-    factory.plan(&(0..bodies.len()).map(outline).collect::<Vec<_>>())
+    factory.plan(bodies.iter().zip(checked).map(of_body).collect())
 }
 
 /// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan.

@@ -231,7 +231,7 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     let scene = built.scene.clone();
     let Begin { start, steps } = begin;
     for (i, pair) in steps.last().iter().flat_map(|step| step.pairs.iter().enumerate()) {
-        if scene.method.steps.locks(steps.len(), &built.discrete.contacts[i].spec) {
+        if scene.method.steps.locks(steps.len(), &built.discrete.specs[i]) {
             built.discrete.lock(i, pair.offset.unwrap_or(0.0));
         }
     }

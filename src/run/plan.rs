@@ -5,39 +5,11 @@
 
 use crate::parallel::owners;
 use crate::problem::{Linear, MethodName, Preset};
-use crate::solver::cost::{BodySize, Comparison};
-use crate::solver::preset::{self, Size};
+use crate::solver::InterfaceDofs;
+use crate::solver::cost::{BodyFacts, Comparison};
+use crate::solver::options::Chosen;
+use crate::solver::preset;
 use serde::{Deserialize, Serialize};
-
-/// The facts of a body on which its solver depends.
-#[derive(Debug, Clone)]
-pub struct Facts {
-    /// Name in the scene.
-    pub name: String,
-    /// Space dimension.
-    pub dimension: usize,
-    /// Dofs, contact and shape, as they matter for costs.
-    pub size: BodySize,
-    /// Number of dofs that a condensed body keeps. It can be condensed if this is neither zero nor the number of all dofs.
-    pub interface: usize,
-    /// Whether a condensed body of an earlier scene serves, so that its memory is allocated already.
-    pub is_kept: bool,
-    /// Options that the user wrote for its solver.
-    pub typed: Typed,
-}
-
-/// What the plan asks of the options that the user wrote for a solver.
-#[derive(Debug, Clone, Default)]
-pub struct Typed {
-    /// Whether they choose or steer a KSP of PETSc.
-    pub asks_for_ksp: bool,
-    /// Whether some are for this solver alone.
-    pub has_own: bool,
-    /// The preconditioner.
-    pub pc: Option<String>,
-    /// Whether all preconditioners, also nested ones, work with rows on several ranks.
-    pub is_for_one_rank: bool,
-}
 
 /// What the user asks for, and what the machine has.
 #[derive(Debug, Clone)]
@@ -48,8 +20,8 @@ pub struct Asked {
     pub linear: Option<Linear>,
     /// The method.
     pub method: MethodName,
-    /// Options that the user wrote for the matrix of all bodies.
-    pub whole: Typed,
+    /// Options of the solver of the matrix of all bodies, at first those that the user wrote.
+    pub whole: Chosen,
     /// Bytes that are free, on the rank that has least.
     pub memory: usize,
     /// Number of ranks.
@@ -68,13 +40,16 @@ pub struct Plan {
     pub seconds: Option<f64>,
 }
 
-/// The solver of a body.
+/// A body with its solver.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct BodyPlan {
-    /// Its preset.
+    pub facts: BodyFacts,
+    /// The preset of its solver.
     pub preset: Preset,
     /// Whether its dofs are distributed over the ranks in a matrix of its own.
     pub is_distributed: bool,
+    /// Interface dofs of a condensed body, until it is made.
+    pub interface: Option<InterfaceDofs>,
     /// Reason for the preset, in words; other ranks do not get it.
     #[serde(skip)]
     pub reason: String,
@@ -83,10 +58,13 @@ pub struct BodyPlan {
 /// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and 250 MB.
 const DENSE: usize = 3000;
 
-/// Return the plan for bodies with these facts.
-pub fn plan(facts: &[Facts], asked: &Asked) -> Plan {
+/// A preset with its reason.
+type Choice = (Preset, String);
+
+/// Return the plan for these bodies, without the interface dofs of condensed ones.
+pub fn plan(facts: Vec<BodyFacts>, asked: &Asked) -> Plan {
     let mut seconds = None;
-    let mut chosen: Vec<Option<BodyPlan>> = facts.iter().map(|body| asked.for_body(body)).collect();
+    let mut chosen: Vec<Option<Choice>> = facts.iter().map(|body| asked.for_body(body)).collect();
     let open: Vec<usize> = (0..facts.len()).filter(|&body| chosen[body].is_none()).collect();
     let mut memory = asked.memory;
     match facts.first().map(|body| body.dimension) {
@@ -98,25 +76,26 @@ pub fn plan(facts: &[Facts], asked: &Asked) -> Plan {
         _ => {
             let together = if asked.may_join() { open.len().max(1) } else { 1 };
             for group in open.chunks(together) {
-                let bodies: Vec<&Facts> = group.iter().map(|&body| &facts[body]).collect();
-                let (plan, cost) = in_space(&bodies, asked, &mut memory);
+                let bodies: Vec<BodyFacts> = group.iter().map(|&body| facts[body].clone()).collect();
+                let (choices, cost) = in_space(&bodies, asked, &mut memory);
                 *seconds.get_or_insert(0.0) += cost;
-                group.iter().zip(plan).for_each(|(&body, plan)| chosen[body] = Some(plan));
+                group.iter().zip(choices).for_each(|(&body, choice)| chosen[body] = Some(choice));
             }
         }
     }
-    let mut bodies: Vec<BodyPlan> = chosen.into_iter().flatten().collect();
-    let linear = linear_step(facts, asked, &mut bodies);
+    let of_body = |(facts, (preset, reason)): (BodyFacts, Choice)| BodyPlan {
+        facts,
+        preset,
+        is_distributed: false,
+        interface: None,
+        reason,
+    };
+    let mut bodies: Vec<BodyPlan> = facts.into_iter().zip(chosen.into_iter().flatten()).map(of_body).collect();
+    let linear = linear_step(asked, &mut bodies);
     if linear == Linear::Sweeps {
-        distribute(facts, asked.ranks, &mut bodies);
+        distribute(asked.ranks, &mut bodies);
     }
     Plan { linear, bodies, seconds }
-}
-
-impl BodyPlan {
-    fn new(preset: Preset, reason: impl Into<String>) -> Self {
-        Self { preset, is_distributed: false, reason: reason.into() }
-    }
 }
 
 impl Asked {
@@ -127,17 +106,17 @@ impl Asked {
     }
 
     /// Return whether the user wants a KSP of PETSc for a body; a KSP for all bodies together needs them uncondensed.
-    fn wants_ksp(&self, body: &Facts) -> bool {
-        body.typed.asks_for_ksp || (self.may_join() && self.whole.asks_for_ksp)
+    fn wants_ksp(&self, body: &BodyFacts) -> bool {
+        body.options.asks_for_ksp() || (self.may_join() && self.whole.asks_for_ksp())
     }
 
     /// Return whether a body may be condensed.
-    fn may_condense(&self, body: &Facts) -> bool {
-        (1..body.size.dofs).contains(&body.interface) && !self.wants_ksp(body)
+    fn may_condense(&self, body: &BodyFacts) -> bool {
+        (1..body.dofs).contains(&body.interface) && !self.wants_ksp(body)
     }
 
     /// Return the solver of a body that the user asks for, or `None` for the program's choice.
-    fn for_body(&self, body: &Facts) -> Option<BodyPlan> {
+    fn for_body(&self, body: &BodyFacts) -> Option<Choice> {
         let may_condense = self.may_condense(body);
         let (preset, why) = match (self.preset, self.linear) {
             (Some(Preset::Condensed), _) if !may_condense => (
@@ -150,73 +129,69 @@ impl Asked {
             (None, Some(Linear::Multigrid)) => (Preset::Hypre, "the scene asks for linear steps by multigrid"),
             _ => return None,
         };
-        Some(BodyPlan::new(preset, why))
+        Some((preset, why.to_owned()))
     }
 }
 
 /// Choose the solver of a body in the plane, and take its memory.
-fn in_plane(body: &Facts, asked: &Asked, memory: &mut usize) -> BodyPlan {
-    let free = if body.is_kept { usize::MAX } else { *memory };
-    let size = Size { dofs: body.size.dofs, interface: body.interface, memory: free };
-    let (mut preset, reason) = preset::in_plane(&size);
+fn in_plane(body: &BodyFacts, asked: &Asked, memory: &mut usize) -> Choice {
+    let (mut preset, reason) = preset::in_plane(body, if body.is_kept { usize::MAX } else { *memory });
     if preset == Preset::Condensed && !asked.may_condense(body) {
         preset = Preset::Mumps;
     }
     if !body.is_kept && preset != Preset::Hypre {
-        *memory = memory.saturating_sub(size.bytes(preset));
+        *memory = memory.saturating_sub(body.bytes_in_plane(preset));
     }
-    BodyPlan::new(preset, reason)
+    (preset, reason)
 }
 
 /// Choose the solvers of bodies in space, which are solved together or are one body, and take their memory. Return the estimated seconds, too.
-fn in_space(bodies: &[&Facts], asked: &Asked, memory: &mut usize) -> (Vec<BodyPlan>, f64) {
-    let sizes = bodies
-        .iter()
-        .map(|body| BodySize { interface: asked.may_condense(body).then_some(body.interface), ..body.size });
+fn in_space(bodies: &[BodyFacts], asked: &Asked, memory: &mut usize) -> (Vec<Choice>, f64) {
     let is_kept = bodies.iter().all(|body| body.is_kept);
-    let comparison = Comparison::new(&sizes.collect::<Vec<_>>(), asked.method, asked.may_join());
+    let comparison = Comparison::new(bodies, |body| asked.may_condense(body), asked.method, asked.may_join());
     let is_direct = comparison.is_direct(if is_kept { usize::MAX } else { *memory });
     if is_direct && !is_kept {
         *memory = memory.saturating_sub(comparison.direct.bytes as usize);
     }
     let (dofs, interface): (usize, usize) =
-        (bodies.iter().map(|body| body.size.dofs).sum(), bodies.iter().map(|body| body.interface).sum());
+        (bodies.iter().map(|body| body.dofs).sum(), bodies.iter().map(|body| body.interface).sum());
     let Comparison { direct, multigrid } = comparison;
     let (factored, iterated) = (direct.words(), multigrid.words());
     let reason = format!(
         "{dofs} dofs in space, {interface} of them on the contact; estimates: factored {factored}, multigrid {iterated}"
     );
-    let of_body = |body: &&Facts| match is_direct {
+    let of_body = |body: &BodyFacts| match is_direct {
         true if asked.may_condense(body) => Preset::Condensed,
         true => Preset::Mumps,
         false => Preset::Hypre,
     };
-    let plans = bodies.iter().map(|body| BodyPlan::new(of_body(body), reason.clone())).collect();
-    (plans, if is_direct { direct.seconds } else { multigrid.seconds })
+    let choices = bodies.iter().map(|body| (of_body(body), reason.clone())).collect();
+    (choices, if is_direct { direct.seconds } else { multigrid.seconds })
 }
 
 /// Return the solver of linear steps for bodies with these presets. Where the program chose them, bodies first get presets that one matrix can have.
-fn linear_step(facts: &[Facts], asked: &Asked, bodies: &mut [BodyPlan]) -> Linear {
+fn linear_step(asked: &Asked, bodies: &mut [BodyPlan]) -> Linear {
     let is_auto = asked.method == MethodName::Auto;
+    let is_typed = |body: &BodyPlan| body.facts.options.asks_for_ksp();
     // options typed for one body apply to that body alone, so the bodies are not joined
-    let is_apart = |body: &Facts| is_auto && body.typed.has_own && body.typed.asks_for_ksp;
-    if !asked.may_join() || facts.iter().any(is_apart) {
+    let is_apart = |body: &BodyPlan| is_auto && body.facts.options.has_own() && is_typed(body);
+    if !asked.may_join() || bodies.iter().any(is_apart) {
         return Linear::Sweeps;
     }
-    let is_typed = facts.iter().any(|body| body.typed.asks_for_ksp);
-    if asked.preset.is_none() && asked.linear.is_none() && !is_typed {
-        agree(facts, bodies);
+    if asked.preset.is_none() && asked.linear.is_none() && !bodies.iter().any(is_typed) {
+        agree(bodies);
     }
     let all = |preset: Preset| bodies.iter().all(|body| body.preset == preset);
-    let fits_dense =
-        asked.linear.is_some() || facts.iter().all(|body| body.dimension == 3) || on_contact(facts, bodies) <= DENSE;
-    let is_quadratic = facts.iter().any(|body| body.size.is_quadratic);
-    match asked.whole.pc.as_deref() {
+    let is_in_space = bodies.iter().all(|body| body.facts.dimension == 3);
+    let fits_dense = asked.linear.is_some() || is_in_space || on_contact(bodies) <= DENSE;
+    let is_quadratic = bodies.iter().any(|body| body.facts.is_quadratic);
+    let whole = &asked.whole;
+    match whole.typed("pc_type") {
         Some("hypre") => Linear::Multigrid,
         Some("mg") if is_quadratic => Linear::Multigrid,
         Some("cholesky" | "lu") => Linear::Direct,
-        Some(_) if is_auto && !asked.whole.has_own => Linear::Sweeps,
-        None if all(Preset::Condensed) && !asked.whole.asks_for_ksp && fits_dense => Linear::Dense,
+        Some(_) if is_auto && !whole.has_own() => Linear::Sweeps,
+        None if all(Preset::Condensed) && !whole.asks_for_ksp() && fits_dense => Linear::Dense,
         None if all(Preset::Hypre) => Linear::Multigrid,
         None if is_auto && bodies.iter().any(|body| matches!(body.preset, Preset::Gamg | Preset::Icc)) => {
             Linear::Sweeps
@@ -226,25 +201,25 @@ fn linear_step(facts: &[Facts], asked: &Asked, bodies: &mut [BodyPlan]) -> Linea
 }
 
 /// Return the number of dofs of all condensed bodies together.
-fn on_contact(facts: &[Facts], bodies: &[BodyPlan]) -> usize {
-    let condensed = facts.iter().zip(bodies).filter(|(_, plan)| plan.preset == Preset::Condensed);
-    condensed.map(|(body, _)| body.interface).sum()
+fn on_contact(bodies: &[BodyPlan]) -> usize {
+    bodies.iter().filter(|body| body.preset == Preset::Condensed).map(|body| body.facts.interface).sum()
 }
 
 /// Give all bodies presets that Newton's method can join. They get multigrid if one of them needs it. In the plane they get one
 /// factorisation if together they have too many dofs on the contact for one dense matrix.
-fn agree(facts: &[Facts], bodies: &mut [BodyPlan]) {
-    let dense = on_contact(facts, bodies);
-    let needs = facts.iter().zip(&*bodies).find(|(_, plan)| plan.preset == Preset::Hypre);
-    let (preset, why) = match needs {
-        Some((first, _)) => (Preset::Hypre, format!("`{}` has it, and Newton's method joins the bodies", first.name)),
-        None if dense > DENSE && facts.iter().any(|body| body.dimension == 2) => {
+fn agree(bodies: &mut [BodyPlan]) {
+    let dense = on_contact(bodies);
+    let (preset, why) = match bodies.iter().find(|body| body.preset == Preset::Hypre) {
+        Some(first) => {
+            (Preset::Hypre, format!("`{}` has it, and Newton's method joins the bodies", first.facts.name))
+        }
+        None if dense > DENSE && bodies.iter().any(|body| body.facts.dimension == 2) => {
             (Preset::Mumps, format!("{dense} of all bodies are on the contact: too many to join by dense algebra"))
         }
         None => return,
     };
-    for (body, plan) in facts.iter().zip(bodies).filter(|(_, plan)| plan.preset != preset) {
-        *plan = BodyPlan::new(preset, format!("{} dofs; {why}", body.size.dofs));
+    for body in bodies.iter_mut().filter(|body| body.preset != preset) {
+        (body.preset, body.reason) = (preset, format!("{} dofs; {why}", body.facts.dofs));
     }
 }
 
@@ -258,14 +233,15 @@ const MESSAGES: usize = 1000;
 
 /// Distribute the largest bodies over all ranks, as many as make a sweep shortest. Each other body stays whole on one rank. If there are as many
 /// bodies as ranks and they are about equally large, all stay whole.
-fn distribute(facts: &[Facts], ranks: usize, bodies: &mut [BodyPlan]) {
-    let may = |(body, plan): (&Facts, &BodyPlan)| {
-        plan.preset != Preset::Condensed
-            && !body.typed.is_for_one_rank
-            && (body.typed.pc.is_some() || plan.preset != Preset::Icc)
+fn distribute(ranks: usize, bodies: &mut [BodyPlan]) {
+    let may = |body: &BodyPlan| {
+        let options = &body.facts.options;
+        body.preset != Preset::Condensed
+            && !options.is_for_one_rank()
+            && (options.typed("pc_type").is_some() || body.preset != Preset::Icc)
     };
-    let loads: Vec<usize> = facts.iter().map(|body| body.size.dofs).collect();
-    let may: Vec<bool> = facts.iter().zip(&*bodies).map(may).collect();
+    let loads: Vec<usize> = bodies.iter().map(|body| body.facts.dofs).collect();
+    let may: Vec<bool> = bodies.iter().map(may).collect();
     let distributed = largest(&loads, &may, ranks);
     bodies.iter_mut().zip(distributed).for_each(|(plan, distributed)| plan.is_distributed = distributed);
 }
@@ -298,25 +274,29 @@ fn largest(loads: &[usize], may: &[bool], ranks: usize) -> Vec<bool> {
 mod tests {
     use super::*;
     use crate::solver::cost::compactness;
+    use crate::solver::options::UserOptions;
 
     const GIGABYTES: usize = 8_000_000_000;
 
     /// Return a body of n x n x m boxes with linear elements in space, or with n x m boxes in the plane, whose lower surface is the contact.
-    fn body(dimension: usize, n: usize, m: usize) -> Facts {
-        let nodes = (n + 1).pow(dimension as u32 - 1) * (m + 1);
-        let dofs = dimension * nodes;
-        let compactness = compactness(6 * n * n * m, 4 * n * n + 8 * n * m);
-        let size = BodySize { dofs, interface: None, is_quadratic: false, compactness };
+    fn body(dimension: usize, n: usize, m: usize) -> BodyFacts {
         let interface = (n + 1).pow(dimension as u32 - 1);
-        Facts { name: format!("{n}x{m}"), dimension, size, interface, is_kept: false, typed: Typed::default() }
+        BodyFacts {
+            name: format!("{n}x{m}"),
+            dimension,
+            dofs: dimension * interface * (m + 1),
+            interface,
+            compactness: compactness(6 * n * n * m, 4 * n * n + 8 * n * m),
+            ..BodyFacts::default()
+        }
     }
 
     fn asked(method: MethodName) -> Asked {
-        Asked { preset: None, linear: None, method, whole: Typed::default(), memory: GIGABYTES, ranks: 1 }
+        Asked { preset: None, linear: None, method, whole: Chosen::default(), memory: GIGABYTES, ranks: 1 }
     }
 
-    fn of(facts: &[Facts], asked: &Asked) -> (Linear, Vec<Preset>) {
-        let plan = plan(facts, asked);
+    fn of(facts: &[BodyFacts], asked: &Asked) -> (Linear, Vec<Preset>) {
+        let plan = plan(facts.to_vec(), asked);
         (plan.linear, plan.bodies.iter().map(|body| body.preset).collect())
     }
 
@@ -325,7 +305,7 @@ mod tests {
     fn bodies_get_the_cheaper_solver() {
         use Preset::{Condensed, Hypre, Mumps};
         let cubes = |n: usize| vec![body(3, n, n), body(3, n, n)];
-        let of_auto = |facts: &[Facts]| of(facts, &asked(MethodName::Auto));
+        let of_auto = |facts: &[BodyFacts]| of(facts, &asked(MethodName::Auto));
         assert_eq!(of_auto(&cubes(8)), (Linear::Dense, vec![Condensed; 2]));
         assert_eq!(of_auto(&cubes(40)), (Linear::Multigrid, vec![Hypre; 2]));
         // a plate lies on its neighbour with a third of its nodes, which a dense matrix would join
@@ -339,7 +319,7 @@ mod tests {
         assert_eq!(of(&sheets(300), &short), (Linear::Multigrid, vec![Hypre; 2]));
         // bodies get multigrid if one of them needs it
         assert_eq!(of(&[body(2, 10, 10), body(2, 300, 100)], &short), (Linear::Multigrid, vec![Hypre; 2]));
-        assert!(plan(&[body(2, 10, 10), body(2, 300, 100)], &short).bodies[0].reason.contains("`300x100` has it"));
+        assert!(plan(vec![body(2, 10, 10), body(2, 300, 100)], &short).bodies[0].reason.contains("`300x100` has it"));
         // each for itself
         let apart = [body(3, 8, 8), body(3, 60, 60)];
         assert_eq!(of(&apart, &asked(MethodName::NewtonRobin)), (Linear::Sweeps, vec![Condensed, Hypre]));
@@ -363,11 +343,12 @@ mod tests {
         assert_eq!(preset(Hypre, MethodName::Robin), (Linear::Sweeps, vec![Hypre; 2]));
         // options for one body apply to that body alone
         let mut own = cubes.clone();
-        own[1].typed = Typed { asks_for_ksp: true, has_own: true, ..Typed::default() };
+        own[1].options = UserOptions::of_test(&[("-upper_ksp_rtol", "1e-3")]).of("upper");
         assert_eq!(of(&own, &auto).0, Linear::Sweeps);
         assert_eq!(of(&own, &asked(MethodName::Newton)), (Linear::Multigrid, vec![Hypre; 2]));
         let of_pc = |pc: &str, has_own: bool| {
-            let whole = Typed { asks_for_ksp: true, has_own, pc: Some(pc.to_owned()), ..Typed::default() };
+            let name = if has_own { "-newton_pc_type" } else { "-pc_type" };
+            let whole = UserOptions::of_test(&[(name, pc)]).of("newton");
             of(&cubes, &Asked { whole, ..auto.clone() }).0
         };
         assert_eq!(

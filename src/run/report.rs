@@ -230,9 +230,9 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let sides = discrete.sides(i);
     let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
     PairReport {
-        surfaces: discrete.contacts[i].spec.between.each_ref().map(|name| name.value.clone()),
+        surfaces: discrete.specs[i].between.each_ref().map(|name| name.value.clone()),
         bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
-        contact: discrete.contacts[i].spec.table,
+        contact: discrete.specs[i].table,
         points: pair.len(),
         carrier: pair.surfaces[0].clone(),
         facets_uncovered: pair.uncovered(),
@@ -271,7 +271,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     let sides = done.built.discrete.sides(i);
     let displacement = |side: usize| {
         let mut u = model.displacement(&outcome.iterate.trace, i, side);
-        if side == 1 && !done.built.discrete.contacts[i].spec.obstacle {
+        if side == 1 && !done.built.discrete.specs[i].obstacle {
             // the offset of a gap is no displacement
             axpy(-1.0, &model.rigid_closing(i, &outcome.iterate.rigid), &mut u);
         }

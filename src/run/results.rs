@@ -306,7 +306,7 @@ pub fn columns(spec: &ContactSpec) -> PairColumns {
 
 /// Return the motion of the obstacle of pair `i` and what acts on it; none without an obstacle.
 pub fn obstacle(done: &Done, i: usize) -> Option<ObstacleReport> {
-    let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.contacts[i].spec);
+    let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.specs[i]);
     let found = spec.obstacle.then(|| Obstacle::new(pair, spec))?;
     let (approach, tilt) = found.moved(&done.outcome.iterate.rigid[pair.bodies[1]], done.built.discrete.factor);
     let force = &done.outcome.layer.force[done.model().range(i)];
@@ -317,7 +317,7 @@ pub fn obstacle(done: &Done, i: usize) -> Option<ObstacleReport> {
 
 /// Return the offset of the gap of pair `i` that was found for its force or preload; none without such.
 pub fn offset(done: &Done, i: usize) -> Option<f64> {
-    let (model, spec) = (done.model(), &done.built.discrete.contacts[i].spec);
+    let (model, spec) = (done.model(), &done.built.discrete.specs[i]);
     let has_offset = !spec.obstacle && (spec.force.is_some() || spec.preload.is_some());
     let closing = has_offset.then(|| model.rigid_closing(i, &done.outcome.iterate.rigid))?;
     Some(model.pairs[i].offset + closing[0])

@@ -6,13 +6,14 @@ use super::results::peak;
 use super::stages::Done;
 use super::verdict::is_solved;
 use crate::contact::{Chords, ContactPair, LostPieces};
-use crate::discretize::{ContactInfo, Discrete};
+use crate::discretize::Discrete;
 use crate::estimate::{Cause, Estimate, softness};
 use crate::linalg;
 use crate::model::Mechanism;
 use crate::output::report::{DIGITS, place, readable};
 use crate::output::{BalanceReport, sci};
 use crate::petsc::Session;
+use crate::problem::ContactSpec;
 use std::f64::consts::PI;
 
 /// Return the warnings about a problem before it is solved.
@@ -33,7 +34,7 @@ pub fn of_problem(session: &Session, discrete: &Discrete) -> Vec<String> {
     }
     warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
-    warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.contacts));
+    warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.specs));
     warnings
 }
 
@@ -115,19 +116,19 @@ pub fn of_pressures(discrete: &Discrete, estimate: &Estimate) -> Vec<String> {
 }
 
 /// Return the names of the surfaces of a pair, in the order of the scene.
-fn names(contact: &ContactInfo) -> [&str; 2] {
-    contact.spec.between.each_ref().map(|name| name.value.as_str())
+fn names(spec: &ContactSpec) -> [&str; 2] {
+    spec.between.each_ref().map(|name| name.value.as_str())
 }
 
 /// Return the warnings of the surfaces of all pairs.
-fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
+fn of_surfaces(pairs: &[ContactPair], specs: &[ContactSpec]) -> Vec<String> {
     let mut warnings = Vec::new();
-    for (pair, contact) in pairs.iter().zip(contacts) {
-        warnings.extend(lost(pair, contact));
+    for (pair, spec) in pairs.iter().zip(specs) {
+        warnings.extend(lost(pair, spec));
         let overlap = pair.gap.iter().copied().fold(0.0, f64::min);
         // the gap of an obstacle says how far it reaches into the body
-        if overlap < 0.0 && !contact.spec.obstacle {
-            let [a, b] = names(contact);
+        if overlap < 0.0 && !spec.obstacle {
+            let [a, b] = names(spec);
             warnings.push(format!(
                 "{a} - {b}: the bodies overlap by {:.3e} before loading; the layer takes it as compression",
                 -overlap
@@ -140,17 +141,17 @@ fn of_surfaces(pairs: &[ContactPair], contacts: &[ContactInfo]) -> Vec<String> {
 /// Return the warning of facets without a partner at which the contact of pair `i` ends under pressure. Where a surface turns away from the other
 /// one, or goes on beyond it, such facets are usual, and `check` counts them.
 pub fn cut_short(done: &Done, i: usize) -> Option<String> {
-    let (pair, contact) = (&done.model().pairs[i], &done.built.discrete.contacts[i]);
+    let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.specs[i]);
     let pressure = &done.outcome.layer.pressure[done.model().range(i)];
-    let [a, b] = names(contact);
-    let distance = contact.spec.distance.map_or(String::new(), |distance| format!(" and `distance` = {distance}"));
-    contact.surface.beside_uncovered().any(|q| pressure[q] != 0.0).then(|| {
+    let [a, b] = names(spec);
+    let distance = spec.distance.map_or(String::new(), |distance| format!(" and `distance` = {distance}"));
+    done.built.discrete.contacts[i].surface.beside_uncovered().any(|q| pressure[q] != 0.0).then(|| {
         format!(
             "{a} - {b}: {} of {} facets of `{}` have no partner within `angle` = {}{distance}, and there is pressure beside them",
             pair.uncovered(),
             pair.cover.len(),
             pair.surfaces[0],
-            contact.spec.angle
+            spec.angle
         )
     })
 }
@@ -191,7 +192,7 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
         true => format!("would change by about {:.0} % on these", 100.0 * f64::sqrt(changed / whole)),
         false => "would not vanish on these".to_owned(),
     };
-    let [a, b] = names(&done.built.discrete.contacts[i]);
+    let [a, b] = names(&done.built.discrete.specs[i]);
     Some(format!(
         "{a} - {b}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
          or a finer mesh; if the true surfaces have one distance everywhere, write touching = true, with that distance as `gap` (negative for an overlap)",
@@ -200,8 +201,8 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
 }
 
 /// Return the warning of pieces of a pair that the search for common points has lost, if any.
-fn lost(pair: &ContactPair, contact: &ContactInfo) -> Option<String> {
-    let [a, b] = names(contact);
+fn lost(pair: &ContactPair, spec: &ContactSpec) -> Option<String> {
+    let [a, b] = names(spec);
     pair.lost.map(|LostPieces { pieces, share, at }| {
         format!(
             "{a} - {b}: the search for points has lost {pieces} pieces of `{}`, {:.1e} of its {}, the most near {}: they \
@@ -221,7 +222,7 @@ pub fn beyond_law(done: &Done, i: usize) -> Option<String> {
     let end = (0..pair.len()).map(|q| pair.law.end(q)).fold(f64::INFINITY, f64::min);
     let Compressed { most, pressure, step } = most_compressed(done, i)?;
     let when = step.map_or(String::new(), |step| format!(" in load step {step}"));
-    let [a, b] = names(&done.built.discrete.contacts[i]);
+    let [a, b] = names(&done.built.discrete.specs[i]);
     (most > end).then(|| {
         format!(
             "{a} - {b}: the layer is compressed by {}{when}, under a pressure of {}, and its law ends at a compression of {}: beyond, the last \
@@ -244,7 +245,7 @@ pub fn tilted(done: &Done, i: usize) -> Option<String> {
     let all: f64 = (0..pair.len()).map(force).sum();
     let mean = |of: &dyn Fn(f64) -> f64| (0..pair.len()).map(|q| force(q) * of(pair.tilt[q])).sum::<f64>() / all;
     let along = mean(&|tilt| 0.5 * tilt * tilt);
-    let [a, b] = names(&done.built.discrete.contacts[i]);
+    let [a, b] = names(&done.built.discrete.specs[i]);
     (done.outcome.status.is_solved() && all > 0.0 && along > TILTED).then(|| {
         format!(
             "{a} - {b}: the normals of both sides differ under pressure by {:.0} degrees on the mean: the contact force depends by {:.0} % on which of \
@@ -265,7 +266,7 @@ pub fn nothing_touches(done: &Done) -> Option<String> {
     let compressed: Option<Vec<Compressed>> = pairs.map(|i| most_compressed(done, i)).collect();
     let compressed = compressed.filter(|all| all.iter().all(|found| found.pressure <= 0.0))?;
     let nearest = (0..compressed.len()).max_by(|&i, &j| compressed[i].most.total_cmp(&compressed[j].most))?;
-    let ([a, b], gap) = (names(&done.built.discrete.contacts[nearest]), -compressed[nearest].most);
+    let ([a, b], gap) = (names(&done.built.discrete.specs[nearest]), -compressed[nearest].most);
     (gap > 0.0).then(|| format!(
         "nothing touches: no contact carries a pressure, and `{a}` and `{b}` come nearest, with a gap of {}; look at the loads, the supports and the gaps",
         sci(gap, 3)
@@ -307,13 +308,13 @@ pub fn note_ends(done: &mut Done) {
         if reached == 0 {
             continue;
         }
-        let contact = &done.built.discrete.contacts[i];
-        let [a, b] = names(contact);
+        let spec = &done.built.discrete.specs[i];
+        let [a, b] = names(spec);
         let title = format!("{a} - {b}: the contact reaches places");
         if done.warnings.iter().any(|warning| warning.starts_with(&title)) {
             continue;
         }
-        let distance = contact.spec.distance.unwrap_or_default();
+        let distance = spec.distance.unwrap_or_default();
         let step = if done.steps.is_empty() { String::new() } else { format!(" in load step {}", done.steps.len()) };
         done.warnings.push(format!(
             "{title}{step} where the surfaces are farther apart than {distance} (key `distance`), and the pair ends: {reached} contact points \
@@ -335,8 +336,9 @@ const NEARLY: f64 = 0.5;
 /// whatever their distance is have no approach: there every such point counts.
 fn reached(done: &Done, i: usize) -> usize {
     let (layer, first) = (&done.outcome.layer, done.model().range(i).start);
-    let (contact, gap) = (&done.built.discrete.contacts[i], &done.model().pairs[i].gap);
-    let least = contact.spec.distance.filter(|_| !contact.spec.is_touching()).map_or(f64::NEG_INFINITY, |d| NEARLY * d);
+    let (discrete, gap) = (&done.built.discrete, &done.model().pairs[i].gap);
+    let spec = &discrete.specs[i];
+    let least = spec.distance.filter(|_| !spec.is_touching()).map_or(f64::NEG_INFINITY, |d| NEARLY * d);
     let goes_on = |q: &&usize| layer.pressure[first + *q] > 0.0 && layer.compression[first + *q] + gap[**q] >= least;
-    contact.ends.iter().filter(goes_on).count()
+    discrete.contacts[i].ends.iter().filter(goes_on).count()
 }

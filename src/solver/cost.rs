@@ -4,8 +4,10 @@
 //! hundred products of K with a vector, whose time is that of reading the entries of K from memory. "The
 //! table" below are 29 scenes of 3564 to 215 622 dofs, cubes, grooves, spheres, flanges and rough faces; docs/solvers.md has some of them.
 
+use super::options::Chosen;
 use crate::linalg::portable::{log2, pow};
-use crate::problem::MethodName;
+use crate::problem::{MethodName, Preset};
+use serde::{Deserialize, Serialize};
 
 /// Dense operations a second, of two cores with AVX2 or one with AVX-512.
 const RATE: f64 = 2.8e10;
@@ -33,17 +35,26 @@ const LEVELS: f64 = 42.0 * 30.0;
 /// about twice as many entries. Cubes of 12^3 with quadratic elements took 1.2 times as long as cubes of 24^3 with linear elements.
 const FILL_P2: f64 = 1.2;
 
-/// A body in space that is not assembled yet.
-#[derive(Debug, Clone, Copy)]
-pub struct BodySize {
+/// A body before it is assembled, in the numbers on which its solver depends.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct BodyFacts {
+    /// Name in the scene.
+    pub name: String,
+    /// Space dimension, which is the number of dofs of a node.
+    pub dimension: usize,
     /// Number of its dofs.
     pub dofs: usize,
-    /// The number of dofs that the body keeps if it is condensed; `None` if every factorisation is one of the whole body.
-    pub interface: Option<usize>,
-    /// Whether its elements are quadratic.
+    /// Number of dofs that it keeps if it is condensed.
+    pub interface: usize,
+    /// Whether its elements are of second or higher order.
     pub is_quadratic: bool,
     /// See [`compactness`].
     pub compactness: f64,
+    /// Whether a condensed body of an earlier scene serves, so that its memory is allocated already.
+    pub is_kept: bool,
+    /// Options of its solver, at first those that the user wrote.
+    #[serde(skip)]
+    pub options: Chosen,
 }
 
 /// Return the number of cells over that of a cube with as many facets on its boundary, at most one. A cube of n x n x n boxes has 6 n^3 tetrahedra and
@@ -92,18 +103,24 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Compare both ways to solve for these bodies by a method, which may join them in one matrix.
-    pub fn new(bodies: &[BodySize], method: MethodName, are_joined: bool) -> Self {
+    /// Compare both ways to solve for these bodies by a method, which may join them in one matrix. `may_condense` says of each whether it can be condensed; every
+    /// factorisation of another one is of the whole body.
+    pub fn new(
+        bodies: &[BodyFacts],
+        may_condense: impl Fn(&BodyFacts) -> bool,
+        method: MethodName,
+        are_joined: bool,
+    ) -> Self {
         // On the first scenes of the table `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies, and `robin` 5.4 to 12 times.
         let times = match method {
             _ if are_joined => 1.0,
             MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => 1.2,
             _ => 7.0,
         };
-        let interfaces = bodies.iter().map(|body| body.interface.unwrap_or(0));
+        let interfaces = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface);
         let interface = if are_joined { interfaces.sum() } else { interfaces.max().unwrap_or(0) } as f64;
         let dense = Cost { seconds: STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
-        let direct = bodies.iter().map(BodySize::factored).fold(dense, Cost::and);
+        let direct = bodies.iter().map(|body| body.factored(may_condense(body))).fold(dense, Cost::and);
         let multigrid = bodies.iter().map(|body| body.multigrid(times)).fold(Cost::default(), Cost::and);
         Self { direct, multigrid }
     }
@@ -114,7 +131,13 @@ impl Comparison {
     }
 }
 
-impl BodySize {
+impl BodyFacts {
+    /// Return the estimated bytes of a solver that factors, for a plane body.
+    pub fn bytes_in_plane(&self, preset: Preset) -> usize {
+        let dense = if preset == Preset::Condensed { condensed_bytes(self.interface) } else { 0 };
+        plane_factor_bytes(self.dofs) + dense
+    }
+
     /// Return the cost of multigrid, `times` that of a matrix of all bodies.
     fn multigrid(&self, times: f64) -> Cost {
         let n = self.dofs as f64;
@@ -125,25 +148,25 @@ impl BodySize {
     ///
     /// A cube with n dofs takes 19 n^2 operations, measured on blocks of 32 000 to 500 000 dofs, and no body takes more. A plate with m x m columns of k
     /// nodes is a plane grid of such columns, which takes some 20 m^3 (3 k)^3: the fraction 3.2 k/m of a cube with as many nodes, which is about its compactness.
-    fn factored(&self) -> Cost {
+    fn factored(&self, is_condensed: bool) -> Cost {
         let n = self.dofs as f64;
         let fill = if self.is_quadratic { FILL_P2 } else { 1.0 };
         let seconds = 19.0 * n * n * self.compactness * fill / RATE + FACTORED * PRODUCT * n;
         // a body that is not condensed is factored in each step
-        let times = if self.interface.is_some() { 1.0 } else { STEPS };
+        let times = if is_condensed { 1.0 } else { STEPS };
         Cost { seconds: times * seconds, bytes: 220.0 * pow(n, 4.0 / 3.0) }
     }
 }
 
 /// Return the estimated bytes of the sparse Cholesky factor of a plane body by nested dissection. They grow as n log n; the constant was
 /// measured on blocks of 32 000 to 500 000 dofs.
-pub fn plane_factor_bytes(dofs: usize) -> usize {
+fn plane_factor_bytes(dofs: usize) -> usize {
     let n = dofs as f64;
     (60.0 * n * log2(n + 2.0)) as usize
 }
 
 /// Return the bytes of a condensed body besides its sparse factor: S with its pattern, G, and the factor of G.
-pub fn condensed_bytes(interface: usize) -> usize {
+fn condensed_bytes(interface: usize) -> usize {
     36 * interface * interface
 }
 

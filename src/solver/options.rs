@@ -24,6 +24,12 @@ use std::rc::{Rc, Weak};
 pub struct UserOptions(Vec<Entry>);
 
 impl UserOptions {
+    /// Return options with these names, which begin with a dash, and values.
+    #[cfg(test)]
+    pub fn of_test(options: &[(&str, &str)]) -> Self {
+        Self(options.iter().map(|(name, value)| ((*name).to_owned(), Some((*value).to_owned()))).collect())
+    }
+
     /// Read the options of a session.
     pub fn read(session: &Session) -> Self {
         Self(session.options().typed())
@@ -159,6 +165,19 @@ impl Chosen {
     /// Return whether the user wrote an option whose name begins with `family`.
     pub fn has_typed_of(&self, family: &str) -> bool {
         self.all_typed().any(|(name, _)| name.starts_with(family))
+    }
+
+    /// Return whether a preconditioner that the user wrote, also a nested one, does not work with rows on several ranks.
+    pub fn is_for_one_rank(&self) -> bool {
+        let works = |name: &str, value: &str| match value {
+            "hypre" | "gamg" | "jacobi" | "pbjacobi" | "none" | "mg" => true,
+            "cholesky" | "lu" => {
+                let package = name.replace("pc_type", "pc_factor_mat_solver_type");
+                self.typed(&package).is_none_or(|package| package == "mumps")
+            }
+            _ => false,
+        };
+        self.all_typed().any(|(name, value)| name.ends_with("pc_type") && !works(name, value))
     }
 
     /// Put the options into PETSc's table, and return the group of solvers that has them. They leave it with the last solver that holds the group.
@@ -325,14 +344,10 @@ pub fn show_help(session: &Session) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn typed(options: &[(&str, &str)]) -> UserOptions {
-        UserOptions(options.iter().map(|(name, value)| ((*name).to_owned(), Some((*value).to_owned()))).collect())
-    }
-
     #[test]
     fn own_options_win_over_those_of_all_and_over_defaults() {
-        let typed =
-            typed(&[("-KSP_type", "gmres"), ("-b_1_pc_type", "icc"), ("-b_ksp_type", "cg"), ("-pc_type", "lu")]);
+        let options = [("-KSP_type", "gmres"), ("-b_1_pc_type", "icc"), ("-b_ksp_type", "cg"), ("-pc_type", "lu")];
+        let typed = UserOptions::of_test(&options);
         let mut chosen = typed.of("b");
         chosen.set_default("pc_type", "hypre");
         chosen.set_default("ksp_rtol", "1e-6");
@@ -352,7 +367,7 @@ mod tests {
         for (name, asks) in
             [("-mat_mumps_icntl_14", false), ("-log_view", false), ("-ksp_view", false), ("-b_ksp_rtol", true)]
         {
-            let mut chosen = typed(&[(name, "1")]).of("b");
+            let mut chosen = UserOptions::of_test(&[(name, "1")]).of("b");
             chosen.set_default("pc_type", "gamg");
             assert_eq!(chosen.asks_for_ksp(), asks, "{name}");
         }
@@ -360,7 +375,7 @@ mod tests {
 
     #[test]
     fn factorisations_are_those_of_mumps() {
-        let mut chosen = typed(&[("-pc_type", "asm"), ("-sub_pc_type", "lu")]).of("b");
+        let mut chosen = UserOptions::of_test(&[("-pc_type", "asm"), ("-sub_pc_type", "lu")]).of("b");
         chosen.prefer_mumps();
         let package = |nest: &str| chosen.get(&format!("{nest}pc_factor_mat_solver_type"));
         assert_eq!([package("sub_"), package("")], [Some("mumps"), None]);

@@ -1,6 +1,6 @@
 //! The inner solver that a body gets when the user typed no PETSc option, and the default options of each.
 
-use super::cost;
+use super::cost::{self, BodyFacts};
 use super::options::Chosen;
 use crate::error::{Error, Kind, Result};
 use crate::petsc::HAS_HYPRE;
@@ -62,32 +62,13 @@ const TOLERANCE: &str = "1e-6";
 /// Number of interface dofs up to which the cost of a dense factorisation need not be compared.
 const SMALL: usize = 300;
 
-/// The sizes on which the choice of a solver in the plane depends.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Size {
-    /// Number of dofs of the body.
-    pub dofs: usize,
-    /// Number of dofs that a condensed body would retain.
-    pub interface: usize,
-    /// Bytes of memory that are left after the solvers of earlier bodies.
-    pub memory: usize,
-}
-
-impl Size {
-    /// Return the estimated bytes of a solver that factors, for a plane body.
-    pub fn bytes(&self, preset: Preset) -> usize {
-        let dense = if preset == Preset::Condensed { cost::condensed_bytes(self.interface) } else { 0 };
-        cost::plane_factor_bytes(self.dofs) + dense
-    }
-}
-
 /// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
-/// lack of memory speaks against it. In space [`cost`] decides.
-pub fn in_plane(size: &Size) -> (Preset, String) {
-    let &Size { dofs, interface, memory } = size;
+/// lack of memory speaks against it; `memory` are the bytes that earlier bodies have left. In space [`cost`] decides.
+pub fn in_plane(body: &BodyFacts, memory: usize) -> (Preset, String) {
+    let &BodyFacts { dofs, interface, .. } = body;
     let what = format!("{dofs} dofs in the plane, {interface} of them on the contact");
-    let megabytes = |preset: Preset| size.bytes(preset) / 1_000_000;
-    let fits = |preset: Preset| size.bytes(preset) < memory;
+    let megabytes = |preset: Preset| body.bytes_in_plane(preset) / 1_000_000;
+    let fits = |preset: Preset| body.bytes_in_plane(preset) < memory;
     // some dofs can be eliminated, and some remain
     let can_condense = (1..dofs).contains(&interface);
     let dense = (interface as f64).powi(3) / 3.0;
@@ -183,10 +164,12 @@ mod tests {
     /// Bodies in the plane are condensed where that pays, and multigrid is for a factor that does not fit into memory.
     #[test]
     fn a_body_in_the_plane_is_condensed_where_that_pays() {
-        let size = Size { dofs: 98_000, interface: 1024, memory: 8_000_000_000 };
-        assert_eq!(in_plane(&size).0, Preset::Condensed);
+        let block = BodyFacts { dofs: 98_000, interface: 1024, ..BodyFacts::default() };
+        let preset = |body: &BodyFacts, memory: usize| in_plane(body, memory).0;
+        assert_eq!(preset(&block, 8_000_000_000), Preset::Condensed);
         // a sheet whose dofs are mostly on the contact gains nothing by condensation
-        assert_eq!(in_plane(&Size { dofs: 40_000, interface: 20_000, ..size }).0, Preset::Mumps);
-        assert_eq!(in_plane(&Size { memory: 50_000_000, ..size }).0, Preset::Hypre);
+        let sheet = BodyFacts { dofs: 40_000, interface: 20_000, ..BodyFacts::default() };
+        assert_eq!(preset(&sheet, 8_000_000_000), Preset::Mumps);
+        assert_eq!(preset(&block, 50_000_000), Preset::Hypre);
     }
 }
