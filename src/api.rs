@@ -37,7 +37,7 @@
 pub use crate::contact::law::{LayerLaw, PerPoint, Response};
 pub use crate::data::{Data, DataSpec, Detrend, Interpolation, Library, Outside};
 pub use crate::ddm::gamma::{GammaRule, Iterate};
-pub use crate::ddm::{Inaccuracy, Observer, Row, Silent, Status};
+pub use crate::ddm::{Observer, Row, Silent, Status};
 pub use crate::error::{Error, Kind, Result};
 pub use crate::expression::Field;
 pub use crate::model::field::Unbounded;

@@ -12,13 +12,13 @@ mod groups;
 mod marks;
 mod mechanism;
 pub mod meshes;
+mod owned;
 mod pairs;
 mod partition;
 mod patterns;
 mod post;
 mod prepare;
 mod rigid;
-mod share;
 mod supports;
 mod surface;
 mod verify;
@@ -30,7 +30,6 @@ pub use facts::BodyInfo;
 pub use marks::marks;
 pub use pairs::ContactFacts;
 pub use post::ForceBalance;
-pub use prepare::StepSpecs;
 pub use rigid::Obstacle;
 pub use verify::{Verified, verify};
 
@@ -74,7 +73,7 @@ pub struct Discrete {
 /// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
 /// assembles it.
 ///
-/// `specs` are the bodies of `verified` and the contacts of the scene under the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
+/// `scene` has the bodies of `verified`, with the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
 /// `factory` turns each body of this rank into one with a solver. `keep` requests that the meshes are kept for an estimate of the
 /// error.
 ///
@@ -84,7 +83,6 @@ pub struct Discrete {
 pub fn discretize<const D: usize>(
     scene: &Scene,
     verified: &Verified<D>,
-    specs: StepSpecs,
     cut: contact::pieces::Cut<D>,
     keep: bool,
     exchange: Rc<dyn Exchange>,
@@ -96,12 +94,12 @@ where
 {
     let mut prepared = None;
     let shared = broadcast(&*exchange, || {
-        let (shared, whole) = prepare(scene, verified, specs, cut, keep, exchange.ranks(), factory)?;
+        let (shared, whole) = prepare(scene, verified, cut, keep, exchange.ranks(), factory)?;
         prepared = Some(whole);
         Ok(shared)
     })?;
     let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
-    let of_pairs: Vec<ContactSpec> = contacts.iter().map(|contact| contact.spec(specs.contacts)).collect();
+    let of_pairs: Vec<ContactSpec> = contacts.iter().map(|contact| contact.spec(&scene.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
         factory.adopt(plan);
@@ -114,7 +112,7 @@ where
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
     for (body, local) in locals.into_iter().enumerate() {
         if let Some(local) = local {
-            assembler.make(&specs.bodies[body], local, &mut slots[body], &mut infos[body])?;
+            assembler.make(&scene.bodies[body], local, &mut slots[body], &mut infos[body])?;
         }
     }
     let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
@@ -145,8 +143,8 @@ where
     };
     let part = |rank| prepared.as_ref().map_or_else(Vec::new, |whole| whole.on(rank));
     let mut locals: Vec<Option<BodyMesh<D>>> = scatter(&**exchange, part)?;
-    for share in locals.iter_mut().flatten().filter_map(|local| local.share.as_mut()) {
-        share.distribution.exchange = exchange.clone();
+    for owned in locals.iter_mut().flatten().filter_map(|local| local.owned.as_mut()) {
+        owned.distribution.exchange = exchange.clone();
     }
     Ok(locals)
 }

@@ -117,7 +117,7 @@ pub fn estimate(
     to_dofs(meshes, model, &mut loads);
 
     let NodalErrors { field, closing, energy: nodal } = nodal_errors(model, step, layer, &loads, &mean_error)?;
-    let products = step.multiply(model, &iterate.states);
+    let products = step.multiply(model, &iterate.displacements);
     let mut strain = [residual(model, products, iterate, &vec![0.0; model.points()]).1.strain];
     model.exchange.sum(&mut strain);
     let reference = strain[0] - held.energy + layer.work;
@@ -152,14 +152,14 @@ pub fn estimate(
 /// Return the displacements of all nodes of each body, on the rank that owns it. Collective.
 fn displacements(meshes: &dyn Meshes, model: &Model, iterate: &Field) -> Result<Vec<Option<Vec<f64>>>> {
     let mut all = Vec::new();
-    for (index, (state, rigid)) in iterate.states.iter().zip(&iterate.rigid).enumerate() {
+    for (index, (state, rigid)) in iterate.displacements.iter().zip(&iterate.rigid).enumerate() {
         let slot = &model.bodies[index];
         let Some(body) = slot.local.as_ref().filter(|_| !slot.is_rigid) else {
             all.push(None);
             continue;
         };
-        let u = body.recover(&body.states().join(state, rigid))?;
-        all.push(body.states().leads().then(|| meshes.displacements(index, &u)));
+        let u = body.recover(&body.dofs().join(state, rigid))?;
+        all.push(body.dofs().leads().then(|| meshes.displacements(index, &u)));
     }
     Ok(all)
 }

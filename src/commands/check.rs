@@ -57,8 +57,8 @@ fn to_json(built: &Built, settings: Value, headline: Value) -> Value {
     value["message"] = json!(built.choice);
     for (info, body) in built.discrete.bodies.iter().zip(0..) {
         value["bodies"][body]["supported"] = json!(info.supported);
-        value["bodies"][body]["rigid_motions"] = json!(info.left_by_supports);
-        value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.left_by_all);
+        value["bodies"][body]["rigid_motions"] = json!(info.unconstrained);
+        value["bodies"][body]["rigid_motions_unconstrained"] = json!(info.unresisted);
     }
     value["pairs"] = (0..built.discrete.model.pairs.len()).map(|i| pair_to_json(built, i)).collect();
     value
@@ -104,11 +104,11 @@ fn each_body(built: &Built) -> Vec<String> {
             "  body {}: {} cells, {} nodes, {} dofs, {} of them supported",
             info.name, info.cells, info.nodes, info.dofs, info.supported
         ));
-        if !info.left_by_supports.is_empty() {
-            lines.push(format!("    rigid motions left to contact: {}", info.left_by_supports.join("; ")));
+        if !info.unconstrained.is_empty() {
+            lines.push(format!("    rigid motions left to contact: {}", info.unconstrained.join("; ")));
         }
-        if !info.left_by_all.is_empty() {
-            lines.push(format!("    rigid motions that nothing can hold: {}", info.left_by_all.join("; ")));
+        if !info.unresisted.is_empty() {
+            lines.push(format!("    rigid motions that nothing can hold: {}", info.unresisted.join("; ")));
         }
     }
     lines
@@ -139,8 +139,8 @@ fn all_bodies(built: &Built) -> Vec<String> {
             || format!("    rigid motions {what}: of {} bodies, {}", names.len(), in_words(names.iter().copied()));
         (!names.is_empty()).then(line)
     };
-    lines.extend(named("left to contact", |info| &info.left_by_supports));
-    lines.extend(named("that nothing can hold", |info| &info.left_by_all));
+    lines.extend(named("left to contact", |info| &info.unconstrained));
+    lines.extend(named("that nothing can hold", |info| &info.unresisted));
     lines
 }
 

@@ -15,7 +15,7 @@ use crate::output::{
 };
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
-use crate::run::{self, All, Clock, Done, Prepared, Recorder, Requests, report, results, verdict};
+use crate::run::{self, All, Clock, Done, Prepared, Recorder, report, results, verdict};
 use std::path::PathBuf;
 
 /// The command line of `winkler solve`.
@@ -67,7 +67,6 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     let mut solver = Solver {
         session,
         interrupt,
-        requests: Requests(interrupt.clone()),
         folder,
         terminal,
         clock,
@@ -98,7 +97,6 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
 struct Solver<'s> {
     session: &'s Session,
     interrupt: &'s Interrupt,
-    requests: Requests,
     folder: Folder,
     terminal: Terminal,
     clock: Clock,
@@ -320,7 +318,7 @@ impl Observer for Solver<'_> {
     }
 
     fn asked(&self) -> u8 {
-        self.requests.asked()
+        Observer::asked(self.interrupt)
     }
 }
 

@@ -14,7 +14,7 @@ use crate::output::tables::{contact_column, vector_columns, vector_fields};
 use crate::output::{Folder, LISTED, Report, RowFile, busiest, say, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::run::{self, Begin, Built, Clock, Done, Prepared, Requests, report, results, verdict};
+use crate::run::{self, Begin, Built, Clock, Done, Prepared, report, results, verdict};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
@@ -66,7 +66,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         plots: Plots::default(),
         reports: Vec::new(),
     };
-    let mut requests = Requests(interrupt.clone());
+    let mut requests = interrupt.clone();
     let (mut exit, mut before) = (0, None);
     for (case, scene) in plan.cases.iter().zip(&scenes) {
         let mut clock = Clock::default();

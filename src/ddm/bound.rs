@@ -77,16 +77,14 @@ impl Reached {
     ) -> Self {
         let Equilibrium { compression, roundoff, pressure, rho } = *state;
         let (mut gap, mut mismatch, mut is_bound) = (0.0, 0.0f64, step.is_exact);
-        for (i, pair) in model.pairs.iter().enumerate() {
-            for q in model.range(i) {
-                let (point, weight, p) = (q - model.offset[i], model.weight[q], pressure[q]);
-                let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
-                let changed = (p - layer.pressure[q]).powi(2) / rho[q];
-                mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
-                let is_on_side = p >= 0.0 || pair.law.is_bonded();
-                gap += weight * if is_on_side { pair.law.duality_gap(point, c, p) } else { changed };
-                is_bound &= is_on_side;
-            }
+        for (q, pair, point) in model.each_point() {
+            let p = pressure[q];
+            let c = nearest(&*pair.law, point, compression[q], roundoff[q], p);
+            let changed = (p - layer.pressure[q]).powi(2) / rho[q];
+            mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
+            let is_on_side = p >= 0.0 || pair.law.is_bonded();
+            gap += model.weight[q] * if is_on_side { pair.law.duality_gap(point, c, p) } else { changed };
+            is_bound &= is_on_side;
         }
         let (linear, energy) = (step.error, strain + layer.work);
         let absolute = (2.0 * gap).sqrt() + linear;

@@ -94,9 +94,9 @@ pub fn respond(
             residual.push(vec![0.0; count]);
             continue;
         }
-        let reduced = slot.local.as_mut().map(|body| body.reduce(load)).transpose()?.unwrap_or_default();
-        residual.push(reduced.force);
-        work[0] += reduced.work;
+        let (force, inside) = slot.local.as_mut().map(|body| body.reduce(load)).transpose()?.unwrap_or_default();
+        residual.push(force);
+        work[0] += inside;
     }
     model.exchange.sum(&mut work);
     let springs = resisting(model, layer);
@@ -106,23 +106,15 @@ pub fn respond(
 }
 
 /// Stiffness, as a share of the springs of whole surfaces, that resists motions which no closed contact resists: such motions then go far, but not
-/// without end.
-const PROXIMAL: f64 = 1e-3;
+/// without end. How far is not what this share decides: where these springs carry a force, a descent chooses the length of the step.
+const STAND_IN: f64 = 1e-3;
 
 /// The springs of a linear step.
 pub struct Springs {
     /// omega kappa, with those that were added, n.
     pub all: Vec<f64>,
-    /// Those that stand in for a contact, which resists the motions of bodies together only when it has closed.
-    pub added: Vec<Spring>,
-}
-
-/// A spring at a contact point.
-pub struct Spring {
-    /// Number of the point.
-    pub at: usize,
-    /// Force over closing.
-    pub stiffness: f64,
+    /// Those that stand in for a contact, which resists the motions of bodies together only when it has closed, n.
+    pub added: Vec<f64>,
 }
 
 /// Return the springs omega kappa of a linear step from `layer`, n, with one more for every rigid motion of the bodies together that is otherwise
@@ -132,7 +124,7 @@ pub struct Spring {
 /// the closed points. Then a single spring carries nothing, and the step is exact; several springs would carry forces. Of the points that the motion closes
 /// at least half as much as any, it is that of the least gap: over a wide one it would tie the body to another that a support carries along.
 pub fn resisting(model: &Model, layer: &Layer) -> Springs {
-    let (motions, mut all, mut added) = (Motions::of(model), layer.springs(model), Vec::new());
+    let (motions, mut all, mut added) = (Motions::of(model), layer.springs(model), vec![0.0; model.points()]);
     // compared with a new spring, softer ones may be rounding, so that another motion is unresisted
     for _ in 0..motions.count() {
         let mut free = motions.springs(&all).factor().kernel();
@@ -149,9 +141,9 @@ pub fn resisting(model: &Model, layer: &Layer) -> Springs {
                 break;
             };
             let shares = closing.iter().map(|s| (s / closing[at]).powi(2));
-            let spring = PROXIMAL * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
+            let spring = STAND_IN * shares.zip(&surfaces).map(|(share, surface)| share * surface).sum::<f64>();
             all[at] += spring;
-            added.push(Spring { at, stiffness: spring });
+            added[at] += spring;
             // take this motion out of the others, so that they close nothing at that point
             for other in &mut free {
                 let share = motions.closing(other)[at] / closing[at];

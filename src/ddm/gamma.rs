@@ -61,21 +61,21 @@ impl GammaRule for Schedule {
     }
 }
 
-/// gamma^k minimises F1 along the correction. F1 is convex, so it falls in every step.
+/// gamma^k minimises F1 along the correction, to six digits of its slope. F1 is convex, so it falls in every step.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct LineSearch;
 
 impl GammaRule for LineSearch {
     fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
         let z = &here.sweep.correction;
-        let products = here.model.multiply(&z.states);
+        let products = here.model.multiply(&z.displacements);
         LineEnergy::new(here.model, here.layer, &here.sweep.residual, z, &products).minimize(1e-6)
     }
 }
 
 /// gamma^k = -gamma^{k-1} z^{k-1}.(z^k - z^{k-1}) / |z^k - z^{k-1}|^2 on the traces: the secant of the fixed point map.
 ///
-/// A value outside of (0, 10), as where contact changes the most, is replaced by the exact line search.
+/// A value outside of (0, 10), as where contact changes the most, is replaced by the exact line search: a secant that goes farther than ten steps extrapolates.
 #[derive(Debug, Default)]
 pub struct Aitken {
     last: Option<(f64, Vec<f64>)>,

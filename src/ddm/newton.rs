@@ -13,11 +13,11 @@
 //! ([`Newton::descend`]).
 
 use super::bound::{EXACT, Reached, compression_roundoff};
-use super::forcing::{Forcing, Spring, resisting};
+use super::forcing::{Forcing, resisting};
 use super::run::{Outcome, Row, Run};
 use super::start::SEARCH;
-use super::step::{Equilibrium, Progress, StepLength, WholeStep};
-use super::stop::{Attained, Stagnation, Status};
+use super::step::{Equilibrium, Progress, StepLength};
+use super::stop::{Stagnation, Status};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -27,20 +27,20 @@ use crate::model::layer::Layer;
 use crate::model::linear::{LinearResult, LinearSolution, LinearStep, System, Trial};
 
 /// Relative error of the linear system that shows what is left of equilibrium: only its size is wanted.
-const HALF: f64 = 0.5;
+const LOOK: f64 = 0.5;
 
 /// Relative error above which the first linear step from the states of another solution does not end. Displacements are zero before it, and the
 /// first iterations of a solver leave them so far from the laws that [`Forcing`] would take them for settled, with all points closed. The last adapted
 /// meshes of a bearing cap and of a fishplate take 2 steps, instead of 10 and 6. With 0.03 and 0.01 the cap takes 3 and 2 steps, and more
 /// iterations. Spheres, flanges, a T-slot nut and a clamp take as many steps as without this limit.
-const NEAR: f64 = 0.1;
+const FIRST_STEP: f64 = 0.1;
 
 /// Share of the tolerance below which an error in the energy norm changes nothing in the digits that are asked for.
 const UNSEEN: f64 = 0.01;
 
 /// Distance from 1 of the length of a descent at which the descent ends. Lengths tend to 1 where Newton's method for F1 converges fast. With 0.2 none of
 /// 900 random scenes and none of 320 scenes with saturating layers was lost.
-const WHOLE: f64 = 0.2;
+const WHOLE_STEP: f64 = 0.2;
 
 /// Iterate from displacements and layer states until a rule ends the run. `is_near` is whether the states are those of another solution, while the
 /// displacements are still at rest.
@@ -90,8 +90,8 @@ struct Newton<'n, 'r> {
     start: Option<Field>,
     /// States of the layers from which the next linear step is taken.
     states: Layer,
-    /// Springs that stood in for a contact in the last linear step.
-    added: Vec<Spring>,
+    /// Springs that stood in for a contact in the last linear step, n.
+    added: Vec<f64>,
     /// Whether the states are those of another solution, while the displacements are still at rest.
     is_near: bool,
 }
@@ -144,11 +144,11 @@ impl Newton<'_, '_> {
         let springs = resisting(model, states);
         self.added = springs.added;
         let compression = model.compression(&self.u.trace);
-        let products = self.linear.multiply(model, &self.u.states);
+        let products = self.linear.multiply(model, &self.u.displacements);
         let (residual, _) = residual(model, products, &self.u, &model.forces(&states.linear(&compression)));
         let rho = self.progress.slopes(model, states);
         let scale = (self.tolerance, &self.run.scale);
-        let limit = if std::mem::take(&mut self.is_near) { NEAR } else { 1.0 };
+        let limit = if std::mem::take(&mut self.is_near) { FIRST_STEP } else { 1.0 };
         let roughest = limit.min(self.linear.roughest());
         let mut forcing = Forcing::new(states, compression, &rho, scale, roughest);
         let mut enough = |model: &Model, trial: &Trial| forcing.is_enough(model, trial);
@@ -167,16 +167,15 @@ impl Newton<'_, '_> {
         let before = model.compression(&self.u.trace);
         let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
         let roundoff = compression_roundoff(model, &self.u.trace);
-        let pressure = &self.states.linear(&whole)[..];
-        let step = WholeStep { from: &before, roundoff: &roundoff, compression: &whole, pressure };
-        self.progress.step_length(model, &self.states, &step)
+        let pressure = self.states.linear(&whole);
+        self.progress.step_length(model, &self.states, [&before, &roundoff], [&whole, &pressure])
     }
 
     /// Return whether springs that stand in for a contact take more of a step's energy than the accuracy of a line search. The step then has the direction
     /// in which loads push the bodies, but a length that those springs chose, which says nothing of where the bodies meet.
     fn is_unresisted(&self, step: &LinearSolution) -> bool {
         let closing = step.field.closing();
-        let taken: f64 = self.added.iter().map(|spring| spring.stiffness * closing[spring.at].powi(2)).sum();
+        let taken: f64 = self.added.iter().zip(closing).map(|(spring, s)| spring * s.powi(2)).sum();
         taken > SEARCH * step.energy
     }
 
@@ -192,7 +191,7 @@ impl Newton<'_, '_> {
                 (self.u, self.run.model.gap) = (start, gap);
                 return Ok(false);
             };
-            if length == 0.0 || (length - 1.0).abs() <= WHOLE || self.is_asked() {
+            if length == 0.0 || (length - 1.0).abs() <= WHOLE_STEP || self.is_asked() {
                 break;
             }
         }
@@ -222,7 +221,7 @@ impl Newton<'_, '_> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
         let springs = resisting(model, &layer);
-        let products = self.linear.multiply(model, &self.u.states);
+        let products = self.linear.multiply(model, &self.u.displacements);
         let (residual, _) = residual(model, products, &self.u, &layer.force);
         let roughest = self.linear.roughest();
         let mut enough = |_: &Model, trial: &Trial| trial.is_within(roughest);
@@ -234,7 +233,7 @@ impl Newton<'_, '_> {
             enough: &mut enough,
         };
         let Ok(step) = self.linear.solve(system)? else { return Ok(None) };
-        let products = self.linear.multiply(model, &step.field.states);
+        let products = self.linear.multiply(model, &step.field.displacements);
         let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field, &products).minimize(SEARCH) else {
             return Ok(None);
         };
@@ -264,7 +263,7 @@ impl Newton<'_, '_> {
     fn measure(&mut self, iterate: &StepResult) -> Result<Measured> {
         let StepResult { step, resolved, .. } = iterate;
         let run = &mut *self.run;
-        let products = self.linear.multiply(run.model, &self.u.states);
+        let products = self.linear.multiply(run.model, &self.u.displacements);
         let (rest, energy) = residual(run.model, products, &self.u, &run.model.forces(&iterate.pressure));
         let sums = self.sum(&rest, energy);
         let run = &mut *self.run;
@@ -293,7 +292,7 @@ impl Newton<'_, '_> {
         let model = &*self.run.model;
         let unbalanced = unbalanced(model, rest, &self.states.springs(model));
         let mut sums = vec![energy.strain, energy.potential, unbalanced, 0.0, 0.0];
-        for body in model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.states().leads()) {
+        for body in model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.dofs().leads()) {
             let counts = body.counts();
             sums[3] += counts.factorizations as f64;
             sums[4] += counts.inner_iterations as f64;
@@ -308,7 +307,7 @@ impl Newton<'_, '_> {
     fn look(&mut self, iterate: &StepResult, measured: &mut Measured) -> Result<Option<LinearSolution>> {
         let (run, layer) = (&mut *self.run, &self.states);
         let springs = resisting(run.model, layer);
-        let mut enough = |_: &Model, trial: &Trial| trial.is_within(HALF);
+        let mut enough = |_: &Model, trial: &Trial| trial.is_within(LOOK);
         let before = self.linear.counts();
         let system =
             System { model: run.model, layer, springs: &springs.all, residual: &measured.rest, enough: &mut enough };
@@ -329,7 +328,7 @@ impl Newton<'_, '_> {
         let is_enough = |error: f64| self.run.stop.residual.is_some_and(|tolerance| error <= tolerance);
         let seems_enough = is_enough(measured.reached.worst());
         let (error, fall) = (measured.reached.worst(), iterate.part.fall);
-        let stagnates = self.stagnation.note(Attained { error, energy: measured.f1, fall, is_smoothed });
+        let stagnates = self.stagnation.note(error, measured.f1, fall, is_smoothed);
         if seems_enough || stagnates {
             self.look(iterate, measured)?;
         }

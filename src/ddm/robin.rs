@@ -158,15 +158,8 @@ const FALLEN: f64 = 0.1;
 /// changes by 1 - s of its earlier error. So s/(1 - s) of that change is left as its error.
 #[derive(Debug, Default)]
 struct Settling {
-    past: Vec<PastIterate>,
-}
-
-/// An earlier iterate.
-#[derive(Debug)]
-struct PastIterate {
-    residual: f64,
-    /// n.
-    pressure: Vec<f64>,
+    /// Residual and pressures, n, of each.
+    past: Vec<(f64, Vec<f64>)>,
 }
 
 impl Settling {
@@ -174,20 +167,20 @@ impl Settling {
     /// count as the peak: laws are far from linear there, so that larger errors say nothing about those that follow.
     fn error(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
         // from a good start the residual may never have fallen so far
-        let earlier = self.past.iter().rfind(|earlier| residual <= FALLEN * earlier.residual).or(self.past.first());
-        earlier.map_or(0.0, |earlier| {
-            let changes = earlier.pressure.iter().zip(now).map(|(before, now)| (now - before).abs());
+        let earlier = self.past.iter().rfind(|(earlier, _)| residual <= FALLEN * earlier).or(self.past.first());
+        earlier.map_or(0.0, |(earlier, pressure)| {
+            let changes = pressure.iter().zip(now).map(|(before, now)| (now - before).abs());
             let change = changes.fold(0.0, f64::max).min(peak);
             // without a fall of the residual, no smaller error is known
-            if residual < earlier.residual { change * residual / (earlier.residual - residual) } else { change }
+            if residual < *earlier { change * residual / (earlier - residual) } else { change }
         })
     }
 
     /// Note an iterate.
     fn note(&mut self, residual: f64, pressure: &[f64]) {
-        self.past.retain(|earlier| earlier.residual > residual);
-        if self.past.last().is_none_or(|earlier| residual <= FALLEN * earlier.residual) {
-            self.past.push(PastIterate { residual, pressure: pressure.to_vec() });
+        self.past.retain(|(earlier, _)| *earlier > residual);
+        if self.past.last().is_none_or(|(earlier, _)| residual <= FALLEN * earlier) {
+            self.past.push((residual, pressure.to_vec()));
         }
     }
 }

@@ -5,7 +5,7 @@ use super::forcing::resisting;
 use super::gamma::GammaRule;
 use super::run::{Observer, Outcome, Run};
 use super::start::{self, RigidStart};
-use super::stop::{Inaccuracy, Status};
+use super::stop::Status;
 use super::{newton, robin};
 use crate::error::Result;
 use crate::linalg::axpy;
@@ -16,6 +16,7 @@ use crate::model::linear::LinearStep;
 use crate::model::rigid::{self, Motions, Moved};
 use crate::problem::method::StopRule;
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
+use crate::solver::preset::INNER_TOLERANCE;
 use nalgebra::DVector;
 use std::time::Instant;
 
@@ -92,7 +93,7 @@ impl Run<'_> {
         let RigidStart { layer: states, amounts, mut trace } = first_states(self.model, &start, rigid);
         let is_known = matches!(start, InitialGuess::Known(_));
         let known = match start {
-            InitialGuess::Known(solution) if !solution.field.states.is_empty() => {
+            InitialGuess::Known(solution) if !solution.field.displacements.is_empty() => {
                 Some(solution.field.supported(self.model))
             }
             _ => None,
@@ -164,14 +165,14 @@ impl Run<'_> {
         let is_balanced = end.unbalanced <= TIMES * tolerance.max(reached);
         // NaN is no balance
         if !is_balanced {
-            return Status::Inaccurate(Inaccuracy::Unbalanced(end.unbalanced));
+            return Status::Unbalanced(end.unbalanced);
         }
         let lost = if end.status == Status::RoundoffLimited { reached.max(rounding) } else { rounding };
         if lost > ONE_DIGIT {
-            return Status::Inaccurate(Inaccuracy::Roundoff(lost));
+            return Status::NoDigits(lost);
         }
         let tolerance = self.stop.increment.map_or(tolerance, |increment| increment.max(tolerance));
-        if rounding > TIMES * tolerance.max(INNER) { Status::RoundoffLimited } else { end.status.clone() }
+        if rounding > TIMES * tolerance.max(INNER_TOLERANCE) { Status::RoundoffLimited } else { end.status.clone() }
     }
 }
 
@@ -183,9 +184,6 @@ fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// A run reports unbalanced forces, or the roundoff of pressures, if they are larger than this number of tolerances. The norms in which the two are measured
 /// differ by less than a factor of ten.
 const TIMES: f64 = 10.0;
-
-/// Default relative tolerance of an inner solver: roundoff below it is not told.
-const INNER: f64 = 1e-6;
 
 /// Relative error beyond which a number has no correct digit. A run that rounding ended there has no result.
 const ONE_DIGIT: f64 = 0.1;

@@ -18,7 +18,6 @@
 //! Two quantities count as zero below [`PART`] of what they could be. Forces out of balance: the elastic bodies change the start by more. Closings
 //! of a motion: rounding and proximal springs make some. A motion that is resisted at a meshed circle of 1000 edges closes 1e-5 of itself.
 
-use crate::contact::ContactPair;
 use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{self, Unbounded};
@@ -38,11 +37,11 @@ pub struct RigidStart {
 }
 
 /// Stiffness of the springs that resist every motion, as a share of rho0. With them, a step along a motion that no closed contact resists is finite,
-/// and the line search takes it as far as the next contact. A step then closes pressed contacts by this share of the opening of others.
+/// and the line search takes it as far as the next contact. A step then closes pressed contacts by this share of the opening of others, far less than [`PART`].
 const PROXIMAL: f64 = 1e-9;
 
 /// Most Newton steps; random scenes and walls of 4096 bricks take 2 to 20.
-const STEPS: usize = 200;
+const MOST_STEPS: usize = 200;
 
 /// Accuracy of line searches, relative to the first slope. A step is only a way to the next, and the energy falls with any accuracy below one.
 pub(super) const SEARCH: f64 = 1e-3;
@@ -139,9 +138,8 @@ impl Rigid<'_> {
     /// A motion along which the energy falls for ever.
     fn descend(&self, mut amounts: DVector<f64>) -> Result<DVector<f64>, DVector<f64>> {
         let largest = self.work.amax();
-        let of_pair = |(i, pair): (usize, &ContactPair)| vec![pair.law.is_bonded(); self.model.range(i).len()];
-        let bonded: Vec<bool> = self.model.pairs.iter().enumerate().flat_map(of_pair).collect();
-        for _ in 0..STEPS {
+        let bonded: Vec<bool> = self.model.each_point().map(|(_, pair, _)| pair.law.is_bonded()).collect();
+        for _ in 0..MOST_STEPS {
             let layer = self.states(&amounts);
             let push = self.motions.work(&layer.force);
             let acting = self.motions.sizes(&layer.force);

@@ -35,24 +35,9 @@ pub(super) struct Progress {
 /// How often a step is halved: to less than a hundredth. From 3 to 14 times 4000 random scenes took the same number of steps within a per cent.
 const HALVINGS: i32 = 7;
 
-/// Length of a step that comes nearer to the laws at no tried length, where F1 cannot fall either: half of the least tried one.
-const SHORTEST: f64 = 1.0 / (1 << HALVINGS) as f64;
-
 /// Share of a step's length by which the squared distance from the laws must fall (Armijo's rule with its usual constant). Of 540 random scenes all had
 /// the same histories as with zero.
-const FALLS: f64 = 1e-4;
-
-/// A whole linear step, n each.
-pub(super) struct WholeStep<'a> {
-    /// Compressions at its beginning.
-    pub from: &'a [f64],
-    /// Error of these by roundoff.
-    pub roundoff: &'a [f64],
-    /// Compressions at its end.
-    pub compression: &'a [f64],
-    /// Pressures there.
-    pub pressure: &'a [f64],
-}
+const ARMIJO: f64 = 1e-4;
 
 /// The part of a linear step that is taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,9 +99,15 @@ impl Progress {
         }
     }
 
-    /// Return the length of a step: the part of the way that comes nearer to the laws with the smoothing of `states`, from which the step is taken.
-    pub fn step_length(&mut self, model: &Model, states: &Layer, step: &WholeStep) -> StepLength {
-        let &WholeStep { from, roundoff, compression: c, pressure: p } = step;
+    /// Return the length of a step from the compressions `from`, known to their `roundoff`, to the compressions c and the pressures p, n each: the part of the way
+    /// that comes nearer to the laws with the smoothing of `states`, from which the step is taken.
+    pub fn step_length(
+        &mut self,
+        model: &Model,
+        states: &Layer,
+        [from, roundoff]: [&[f64]; 2],
+        [c, p]: [&[f64]; 2],
+    ) -> StepLength {
         if self.pressure.is_empty() {
             return StepLength { length: 1.0, fall: 1.0, is_lost: false, is_measured: false };
         }
@@ -129,8 +120,10 @@ impl Progress {
         };
         let here = off(0.0);
         let mut tried = (0..HALVINGS).map(|halvings| 0.5f64.powi(halvings)).map(|t| (t, off(t)));
-        let found = tried.find(|&(t, there)| there <= (1.0 - FALLS * t) * here);
-        let (length, there) = found.unwrap_or_else(|| (SHORTEST, off(SHORTEST)));
+        let found = tried.find(|&(t, there)| there <= (1.0 - ARMIJO * t) * here);
+        // where F1 cannot fall either, the step is half of the least tried length
+        let shortest = 0.5f64.powi(HALVINGS);
+        let (length, there) = found.unwrap_or_else(|| (shortest, off(shortest)));
         self.path.note(length, !states.smoothing.is_empty());
         let fall = if here == 0.0 { 1.0 } else { there / here };
         StepLength { length, fall, is_lost: found.is_none(), is_measured: true }
@@ -259,8 +252,7 @@ mod tests {
         let (from, start, exact) = ([0.5, 0.5, 1.0, 1.0], [2.0, 4.0, 1.0, 1.0], [0.0; 4]);
         let length = |progress: &mut Progress, rho: &[f64; 4], roundoff: &[f64; 4], c: &[f64; 4], p: &[f64; 4]| {
             progress.unit = rho.to_vec();
-            let step = WholeStep { from: &from, roundoff, compression: c, pressure: p };
-            let step = progress.step_length(&model, &Layer::default(), &step);
+            let step = progress.step_length(&model, &Layer::default(), [&from, roundoff], [c, p]);
             (!step.is_lost).then_some(step.length)
         };
         let begin = || Progress { pressure: start.to_vec(), ..Progress::default() };

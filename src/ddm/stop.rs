@@ -37,8 +37,10 @@ pub enum Status {
     },
     /// An inner solver failed.
     InnerSolver(Failure),
-    /// The run ended as solved, but its result has a larger error.
-    Inaccurate(Inaccuracy),
+    /// The run ended as solved, but the forces f - K u - B' omega p, computed with K itself, have this relative error.
+    Unbalanced(f64),
+    /// The run ended as solved, but roundoff of gaps and displacements may change the pressures by this share, so that no digit of them is left.
+    NoDigits(f64),
     /// A signal ended the run.
     Interrupted {
         /// The bits of [`Observer::asked`](super::Observer::asked) of all ranks.
@@ -46,16 +48,12 @@ pub enum Status {
     },
 }
 
-/// The relative error of a result that is none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Inaccuracy {
-    /// The forces f - K u - B' omega p, computed with K itself, are not zero.
-    Unbalanced(f64),
-    /// Roundoff of gaps and displacements may change all digits of the pressures.
-    Roundoff(f64),
-}
-
 impl Status {
+    /// Whether the run ended as solved, but with a larger error.
+    pub fn is_inaccurate(&self) -> bool {
+        matches!(self, Status::Unbalanced(_) | Status::NoDigits(_))
+    }
+
     /// Whether the last iterate is a solution.
     pub fn is_solved(&self) -> bool {
         matches!(self, Status::Converged | Status::RoundoffLimited)
@@ -102,31 +100,19 @@ impl Default for Stagnation {
     }
 }
 
-/// What a step of Newton's method has reached.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Attained {
-    /// The error after it.
-    pub error: f64,
-    /// F1 after it.
-    pub energy: f64,
-    /// The squared distance from the laws after it over that before it.
-    pub fall: f64,
-    /// Whether the laws were smoothed. The error then falls with mu.
-    pub is_smoothed: bool,
-}
-
 impl Stagnation {
-    /// Note a step. Return whether the run stagnates.
-    pub fn note(&mut self, step: Attained) -> bool {
-        let is_far = step.error.powi(2) > EXACT;
+    /// Note a step: the error and F1 after it, the squared distance from the laws after it over that before it (`fall`), and whether the laws were smoothed, so
+    /// that the error falls with mu. Return whether the run stagnates.
+    pub fn note(&mut self, error: f64, energy: f64, fall: f64, is_smoothed: bool) -> bool {
+        let is_far = error.powi(2) > EXACT;
         let share = if is_far { FALLS } else { NEAR_FALLS };
-        let is_better = step.error < share * self.best;
+        let is_better = error < share * self.best;
         if is_better {
-            self.best = step.error;
+            self.best = error;
         }
-        let is_lower = self.least - step.energy > EXACT * step.energy.abs();
-        self.least = self.least.min(step.energy);
-        let is_progress = is_better || step.is_smoothed || is_far && (is_lower || step.fall < FALLS);
+        let is_lower = self.least - energy > EXACT * energy.abs();
+        self.least = self.least.min(energy);
+        let is_progress = is_better || is_smoothed || is_far && (is_lower || fall < FALLS);
         self.since = if is_progress { 0 } else { self.since + 1 };
         self.since >= PATIENCE
     }
@@ -146,8 +132,8 @@ mod tests {
     fn three_steps_without_progress_are_stagnation() {
         let noted = |steps: &[(f64, f64, bool)], energy: &dyn Fn(usize) -> f64| {
             let mut stagnation = Stagnation::default();
-            let step = |(k, &(error, fall, is_smoothed))| Attained { error, energy: energy(k), fall, is_smoothed };
-            steps.iter().enumerate().map(step).map(|step| stagnation.note(step)).collect::<Vec<_>>()
+            let mut note = |(k, &(error, fall, is_smoothed))| stagnation.note(error, energy(k), fall, is_smoothed);
+            steps.iter().enumerate().map(&mut note).collect::<Vec<_>>()
         };
         let same = |_| -1.0;
         assert_eq!(noted(&[(1.0, 1.0, false); 4], &same), [false, false, false, true]);

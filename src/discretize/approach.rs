@@ -68,15 +68,12 @@ pub fn rows<const D: usize>(
     Ok(rows)
 }
 
-/// Weights of nodes in a mean.
-type Weights = Vec<(u32, f64)>;
-
 /// A support or spring of the body.
 struct Holder<const D: usize> {
     /// Unit vectors: the constrained directions, and whether the body moves along them by a displacement other than zero.
     directions: Vec<([f64; D], bool)>,
     /// Integrals of the shape functions of nodes over its surface; 1 for each node of a group of another dimension.
-    weights: Weights,
+    weights: Vec<(u32, f64)>,
     is_surface: bool,
 }
 
@@ -110,17 +107,17 @@ fn holder<const D: usize>(body: &SceneBody<D>, group: &Group, directions: Vec<([
 }
 
 /// Return the first components of nodal forces. Under a unit traction or body force along x they are the integrals of the shape functions.
-fn shapes<const D: usize>(all: &NodalForces<D>) -> Weights {
+fn shapes<const D: usize>(all: &NodalForces<D>) -> Vec<(u32, f64)> {
     all.iter().map(|(node, weight)| (node, weight[0])).collect()
 }
 
 /// Return the weights of the mean over those holders that constrain the direction `n`, or move the body along it if `moving`. Points count
 /// only where there is no surface. The result is `None` without such holders.
-fn mean<const D: usize>(holders: &[Holder<D>], n: [f64; D], moving: bool) -> Option<Weights> {
+fn mean<const D: usize>(holders: &[Holder<D>], n: [f64; D], moving: bool) -> Option<Vec<(u32, f64)>> {
     let acts = |&(d, moves): &([f64; D], bool)| (moves || !moving) && dot(&d, &n).abs() >= ALONG;
     let along = holders.iter().filter(|holder| holder.directions.iter().any(acts));
     let surfaces = along.clone().any(|holder| holder.is_surface);
-    let weights: Weights = along
+    let weights: Vec<(u32, f64)> = along
         .filter(|holder| holder.is_surface || !surfaces)
         .flat_map(|holder| holder.weights.iter().copied())
         .collect();
@@ -129,8 +126,8 @@ fn mean<const D: usize>(holders: &[Holder<D>], n: [f64; D], moving: bool) -> Opt
 
 /// Return the forces at nodes along `n` of those loads that push along it; `None` without such loads. A moment and a pressure all around
 /// have no sum.
-fn working<const D: usize>(loads: &[NodalForces<D>], n: [f64; D]) -> Option<Weights> {
-    let mut weights = Weights::new();
+fn working<const D: usize>(loads: &[NodalForces<D>], n: [f64; D]) -> Option<Vec<(u32, f64)>> {
+    let mut weights = Vec::new();
     for load in loads {
         let [net, size] = load.iter().fold([0.0; 2], |[net, size], (_, f)| [net + dot(&f, &n), size + length(f)]);
         if net != 0.0 && net.abs() >= ALONG * size {
@@ -141,7 +138,7 @@ fn working<const D: usize>(loads: &[NodalForces<D>], n: [f64; D]) -> Option<Weig
 }
 
 /// Add the weights of nodes that occur several times.
-fn summed(mut weights: Weights) -> Weights {
+fn summed(mut weights: Vec<(u32, f64)>) -> Vec<(u32, f64)> {
     weights.sort_by_key(|entry| entry.0);
     weights.chunk_by(|a, b| a.0 == b.0).map(|same| (same[0].0, same.iter().map(|entry| entry.1).sum())).collect()
 }

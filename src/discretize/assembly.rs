@@ -3,12 +3,11 @@
 use super::bodies::{SceneBody, elasticity_of};
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
-use super::meshes::FemBody;
-use super::post::{OnPart, Post};
+use super::post::FemBody;
 use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid;
-use crate::fem::{ElasticBody, Prolongation, Split};
+use crate::fem::{ElasticBody, Prolongation};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
 use crate::model::{Body, BodySlot, Distribution};
@@ -31,7 +30,7 @@ pub struct Assembler<'a, const D: usize, F> {
     /// Number of matrices reused from an earlier scene.
     pub avoided: usize,
     /// Meshes of the bodies that this rank has.
-    pub shapes: Vec<FemBody<D>>,
+    pub shapes: Vec<Rc<FemBody<D>>>,
 }
 
 impl<const D: usize, F: Factory> Assembler<'_, D, F> {
@@ -54,17 +53,14 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
             self.give_solver(&mut part, slot, info.rank)?;
         }
         let SceneBody { elasticity, mesh, .. } = part;
-        let mesh = Rc::new(mesh);
-        if mesh.is_owned {
-            let split = Split::new(&mesh.space, &elasticity);
-            let (name, exact) = (info.name.clone(), spec.exact.clone());
-            let (mesh, elasticity) = (mesh.clone(), elasticity.clone());
-            let post = OnPart { name, exact, mesh, split, own, elasticity, supports: spec.fix.len() };
-            post.check_exact()?;
-            info.points = post.points();
-            info.post = Some(Box::new(post) as Box<dyn Post>);
+        let (name, exact, supports) = (info.name.clone(), spec.exact.clone(), spec.fix.len());
+        let body = Rc::new(FemBody { name, exact, supports, mesh, own, elasticity, split: OnceCell::new() });
+        if body.mesh.is_owned {
+            body.check_exact()?;
+            info.points = body.points();
+            info.post = Some(body.clone());
         }
-        self.shapes.push(FemBody { mesh, split: OnceCell::new(), elasticity });
+        self.shapes.push(body);
         Ok(())
     }
 
@@ -73,7 +69,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     fn give_solver(&mut self, part: &mut SceneBody<D>, slot: &mut BodySlot, owner: usize) -> Result<()> {
         let mesh = &part.mesh;
         let load = mesh.load_vector();
-        let kept = self.factory.kept(&slot.name).filter(|_| mesh.share.is_none());
+        let kept = self.factory.kept(&slot.name).filter(|_| mesh.owned.is_none());
         if let Some(before) = reload(kept, &load, &mesh.prescribed)? {
             self.avoided += 1;
             (slot.local, slot.scale, slot.row_stiffness) = (before.local, before.scale, before.row_stiffness);
@@ -88,37 +84,38 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     /// Assemble the matrix of a body, all of it or the rows of this rank, and make its solver, which takes the contact rows.
     fn assemble(&mut self, part: &mut SceneBody<D>, load: Vec<f64>, slot: &mut BodySlot) -> Result<()> {
         let prescribed = part.mesh.prescribed.clone();
-        let mut left: Vec<Vec<f64>> = part.mesh.left.iter().map(|motion| part.mesh.dofs_of(motion)).collect();
-        left.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
+        let modes = part.mesh.unconstrained_modes.iter();
+        let mut unconstrained_modes: Vec<Vec<f64>> = modes.map(|motion| part.mesh.dofs_of(motion)).collect();
+        unconstrained_modes.iter_mut().for_each(|motion| prescribed.iter().for_each(|entry| motion[entry.0] = 0.0));
         part.mesh.graph();
-        let (share, rows) = (part.mesh.share.take(), std::mem::take(&mut part.mesh.rows));
+        let (owned, rows) = (part.mesh.owned.take(), std::mem::take(&mut part.mesh.rows));
         let mut graph = part.mesh.graph.take().unwrap_or_else(|| unreachable!("the graph was requested"));
-        if let Some(share) = &share {
-            graph = graph.of(|node| share.is_own::<D>(node));
+        if let Some(owned) = &owned {
+            graph = graph.of(|node| owned.is_own::<D>(node));
         }
         let mut body = part.assemble(self.mesh, &graph, load, prescribed)?;
         drop(graph);
         slot.scale = (0..body.load.len()).map(|i| body.stiffness.diagonal(i)).fold(0.0, f64::max);
         slot.row_stiffness = rows.quadratic_diagonal(&body.stiffness);
-        if let Some(share) = &share {
-            body = share.own::<D>(body);
+        if let Some(owned) = &owned {
+            body = owned.restrict::<D>(body);
         }
         let mesh = &part.mesh;
-        let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &share {
-            Some(share) => share.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
+        let interpolation = self.factory.wants_interpolation(&slot.name).then(|| match &owned {
+            Some(owned) => owned.interpolation::<D>(|coarse| mesh.interpolation(coarse)),
             None => mesh.interpolation(&mesh.coarse_nodes()),
         });
         // Multigrid must represent motions with hardly any strain. Far from the axis, a ring is nearly as soft against radial
         // displacements and rotations of its section as a plane body.
-        let smooth = || rigid::modes(&mesh.extent).iter().map(|motion| mesh.dofs_of(motion)).collect();
+        let near_null_space = || rigid::modes(&mesh.extent).iter().map(|motion| mesh.dofs_of(motion)).collect();
         let body = self.factory.make(Assembled {
             name: slot.name.clone(),
             dimension: D,
             body,
-            distribution: share.map(|share| share.distribution),
+            distribution: owned.map(|owned| owned.distribution),
             rows,
-            motions: &smooth,
-            left,
+            near_null_space: &near_null_space,
+            unconstrained_modes,
             interpolation,
         })?;
         slot.local = Some(body);
@@ -182,9 +179,9 @@ pub struct Assembled<'a> {
     pub rows: Csr,
     /// Motions with hardly any strain in a few cells, for the near-null space of multigrid. They are the rigid motions of the
     /// free body, in a body of revolution those of its meridian. Each is one vector over these dofs.
-    pub motions: &'a dyn Fn() -> Vec<Vec<f64>>,
+    pub near_null_space: &'a dyn Fn() -> Vec<Vec<f64>>,
     /// Displacements of the rigid motions that supports and springs leave, on these dofs.
-    pub left: Vec<Vec<f64>>,
+    pub unconstrained_modes: Vec<Vec<f64>>,
     /// Interpolation of displacements from linear ones, if it was requested. The rows are the dofs of `body`. The columns belong
     /// to this body alone, or to all bodies of the matrix if the dofs are distributed.
     pub interpolation: Option<Prolongation>,

@@ -42,31 +42,20 @@ pub fn find<'a, const D: usize>(
     }
     let whole: Vec<Side<D>> =
         parts.iter().map(|part| part.side(&part.spec.name.value, part.mesh.space.boundary(), 180.0)).collect();
-    let mut all = Vec::new();
-    for possible in possible(rules, parts, &whole, named)? {
-        all.push(meeting(cut, &whole, &possible));
-    }
+    let mut all: Vec<_> = possible(rules, parts, &whole, named)?.into_iter().map(|pair| meeting(cut, pair)).collect();
     all.retain(|found| found.sides[0].facets.count() > 0);
     Ok(all)
 }
 
-/// Two bodies to which a rule applies, with the facets that could have a partner.
-struct Possible<'a, const D: usize> {
-    /// Indices of the bodies, the smaller one first.
-    bodies: [usize; 2],
-    /// Facets of each body that could have a partner.
-    near: [Facets<D>; 2],
-    /// The last rule for the bodies.
-    rule: &'a ContactSpec,
-}
-
+/// Return the pairs of bodies to which a rule applies, the body with the smaller index first, with the facets that could have a partner.
 fn possible<'a, const D: usize>(
     rules: &[&'a ContactSpec],
     parts: &[SceneBody<D>],
-    whole: &[Side<D>],
+    whole: &[Side<'a, D>],
     named: &HashSet<[usize; 2]>,
-) -> Result<Vec<Possible<'a, D>>> {
-    let matches = rules.iter().map(|rule| Matches::new(rule, parts)).collect::<Result<Vec<_>>>()?;
+) -> Result<Vec<SurfacePair<'a, D>>> {
+    let matching = rules.iter().map(|rule| matching(rule, parts)).collect::<Result<Vec<_>>>()?;
+    let are_for = |[first, second]: &[Vec<bool>; 2], a: usize, b: usize| first[a] && second[b] || first[b] && second[a];
     let farthest = rules.iter().copied().map(distance).fold(0.0, f64::max);
     let searches: Vec<BoxTree<D>> = whole.iter().map(BoxTree::new).collect();
     let bodies = BoxTree::of_boxes(whole.iter().map(Side::extent));
@@ -76,30 +65,26 @@ fn possible<'a, const D: usize>(
         others.retain(|&b| b > a && !named.contains(&[a, b]));
         others.sort_unstable();
         for b in others {
-            let Some(rule) = matches.iter().rposition(|rule| rule.are_for(a, b)) else { continue };
+            let Some(rule) = matching.iter().rposition(|bodies| are_for(bodies, a, b)) else { continue };
             let rule = rules[rule];
             let reach = Reach::between(&whole[a], &whole[b], rule.angle, rule.distance);
             let near = candidates(&whole[a], &whole[b], &searches[b], &reach);
             if near.iter().all(|facets| facets.count() > 0) {
-                all.push(Possible { bodies: [a, b], near, rule });
+                let [near_a, near_b] = near;
+                let side = |body: usize, facets: Facets<D>| {
+                    let Side { name, space, prescribed, frame, .. } = whole[body];
+                    Side::new(name, space, facets, prescribed, frame, rule.edge)
+                };
+                all.push(SurfacePair::new(rule, [a, b], [side(a, near_a), side(b, near_b)]));
             }
         }
     }
     Ok(all)
 }
 
-/// Return the pair that two possible bodies form. Its surfaces have no facets if they have no common piece.
-fn meeting<'a, const D: usize>(
-    cut: Cut<D>,
-    whole: &[Side<'a, D>],
-    possible: &Possible<'a, D>,
-) -> SurfacePair<'a, D> {
-    let spec = possible.rule;
-    let near = |k: usize| {
-        let Side { name, space, prescribed, frame, .. } = whole[possible.bodies[k]];
-        Side::new(name, space, possible.near[k].clone(), prescribed, frame, spec.edge)
-    };
-    let [a, b] = [near(0), near(1)];
+/// Return a possible pair on the facets with a common piece; there may be none.
+fn meeting<'a, const D: usize>(cut: Cut<D>, possible: SurfacePair<'a, D>) -> SurfacePair<'a, D> {
+    let SurfacePair { spec, bodies, sides: [a, b], .. } = possible;
     let common = cut(&a, &b, &Reach::between(&a, &b, spec.angle, spec.distance));
     let mut far = [BTreeSet::new(), BTreeSet::new()];
     for (i, j) in common.far() {
@@ -111,7 +96,7 @@ fn meeting<'a, const D: usize>(
         (used[0][point.facet_a], used[1][point.facet_b]) = (true, true);
     }
     let sides = [a.only(&used[0]), b.only(&used[1])];
-    SurfacePair { far, ..SurfacePair::new(spec, possible.bodies, sides) }
+    SurfacePair { far, ..SurfacePair::new(spec, bodies, sides) }
 }
 
 /// Check that every rule found a pair. `found` are the numbers of the tables of all pairs.
@@ -129,28 +114,20 @@ pub fn all_find_some(rules: &[&ContactSpec], found: impl Iterator<Item = usize> 
     Err(Error::scene(place, message).help(help))
 }
 
-/// The bodies to which a rule applies, as the first and as the second of a pair; `None` if it applies to all.
-struct Matches(Option<[Vec<bool>; 2]>);
-
-impl Matches {
-    fn new<const D: usize>(rule: &ContactSpec, parts: &[SceneBody<D>]) -> Result<Self> {
-        let Some(of) = &rule.of else { return Ok(Self(None)) };
-        let names = || parts.iter().map(|part| part.spec.name.value.as_str());
-        let matching = |name: &Located<String>| {
-            let pattern = pattern(name)?;
-            let found: Vec<bool> = names().map(|body| pattern.matches(body)).collect();
-            if found.contains(&true) {
-                return Ok(found);
-            }
-            let help = format!("the bodies of the scene: {}", few(names()).join(", "));
-            Err(Error::scene(&name.place, format!("no body matches `{}`", name.value)).help(help))
-        };
-        Ok(Self(Some([matching(&of[0])?, matching(&of[1])?])))
-    }
-
-    fn are_for(&self, a: usize, b: usize) -> bool {
-        self.0.as_ref().is_none_or(|[first, second]| (first[a] && second[b]) || (first[b] && second[a]))
-    }
+/// Return whether a rule applies to each body, as the first and as the second of a pair.
+fn matching<const D: usize>(rule: &ContactSpec, parts: &[SceneBody<D>]) -> Result<[Vec<bool>; 2]> {
+    let Some(of) = &rule.of else { return Ok([vec![true; parts.len()], vec![true; parts.len()]]) };
+    let names = || parts.iter().map(|part| part.spec.name.value.as_str());
+    let matching = |name: &Located<String>| {
+        let pattern = pattern(name)?;
+        let found: Vec<bool> = names().map(|body| pattern.matches(body)).collect();
+        if found.contains(&true) {
+            return Ok(found);
+        }
+        let help = format!("the bodies of the scene: {}", few(names()).join(", "));
+        Err(Error::scene(&name.place, format!("no body matches `{}`", name.value)).help(help))
+    };
+    Ok([matching(&of[0])?, matching(&of[1])?])
 }
 
 /// Return the name of a rule in an error, and its place in the scene.

@@ -246,14 +246,10 @@ fn too_large(spec: &BodySpec) -> Error {
 ///
 /// # Errors
 /// The scene contradicts its mesh.
-pub fn parts<'a, const D: usize>(
-    scene: &Scene,
-    verified: &Verified<D>,
-    bodies: &'a [BodySpec],
-) -> Result<Vec<SceneBody<'a, D>>> {
+pub fn parts<'a, const D: usize>(scene: &'a Scene, verified: &Verified<D>) -> Result<Vec<SceneBody<'a, D>>> {
     let Verified { mesh, checked, .. } = verified;
     let mut parts = Vec::new();
-    for (index, spec) in bodies.iter().enumerate() {
+    for (index, spec) in scene.bodies.iter().enumerate() {
         let space = space(spec, mesh, scene.plane)?;
         let checked = &checked[index];
         refuse_parts(spec, &space, &checked.parts, mesh)?;
@@ -278,10 +274,10 @@ pub fn parts<'a, const D: usize>(
             approach,
             load: NodalForces::default(),
             missed_load: Vec::new(),
-            left: Vec::new(),
-            unsupported: Vec::new(),
+            unconstrained_modes: Vec::new(),
+            unsupported_modes: Vec::new(),
             prescribed: Vec::new(),
-            share: None,
+            owned: None,
             is_owned: true,
             graph: OnceCell::new(),
         };

@@ -1,7 +1,7 @@
 //! The mesh of a body with all that is tied to its nodes: on the first rank the whole body, on every rank the part that it needs, with local
 //! numbers.
 
-use super::share::Share;
+use super::owned::OwnedDofs;
 use super::supports::Constraints;
 use crate::exchange::Plain;
 use crate::fem::interpolation::{coarse_nodes, from_vertices};
@@ -39,13 +39,13 @@ pub struct BodyMesh<const D: usize> {
     /// Nodal forces of the loads that their quadrature misses, at all nodes, if an estimate of the error needs them.
     pub missed_load: Vec<f64>,
     /// Rigid motions that supports and springs leave.
-    pub left: Vec<RigidMotion<D>>,
+    pub unconstrained_modes: Vec<RigidMotion<D>>,
     /// Rigid motions that supports alone leave.
-    pub unsupported: Vec<RigidMotion<D>>,
+    pub unsupported_modes: Vec<RigidMotion<D>>,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
     /// Dofs of this rank, if the body is distributed.
-    pub share: Option<Share>,
+    pub owned: Option<OwnedDofs>,
     /// Whether this rank owns the body or nodes of it. Other ranks have it for estimates of the error.
     pub is_owned: bool,
     /// Coupling of nodes by K, once it was requested on this rank.
@@ -56,7 +56,7 @@ pub struct BodyMesh<const D: usize> {
 impl<const D: usize> BodyMesh<D> {
     /// Return whether this rank owns each node.
     pub fn own_nodes(&self) -> Vec<bool> {
-        let is_own = |node| self.share.as_ref().is_none_or(|s| s.is_own::<D>(self.held.frame.node(node) as usize));
+        let is_own = |node| self.owned.as_ref().is_none_or(|s| s.is_own::<D>(self.held.frame.node(node) as usize));
         (0..self.space.nodes.len() as u32).map(is_own).collect()
     }
 
@@ -71,7 +71,7 @@ impl<const D: usize> BodyMesh<D> {
     }
 
     /// Return the rigid motions of the free body.
-    pub fn free(&self) -> Vec<RigidMotion<D>> {
+    pub fn rigid_modes(&self) -> Vec<RigidMotion<D>> {
         rigid::of(&self.extent, self.space.axisymmetric)
     }
 
@@ -87,10 +87,12 @@ impl<const D: usize> BodyMesh<D> {
 
     /// Return the products of the rigid motions that supports and springs leave, over all dofs without the prescribed ones.
     pub fn products(&self) -> DMatrix<f64> {
-        let (count, mut held) = (self.left.len(), self.prescribed.iter().map(|entry| entry.0).peekable());
+        let (count, mut held) =
+            (self.unconstrained_modes.len(), self.prescribed.iter().map(|entry| entry.0).peekable());
         let mut products = DMatrix::zeros(count, count);
         for node in 0..self.space.nodes.len() {
-            let mut at: Vec<[f64; D]> = self.left.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
+            let mut at: Vec<[f64; D]> =
+                self.unconstrained_modes.iter().map(|motion| self.at_dofs(motion, node as u32)).collect();
             while let Some(dof) = held.next_if(|dof| dof / D <= node) {
                 at.iter_mut().filter(|_| dof / D == node).for_each(|u| u[dof % D] = 0.0);
             }
@@ -113,23 +115,28 @@ impl<const D: usize> BodyMesh<D> {
         all
     }
 
-    /// Return the combination of the `free` motions that comes nearest to the prescribed displacements in the sum of squares. Its part along motions that
+    /// Return the combination of the `rigid_modes` that comes nearest to the prescribed displacements in the sum of squares. Its part along motions that
     /// supports leave is zero.
-    pub fn imposed_motion(&self, free: &[RigidMotion<D>]) -> RigidMotion<D> {
-        let mut squares = DMatrix::zeros(free.len(), free.len());
-        let mut work = DVector::zeros(free.len());
+    pub fn imposed_motion(&self, rigid_modes: &[RigidMotion<D>]) -> RigidMotion<D> {
+        let mut squares = DMatrix::zeros(rigid_modes.len(), rigid_modes.len());
+        let mut work = DVector::zeros(rigid_modes.len());
         for &(dof, value) in &self.prescribed {
-            let at = DVector::from_iterator(free.len(), free.iter().map(|motion| self.dof_of(motion, dof)));
+            let at =
+                DVector::from_iterator(rigid_modes.len(), rigid_modes.iter().map(|motion| self.dof_of(motion, dof)));
             squares.ger(1.0, &at, &at, 1.0);
             work.axpy(value, &at, 1.0);
         }
-        rigid::sum(free, &Blocks::single(&squares).factor().solve(&work))
+        rigid::sum(rigid_modes, &Blocks::single(&squares).factor().solve(&work))
     }
 
-    /// Return the combinations of the `free` motions that supports leave.
-    pub fn left_by_supports(&self, free: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
-        let left = rigid::left_by_supports(free.len(), |k, dof| self.dof_of(&free[k], dof), &self.prescribed_sorted());
-        left.iter().map(|weights| rigid::combine(free, weights)).collect()
+    /// Return the combinations of the `rigid_modes` that supports leave.
+    pub fn unsupported(&self, rigid_modes: &[RigidMotion<D>]) -> Vec<RigidMotion<D>> {
+        let left = rigid::left_by_supports(
+            rigid_modes.len(),
+            |k, dof| self.dof_of(&rigid_modes[k], dof),
+            &self.prescribed_sorted(),
+        );
+        left.iter().map(|weights| rigid::combine(rigid_modes, weights)).collect()
     }
 
     /// Return the stiffness of the springs to the ground in terms of motions; zero without springs.

@@ -9,6 +9,7 @@ use crate::mesh::BodyCheck;
 use crate::model::BodySlot;
 use crate::problem::Plane;
 use serde::{Deserialize, Serialize};
+use std::rc::Rc;
 
 /// Facts of a body besides its matrices.
 #[derive(Serialize, Deserialize)]
@@ -27,10 +28,10 @@ pub struct BodyInfo {
     pub dofs: usize,
     /// Number of constrained degrees of freedom.
     pub supported: usize,
-    /// Names of the rigid motions that the supports leave.
-    pub left_by_supports: Vec<String>,
+    /// Names of the rigid motions that supports and springs leave.
+    pub unconstrained: Vec<String>,
     /// Names of the rigid motions that no contact row can resist either.
-    pub left_by_all: Vec<String>,
+    pub unresisted: Vec<String>,
     /// Warning for the user about the elasticity.
     pub warning: Option<String>,
     /// Rank that owns the body or, if it is distributed, most of it.
@@ -45,7 +46,7 @@ pub struct BodyInfo {
     pub rigid: Vec<String>,
     /// Evaluation of the displacements on this rank.
     #[serde(skip)]
-    pub(super) post: Option<Box<dyn Post>>,
+    pub(super) post: Option<Rc<dyn Post>>,
 }
 
 impl BodyInfo {
@@ -77,7 +78,7 @@ impl<const D: usize> WholeBody<'_, D> {
             modulus,
             depth,
             row_stiffness: Vec::new(),
-            imposed: self.trace(&self.part.mesh.imposed_motion(&self.free)),
+            imposed: self.trace(&self.part.mesh.imposed_motion(&self.rigid_modes)),
         };
         (slot, self.info(checked, plane))
     }
@@ -94,8 +95,8 @@ impl<const D: usize> WholeBody<'_, D> {
             facets: BodyCheck { points: Vec::new(), ..checked.clone() },
             dofs: part.mesh.space.dofs(),
             supported: part.mesh.held.supported(),
-            left_by_supports: part.mesh.left.iter().map(|motion| motion.name.clone()).collect(),
-            left_by_all: unresisted,
+            unconstrained: part.mesh.unconstrained_modes.iter().map(|motion| motion.name.clone()).collect(),
+            unresisted,
             warning: part.locking(plane),
             rank: self.owner,
             ranks: self.ranks.clone(),

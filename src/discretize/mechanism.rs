@@ -9,7 +9,7 @@
 //! work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces may lack balance on facets, and by
 //! quadrature. A small imbalance is taken from the loads, with a warning.
 
-use super::whole::{FixableDof, NO_WORK, WholeBody};
+use super::whole::{NO_WORK, WholeBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
 use crate::fem::{PointExtent, RigidMotion, rigid};
@@ -33,16 +33,14 @@ pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], l
     search.found
 }
 
-/// The amounts of the motions of all bodies in one motion, body by body.
-type Amounts = DVector<f64>;
-
 /// A motion of some bodies, each of which is rigid.
 struct Moving<const D: usize> {
     /// Indices of the bodies that it moves.
     bodies: Vec<usize>,
     /// Motions of these bodies.
     motions: Vec<RigidMotion<D>>,
-    amounts: Amounts,
+    /// The amounts of the motions of all bodies, body by body.
+    amounts: DVector<f64>,
 }
 
 struct MechanismSearch<'p, 's, const D: usize> {
@@ -57,8 +55,8 @@ struct MechanismSearch<'p, 's, const D: usize> {
 
 impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// Return the motions that supports and springs leave to a body at present.
-    fn left(&self, body: usize) -> &[RigidMotion<D>] {
-        &self.bodies[body].part.mesh.left
+    fn unconstrained(&self, body: usize) -> &[RigidMotion<D>] {
+        &self.bodies[body].part.mesh.unconstrained_modes
     }
 
     fn extent(&self, body: usize) -> &PointExtent {
@@ -91,16 +89,17 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Return the motions of a group as one body that the supports of its bodies leave.
-    fn as_one(&self, group: &[usize]) -> Vec<Amounts> {
+    fn as_one(&self, group: &[usize]) -> Vec<DVector<f64>> {
         let all = self.common(group);
         let mut held = DMatrix::zeros(all.len(), all.len());
         let mut amounts = vec![DVector::zeros(self.count()); all.len()];
         for &body in group {
-            let left: Vec<Vec<f64>> = self.left(body).iter().map(|motion| self.at_corners(body, motion)).collect();
+            let left: Vec<Vec<f64>> =
+                self.unconstrained(body).iter().map(|motion| self.at_corners(body, motion)).collect();
             let mut off = Vec::new();
             for (motion, amounts) in all.iter().zip(&mut amounts) {
                 let mut rest = self.at_corners(body, motion);
-                let own = fit(&slices(&left), &rest);
+                let own = fit(&left, &rest);
                 own.iter().zip(&left).for_each(|(&a, motion)| axpy(-a, motion, &mut rest));
                 amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
                 off.push(rest);
@@ -119,14 +118,14 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
     /// Return the number of the first motion of a body.
     fn first(&self, body: usize) -> usize {
-        (0..body).map(|body| self.left(body).len()).sum()
+        (0..body).map(|body| self.unconstrained(body).len()).sum()
     }
 
     /// Return the motions that contact does not resist.
     ///
     /// Each pair counts by the mean square of its closings. Motions are of size one. So a motion that closes less than the error of the
     /// normals is free, and so is one that closes less than the root of [`TOLERANCE`], the error of coordinates on curves.
-    fn kernel(&self) -> Vec<Amounts> {
+    fn kernel(&self) -> Vec<DVector<f64>> {
         let points: Vec<usize> = self.pairs.iter().map(ContactPair::len).collect();
         let share = |pair: &ContactPair| {
             let all: f64 = pair.weight.iter().sum();
@@ -138,11 +137,11 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Return the motion with these amounts.
-    fn moving(&self, amounts: Amounts) -> Moving<D> {
+    fn moving(&self, amounts: DVector<f64>) -> Moving<D> {
         let (mut bodies, mut motions, mut first) = (Vec::new(), Vec::new(), 0);
         let least = PART * amounts.amax();
         for body in 0..self.bodies.len() {
-            let left = self.left(body);
+            let left = self.unconstrained(body);
             let own = amounts.rows(first, left.len());
             first += left.len();
             if own.amax() > least {
@@ -154,7 +153,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Fix motions that nothing resists if no load works on them, and record them.
-    fn settle(&mut self, all: Vec<Amounts>) {
+    fn settle(&mut self, all: Vec<DVector<f64>>) {
         let mut sets: Vec<Vec<Moving<D>>> = Vec::new();
         for moving in all.into_iter().map(|amounts| self.moving(amounts)) {
             match sets.iter_mut().find(|set| set[0].bodies == moving.bodies) {
@@ -205,7 +204,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let mut spans = Vec::new();
         for moving in &set {
             let mut rest = at(&moving.bodies, &|k| moving.motions[k].clone());
-            let (size, amounts) = (dot(&rest, &rest), fit(&slices(&vectors), &rest));
+            let (size, amounts) = (dot(&rest, &rest), fit(&vectors, &rest));
             amounts.iter().zip(&vectors).for_each(|(&a, vector)| axpy(-a, vector, &mut rest));
             if dot(&rest, &rest) > PART * PART * size {
                 let name = |moving: Moving<D>| (self.name_of_each(&moving), moving);
@@ -286,31 +285,30 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             amounts -= value * &pin.amounts;
         }
         let moving = self.moving(amounts);
-        let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| Some((body, self.bodies[body].candidate(motion)?));
-        let mut all: Vec<(usize, FixableDof)> =
-            moving.bodies.iter().zip(&moving.motions).filter_map(candidate).collect();
-        let most = all.iter().map(|(_, found)| found.size.abs()).fold(0.0, f64::max);
-        all.retain(|(_, found)| found.size.abs() > NEAR * most);
-        let size = |body: usize| self.extent(body).size();
-        let (body, found) = all.into_iter().rev().max_by(|a, b| size(a.0).total_cmp(&size(b.0)))?;
-        self.bodies[body].fix(&found);
-        pins.push(Pin { body, dof: found.dof, amounts: moving.amounts / found.size });
+        let candidate = |(&body, motion): (&usize, &RigidMotion<D>)| {
+            let (dof, moved) = self.bodies[body].candidate(motion)?;
+            Some((Pin { body, dof, amounts: &moving.amounts / moved }, moved.abs()))
+        };
+        let mut all: Vec<(Pin, f64)> = moving.bodies.iter().zip(&moving.motions).filter_map(candidate).collect();
+        let most = all.iter().map(|(_, moved)| *moved).fold(0.0, f64::max);
+        all.retain(|(_, moved)| *moved > NEAR * most);
+        let size = |pin: &Pin| self.extent(pin.body).size();
+        let (pin, _) = all.into_iter().rev().max_by(|a, b| size(&a.0).total_cmp(&size(&b.0)))?;
+        let body = pin.body;
+        self.bodies[body].fix(pin.dof);
+        pins.push(pin);
         Some(body)
     }
 }
 
-/// Share of the largest displacement from which a node can fix a motion.
+/// Share of the largest displacement from which a node can fix a motion; two of its digits are lost there.
 const NEAR: f64 = 1e-2;
 
 /// A dof that was fixed, with the motion that it fixes, which is one at this dof and zero at earlier ones.
 struct Pin {
     body: usize,
     dof: usize,
-    amounts: Amounts,
-}
-
-fn slices(vectors: &[Vec<f64>]) -> Vec<&[f64]> {
-    vectors.iter().map(Vec::as_slice).collect()
+    amounts: DVector<f64>,
 }
 
 impl<const D: usize> Moving<D> {

@@ -1,10 +1,10 @@
 //! The meshes without their space dimension, as an estimate of the error uses them.
 
 use super::body::BodyMesh;
+use super::post::FemBody;
 use crate::contact::{Fine, FinePoints};
-use crate::fem::{Elasticity, Errors, Recovery, Split, element};
+use crate::fem::{Errors, Recovery, Split, element};
 use crate::linalg::{Csr, axpy, dot};
-use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// The meshes of all bodies and pairs, kept for an estimate of the error.
@@ -74,20 +74,10 @@ pub trait RecoveredFields {
     fn add_forces(&self, pair: usize, side: usize, force: &[f64], r: &mut [f64]);
 }
 
-/// A body's space, elasticity and supports.
-pub struct FemBody<const D: usize> {
-    /// Nodes and cells, supports, and the rigid motions that these leave.
-    pub mesh: Rc<BodyMesh<D>>,
-    /// The same space, cut apart where the material jumps, once it has been requested.
-    pub split: OnceCell<Split<D>>,
-    /// Elasticity of the body.
-    pub elasticity: Rc<Elasticity>,
-}
-
 /// The implementation of [`Meshes`] in `D` dimensions.
 pub struct Kept<const D: usize> {
     /// Bodies in the order of the scene.
-    pub shapes: Vec<FemBody<D>>,
+    pub shapes: Vec<Rc<FemBody<D>>>,
     /// Integration points of each pair.
     pub fine: Vec<Fine<D>>,
 }
@@ -103,7 +93,7 @@ impl<const D: usize> Meshes for Kept<D> {
 
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a> {
         let shape = &self.shapes[body];
-        let split = shape.split.get_or_init(|| Split::new(&shape.mesh.space, &shape.elasticity));
+        let split = shape.split();
         let recovery = Recovery::new(&split.space, &shape.elasticity, split.values(u));
         Box::new(OnBody { kept: self, shape, split, u, recovery })
     }
@@ -113,9 +103,9 @@ impl<const D: usize> Meshes for Kept<D> {
     }
 
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {
-        let BodyMesh { space, unsupported, .. } = &*self.shapes[body].mesh;
+        let BodyMesh { space, unsupported_modes, .. } = &self.shapes[body].mesh;
         let mut moved = vec![0.0; space.dofs()];
-        for (motion, amount) in unsupported.iter().zip(amounts) {
+        for (motion, amount) in unsupported_modes.iter().zip(amounts) {
             axpy(*amount, &motion.nodal(space.nodes.iter().copied()), &mut moved);
         }
         moved
@@ -164,9 +154,6 @@ struct OnBody<'a, const D: usize> {
     recovery: Recovery<'a, D>,
 }
 
-/// Factors of the normal for side a and side b. The outer normal of side b is minus that of side a.
-const SIGN: [f64; 2] = [1.0, -1.0];
-
 impl<const D: usize> OnBody<'_, D> {
     /// Return the displacement at a point of a facet, including the interpolation error.
     fn displacement(&self, at: &FacetPoint<D>) -> [f64; D] {
@@ -189,7 +176,9 @@ impl<const D: usize> OnBody<'_, D> {
         let split = self.split.facets(&on.facets);
         for g in 0..fine.points.each.len() {
             let (nodes, split) = (on.facets.facet(on.facet[g]), split.facet(on.facet[g]));
-            visitor(g, fine.normal[g].map(|n| SIGN[side] * n), FacetPoint { nodes, split, l: &on.at[g] });
+            // the outer normal of side b is minus that of side a
+            let normal = fine.normal[g].map(|n| if side == 0 { n } else { -n });
+            visitor(g, normal, FacetPoint { nodes, split, l: &on.at[g] });
         }
     }
 }

@@ -67,13 +67,12 @@ fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
 }
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found; and the rigid parts, obstacles and
-/// offsets. `specs` are the contacts with the factors of a step. `fine` requests integration points.
+/// offsets. `fine` requests integration points.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
 pub fn all<const D: usize>(
     scene: &Scene,
-    specs: &[ContactSpec],
     mesh: &Mesh<D>,
     cut: Cut<D>,
     parts: &[SceneBody<D>],
@@ -82,8 +81,8 @@ pub fn all<const D: usize>(
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
-    let rules: Vec<&ContactSpec> = specs.iter().filter(|spec| spec.is_rule()).collect();
-    let named = || specs.iter().filter(|spec| !spec.is_rule());
+    let rules: Vec<&ContactSpec> = scene.rules().collect();
+    let named = || scene.pairs();
     let mut found = named().map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
     let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
     let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
@@ -226,7 +225,11 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         };
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
-        Ok(Some(Contact { pair, fine, facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface } }))
+        Ok(Some(Contact {
+            pair,
+            fine,
+            facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface },
+        }))
     }
 }
 

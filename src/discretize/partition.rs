@@ -2,7 +2,7 @@
 //! matrix. The coupling of the nodes determines the work and the memory of each.
 
 use super::body::BodyMesh;
-use super::share::Share;
+use super::owned::OwnedDofs;
 use super::whole::WholeBody;
 use crate::contact::ContactPair;
 use crate::exchange::Serial;
@@ -159,12 +159,12 @@ impl Partition {
             approach: rows_here(&body.approach),
             load: body.load.only(is_assembled).on(&nodes),
             missed_load: body.missed_load.clone(),
-            left: body.left.clone(),
-            unsupported: body.unsupported.clone(),
+            unconstrained_modes: body.unconstrained_modes.clone(),
+            unsupported_modes: body.unsupported_modes.clone(),
             prescribed: body.prescribed.iter().filter_map(prescribed_here).collect(),
             is_owned: true,
             graph: OnceCell::new(),
-            share: Some(self.share::<D>(number, &nodes, &body.rows, rank)),
+            owned: Some(self.owned::<D>(number, &nodes, &body.rows, rank)),
         }
     }
 
@@ -194,8 +194,8 @@ impl Partition {
         Space::<D>::among(own.chain(of_cells).chain(of_rows).chain(held.frame.leaders()))
     }
 
-    /// Return the share of a rank that has these `nodes` of a body. `rows` are the contact rows of the body.
-    fn share<const D: usize>(&self, number: usize, nodes: &[u32], rows: &Csr, rank: usize) -> Share {
+    /// Return the dofs of a rank that has these `nodes` of a body. `rows` are the contact rows of the body.
+    fn owned<const D: usize>(&self, number: usize, nodes: &[u32], rows: &Csr, rank: usize) -> OwnedDofs {
         let numbers = &self.nodes.of_node[number];
         let dofs = |node: u32| D as u32 * node..D as u32 * (node + 1);
         let mut others = vec![(Vec::new(), Vec::new()); self.ranks];
@@ -229,7 +229,7 @@ impl Partition {
         };
         let coarse = (0..).zip(nodes).map(|(place, &node)| (place, self.coarse.of_node[number][node as usize]));
         let (of_coarse, coarse) = coarse.filter(|(_, coarse)| *coarse != NONE).unzip();
-        Share {
+        OwnedDofs {
             distribution,
             coarse_nodes: of_coarse,
             coarse_number: coarse,

@@ -13,12 +13,12 @@ use std::collections::{BTreeSet, HashMap};
 
 /// Return the bodies of a scene, table by table. The bodies of a pattern are in the order of the mesh.
 ///
-/// A body that several tables match belongs to the last of these. A line on groups named by a pattern acts on all groups that
+/// `lying` are the groups on each body ([`lying`]). A body that several tables match belongs to the last of these. A line on groups named by a pattern acts on all groups that
 /// match and lie on the body. In a table of a pattern, every line acts on those bodies on which its group lies.
 ///
 /// # Errors
 /// A table has no body, a group cannot name a body, a line acts on no body, or a total force acts on several surfaces.
-pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &Lying) -> Result<Vec<BodySpec>> {
+pub fn bodies<const D: usize>(scene: &Scene, mesh: &Mesh<D>, lying: &[Vec<u32>]) -> Result<Vec<BodySpec>> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(scene.bodies.clone());
     }
@@ -191,15 +191,12 @@ pub fn members<'a, const D: usize>(scene: &'a Scene, mesh: &'a Mesh<D>) -> Resul
     Ok(members)
 }
 
-/// Indices of the groups that lie on each body, for the bodies of each table in turn. The list is empty if no table or line
-/// stands for many.
-pub type Lying = Vec<Vec<u32>>;
-
-/// Return the groups that lie on each body: its own cells, and each group with an element whose corners all belong to the body.
+/// Return the indices of the groups that lie on each body, for the bodies of each table in turn: its own cells, and each group with an element whose corners
+/// all belong to the body. The list is empty if no table or line stands for many.
 ///
 /// # Errors
 /// A pattern of bodies matches nothing or too much.
-pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Lying> {
+pub fn lying<const D: usize>(scene: &Scene, mesh: &Mesh<D>) -> Result<Vec<Vec<u32>>> {
     if !scene.bodies.iter().any(is_plural) {
         return Ok(Vec::new());
     }

@@ -8,6 +8,7 @@ use crate::expression::Expression;
 use crate::fem::displacement::{self, Strained};
 use crate::fem::{Elasticity, Frame, NodalBlock, NodeGraph, Space, Split, assemble, pad, space};
 use crate::output::{BodyField, CellKind, LargestStress};
+use std::cell::OnceCell;
 use std::rc::Rc;
 
 /// A part of a body that is evaluated for states of the dofs of its nodes, without the space dimension.
@@ -35,28 +36,33 @@ pub trait Post {
     fn errors(&self, v: &[f64]) -> Option<[[f64; 3]; 2]>;
 }
 
-/// The implementation of [`Post`] in `D` dimensions: the cells that one rank has of a body, with their nodes in local numbers.
+/// A body with its elasticity, or the cells that one rank has of it, with their nodes in local numbers: the implementation of [`Post`] in `D` dimensions.
 ///
 /// The cells around owned nodes are complete, and so are those around the cells that touch owned nodes. Nodes of contact rows and
 /// masters of tied nodes are included.
-pub struct OnPart<const D: usize> {
+pub struct FemBody<const D: usize> {
     /// Name of the body.
     pub name: String,
     /// Known displacements, if the scene has them.
     pub exact: Option<Vec<Expression>>,
+    /// Number of supports in the scene.
+    pub supports: usize,
     /// Cells, nodes, supports, springs, and rows with displacements of nodes as columns.
-    pub mesh: Rc<BodyMesh<D>>,
-    /// The space, cut apart where the material jumps.
-    pub split: Split<D>,
+    pub mesh: BodyMesh<D>,
     /// Whether this rank owns each node.
     pub own: Vec<bool>,
     /// Elasticity of the cells.
     pub elasticity: Rc<Elasticity>,
-    /// Number of supports in the scene.
-    pub supports: usize,
+    /// See [`Self::split`].
+    pub split: OnceCell<Split<D>>,
 }
 
-impl<const D: usize> OnPart<D> {
+impl<const D: usize> FemBody<D> {
+    /// Return the space, cut apart where the material jumps. It is made when it is first requested.
+    pub fn split(&self) -> &Split<D> {
+        self.split.get_or_init(|| Split::new(&self.mesh.space, &self.elasticity))
+    }
+
     /// Check that the known displacements are finite at all nodes.
     ///
     /// # Errors
@@ -76,8 +82,9 @@ impl<const D: usize> OnPart<D> {
 
     /// Return the point of the mesh for each node of the cells that this rank writes.
     pub fn points(&self) -> Vec<u32> {
-        let shown = self.split.space.part(self.owned()).1;
-        shown.into_iter().map(|node| self.mesh.points[self.split.origin(node) as usize]).collect()
+        let split = self.split();
+        let shown = split.space.part(self.owned()).1;
+        shown.into_iter().map(|node| self.mesh.points[split.origin(node) as usize]).collect()
     }
 
     /// Return the indices of the cells that this rank writes and measures. Each cell of the body belongs to the rank that owns
@@ -114,9 +121,9 @@ impl<const D: usize> OnPart<D> {
     }
 }
 
-impl<const D: usize> Post for OnPart<D> {
+impl<const D: usize> Post for FemBody<D> {
     fn field(&self, v: &[f64], bent: &[f64]) -> BodyField {
-        let (u, split) = (self.nodal(v), &self.split);
+        let (u, split) = (self.nodal(v), self.split());
         let (mut owned, shown) = split.space.part(self.owned());
         let nodal = self.nodal(bent);
         let bent = split.values(&nodal);
@@ -163,12 +170,12 @@ impl<const D: usize> Post for OnPart<D> {
         let mut contact = vec![0.0; u.len()];
         self.mesh.nodal_rows.add_transpose(-1.0, force, &mut contact);
         let space = &self.mesh.space;
-        let mut sum = Resultants { size: [0.0; 2], part: self };
+        let mut all = ForceBalance::default();
         let mut load = self.mesh.load.all(space.nodes.len());
         load.iter_mut().for_each(|force| *force *= factor);
-        let parts = vec![sum.of(&load), sum.of(&contact)];
+        all.push(self, &load);
+        all.push(self, &contact);
         let mut known: Vec<f64> = load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();
-        let mut springs = Vec::new();
         for blocks in &self.mesh.springs {
             let mut pull = vec![0.0; u.len()];
             for NodalBlock { nodes: [a, b], block } in blocks {
@@ -177,13 +184,13 @@ impl<const D: usize> Post for OnPart<D> {
                     pull[D * *a as usize + i] -= (0..D).map(|j| row[j] * u[at + j]).sum::<f64>();
                 }
             }
-            springs.push(sum.of(&pull));
+            all.push(self, &pull);
             crate::linalg::axpy(1.0, &pull, &mut known);
         }
         let mut supports = vec![Resultant::default(); self.supports];
         let mut rigid = vec![Resultant::default(); self.mesh.held.rigid.len()];
         for (node, reaction) in self.reactions(&u, &known) {
-            sum.grow(node, reaction);
+            all.grow(space, node, reaction);
             match self.mesh.held.rigid.iter().position(|surface| surface.nodes.binary_search(&node).is_ok()) {
                 Some(surface) => rigid[surface].add(space, node, reaction),
                 None => {
@@ -193,7 +200,9 @@ impl<const D: usize> Post for OnPart<D> {
                 }
             }
         }
-        ForceBalance { parts: [parts, supports, springs, rigid].concat(), size: sum.size }
+        let springs = all.parts.split_off(2);
+        all.parts.extend(supports.into_iter().chain(springs).chain(rigid));
+        all
     }
 
     fn approach(&self, v: &[f64]) -> Vec<f64> {
@@ -240,27 +249,23 @@ pub struct ForceBalance {
     pub size: [f64; 2],
 }
 
-/// A sum of forces at owned nodes.
-struct Resultants<'a, const D: usize> {
-    size: [f64; 2],
-    part: &'a OnPart<D>,
-}
-
-impl<const D: usize> Resultants<'_, D> {
-    fn of(&mut self, forces: &[f64]) -> Resultant {
+impl ForceBalance {
+    /// Append the resultant of forces at the owned nodes of a part.
+    fn push<const D: usize>(&mut self, part: &FemBody<D>, forces: &[f64]) {
         let mut resultant = Resultant::default();
-        for (node, force) in forces.chunks_exact(D).enumerate().filter(|(node, _)| self.part.own[*node]) {
+        for (node, force) in forces.chunks_exact(D).enumerate().filter(|(node, _)| part.own[*node]) {
             let force: [f64; D] = std::array::from_fn(|c| force[c]);
-            resultant.add(&self.part.mesh.space, node as u32, force);
-            self.grow(node as u32, force);
+            resultant.add(&part.mesh.space, node as u32, force);
+            self.grow(&part.mesh.space, node as u32, force);
         }
-        resultant
+        self.parts.push(resultant);
     }
 
-    fn grow(&mut self, node: u32, force: [f64; D]) {
+    /// Add a force at a node to the sizes.
+    fn grow<const D: usize>(&mut self, space: &Space<D>, node: u32, force: [f64; D]) {
         let length = |v: [f64; 3]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let size = length(self.part.mesh.space.net_force(force));
+        let size = length(space.net_force(force));
         self.size[0] += size;
-        self.size[1] += size * length(pad(self.part.mesh.space.nodes[node as usize]));
+        self.size[1] += size * length(pad(space.nodes[node as usize]));
     }
 }

@@ -18,20 +18,11 @@ use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodySlot, Mechanism};
-use crate::problem::{BodySpec, ContactSpec, Order};
+use crate::problem::Order;
 use crate::scene::Scene;
 use crate::solver::InterfaceDofs;
 use crate::solver::cost::{BodyFacts, compactness};
 use serde::{Deserialize, Serialize};
-
-/// The bodies and the named contacts of a scene, with the factors of a load step.
-#[derive(Clone, Copy)]
-pub struct StepSpecs<'a> {
-    /// The bodies of the mesh.
-    pub bodies: &'a [BodySpec],
-    /// The contacts that name their surfaces.
-    pub contacts: &'a [ContactSpec],
-}
 
 /// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]
@@ -91,18 +82,17 @@ fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)
 /// # Errors
 /// The scene contradicts its mesh, or `factory` fails.
 pub fn prepare<'a, const D: usize, F: Factory>(
-    scene: &Scene,
+    scene: &'a Scene,
     verified: &Verified<D>,
-    specs: StepSpecs<'a>,
     cut: Cut<D>,
     keep: bool,
     ranks: usize,
     factory: &mut F,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let mesh = &verified.mesh;
-    let parts = parts(scene, verified, specs.bodies)?;
+    let parts = parts(scene, verified)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    let (all, rigid) = pairs::all(scene, specs.contacts, mesh, cut, &parts, keep)?;
+    let (all, rigid) = pairs::all(scene, mesh, cut, &parts, keep)?;
     for found in all {
         pairs.push(found.pair);
         contacts.push(found.facts);
@@ -138,10 +128,10 @@ fn plan<const D: usize, F: Factory>(
     checked: &[BodyCheck],
     factory: &mut F,
 ) -> Result<F::SolverPlan> {
-    let of_body = |(WholeBody { part, free, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
+    let of_body = |(WholeBody { part, rigid_modes, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
         let (spec, mesh) = (part.spec, &part.mesh);
-        let at = |k: usize, dof: usize| mesh.dof_of(&free[k], dof);
-        let motions = AtDofs { count: free.len(), at: &at };
+        let at = |k: usize, dof: usize| mesh.dof_of(&rigid_modes[k], dof);
+        let motions = AtDofs { count: rigid_modes.len(), at: &at };
         let interface = InterfaceDofs::new(D, &mesh.rows, &mesh.prescribed, motions);
         let facts = BodyFacts {
             name: spec.name.value.clone(),

@@ -12,6 +12,7 @@
 
 use super::approach::mean_normal;
 use super::groups::point;
+use super::whole::NO_WORK;
 use crate::contact::ContactPair;
 use crate::error::{Error, Result};
 use crate::fem::cross;
@@ -129,7 +130,7 @@ impl<'a> Obstacle<'a> {
             .help("name a part of the surface, or let the gap change: gap = \"...\""));
         }
         let moment = spec.moment().unwrap_or_default();
-        if !self.pair.along_curve && self.along(moment).abs() > 1e-9 * length(moment) {
+        if !self.pair.along_curve && self.along(moment).abs() > NO_WORK * length(moment) {
             let message =
                 format!("a moment on the obstacle before `{name}` about its mean normal {}", point(self.normal));
             return Err(Error::scene(place, message).help("no pressure resists it: take that part out"));

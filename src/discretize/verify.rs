@@ -2,7 +2,7 @@
 //! programs have them, become groups of facets first.
 
 use super::groups::earlier;
-use super::patterns::{self, Lying};
+use super::patterns;
 use crate::error::{Error, Located, Result, few};
 use crate::exchange::{Exchange, broadcast};
 use crate::fem::PointExtent;
@@ -41,7 +41,8 @@ struct MeshHeader {
     split: usize,
     straightened: usize,
     points: usize,
-    lying: Lying,
+    /// The groups that lie on each body, see [`patterns::lying`].
+    lying: Vec<Vec<u32>>,
 }
 
 /// Find the bodies of a scene and check its mesh once, see `patterns::bodies` and [`Mesh::check`]. The first rank reads and
@@ -69,7 +70,7 @@ pub fn verify<const D: usize>(
 }
 
 /// Check the mesh of a scene. Return also which groups lie on which bodies.
-fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D>, Lying)> {
+fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D>, Vec<Vec<u32>>)> {
     size(&mesh)?;
     mesh.sort_cells();
     // The radius of a body of revolution is measured from its axis.
@@ -109,7 +110,7 @@ impl<const D: usize> Verified<D> {
 }
 
 impl MeshHeader {
-    fn of<const D: usize>(verified: &Verified<D>, lying: Lying) -> Self {
+    fn of<const D: usize>(verified: &Verified<D>, lying: Vec<Vec<u32>>) -> Self {
         let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
         Self {
             path: path.clone(),
@@ -167,9 +168,6 @@ enum Need {
     Points,
 }
 
-/// A line of the scene that names a group.
-type Use<'a> = (&'a Located<String>, Need);
-
 /// Replace each group of points that the scene names as a surface by facets: those of the boundary of a body all of whose nodes
 /// belong to the group. Return what is to be said of nodes that belong to no such facet.
 ///
@@ -177,10 +175,10 @@ type Use<'a> = (&'a Located<String>, Need);
 /// The scene names the group for points, too, and some of these would be lost.
 pub fn to_surfaces<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<Vec<String>> {
     let mut notes = Vec::new();
-    let uses: Vec<Use> = scene.bodies.iter().flat_map(of_body).chain(of_contacts(scene)).collect();
+    let uses: Vec<(&Located<String>, Need)> = scene.bodies.iter().flat_map(of_body).chain(of_contacts(scene)).collect();
     for place in 0..mesh.groups.len() {
         let group = &mesh.groups[place];
-        let own: Vec<Use> =
+        let own: Vec<(&Located<String>, Need)> =
             uses.iter().copied().filter(|(on, _)| group.dimension == 0 && names(on, mesh, place)).collect();
         if !own.iter().any(|(_, need)| matches!(need, Need::Facets | Need::Either)) {
             continue;
@@ -210,7 +208,7 @@ pub fn to_surfaces<const D: usize>(scene: &Scene, mesh: &mut Mesh<D>) -> Result<
 }
 
 /// Refuse a group that is named as a surface, and also where points would be lost.
-fn refuse_points(own: &[Use], lost: usize) -> Result<()> {
+fn refuse_points(own: &[(&Located<String>, Need)], lost: usize) -> Result<()> {
     let is_point = |need: Need| need == Need::Points || need == Need::Nodes && lost > 0;
     let as_points = own.iter().find(|(_, need)| is_point(*need));
     let as_surface = own.iter().find(|(_, need)| *need == Need::Facets);
@@ -232,7 +230,7 @@ fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, place: usize) -> 
     }
 }
 
-fn of_body(body: &BodySpec) -> Vec<Use<'_>> {
+fn of_body(body: &BodySpec) -> Vec<(&Located<String>, Need)> {
     let load = body.load.iter().map(|load| match load.kind {
         LoadKind::Force { rigid: false, .. } => (&load.on, Need::Either),
         _ => (&load.on, Need::Facets),
@@ -245,7 +243,7 @@ fn of_body(body: &BodySpec) -> Vec<Use<'_>> {
     load.chain(fix).chain(spring).collect()
 }
 
-fn of_contacts(scene: &Scene) -> impl Iterator<Item = Use<'_>> {
+fn of_contacts(scene: &Scene) -> impl Iterator<Item = (&Located<String>, Need)> {
     scene.pairs().flat_map(|contact| &contact.between).map(|on| (on, Need::Facets))
 }
 

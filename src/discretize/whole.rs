@@ -6,7 +6,7 @@ use super::bodies::SceneBody;
 use crate::contact::ContactPair;
 use crate::error::Result;
 use crate::fem::{NodalForces, RigidMotion, rigid};
-use crate::linalg::{Blocks, Csr, TOLERANCE, dot};
+use crate::linalg::{Blocks, Csr, PART, TOLERANCE, dot};
 use crate::mesh::Mesh;
 use crate::model::{Motion, Segment, Sprung, rigid as joint};
 use nalgebra::{DMatrix, DVector};
@@ -23,7 +23,7 @@ pub struct WholeBody<'a, const D: usize> {
     /// Contact rows of the body, pair by pair.
     pub segments: Vec<Segment>,
     /// Rigid motions of the free body.
-    pub free: Vec<RigidMotion<D>>,
+    pub rigid_modes: Vec<RigidMotion<D>>,
     /// Forces of all loads at dofs.
     pub load: NodalForces<D>,
     /// The motions that supports and springs leave at present, as traces on the contact rows and works of the loads.
@@ -34,13 +34,6 @@ pub struct WholeBody<'a, const D: usize> {
     pub owner: usize,
     /// Ranks that own nodes of the body.
     pub ranks: Vec<usize>,
-}
-
-/// A dof that can be fixed against a motion.
-pub struct FixableDof {
-    pub dof: usize,
-    /// Displacement of the dof in the motion.
-    pub size: f64,
 }
 
 impl<'a, const D: usize> WholeBody<'a, D> {
@@ -69,9 +62,9 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         (part.mesh.rows, part.mesh.nodal_rows) = (rows(|pair| &pair.rows), rows(|pair| &pair.nodal));
         part.mesh.approach = approach::rows(&part, &segments, pairs, mesh)?;
         part.mesh.load = part.load(mesh)?;
-        let (free, load) = (part.mesh.free(), part.mesh.load_on_dofs());
+        let (rigid_modes, load) = (part.mesh.rigid_modes(), part.mesh.load_on_dofs());
         let mut body =
-            Self { part, segments, free, load, motions: Vec::new(), sprung: None, owner: 0, ranks: Vec::new() };
+            Self { part, segments, rigid_modes, load, motions: Vec::new(), sprung: None, owner: 0, ranks: Vec::new() };
         body.find_motions();
         Ok(body)
     }
@@ -122,9 +115,9 @@ impl<'a, const D: usize> WholeBody<'a, D> {
     /// Find the motions that supports and springs leave to the body at present.
     pub fn find_motions(&mut self) {
         let mesh = &self.part.mesh;
-        let unsupported = mesh.left_by_supports(&self.free);
+        let unsupported = mesh.unsupported(&self.rigid_modes);
         let (springs, scale) =
-            (mesh.ground_stiffness(&unsupported), mesh.ground_stiffness(&self.free).diagonal().max());
+            (mesh.ground_stiffness(&unsupported), mesh.ground_stiffness(&self.rigid_modes).diagonal().max());
         let left = match scale > 0.0 && !unsupported.is_empty() {
             true => Blocks::free(&springs, scale, TOLERANCE).iter().map(|w| rigid::combine(&unsupported, w)).collect(),
             false => unsupported.clone(),
@@ -132,21 +125,21 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         let is_sprung = left.len() < unsupported.len();
         self.sprung = is_sprung.then(|| Sprung { motions: self.with_works(&unsupported), stiffness: springs });
         self.motions = self.with_works(&left);
-        (self.part.mesh.left, self.part.mesh.unsupported) = (left, unsupported);
+        (self.part.mesh.unconstrained_modes, self.part.mesh.unsupported_modes) = (left, unsupported);
     }
 
-    /// Return the dof at which a motion can be fixed. It is the one that the motion moves most, the last one of equal ones, outside the
-    /// contact rows so that these do not change. The result is `None` if that displacement is small.
-    pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<FixableDof> {
+    /// Return the dof at which a motion can be fixed, and its displacement there. It is the one that the motion moves most, the last one of equal ones, outside the
+    /// contact rows so that these do not change. The result is `None` if that displacement is rounding.
+    pub fn candidate(&self, motion: &RigidMotion<D>) -> Option<(usize, f64)> {
         let in_rows: HashSet<usize> = self.part.mesh.rows.col.iter().map(|&dof| dof as usize).collect();
         let is_free = |dof: &usize| !in_rows.contains(dof) && !self.part.mesh.held.prescribed.contains_key(dof);
         let all = (0..self.part.mesh.space.dofs()).filter(is_free);
-        let sizes = all.map(|dof| FixableDof { dof, size: self.part.mesh.dof_of(motion, dof) });
-        sizes.max_by(|a, b| a.size.abs().total_cmp(&b.size.abs())).filter(|found| found.size.abs() > 1e-3)
+        let sizes = all.map(|dof| (dof, self.part.mesh.dof_of(motion, dof)));
+        sizes.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).filter(|found| found.1.abs() > PART)
     }
 
     /// Fix a dof. The motions of the body are not found anew.
-    pub fn fix(&mut self, found: &FixableDof) {
-        self.part.mesh.held.prescribed.insert(found.dof, 0.0);
+    pub fn fix(&mut self, dof: usize) {
+        self.part.mesh.held.prescribed.insert(dof, 0.0);
     }
 }

@@ -221,7 +221,7 @@ pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
         return vec![0.0; count];
     }
     // leave out combinations of the vectors that vanish
-    match normal.svd(true, true).solve(&right, 1e-10 * largest) {
+    match normal.svd(true, true).solve(&right, TOLERANCE * largest) {
         Ok(amounts) => amounts.as_slice().to_vec(),
         Err(_) => vec![0.0; count],
     }

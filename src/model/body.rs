@@ -1,7 +1,7 @@
 //! A body as this rank has it: K, f and contact rows B on its dofs, and a solver for G = K + B' diag(d) B.
 
 use super::Motion;
-use super::states::{Distribution, States};
+use super::dofs::{Distribution, Dofs};
 use crate::error::{Error, Kind, Result};
 use crate::fem::{Couplings, ElasticBody};
 use crate::file::available_memory;
@@ -22,22 +22,13 @@ pub struct Energy {
     pub potential: f64,
 }
 
-/// A load on all dofs of a body, as the dofs of a state see it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReducedLoad {
-    /// The right-hand side of [`Body::solve`] with the same effect.
-    pub force: Vec<f64>,
-    /// Work of the load while the interface dofs do not move: r_I' K_II^-1 r_I with the load r_I on eliminated dofs I; zero if there are none.
-    pub work: f64,
-}
-
 /// An elastic body with stiffness K, load f and contact rows B (one row for each contact point of each of its surfaces).
 ///
 /// If the body is distributed over ranks, K has the dofs that this rank owns, and its columns are those of the distributed matrix that has its rows. A condensed
 /// body has its interface dofs; its displacements stand for those of the whole body with its interior in equilibrium, so that residual, energies and all
 /// output have the values of the whole body. Solves may be inexact, but [`Body::residual`] is exact. Errors are failures of the solver library.
 pub struct Body {
-    states: States,
+    dofs: Dofs,
     /// K and the loads. K is empty if a solver stores it, or if it was given away.
     elastic: ElasticBody,
     /// The diagonal of K, if K itself is in a solver or was given away; else empty.
@@ -75,23 +66,23 @@ struct Interior {
 
 impl Body {
     /// Join a body, whose K has a pattern that holds that of B'B, its contact rows B (columns: its dofs, none of them prescribed), and the rigid motions
-    /// `free` that its supports leave, one vector over the dofs each. `make` makes a solver of K when something is first solved, and `words` describe that solver.
+    /// `unconstrained_modes` that its supports and springs leave, one vector over the dofs each. `make` makes a solver of K when something is first solved, and `words` describe that solver.
     ///
-    /// A distributed body has the dofs that this rank owns, while `rows` and `free` have those of its owned and ghost nodes. If the body gets a matrix of its
+    /// A distributed body has the dofs that this rank owns, while `rows` and `unconstrained_modes` have those of its owned and ghost nodes. If the body gets a matrix of its
     /// own, that is distributed over all ranks.
     pub fn new(
         mut elastic: ElasticBody,
         rows: Csr,
-        free: Vec<Vec<f64>>,
+        unconstrained_modes: Vec<Vec<f64>>,
         distribution: Option<Distribution>,
         make: MakeSolver,
         words: String,
     ) -> Self {
         elastic.held = Couplings::default();
         let prescribed = std::mem::take(&mut elastic.prescribed);
-        let states = States::new(elastic.load.len(), prescribed, rows, free, distribution.map(Rc::new));
+        let dofs = Dofs::new(elastic.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
         let (diagonal, make) = (Vec::new(), Some(make));
-        Self { states, elastic, diagonal, robin: None, make, keeps_stiffness: false, words, interior: None }
+        Self { dofs, elastic, diagonal, robin: None, make, keeps_stiffness: false, words, interior: None }
     }
 
     /// Return a rigid part, whose dofs are the amounts of its `motions`, without a stiffness.
@@ -110,21 +101,21 @@ impl Body {
         Self { keeps_stiffness: true, ..body }
     }
 
-    /// Return a body that is to be condensed to its interface dofs. `whole` and `free` are on all dofs.
+    /// Return a body that is to be condensed to its interface dofs. `whole` and `unconstrained_modes` are on all dofs.
     pub fn to_condense(
         session: Session,
         chosen: Chosen,
         dimension: usize,
         whole: ElasticBody,
-        free: &[Vec<f64>],
+        unconstrained_modes: &[Vec<f64>],
         interface: InterfaceDofs,
     ) -> Self {
         let on_interface = |motion: &Vec<f64>| {
             let turned = interface.turn(motion);
             interface.dofs.iter().map(|&dof| turned[dof]).collect()
         };
-        let free = free.iter().map(on_interface).collect();
-        let states = States::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), free, None);
+        let modes = unconstrained_modes.iter().map(on_interface).collect();
+        let dofs = Dofs::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), modes, None);
         let (load, words) = (interface.turn(&whole.load), interface.in_words());
         let interior = Interior {
             session,
@@ -140,7 +131,7 @@ impl Body {
         let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
         let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
         let (make, interior) = (Some(make), Some(interior));
-        Self { states, elastic, diagonal, robin: None, make, keeps_stiffness: true, words, interior }
+        Self { dofs, elastic, diagonal, robin: None, make, keeps_stiffness: true, words, interior }
     }
 
     /// Eliminate the interior, if the body is to be condensed and is not yet.
@@ -155,8 +146,8 @@ impl Body {
     }
 
     /// Return the dofs.
-    pub fn states(&self) -> &States {
-        &self.states
+    pub fn dofs(&self) -> &Dofs {
+        &self.dofs
     }
 
     /// Compute the equilibrium residual (26) r = f - K u - B' force, with `product` = K u and `force` = omega p at each row. Return the
@@ -166,7 +157,7 @@ impl Body {
         for (r, (load, product)) in r.iter_mut().zip(load.iter().zip(product)) {
             *r = load - product;
         }
-        self.states.rows.add_transpose(-1.0, force, r);
+        self.dofs.rows.add_transpose(-1.0, force, r);
         let quadratic = dot(u, product);
         Energy {
             strain: quadratic + 2.0 * dot(lifting, u) + strain_constant,
@@ -178,11 +169,11 @@ impl Body {
     /// K + B' diag(`springs`) B, for `springs` at each row.
     pub fn unbalanced(&self, r: &[f64], springs: &[f64]) -> f64 {
         let mut diagonal = match self.diagonal.is_empty() {
-            true => (0..self.states.dofs).map(|i| self.elastic.stiffness.diagonal(i)).collect(),
+            true => (0..self.dofs.count).map(|i| self.elastic.stiffness.diagonal(i)).collect(),
             false => self.diagonal.clone(),
         };
         for (q, spring) in springs.iter().enumerate().filter(|(_, spring)| **spring > 0.0) {
-            self.states.rows.row(q).for_each(|(i, b)| diagonal[i] += spring * b * b);
+            self.dofs.rows.row(q).for_each(|(i, b)| diagonal[i] += spring * b * b);
         }
         let squared = |(r, diagonal): (&f64, &f64)| if *r == 0.0 { 0.0 } else { r * r / diagonal };
         r.iter().zip(&diagonal).map(squared).sum()
@@ -197,7 +188,7 @@ impl Body {
     pub fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
         match &mut self.robin {
             Some(robin) if self.elastic.stiffness.rows() == 0 => {
-                robin.multiply_stiffness(self.states.matrix_rows(), u, y)
+                robin.multiply_stiffness(self.dofs.matrix_rows(), u, y)
             }
             _ => self.elastic.stiffness.multiply(u, y),
         }
@@ -210,7 +201,7 @@ impl Body {
 
     fn take_stiffness(&mut self) -> Csr {
         let k = std::mem::replace(&mut self.elastic.stiffness, Csr::new(0));
-        let first = self.states.distribution.as_ref().map_or(0, |distribution| distribution.first);
+        let first = self.dofs.distribution.as_ref().map_or(0, |distribution| distribution.first);
         let diagonal = |i: usize| k.position(i, first + i).map_or(0.0, |at| k.values[at]);
         self.diagonal = (0..k.rows()).map(diagonal).collect();
         k
@@ -221,13 +212,13 @@ impl Body {
         if let Some(make) = self.make.take() {
             let stiffness = if self.keeps_stiffness { self.elastic.stiffness.clone() } else { self.take_stiffness() };
             let diagonal = |i: usize| self.diagonal.get(i).map_or_else(|| stiffness.diagonal(i), |value| *value);
-            let square = |q: usize| self.states.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
-            let mut row_stiffness: Vec<f64> = (0..self.states.rows.rows()).map(square).collect();
-            if let Some(distribution) = &self.states.distribution {
+            let square = |q: usize| self.dofs.rows.row(q).map(|(i, b)| b * b * diagonal(i)).sum();
+            let mut row_stiffness: Vec<f64> = (0..self.dofs.rows.rows()).map(square).collect();
+            if let Some(distribution) = &self.dofs.distribution {
                 distribution.exchange.sum(&mut row_stiffness);
             }
-            let start = self.states.distribution.as_ref().map(|distribution| distribution.start);
-            let rows = self.states.matrix_rows();
+            let start = self.dofs.distribution.as_ref().map(|distribution| distribution.start);
+            let rows = self.dofs.matrix_rows();
             self.robin = Some(RobinMatrix::new(rows_of(stiffness, start)?, rows, row_stiffness, None, make)?);
         }
         self.robin.as_mut().ok_or_else(|| Error::new(Kind::Solver, "an inner solver could not be made"))
@@ -237,7 +228,7 @@ impl Body {
     /// are those of the last call.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
         self.robin_matrix()?;
-        let rows = self.states.matrix_rows();
+        let rows = self.dofs.matrix_rows();
         self.robin.as_mut().map_or(Ok(()), |robin| robin.update(rows, weight))
     }
 
@@ -262,17 +253,18 @@ impl Body {
         self.robin_matrix()?.apply(|solver| solver.precondition(r, z))
     }
 
-    /// Return a load on all dofs as a force on those of the body. What acts on supports is left out.
-    pub fn reduce(&mut self, load: &[f64]) -> Result<ReducedLoad> {
+    /// Return a load on all dofs as a force on those of the body, and its work while the interface dofs do not move: r_I' K_II^-1 r_I with the load r_I on
+    /// eliminated dofs I, zero if there are none. What acts on supports is left out.
+    pub fn reduce(&mut self, load: &[f64]) -> Result<(Vec<f64>, f64)> {
         match &mut self.interior {
-            None => Ok(ReducedLoad { force: self.states.reduce(load), work: 0.0 }),
+            None => Ok((self.dofs.reduce(load), 0.0)),
             Some(interior) => interior.reduce(load),
         }
     }
 
     /// Return the displacements of the owned and ghost nodes of this rank from those of the dofs. Collective for a distributed body.
     pub fn recover(&self, u: &[f64]) -> Result<Vec<f64>> {
-        self.interior.as_ref().map_or_else(|| Ok(self.states.recover(u)), |interior| interior.recover(u))
+        self.interior.as_ref().map_or_else(|| Ok(self.dofs.recover(u)), |interior| interior.recover(u))
     }
 
     /// Return the counters of the work so far.
@@ -307,7 +299,7 @@ impl Body {
         let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &mut self.elastic;
         let interior = self.interior.iter_mut().flat_map(|interior| &mut interior.load);
         load.iter_mut().chain(lifting).chain(interior).for_each(|force| *force *= ratio);
-        self.states.prescribed.iter_mut().for_each(|(_, value)| *value *= ratio);
+        self.dofs.prescribed.iter_mut().for_each(|(_, value)| *value *= ratio);
         [strain_constant, energy_constant].into_iter().for_each(|energy| *energy *= ratio * ratio);
     }
 
@@ -375,14 +367,14 @@ impl Interior {
     }
 
     /// See [`Body::reduce`].
-    fn reduce(&self, load: &[f64]) -> Result<ReducedLoad> {
+    fn reduce(&self, load: &[f64]) -> Result<(Vec<f64>, f64)> {
         let mut load = load.to_vec();
         self.whole.prescribed.iter().for_each(|&(dof, _)| load[dof] = 0.0);
         let load = self.interface.turn(&load);
         self.with_factor(|schur| {
             let force = schur.condense(&load)?;
             let interior = schur.expand_condensed(&load, &vec![0.0; force.len()])?;
-            Ok(ReducedLoad { work: dot(&load, &interior), force })
+            Ok((force, dot(&load, &interior)))
         })
     }
 

@@ -56,7 +56,7 @@ pub(super) struct Border {
 }
 
 /// What the rigid parts do in a step.
-pub(super) struct Moved {
+pub(super) struct BorderStep {
     /// a.
     pub amounts: Vec<f64>,
     /// (N - B X) a, n, by which all points close besides B x_0.
@@ -83,7 +83,7 @@ impl Border {
     }
 
     /// Return how the rigid parts move where x_0 closes the points by `closing`, n, and `work` is the work s on their motions.
-    pub fn moved(&self, work: &[f64], closing: &[f64]) -> Moved {
+    pub fn moved(&self, work: &[f64], closing: &[f64]) -> BorderStep {
         let count = work.len();
         let stiffness = DMatrix::from_fn(count, count, |i, j| dot(&self.forces[i], &self.left[j]));
         let lacking = DVector::from_fn(count, |i, _| work[i] - dot(&self.forces[i], closing));
@@ -93,7 +93,7 @@ impl Border {
         let mut all = vec![0.0; closing.len()];
         self.left.iter().zip(amounts.iter()).for_each(|(left, &a)| axpy(a, left, &mut all));
         let error = self.errors.iter().zip(amounts.iter()).map(|(error, a)| (error * a).abs()).sum();
-        Moved { energy: amounts.dot(&lacking), amounts: amounts.as_slice().to_vec(), closing: all, error }
+        BorderStep { energy: amounts.dot(&lacking), amounts: amounts.as_slice().to_vec(), closing: all, error }
     }
 }
 

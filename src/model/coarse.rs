@@ -54,7 +54,7 @@ impl RigidSpace {
         let (length, motions) = (offset[offset.len() - 1], motions_of(&bodies, &points));
         let mut columns = Vec::new();
         for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.is_rigid) {
-            let shapes = slot.local.as_ref().into_iter().flat_map(|local| &local.states().motions);
+            let shapes = slot.local.as_ref().into_iter().flat_map(|local| &local.dofs().unconstrained_modes);
             let column = |(motion, values): (usize, &Vec<f64>)| MotionColumn {
                 motion,
                 first: offset[body],

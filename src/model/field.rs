@@ -13,7 +13,7 @@ use crate::linalg::{axpy, dot};
 #[derive(Debug, Clone, Default)]
 pub struct Field {
     /// v, the displacements of each local body without their rigid parts; empty for a body of another rank.
-    pub states: Vec<Vec<f64>>,
+    pub displacements: Vec<Vec<f64>>,
     /// a, the amounts of the motions of each body, on all ranks.
     pub rigid: Vec<Vec<f64>>,
     /// B (v + E a) or B v of all contact rows (see [`model`](crate::model) for the layout).
@@ -23,26 +23,26 @@ pub struct Field {
 impl Field {
     /// Return the field of all bodies at rest.
     pub fn rest(model: &Model) -> Field {
-        Self::of(model, |body| body.states().rest())
+        Self::of(model, |body| body.dofs().rest())
     }
 
     /// Return the field with the displacements that supports prescribe.
     #[must_use]
     pub fn supported(mut self, model: &Model) -> Field {
-        let bodies = model.bodies.iter().map(|slot| slot.local.as_ref()).zip(&mut self.states);
-        bodies.for_each(|(body, u)| body.into_iter().for_each(|body| body.states().prescribe(u)));
+        let bodies = model.bodies.iter().map(|slot| slot.local.as_ref()).zip(&mut self.displacements);
+        bodies.for_each(|(body, u)| body.into_iter().for_each(|body| body.dofs().prescribe(u)));
         self
     }
 
     /// Return the field without displacement of any body.
     pub fn zero(model: &Model) -> Field {
-        Self::of(model, |body| vec![0.0; body.states().dofs])
+        Self::of(model, |body| vec![0.0; body.dofs().count])
     }
 
     fn of(model: &Model, displacements: impl Fn(&Body) -> Vec<f64>) -> Field {
         let state = |slot: &BodySlot| slot.local.as_ref().map_or(Vec::new(), &displacements);
         Field {
-            states: model.bodies.iter().map(state).collect(),
+            displacements: model.bodies.iter().map(state).collect(),
             rigid: model.bodies.iter().map(|slot| vec![0.0; slot.motions.len()]).collect(),
             trace: vec![0.0; 2 * model.points()],
         }
@@ -51,12 +51,12 @@ impl Field {
     /// Return the step with the displacements u + E a of the local bodies, and the sums over ranks of `more` numbers. u may have rigid parts; a are the amounts
     /// `apart` of the motions of each local body, or empty where all is in u. One message, so that all ranks have the same numbers although their processors may
     /// round differently.
-    pub fn of_step(model: &Model, states: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
-        let (mut field, mut fallen) = (Field { states, ..Self::zero(model) }, Self::zero(model).rigid);
+    pub fn of_step(model: &Model, displacements: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
+        let (mut field, mut fallen) = (Field { displacements, ..Self::zero(model) }, Self::zero(model).rigid);
         field.trace_here(model);
         for (index, slot) in model.bodies.iter().enumerate() {
             if let Some(body) = slot.local.as_ref() {
-                field.rigid[index] = body.states().amounts(&field.states[index]);
+                field.rigid[index] = body.dofs().amounts(&field.displacements[index]);
                 fallen[index].iter_mut().zip(&apart[index]).for_each(|(sum, a)| *sum = *a);
             }
         }
@@ -65,9 +65,9 @@ impl Field {
         let mut numbers = message.into_iter();
         let rigid = field.rigid.iter_mut().chain(&mut fallen).flatten();
         field.trace.iter_mut().chain(rigid).zip(&mut numbers).for_each(|(to, sum)| *to = sum);
-        for ((slot, state), rigid) in model.bodies.iter().zip(&mut field.states).zip(&field.rigid) {
+        for ((slot, state), rigid) in model.bodies.iter().zip(&mut field.displacements).zip(&field.rigid) {
             if let Some(body) = slot.local.as_ref() {
-                body.states().add_motions(-1.0, rigid, state);
+                body.dofs().add_motions(-1.0, rigid, state);
             }
         }
         axpy(1.0, &rigid::trace(model, &fallen), &mut field.trace);
@@ -83,8 +83,8 @@ impl Field {
     /// Multiply by t.
     pub fn scale(&mut self, t: f64) {
         if t != 1.0 {
-            let Self { states, rigid, trace } = self;
-            states.iter_mut().chain(rigid).flatten().chain(trace).for_each(|x| *x *= t);
+            let Self { displacements, rigid, trace } = self;
+            displacements.iter_mut().chain(rigid).flatten().chain(trace).for_each(|x| *x *= t);
         }
     }
 
@@ -95,8 +95,8 @@ impl Field {
 
     /// Return all vectors of this field with those of the `other` one.
     fn parts_with<'f>(&'f mut self, other: &'f Field) -> impl Iterator<Item = (&'f mut Vec<f64>, &'f Vec<f64>)> {
-        let states = self.states.iter_mut().zip(&other.states);
-        states.chain(self.rigid.iter_mut().zip(&other.rigid)).chain([(&mut self.trace, &other.trace)])
+        let displacements = self.displacements.iter_mut().zip(&other.displacements);
+        displacements.chain(self.rigid.iter_mut().zip(&other.rigid)).chain([(&mut self.trace, &other.trace)])
     }
 
     /// Add t `step` to an iterate, whose rigid part goes into the gap of the model.
@@ -121,7 +121,7 @@ impl Field {
         for (index, slot) in model.bodies.iter().enumerate() {
             if let Some(body) = slot.local.as_ref() {
                 let mut rows = vec![0.0; slot.row_stiffness.len()];
-                body.states().rows.multiply(&self.states[index], &mut rows);
+                body.dofs().rows.multiply(&self.displacements[index], &mut rows);
                 model.add(index, &rows, &mut trace);
             }
         }
@@ -144,14 +144,14 @@ pub fn local_dot(x: &[Vec<f64>], y: &[Vec<f64>]) -> f64 {
 pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]) -> (Vec<Vec<f64>>, Energy) {
     let mut sum = Energy::default();
     let of_body = |(index, product): (usize, Vec<f64>)| {
-        let (slot, state, rows) = (&model.bodies[index], &u.states[index], model.at_rows(index, force));
+        let (slot, state, rows) = (&model.bodies[index], &u.displacements[index], model.at_rows(index, force));
         let mut r = vec![0.0; state.len()];
         let Some(body) = slot.local.as_ref() else { return r };
         let energy = body.residual(state, &product, &rows, &mut r);
-        body.states().balance(&mut r, &slot.works(&rows));
+        body.dofs().balance(&mut r, &slot.works(&rows));
         sum.strain += energy.strain;
         sum.potential += energy.potential;
-        if body.states().leads() {
+        if body.dofs().leads() {
             sum.potential -= slot.motions.iter().zip(&u.rigid[index]).map(|(motion, a)| motion.work * a).sum::<f64>();
         }
         r
@@ -173,7 +173,7 @@ pub fn unbalanced(model: &Model, r: &[Vec<f64>], springs: &[f64]) -> f64 {
 pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
     for (index, y) in y.iter_mut().enumerate() {
         if let Some(body) = model.bodies[index].local.as_ref() {
-            body.states().rows.add_transpose(1.0, &model.at_rows(index, force), y);
+            body.dofs().rows.add_transpose(1.0, &model.at_rows(index, force), y);
         }
     }
 }
@@ -198,7 +198,7 @@ pub struct Unbounded;
 impl<'a> LineEnergy<'a> {
     /// Return the line from an iterate with the layer state `layer` and the equilibrium residual `r` along `v`, with the products `kv` = K v. One message.
     pub fn new(model: &'a Model, layer: &'a Layer, r: &[Vec<f64>], v: &Field, kv: &[Vec<f64>]) -> Self {
-        let mut sums = [local_dot(r, &v.states), local_dot(kv, &v.states)];
+        let mut sums = [local_dot(r, &v.displacements), local_dot(kv, &v.displacements)];
         model.exchange.sum(&mut sums);
         let closing = v.closing();
         let works = (0..model.bodies.len()).map(|body| {
@@ -212,14 +212,9 @@ impl<'a> LineEnergy<'a> {
     /// Return d/dt F1(u + t v).
     pub fn derivative(&self, t: f64) -> f64 {
         let mut sum = self.slope + t * self.curvature;
-        for (i, pair) in self.model.pairs.iter().enumerate() {
-            for q in self.model.range(i) {
-                let s = self.closing[q];
-                if s != 0.0 {
-                    let c = self.compression[q] + t * s;
-                    sum += self.model.weight[q] * pair.law.pressure(q - self.model.offset[i], c) * s;
-                }
-            }
+        for (q, pair, point) in self.model.each_point().filter(|(q, ..)| self.closing[*q] != 0.0) {
+            let s = self.closing[q];
+            sum += self.model.weight[q] * pair.law.pressure(point, self.compression[q] + t * s) * s;
         }
         // a law that leaves the range of numbers resists with an infinite force
         if sum.is_nan() { f64::INFINITY } else { sum }
@@ -270,7 +265,8 @@ pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64
         low = high;
         high = SearchPoint::new(4.0 * high.t, value(4.0 * high.t));
     }
-    // Illinois variant of the secant rule, with bisection where a law is too steep for it
+    // Illinois variant of the secant rule, with bisection where a law is too steep for it: halving a value of a thousand times the other takes ten secants.
+    // Every third step halves the interval at least, so that 200 are more than the 53 bits of t need.
     for _ in 0..200 {
         if high.value <= target {
             return Ok(high.t);
@@ -280,7 +276,7 @@ pub fn zero(value: impl Fn(f64) -> f64, start: f64, accuracy: f64) -> Result<f64
         let is_steep = !high.value.is_finite() || high.value > 1e3 * low.value.abs();
         let t = if is_steep || !(secant > low.t && secant < high.t) { middle } else { secant };
         let next = SearchPoint::new(t, value(t));
-        if next.value.abs() <= target || high.t - low.t <= 1e-15 * high.t {
+        if next.value.abs() <= target || high.t - low.t <= 4.0 * f64::EPSILON * high.t {
             return Ok(t);
         }
         if next.value < 0.0 {

@@ -8,7 +8,7 @@
 use super::border::{self, Border, BorderMotion};
 use super::coarse::RigidSpace;
 use super::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
-use super::{BodySlot, Distribution, Field, Model, States};
+use super::{BodySlot, Distribution, Dofs, Field, Model};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable, dot};
@@ -80,7 +80,7 @@ impl Joint {
     }
 
     /// Solve G x = r with the matrix until `enough` accepts an iterate. Return x, and the estimated energy norm of its error, or why the solver gave up.
-    fn solve_matrix(&mut self, model: &Model, r: &[f64], enough: &mut StoppingTest) -> Result<Solution> {
+    fn solve_matrix(&mut self, model: &Model, r: &[f64], enough: &mut StoppingTest) -> Result<MatrixSolution> {
         let (rows, first) = (&self.rows, self.first);
         let (mut x, mut last_error) = (vec![0.0; r.len()], None);
         let mut test = |iterate: &KspIterate| {
@@ -90,7 +90,7 @@ impl Joint {
             enough(model, &Trial { closing: &closing, energy, error })
         };
         let failure = self.matrix.apply(|solver| solver.solve_until(r, &mut x, &mut test))?.failure;
-        Ok(Solution { x, last_error, failure })
+        Ok(MatrixSolution { x, last_error, failure })
     }
 
     /// Return B' `force` in the rows of this rank, for forces at the points, n.
@@ -145,7 +145,8 @@ impl Joint {
     fn load(&self, model: &Model, r: &[Vec<f64>]) -> Vec<f64> {
         let mut load = self.whole(r);
         for (body, (r, pins)) in r.iter().zip(&self.pins).enumerate() {
-            let motions = model.bodies[body].local.as_ref().into_iter().flat_map(|body| &body.states().motions);
+            let motions =
+                model.bodies[body].local.as_ref().into_iter().flat_map(|body| &body.dofs().unconstrained_modes);
             pins.iter().zip(motions).for_each(|(pin, motion)| load[self.offset[body] + pin] = dot(motion, r));
         }
         load
@@ -221,7 +222,7 @@ impl LinearStep for Joint {
             let (energy, error) = (trial.energy + moved.energy, trial.error + moved.error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
-        let Solution { mut x, mut last_error, failure } = self.solve_matrix(model, &r, &mut test)?;
+        let MatrixSolution { mut x, mut last_error, failure } = self.solve_matrix(model, &r, &mut test)?;
         if let (false, Some(reason)) = (self.is_redundant, &failure) {
             return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
@@ -238,11 +239,12 @@ impl LinearStep for Joint {
         self.border = border;
         let local = self.parts().zip(residual).filter(|(_, r)| !r.is_empty());
         energy += local.map(|(part, _)| dot(&x[part.clone()], &r[part])).sum::<f64>();
-        let [states, mut apart] = self.displacements(&x, residual);
+        let [displacements, mut apart] = self.displacements(&x, residual);
         for (motion, a) in self.motions.iter().zip(amounts).filter(|(motion, _)| !residual[motion.body].is_empty()) {
             apart[motion.body].push(a);
         }
-        let (field, sums) = Field::of_step(model, states, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
+        let (field, sums) =
+            Field::of_step(model, displacements, &apart, &[energy, f64::from(u8::from(failure.is_some()))]);
         let (energy, failures) = (sums[0], sums[1]);
         if failures > 0.0 {
             let elsewhere = || "the matrix of all bodies cannot be factored on another rank".to_owned();
@@ -263,7 +265,7 @@ impl LinearStep for Joint {
 }
 
 /// The outcome of a solve with the matrix.
-struct Solution {
+struct MatrixSolution {
     /// x in the rows of this rank.
     x: Vec<f64>,
     /// Estimated energy norm of its error, by an iterative solver.
@@ -308,7 +310,7 @@ struct BodyMatrices<'a> {
     /// B.
     rows: Cow<'a, Csr>,
     /// E, if amounts of motions are to stand in the place of pins.
-    motions: Cow<'a, [Vec<f64>]>,
+    modes: Cow<'a, [Vec<f64>]>,
 }
 
 impl<'a> BodyMatrices<'a> {
@@ -316,21 +318,21 @@ impl<'a> BodyMatrices<'a> {
         if slot.is_rigid {
             return Self::without_dofs(slot);
         }
-        let rows = slot.local.as_ref().map_or_else(Cow::default, |body| Cow::Borrowed(&body.states().rows));
-        Self { stiffness: Cow::Owned(stiffness), rows, motions: Cow::Borrowed(&[]) }
+        let rows = slot.local.as_ref().map_or_else(Cow::default, |body| Cow::Borrowed(&body.dofs().rows));
+        Self { stiffness: Cow::Owned(stiffness), rows, modes: Cow::Borrowed(&[]) }
     }
 
     /// Return the matrices of a rigid part that has no unknown in the matrix.
     fn without_dofs(slot: &BodySlot) -> Self {
         let rows = Csr::without_columns(slot.row_stiffness.len());
-        Self { stiffness: Cow::Owned(Csr::new(0)), rows: Cow::Owned(rows), motions: Cow::Borrowed(&[]) }
+        Self { stiffness: Cow::Owned(Csr::new(0)), rows: Cow::Owned(rows), modes: Cow::Borrowed(&[]) }
     }
 
     fn copy(slot: &'a BodySlot) -> Option<Self> {
         let body = slot.local.as_ref()?;
-        let States { rows, motions, .. } = body.states();
+        let Dofs { rows, unconstrained_modes, .. } = body.dofs();
         let [stiffness, rows] = [body.stiffness(), rows].map(Cow::Borrowed);
-        Some(Self { stiffness, rows, motions: Cow::Borrowed(motions) })
+        Some(Self { stiffness, rows, modes: Cow::Borrowed(unconstrained_modes) })
     }
 }
 
@@ -371,9 +373,6 @@ struct Layout<'a> {
     total: usize,
 }
 
-/// Columns, sorted, that a row of the matrix gets besides those of K, by the number of the row on this rank.
-type Coupled = HashMap<usize, Vec<i32>>;
-
 /// A contact row of a body.
 #[derive(Clone, Copy)]
 struct BodyRow {
@@ -391,15 +390,15 @@ impl<'a> Layout<'a> {
         }
         let shared = distributions.iter().copied().flatten().next();
         let total = shared.map_or(offset[parts.len()], |shared| shared.total);
-        let pins = parts.iter().map(|part| pins(&part.motions)).collect();
+        let pins = parts.iter().map(|part| pins(&part.modes)).collect();
         Self { model, parts, distributions, offset, pins, start: shared.map(|shared| shared.start), total }
     }
 
-    /// Return B of all bodies together, and the columns that its products couple in the rows of this rank.
-    fn contact_rows(&self) -> (Csr, Coupled) {
+    /// Return B of all bodies together, and the columns, sorted, that its products couple in the rows of this rank, by the number of the row there.
+    fn contact_rows(&self) -> (Csr, HashMap<usize, Vec<i32>>) {
         let first = self.start.unwrap_or(0);
         let owned = first..first + self.offset[self.parts.len()];
-        let (mut rows, mut coupled) = (Csr::new(self.total), Coupled::new());
+        let (mut rows, mut coupled) = (Csr::new(self.total), HashMap::<usize, Vec<i32>>::new());
         for sides in self.rows_of_points() {
             let mut entries: Vec<(usize, f64)> = sides.iter().flat_map(|&side| self.entries(side)).collect();
             if sides[0].body == sides[1].body {
@@ -444,7 +443,7 @@ impl<'a> Layout<'a> {
     }
 
     /// Return K of all bodies, in the rows of this rank, with zeros at the `coupled` columns that K does not have.
-    fn stiffness(&self, mut coupled: Coupled) -> Result<Csr> {
+    fn stiffness(&self, mut coupled: HashMap<usize, Vec<i32>>) -> Result<Csr> {
         let stored: usize = self.parts.iter().map(|part| part.stiffness.values.len()).sum();
         let room = stored + coupled.values().map(Vec::len).sum::<usize>();
         countable("the matrix of all bodies together", room)?;

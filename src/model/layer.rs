@@ -69,16 +69,13 @@ impl Layer {
     pub fn resolve(model: &Model, compression: &[f64], pressure: &[f64], rho: &[f64], smoothing: &[f64]) -> Self {
         let sum = |q: usize| compression[q] + pressure[q] / rho[q];
         if smoothing.is_empty() {
-            let at = |(i, q): (usize, usize)| model.pairs[i].law.resolvent(q - model.offset[i], sum(q), rho[q]);
-            let points = (0..model.pairs.len()).flat_map(|i| model.range(i).map(move |q| (i, q)));
-            return Self::new(model, points.map(at).collect());
+            let all = model.each_point().map(|(q, pair, point)| pair.law.resolvent(point, sum(q), rho[q]));
+            return Self::new(model, all.collect());
         }
         let mut layer = Self { smoothing: smoothing.to_vec(), energy: vec![0.0; model.pairs.len()], ..Self::default() };
-        for (i, pair) in model.pairs.iter().enumerate() {
-            for q in model.range(i) {
-                let state = law::resolve(&*pair.law, q - model.offset[i], sum(q), rho[q], smoothing[q]);
-                layer.push(model.weight[q], state.compression, state.pressure, state.tangent);
-            }
+        for (q, pair, point) in model.each_point() {
+            let state = law::resolve(&*pair.law, point, sum(q), rho[q], smoothing[q]);
+            layer.push(model.weight[q], state.compression, state.pressure, state.tangent);
         }
         layer
     }
@@ -103,13 +100,10 @@ impl Layer {
     }
 }
 
-/// Stiffness of an elastic foundation over E*/a, in the plane and in space, for which it has the contact of Hertz (Johnson, Contact Mechanics, 1985,
-/// section 4.3). E* is the modulus of the contact, and a its half width or radius.
-const FOUNDATION: [f64; 2] = [1.18, 1.70];
-
-/// Factor on that stiffness. The contact of spheres is then an eighth wider than that of Hertz, because steps that open points are better than
-/// steps that close them. Spheres and cylinders took the fewest steps at this factor, among 0.3 to 1.2.
-const LARGER: f64 = 0.7;
+/// Stiffness of an elastic foundation over E*/a, in the plane and in space. E* is the modulus of the contact, and a its half width or radius. With 1.18 and 1.70 it has
+/// the contact of Hertz (Johnson, Contact Mechanics, 1985, section 4.3). With 0.7 of that the contact of spheres is an eighth wider, because steps that open
+/// points are better than steps that close them: spheres and cylinders took the fewest steps at this factor, among 0.3 to 1.2.
+const FOUNDATION: [f64; 2] = [0.7 * 1.18, 0.7 * 1.70];
 
 /// Return rho0, n: the stiffness per area of the two bodies in series, for contact all over their surfaces.
 pub fn surface_slopes(model: &Model) -> Vec<f64> {
@@ -132,7 +126,7 @@ pub fn contact_slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64>
         let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.weight[q]).sum();
         let is_plane = pair.measure == "length";
         let half = if is_plane { 0.5 * area } else { (area / std::f64::consts::PI).sqrt() };
-        let foundation = LARGER * FOUNDATION[usize::from(!is_plane)] / half;
+        let foundation = FOUNDATION[usize::from(!is_plane)] / half;
         slopes.extend(model.range(i).map(|q| {
             // a row without stiffness has prescribed dofs only, which do not move
             let compliance = |side: usize| match rows[side * points + q] {

@@ -7,21 +7,21 @@
 pub mod body;
 mod border;
 mod coarse;
+pub mod dofs;
 pub mod field;
 pub mod joint;
 pub mod layer;
 pub mod linear;
 pub mod rigid;
-pub mod states;
 
 pub use crate::solver::BodyCounts;
 pub use body::Body;
+pub use dofs::{Distribution, Dofs};
 pub use field::Field;
 pub use joint::Joint;
 pub use layer::Layer;
 pub use linear::LinearStep;
 pub use rigid::{Motions, Moved};
-pub use states::{Distribution, States};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -134,7 +134,7 @@ impl BodySlot {
 
     /// Return how the dofs of the body are distributed over the ranks; `None` for a body of one rank, and for one that does not live here.
     pub fn distribution(&self) -> Option<&Distribution> {
-        self.local.as_ref()?.states().distribution.as_deref()
+        self.local.as_ref()?.dofs().distribution.as_deref()
     }
 }
 
@@ -210,8 +210,7 @@ impl Model {
 
     /// Return the compressions of the layers, n, that carry these pressures, n.
     pub fn compressions_of(&self, pressure: &[f64]) -> Vec<f64> {
-        let points = (0..self.pairs.len()).flat_map(|i| self.range(i).map(move |q| (i, q)));
-        points.map(|(i, q)| self.pairs[i].law.compression(q - self.offset[i], pressure[q])).collect()
+        self.each_point().map(|(q, pair, point)| pair.law.compression(point, pressure[q])).collect()
     }
 
     /// Return the stiffness of the nodes under every contact row, as a trace vector (2n).
@@ -270,6 +269,12 @@ impl Model {
     /// Return the numbers of the points of pair `i`.
     pub fn range(&self, i: usize) -> Range<usize> {
         self.offset[i]..self.offset[i + 1]
+    }
+
+    /// Return the number of each point, its pair, and its number there.
+    pub fn each_point(&self) -> impl Iterator<Item = (usize, &ContactPair, usize)> {
+        let of_pair = |(i, pair)| self.range(i).enumerate().map(move |(point, q)| (q, pair, point));
+        self.pairs.iter().enumerate().flat_map(of_pair)
     }
 
     /// Return the outer normal displacements of a side of pair `i`, one for each of its points: those of `trace`, and the prescribed ones.

@@ -15,19 +15,17 @@ pub struct Motions<'a> {
     first: Vec<usize>,
     /// Motions of each body.
     bodies: Vec<&'a [Motion]>,
-    pairs: Vec<Pair<'a>>,
-}
-
-/// A pair and the bodies at its sides.
-struct Pair<'a> {
-    /// Numbers of its points.
-    points: Range<usize>,
-    sides: Vec<PairSide<'a>>,
+    /// The bodies at the sides of each pair.
+    pairs: Vec<Vec<PairSide<'a>>>,
+    /// Number of the points of all pairs.
+    points: usize,
 }
 
 /// A body at one side of a pair.
 struct PairSide<'a> {
     body: usize,
+    /// Numbers of the points of the pair.
+    points: Range<usize>,
     /// The trace of each of its motions there; `None` if the motion only slides along the surface.
     traces: Vec<Option<&'a [f64]>>,
 }
@@ -44,26 +42,30 @@ pub struct Moved {
 impl<'a> Motions<'a> {
     /// Return the motions of bodies with these contact rows and free motions. `points` are the numbers of points of the pairs.
     pub fn new(bodies: impl IntoIterator<Item = (&'a [Segment], &'a [Motion])>, points: &[usize]) -> Self {
-        let (mut first, mut all, mut pairs, mut next) = (vec![0], Vec::new(), Vec::new(), 0);
-        for count in points {
-            pairs.push(Pair { points: next..next + count, sides: Vec::new() });
-            next += count;
-        }
+        let (mut first, mut all, mut next) = (vec![0], Vec::new(), 0);
+        let mut pairs: Vec<Vec<PairSide>> = points.iter().map(|_| Vec::new()).collect();
+        let points: Vec<Range<usize>> = points
+            .iter()
+            .map(|count| {
+                next += count;
+                next - count..next
+            })
+            .collect();
         for (body, (segments, motions)) in bodies.into_iter().enumerate() {
             let mut row = 0;
             for segment in segments {
-                let pair = &mut pairs[segment.pair];
-                let rows = row..row + pair.points.len();
+                let points = points[segment.pair].clone();
+                let rows = row..row + points.len();
                 row = rows.end;
                 // sliding along a surface closes points by rounding errors, whose squares must not count as stiffness
                 let closes = |trace: &&[f64]| trace.iter().any(|t| t * t > TOLERANCE);
                 let traces = motions.iter().map(|motion| Some(&motion.trace[rows.clone()]).filter(closes)).collect();
-                pair.sides.push(PairSide { body, traces });
+                pairs[segment.pair].push(PairSide { body, points, traces });
             }
             first.push(first[body] + motions.len());
             all.push(motions);
         }
-        Self { first, bodies: all, pairs }
+        Self { first, bodies: all, pairs, points: next }
     }
 
     /// Return the motions of a model's bodies that neither supports nor springs constrain.
@@ -107,8 +109,8 @@ impl<'a> Motions<'a> {
     /// Return (B E)' diag(`weight`) (B E) for springs at the points, one entry a point. The matrix has a row and column of blocks for each body.
     pub fn springs(&self, weight: &[f64]) -> Blocks {
         let mut springs = self.blocks();
-        for Pair { points, sides } in &self.pairs {
-            let weight = &weight[points.clone()];
+        for sides in self.pairs.iter().filter(|sides| !sides.is_empty()) {
+            let weight = &weight[sides[0].points.clone()];
             let force = |trace: &[f64]| trace.iter().zip(weight).map(|(t, w)| t * w).collect::<Vec<f64>>();
             let forces: Vec<Vec<Option<Vec<f64>>>> =
                 sides.iter().map(|side| side.traces.iter().map(|trace| trace.map(force)).collect()).collect();
@@ -131,7 +133,7 @@ impl<'a> Motions<'a> {
 
     /// Return B E `amounts`, by which each point closes.
     pub fn closing(&self, amounts: &DVector<f64>) -> Vec<f64> {
-        let mut closing = vec![0.0; self.pairs.last().map_or(0, |pair| pair.points.end)];
+        let mut closing = vec![0.0; self.points];
         for (points, motion, trace) in self.traces() {
             if amounts[motion] != 0.0 {
                 axpy(amounts[motion], trace, &mut closing[points.clone()]);
@@ -174,7 +176,7 @@ impl<'a> Motions<'a> {
     pub fn work_of(&self, model: &Model, r: &[Vec<f64>]) -> DVector<f64> {
         let mut work = DVector::zeros(self.count());
         for (body, (slot, r)) in model.bodies.iter().zip(r).enumerate() {
-            let motions = slot.local.as_ref().into_iter().flat_map(|local| &local.states().motions);
+            let motions = slot.local.as_ref().into_iter().flat_map(|local| &local.dofs().unconstrained_modes);
             self.of_body(body).zip(motions).for_each(|(i, motion)| work[i] = dot(motion, r));
         }
         model.exchange.sum(work.as_mut_slice());
@@ -192,10 +194,9 @@ impl<'a> Motions<'a> {
 
     /// Return each trace by which a motion closes a pair: (points of the pair, number of the motion, its trace at these points).
     fn traces(&self) -> impl Iterator<Item = (&Range<usize>, usize, &'a [f64])> {
-        let sides = self.pairs.iter().flat_map(|pair| pair.sides.iter().map(move |side| (&pair.points, side)));
-        sides.flat_map(move |(points, side)| {
+        self.pairs.iter().flatten().flat_map(move |side| {
             let traces = self.of_body(side.body).zip(&side.traces);
-            traces.filter_map(move |(motion, trace)| trace.map(|trace| (points, motion, trace)))
+            traces.filter_map(move |(motion, trace)| trace.map(|trace| (&side.points, motion, trace)))
         })
     }
 

@@ -68,12 +68,6 @@ pub(super) struct Obstacles {
     stiffness: Cholesky<f64, Dyn>,
 }
 
-/// What obstacles add to a correction: the amounts a of their motions, and the works s - X'r on them.
-pub(super) struct Share {
-    pub amounts: DVector<f64>,
-    pub works: DVector<f64>,
-}
-
 impl Obstacles {
     /// Return the motions of the obstacles for the Robin term that the model carries; none if no obstacle moves, or if `known` is of that term. Each
     /// costs a solve in every body. Collective.
@@ -113,7 +107,7 @@ impl Obstacles {
         let mut force = vec![0.0; model.points()];
         let trace = &alone.trace[model.points()..];
         range.for_each(|q| force[q] = -model.robin[q] * trace[q]);
-        let mut residual = Field::zero(model).states;
+        let mut residual = Field::zero(model).displacements;
         add_forces(model, &force, &mut residual);
         Ok(solve(model, residual)?.map(|mut column| {
             column.add(1.0, &alone);
@@ -124,8 +118,8 @@ impl Obstacles {
     /// Return S: twice the energies of bodies and springs. One message.
     fn stiffness(model: &mut Model, columns: &[Field]) -> DMatrix<f64> {
         let count = columns.len();
-        let products: Vec<_> = columns.iter().map(|column| model.multiply(&column.states)).collect();
-        let mut strain = DMatrix::from_fn(count, count, |i, j| local_dot(&columns[i].states, &products[j]));
+        let products: Vec<_> = columns.iter().map(|column| model.multiply(&column.displacements)).collect();
+        let mut strain = DMatrix::from_fn(count, count, |i, j| local_dot(&columns[i].displacements, &products[j]));
         model.exchange.sum(strain.as_mut_slice());
         let rows: Vec<Vec<f64>> = columns.iter().map(|column| joint_rows(model, &column.trace)).collect();
         let forces: Vec<Vec<f64>> =
@@ -135,15 +129,15 @@ impl Obstacles {
         0.5 * (&all + all.transpose())
     }
 
-    /// Return what the obstacles add to the correction for a residual. Two messages.
-    pub fn share(&self, model: &Model, residual: &[Vec<f64>]) -> Share {
-        let works = self.works(model, residual);
-        Share { amounts: self.stiffness.solve(&works), works }
+    /// Return the amounts a of the motions for these works.
+    pub fn amounts(&self, works: &DVector<f64>) -> DVector<f64> {
+        self.stiffness.solve(works)
     }
 
-    /// Return s - X'r.
+    /// Return the works s - X'r of a residual on the motions. Two messages.
     pub fn works(&self, model: &Model, residual: &[Vec<f64>]) -> DVector<f64> {
-        let mut works: Vec<f64> = self.columns.iter().map(|column| local_dot(&column.states, residual)).collect();
+        let mut works: Vec<f64> =
+            self.columns.iter().map(|column| local_dot(&column.displacements, residual)).collect();
         model.exchange.sum(&mut works);
         let on_motions = Motions::of(model).work_of(model, residual);
         let rigid = self.columns.iter().map(|column| dot(&column.rigid.concat(), on_motions.as_slice()));

@@ -1,7 +1,7 @@
 //! The interval (33) of gamma, in which Theorem 3 promises convergence, from bounds of the spectrum of G^-1 F1''.
 
 use super::sweep::Sweeper;
-use super::sweeps::conjugate_gradients;
+use super::sweeps::{MOST_SWEEPS, conjugate_gradients};
 use crate::contact::law::LayerLaw;
 use crate::error::Result;
 use crate::model::Model;
@@ -32,9 +32,11 @@ impl Interval {
     }
 }
 
-/// Most steps of a Lanczos iteration, and the relative error of its solution after which the extreme eigenvalues have settled.
-const LANCZOS: (usize, f64) = (300, 1e-9);
-/// Parts of a range of compressions at whose ends the tangent is evaluated, for laws that neither stiffen nor soften all the way.
+/// Relative error of the solution of a Lanczos iteration after which the extreme eigenvalues have settled: a mode that it has not seen has no more than this share
+/// of the solution.
+const SEEN: f64 = 1e-9;
+/// Parts of a range of compressions at whose ends the tangent is evaluated, for laws that neither stiffen nor soften all the way. A bend narrower than one
+/// part may be missed; the interval is reported, and no iteration depends on it.
 const PARTS: usize = 32;
 /// Accuracy of the ends of a range, relative to the excess, which is a difference of energies with sixteen digits.
 const DIGITS: f64 = 1e-13;
@@ -43,13 +45,11 @@ const DIGITS: f64 = 1e-13;
 /// `excess` is F1(u0) - F1 of the solution. Collective: solves with G.
 pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<Interval>> {
     let (mut least, mut most) = (Vec::new(), Vec::new());
-    for (i, pair) in model.pairs.iter().enumerate() {
-        for q in model.range(i) {
-            let (point, weight) = (q - model.offset[i], model.weight[q]);
-            let [low, high] = tangents(&*pair.law, point, layer.compression[q], excess.max(0.0) / weight);
-            least.push(weight * low);
-            most.push(weight * high);
-        }
+    for (q, pair, point) in model.each_point() {
+        let weight = model.weight[q];
+        let [low, high] = tangents(&*pair.law, point, layer.compression[q], excess.max(0.0) / weight);
+        least.push(weight * low);
+        most.push(weight * high);
     }
     let Some((_, upper)) = extremes(model, &most)? else { return Ok(None) };
     let motions = Motions::of(model);
@@ -62,16 +62,16 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
 /// Return the extreme eigenvalues of G^-1 (K + B' diag(`springs`) B), springs at the points (n), among the displacements that forces on the contact rows
 /// cause. Every mode has a part in these forces: multiples of the golden ratio spread evenly over (0, 1) without a period.
 fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
-    let (points, mut load) = (model.points(), Field::zero(model).states);
+    let (points, mut load) = (model.points(), Field::zero(model).displacements);
     let force = |i: usize| model.weight[i % points] * (0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract());
     let rows: Vec<f64> = (0..2 * points).map(force).collect();
     for (index, load) in load.iter_mut().enumerate() {
         let body = model.bodies[index].local.as_ref();
-        body.into_iter().for_each(|body| body.states().rows.add_transpose(1.0, &model.of_body(index, &rows), load));
+        body.into_iter().for_each(|body| body.dofs().rows.add_transpose(1.0, &model.of_body(index, &rows), load));
     }
-    let mut enough = |_: &Model, trial: &Trial| trial.is_within(LANCZOS.1);
+    let mut enough = |_: &Model, trial: &Trial| trial.is_within(SEEN);
     let found =
-        conjugate_gradients(model, &mut Sweeper::default(), springs, &load, (&mut enough, LANCZOS.0), f64::INFINITY)?;
+        conjugate_gradients(model, &mut Sweeper::default(), springs, &load, (&mut enough, MOST_SWEEPS), f64::INFINITY)?;
     Ok(found.ok().and_then(|found| found.spectrum))
 }
 

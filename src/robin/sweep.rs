@@ -39,9 +39,6 @@ pub struct Sweep {
     pub asked: u8,
 }
 
-/// Numbers in the message of a sweep, besides traces, failures and requests.
-const SUMS: usize = 6;
-
 /// Makes sweeps, and counts them.
 #[derive(Debug, Default, Clone)]
 pub struct Sweeper {
@@ -55,7 +52,7 @@ impl Sweeper {
     /// Solve G_s z_s = r_s in every body at `iterate` with its `layer`, with the Robin term that the model carries. The requests `asked` of this rank go with
     /// the message.
     pub fn sweep(&mut self, model: &mut Model, iterate: &Field, layer: &Layer, asked: u8) -> Result<Sweep> {
-        let products = model.multiply(&iterate.states);
+        let products = model.multiply(&iterate.displacements);
         let (residual, energy) = residual(model, products, iterate, &layer.force);
         let sweep = self.solve(model, residual, energy, None, asked)?;
         self.with_obstacles(model, sweep, None)
@@ -79,10 +76,11 @@ impl Sweeper {
             Err(failure) => sweep.failed = Some(sweep.failed.unwrap_or(failure)),
         }
         let Some(obstacles) = &self.obstacles else { return Ok(sweep) };
-        let share = obstacles.share(model, &sweep.residual);
-        sweep.decrement += share.works.dot(&share.amounts);
-        sweep.product += other.map_or(0.0, |other| obstacles.works(model, other).dot(&share.amounts));
-        obstacles.add_to(&share.amounts, &mut sweep.correction);
+        let works = obstacles.works(model, &sweep.residual);
+        let amounts = obstacles.amounts(&works);
+        sweep.decrement += works.dot(&amounts);
+        sweep.product += other.map_or(0.0, |other| obstacles.works(model, other).dot(&amounts));
+        obstacles.add_to(&amounts, &mut sweep.correction);
         Ok(sweep)
     }
 
@@ -97,7 +95,7 @@ impl Sweeper {
     ) -> Result<Sweep> {
         let (bodies, mut reasons) = (model.bodies.len(), vec![String::new(); model.bodies.len()]);
         let mut corrections: Vec<Vec<f64>> = residual.iter().map(|r| vec![0.0; r.len()]).collect();
-        let (mut sums, mut failed) = ([0.0; SUMS], vec![0.0; bodies]);
+        let (mut sums, mut failed) = ([0.0; 6], vec![0.0; bodies]);
         (sums[1], sums[2]) = (energy.strain, energy.potential);
         for index in 0..bodies {
             if is_obstacle(model, index) {
@@ -112,7 +110,7 @@ impl Sweeper {
             sums[0] += dot(r, z);
             sums[3] += other.map_or(0.0, |other| dot(&other[index], z));
             // a body that is distributed over several ranks counts once
-            if body.states().leads() {
+            if body.dofs().leads() {
                 let counts = body.counts();
                 sums[4] += counts.factorizations as f64;
                 sums[5] += counts.inner_iterations as f64;
@@ -120,7 +118,7 @@ impl Sweeper {
         }
         let (correction, numbers) =
             Field::of_step(model, corrections, &vec![Vec::new(); bodies], &[&sums[..], &failed, &asks(asked)].concat());
-        let (sums, rest) = numbers.split_at(SUMS);
+        let (sums, rest) = numbers.split_at(sums.len());
         let (failed, asked) = rest.split_at(bodies);
         let failed = failed.iter().position(|&failed| failed != 0.0);
         self.sweeps += 1;
@@ -185,23 +183,20 @@ impl Coefficient {
 /// Return omega psi kappa at every point, n, in iteration `k`.
 fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
     let mut weight = vec![0.0; model.points()];
-    for (pair, contact) in model.pairs.iter().enumerate() {
-        for q in model.range(pair) {
-            let point = q - model.offset[pair];
-            let inside = match zone {
-                Zone::None => false,
-                Zone::Full => true,
-                Zone::Active => layer.tangent[q] > 0.0,
-                Zone::Subset(holds) => holds.is_true_at(contact.position[point], k)?,
+    for (q, pair, point) in model.each_point() {
+        let inside = match zone {
+            Zone::None => false,
+            Zone::Full => true,
+            Zone::Active => layer.tangent[q] > 0.0,
+            Zone::Subset(holds) => holds.is_true_at(pair.position[point], k)?,
+        };
+        if inside {
+            // a smoothed law has a tangent where the law itself has none
+            let tangent = match layer.tangent[q] {
+                0.0 => pair.law.robin_tangent(point, layer.compression[q]),
+                tangent => tangent,
             };
-            if inside {
-                // a smoothed law has a tangent where the law itself has none
-                let tangent = match layer.tangent[q] {
-                    0.0 => contact.law.robin_tangent(point, layer.compression[q]),
-                    tangent => tangent,
-                };
-                weight[q] = model.weight[q] * tangent;
-            }
+            weight[q] = model.weight[q] * tangent;
         }
     }
     Ok(weight)
@@ -285,14 +280,14 @@ pub fn extend(model: &mut Model, trace: &[f64]) -> Result<std::result::Result<Fi
     let springs = stiff_springs(model);
     model.robin(&springs)?;
     let mut iterate = Field::rest(model);
-    let products = model.multiply(&iterate.states);
+    let products = model.multiply(&iterate.displacements);
     let (mut r, energy) = residual(model, products, &iterate, &vec![0.0; model.points()]);
     let pull: Vec<f64> = springs.iter().zip(trace).map(|(spring, u)| spring * u).collect();
     for (index, r) in r.iter_mut().enumerate() {
         match model.bodies[index].local.as_ref() {
             // the motions of the start have moved it
             Some(_) if model.bodies[index].is_rigid => r.fill(0.0),
-            Some(body) => body.states().rows.add_transpose(1.0, &model.of_body(index, &pull), r),
+            Some(body) => body.dofs().rows.add_transpose(1.0, &model.of_body(index, &pull), r),
             None => {}
         }
     }

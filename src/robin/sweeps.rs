@@ -14,14 +14,15 @@ use crate::model::rigid::Motions;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
-const MOST: usize = 400;
+pub(super) const MOST_SWEEPS: usize = 400;
 
-/// Relative error of a linear step above which it counts as not solved after [`MOST`] iterations. Newton's method converges with
+/// Relative error of a linear step above which it counts as not solved after [`MOST_SWEEPS`] iterations. Newton's method converges with
 /// any relative error below one, more slowly the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
-const LEAST: f64 = 0.1;
+const UNSOLVED: f64 = 0.1;
 
-/// Iterations whose gain of energy estimates the error before them (Hestenes and Stiefel).
-const DELAY: usize = 4;
+/// Iterations whose gain of energy estimates the error before them (Hestenes and Stiefel). What later iterations gain is missing; the least eigenvalue covers that
+/// ([`Lanczos::squared_error`]).
+const GAINS: usize = 4;
 
 /// Relative accuracy of iterative solves of bodies as preconditioner, and of a step.
 const ROUGH: f64 = 1e-2;
@@ -61,16 +62,22 @@ impl LinearStep for Sweeps {
         }
         self.systems += 1;
         let before = self.sweeper.sweeps;
-        let found = match conjugate_gradients(model, &mut self.sweeper, springs, residual, (enough, MOST), self.least)?
-        {
+        let found = match conjugate_gradients(
+            model,
+            &mut self.sweeper,
+            springs,
+            residual,
+            (enough, MOST_SWEEPS),
+            self.least,
+        )? {
             Ok(found) => found,
             Err(failure) => return Ok(Err(failure)),
         };
         self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
         let LinearSolution { energy, error, .. } = found.solution;
-        if self.sweeper.sweeps - before > MOST && error * error > LEAST * LEAST * energy {
+        if self.sweeper.sweeps - before > MOST_SWEEPS && error * error > UNSOLVED * UNSOLVED * energy {
             let relative = error / energy.sqrt();
-            let reason = format!("{MOST} sweeps leave an error of {relative:.0e} of the linear step");
+            let reason = format!("{MOST_SWEEPS} sweeps leave an error of {relative:.0e} of the linear step");
             return Ok(Err(Failure { body: None, reason }));
         }
         Ok(Ok(found.solution))
@@ -188,11 +195,11 @@ impl<'a> Gradients<'a> {
 
     /// Go along a direction p to the least energy. Return false if only rounding is left of p; `rz` is r'G^-1 r.
     fn advance(&mut self, model: &mut Model, p: &Field, rz: f64) -> bool {
-        let mut image = model.multiply(&p.states);
+        let mut image = model.multiply(&p.displacements);
         let closing = p.closing();
         let spring: Vec<f64> = self.springs.iter().zip(&closing).map(|(w, s)| w * s).collect();
         // r'p, not r'z: rounding leaves rigid motions in r that p does not have
-        let mut sums = [local_dot(&image, &p.states), local_dot(&self.r, &p.states)];
+        let mut sums = [local_dot(&image, &p.displacements), local_dot(&self.r, &p.displacements)];
         model.exchange.sum(&mut sums);
         let rigid = DVector::from_vec(p.rigid.concat());
         let (curvature, slope) = (sums[0] + dot(&spring, &closing), sums[1] + self.work.dot(&rigid));
@@ -230,7 +237,8 @@ struct Lanczos {
     energy: f64,
 }
 
-/// Iterations after which the least eigenvalue is known as well as it will be: from then on, recent gains alone estimate the error.
+/// Iterations after which recent gains alone estimate the error: the eigenvalues of the Lanczos matrix take n^3 operations in each of n iterations, and the least one
+/// is known by then.
 const SETTLED: usize = 64;
 
 impl Lanczos {
@@ -246,7 +254,7 @@ impl Lanczos {
     fn squared_error(&self, rz: f64) -> f64 {
         let lately = match self.gains.len() {
             0 => return if rz > 0.0 { f64::INFINITY } else { 0.0 },
-            n => self.gains[n - n.min(DELAY)..].iter().sum(),
+            n => self.gains[n - n.min(GAINS)..].iter().sum(),
         };
         // both estimates are too small as long as a slow mode has not appeared; if the solve ends early, the recent gains are all there are
         let low = if self.alphas.len() <= SETTLED {
@@ -255,7 +263,7 @@ impl Lanczos {
             0.0
         };
         let by_spectrum = rz.max(0.0) / low;
-        if self.gains.len() <= DELAY || by_spectrum.is_infinite() {
+        if self.gains.len() <= GAINS || by_spectrum.is_infinite() {
             by_spectrum.min(lately)
         } else {
             by_spectrum.max(lately)

@@ -78,7 +78,8 @@ impl<'a> SolverFactory<'a> {
         }
         let is_one = kinds.len() == 1;
         let of_kind = |kind: Vec<&BodyPlan>| {
-            let BodyPlan { facts: BodyFacts { name, .. }, reason, .. } = kind.iter().max_by_key(|body| body.facts.dofs)?;
+            let BodyPlan { facts: BodyFacts { name, .. }, reason, .. } =
+                kind.iter().max_by_key(|body| body.facts.dofs)?;
             Some(match kind.len() {
                 _ if is_one => reason.clone(),
                 1 => format!("{name}: {reason}"),
@@ -212,12 +213,21 @@ impl Factory for SolverFactory<'_> {
     }
 
     fn make(&mut self, assembled: Assembled) -> Result<Body> {
-        let Assembled { name, dimension, body, distribution, rows, motions, left, interpolation } = assembled;
+        let Assembled {
+            name,
+            dimension,
+            body,
+            distribution,
+            rows,
+            near_null_space,
+            unconstrained_modes,
+            interpolation,
+        } = assembled;
         let missing = || Error::new(Kind::Solver, format!("no solver is planned for body `{name}`"));
         let planned = self.plan.bodies.iter_mut().find(|body| body.facts.name == name).ok_or_else(missing)?;
         let (session, chosen) = (self.session.clone(), planned.facts.options.clone());
         if let Some(interface) = planned.interface.take() {
-            return Ok(Body::to_condense(session, chosen, dimension, body, &left, interface));
+            return Ok(Body::to_condense(session, chosen, dimension, body, &unconstrained_modes, interface));
         }
         let is_swept = self.plan.linear == Linear::Sweeps;
         let words = preset::in_words(if is_swept { &chosen } else { &self.asked.whole });
@@ -231,14 +241,14 @@ impl Factory for SolverFactory<'_> {
             let first = if distribution.is_some() { 0 } else { whole.rows.columns };
             whole.append(&next, first);
         }
-        let mut modes: Vec<Vec<f64>> = if is_swept { motions() } else { Vec::new() };
+        let mut modes: Vec<Vec<f64>> = if is_swept { near_null_space() } else { Vec::new() };
         if let Some(distribution) = &distribution {
             modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
         }
         let make: MakeSolver = Box::new(move |stiffness: Rows| {
             Ok(Box::new(Krylov::new(&session, chosen, dimension, stiffness, &modes, levels)?))
         });
-        Ok(Body::new(body, rows, left, distribution, make, words))
+        Ok(Body::new(body, rows, unconstrained_modes, distribution, make, words))
     }
 
     fn kept(&mut self, name: &str) -> Option<BodySlot> {

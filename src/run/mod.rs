@@ -15,7 +15,7 @@ pub mod verdict;
 mod warnings;
 
 pub use phases::{build, build_after, estimate, iterate, set_up, targets};
-pub use recorder::{Recorder, Requests};
+pub use recorder::Recorder;
 pub use stages::{All, Begin, Built, Clock, Done, Prepared, Recovered};
 pub use warnings::{in_parts, made_straight};
 

@@ -8,7 +8,7 @@ use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, StepSpecs, Verified};
+use crate::discretize::{self, Verified};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
@@ -133,13 +133,13 @@ where
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
         let Self { session, verified, read, cut, .. } = self;
         let stage = session.stage("discretize");
-        let (mut bodies, mut contacts) = (verified.bodies.clone(), self.scene.contacts.clone());
-        self.scene.method.steps.apply(step, &mut bodies, &mut contacts);
-        let (scene, specs) = (&self.scene, StepSpecs { bodies: &bodies, contacts: &contacts });
+        let mut scene = Scene { bodies: verified.bodies.clone(), ..(*self.scene).clone() };
+        self.scene.method.steps.apply(step, &mut scene.bodies, &mut scene.contacts);
+        let scene = &scene;
         let mut inner = SolverFactory::new(session, scene, kept)?;
         let exchange = Rc::new(Ranks::new(session));
         let keep = scene.estimate || scene.adapt.is_some();
-        let discrete = discretize::discretize(scene, verified, specs, *cut, keep, exchange, &mut inner);
+        let discrete = discretize::discretize(scene, verified, *cut, keep, exchange, &mut inner);
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
         // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
@@ -155,9 +155,9 @@ where
         warnings.extend(inner.applied_once());
         let has_page = scene.output.report && session.rank() == 0;
         let built = Built {
-            scene: scene.clone(),
+            scene: self.scene.clone(),
             marks: if has_page {
-                discretize::marks(&verified.mesh, &bodies, &discrete.model.pairs)
+                discretize::marks(&verified.mesh, &scene.bodies, &discrete.model.pairs)
             } else {
                 Vec::new()
             },

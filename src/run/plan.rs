@@ -210,9 +210,7 @@ fn on_contact(bodies: &[BodyPlan]) -> usize {
 fn agree(bodies: &mut [BodyPlan]) {
     let dense = on_contact(bodies);
     let (preset, why) = match bodies.iter().find(|body| body.preset == Preset::Hypre) {
-        Some(first) => {
-            (Preset::Hypre, format!("`{}` has it, and Newton's method joins the bodies", first.facts.name))
-        }
+        Some(first) => (Preset::Hypre, format!("`{}` has it, and Newton's method joins the bodies", first.facts.name)),
         None if dense > DENSE && bodies.iter().any(|body| body.facts.dimension == 2) => {
             (Preset::Mumps, format!("{dense} of all bodies are on the contact: too many to join by dense algebra"))
         }

@@ -17,7 +17,7 @@ pub trait Recorder: Observer {
 }
 
 impl Recorder for Silent {}
-impl Recorder for Requests {}
+impl Recorder for Interrupt {}
 
 /// Solve until a rule or a signal ends the run. `full` is whether this is the full load. There the interval of gamma is computed if the scene requests it.
 pub fn solve(ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Done> {
@@ -32,15 +32,12 @@ pub fn solve(ready: Prepared, full: bool, keep: &mut dyn Recorder) -> Result<Don
 
 const _: () = assert!(ENDING.len() == ASKS, "a message has as many signals");
 
-/// The signals that end a run.
-pub struct Requests(pub Interrupt);
-
-/// As the observer of a run it passes signals on, and writes no rows.
-impl Observer for Requests {
+/// As the observer of a run, an interrupt passes on the signals that end it, and writes no rows.
+impl Observer for Interrupt {
     fn row(&mut self, _row: &Row) {}
 
     fn asked(&self) -> u8 {
-        let ending = ENDING.iter().position(|&signal| self.0.asked() == Some(signal));
+        let ending = ENDING.iter().position(|&signal| Interrupt::asked(self) == Some(signal));
         ending.map_or(0, |bit| 1 << bit)
     }
 }
@@ -61,7 +58,7 @@ mod tests {
 
     #[test]
     fn signals_are_bits() {
-        assert_eq!((Requests(Interrupt::default()).asked(), signal(0)), (0, None));
+        assert_eq!((Observer::asked(&Interrupt::default()), signal(0)), (0, None));
         let reported = [0b111, 0b110, 0b100].map(signal_name);
         assert_eq!(reported, ["SIGTERM", "SIGINT", "SIGHUP"]);
     }

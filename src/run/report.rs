@@ -66,13 +66,12 @@ fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
         upper: interval.upper,
     });
     // the iterates of other runs are no approximations of a solution
-    let is_measured = matches!(
-        outcome.status,
-        Status::IterationLimit | Status::Stagnated | Status::Interrupted { .. } | Status::Inaccurate(_)
-    ) || outcome.status.is_solved();
+    let is_inaccurate = outcome.status.is_inaccurate();
+    let is_measured = matches!(outcome.status, Status::IterationLimit | Status::Stagnated | Status::Interrupted { .. })
+        || is_inaccurate
+        || outcome.status.is_solved();
     let measured = last.filter(|_| is_measured);
     // a relative error of one or more leaves no digit, and then the bound has none either
-    let is_inaccurate = matches!(outcome.status, Status::Inaccurate(_));
     let is_bound = |row: &&Row| row.is_bound && row.residual < 1.0 && !is_inaccurate;
     report.error_bound = measured.filter(is_bound).and_then(|row| finite(row.error));
     report.error_estimate = measured
@@ -193,7 +192,7 @@ impl GatheredCounters {
         let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
         let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
         for slot in discrete.model.bodies.iter().filter(|slot| !slot.is_rigid) {
-            let owned = slot.local.as_ref().filter(|body| body.states().leads());
+            let owned = slot.local.as_ref().filter(|body| body.dofs().leads());
             mine.solvers.push(owned.map_or_else(String::new, Body::describe));
             mine.counts += owned.map_or(BodyCounts::default(), |body| body.counts());
         }

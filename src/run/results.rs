@@ -34,8 +34,8 @@ pub fn recover(done: &Done) -> Rc<All> {
 
 /// Return the displacements of a body. Collective.
 fn recover_body(slot: &BodySlot, body: &Body, iterate: &Field, index: usize) -> Result<Recovered> {
-    let (bent, amounts) = (&iterate.states[index], &iterate.rigid[index]);
-    let state = body.recover(&body.states().join(bent, amounts))?;
+    let (bent, amounts) = (&iterate.displacements[index], &iterate.rigid[index]);
+    let state = body.recover(&body.dofs().join(bent, amounts))?;
     // a motion that springs resist counts as deformation; the amounts are the same on all ranks, so all of them take the same branch
     let is_whole = slot.sprung.is_some() || amounts.iter().all(|a| *a == 0.0);
     let bent = if is_whole { state.clone() } else { body.recover(bent)? };

@@ -3,7 +3,7 @@
 use super::in_words;
 use super::recorder;
 use super::stages::Done;
-use crate::ddm::{Inaccuracy, Outcome, Status};
+use crate::ddm::{Outcome, Status};
 use crate::error::Kind;
 use crate::model::{Mechanism, Model, Moved};
 use crate::output::report::readable;
@@ -21,7 +21,7 @@ pub fn status_name(status: &Status) -> &'static str {
         Status::Underconstrained(_) | Status::Mechanism(_) => "underconstrained",
         Status::Unbounded { .. } => "unbounded",
         Status::InnerSolver { .. } => "inner-solver",
-        Status::Inaccurate(_) => "inaccurate",
+        Status::Unbalanced(_) | Status::NoDigits(_) => "inaccurate",
         Status::Interrupted { .. } => "interrupted",
     }
 }
@@ -72,8 +72,8 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
             let whose = failure.body.map_or("all bodies".to_owned(), |body| format!("body `{}`", name(&body)));
             format!("{whose}: the inner solver failed in iteration {k}: {reason}")
         }
-        Status::Inaccurate(Inaccuracy::Roundoff(found)) => few_digits(*found),
-        Status::Inaccurate(Inaccuracy::Unbalanced(found)) => inaccurate(*found, residual(outcome)),
+        Status::NoDigits(found) => few_digits(*found),
+        Status::Unbalanced(found) => inaccurate(*found, residual(outcome)),
         Status::Interrupted { asked } => {
             format!("interrupted by {} after {k} iterations, {}", recorder::signal_name(*asked), measure(outcome))
         }

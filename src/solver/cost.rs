@@ -25,7 +25,7 @@ const FACTORED: f64 = 320.0;
 const MULTIGRID: f64 = 900.0;
 
 /// Steps of Newton's method in a scene; those of the table take 3 to 7. Each has a dense factorisation of all contacts together.
-const STEPS: f64 = 5.0;
+const NEWTON_STEPS: f64 = 5.0;
 
 /// Bytes of multigrid for a dof: 12 for each entry of G, which is stored in place of K, 12 for hypre's copy, and half a copy for its levels. With quadratic elements
 /// the levels are those of the vertices. For two cubes of 48^3 this gives 890 MB. The run took 1153 MB, with 50 for the process and 180 for mesh, spaces and vectors.
@@ -119,7 +119,8 @@ impl Comparison {
         };
         let interfaces = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface);
         let interface = if are_joined { interfaces.sum() } else { interfaces.max().unwrap_or(0) } as f64;
-        let dense = Cost { seconds: STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
+        let dense =
+            Cost { seconds: NEWTON_STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
         let direct = bodies.iter().map(|body| body.factored(may_condense(body))).fold(dense, Cost::and);
         let multigrid = bodies.iter().map(|body| body.multigrid(times)).fold(Cost::default(), Cost::and);
         Self { direct, multigrid }
@@ -153,7 +154,7 @@ impl BodyFacts {
         let fill = if self.is_quadratic { FILL_P2 } else { 1.0 };
         let seconds = 19.0 * n * n * self.compactness * fill / RATE + FACTORED * PRODUCT * n;
         // a body that is not condensed is factored in each step
-        let times = if is_condensed { 1.0 } else { STEPS };
+        let times = if is_condensed { 1.0 } else { NEWTON_STEPS };
         Cost { seconds: times * seconds, bytes: 220.0 * pow(n, 4.0 / 3.0) }
     }
 }

@@ -8,12 +8,13 @@
 //! added where supports and contact do not constrain the interior well.
 
 use crate::fem::rigid::AtDofs;
-use crate::linalg::{Blocks, Csr, dot};
+use crate::linalg::{Blocks, Csr, PART, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-/// Normals at a node count as parallel if the sine of their angle is at most this.
+/// Normals at a node count as parallel if the sine of their angle is at most this. Components across the common normal are dropped as rounding, which is 1e-16
+/// for facets in one plane; four digits are left for coordinates of a mesh far from the origin.
 const PARALLEL: f64 = 1e-12;
 
 /// One more interface dof is added for a rigid motion that is constrained by less than this share of what all constrained dofs could do. This is about accuracy, not
@@ -79,7 +80,7 @@ impl InterfaceDofs {
             };
             let sizes = (0..dofs).filter_map(|dof| Some((dof, size(dof)?)));
             match sizes.max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((dof, size)) if size > 1e-3 => interface.insert(dof),
+                Some((dof, size)) if size > PART => interface.insert(dof),
                 _ => return,
             };
         }

@@ -51,9 +51,9 @@ const WORN: f64 = 1.5;
 
 /// A patch has at most one in so many dofs. With 1, 2, 4, 8 and without patches `flange` (P1, n = 4, layer 1e8) takes 150, 150, 150, 401 and 434
 /// iterations, 1.6, 1.6, 1.6, 2.2 and 1.9 s, and `hertz-sphere` (P1, n = 12) 54, 54, 54, 65 and 75, 2.4, 2.4, 2.4, 2.2 and 2.1 s.
-const SMALL: usize = 4;
+const PATCHED: usize = 4;
 
-/// Number of iterations up to which a solve is too short to judge the preconditioner.
+/// Number of iterations up to which a solve is too short to judge the preconditioner: one iteration more or less is a tenth of it.
 const FEW: usize = 12;
 
 impl Krylov {
@@ -143,7 +143,7 @@ impl Krylov {
     /// cannot be made.
     fn patch(&mut self, dofs: &[usize]) -> Result<bool> {
         let layers = self.layers();
-        if dofs.len() * (1 + layers) * SMALL > self.matrix.total() {
+        if dofs.len() * (1 + layers) * PATCHED > self.matrix.total() {
             return Ok(false);
         }
         self.ksp.set_reuse_preconditioner(true)?;

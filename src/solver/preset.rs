@@ -57,10 +57,10 @@ impl Smoother {
 }
 
 /// Relative tolerance of an inner Krylov solve. It is relative to the outer residual, because solves are for corrections.
-const TOLERANCE: &str = "1e-6";
+pub const INNER_TOLERANCE: f64 = 1e-6;
 
-/// Number of interface dofs up to which the cost of a dense factorisation need not be compared.
-const SMALL: usize = 300;
+/// Number of interface dofs up to which the cost of a dense factorisation need not be compared: it takes 9e6 operations, less than a millisecond.
+const TINY: usize = 300;
 
 /// Return the preset for a plane body whose scene names none, with the reason as text. A factorisation costs little in the plane, so only
 /// lack of memory speaks against it; `memory` are the bytes that earlier bodies have left. In space [`cost`] decides.
@@ -72,7 +72,7 @@ pub fn in_plane(body: &BodyFacts, memory: usize) -> (Preset, String) {
     // some dofs can be eliminated, and some remain
     let can_condense = (1..dofs).contains(&interface);
     let dense = (interface as f64).powi(3) / 3.0;
-    let pays = interface <= SMALL || dense <= cost::plane_factor_work(dofs);
+    let pays = interface <= TINY || dense <= cost::plane_factor_work(dofs);
     if can_condense && pays && fits(Preset::Condensed) {
         (Preset::Condensed, format!("{what}, about {} MB", megabytes(Preset::Condensed)))
     } else if fits(Preset::Mumps) {
@@ -130,7 +130,7 @@ pub fn apply(chosen: &mut Chosen, preset: Preset, smoother: Option<Smoother>) {
     }
     chosen.prefer_mumps();
     if !is(chosen, "ksp_type", &["preonly"]) {
-        chosen.set_default("ksp_rtol", TOLERANCE);
+        chosen.set_default("ksp_rtol", &format!("{INNER_TOLERANCE:e}"));
         // PETSc's own default is 1e-50, whatever the unit of forces is
         chosen.set_default("ksp_atol", "0");
         if is(chosen, "ksp_type", &["cg", "fcg", "pipecg"]) {

@@ -69,7 +69,7 @@ fn newton(session: &Session, case: &str, more: &[&str], law: Option<&str>, stop:
 /// u'Ku.
 fn strain(model: &mut Model, u: &Field) -> f64 {
     let open = vec![0.0; model.points()];
-    let products = model.multiply(&u.states);
+    let products = model.multiply(&u.displacements);
     residual(model, products, u, &open).1.strain
 }
 
@@ -122,8 +122,8 @@ fn steps(session: &Session, case: &str, more: &[&str], law: Option<&str>) -> Vec
         let row = &outcome.rows[number - 1];
         let mut difference = outcome.iterate.clone();
         difference.add(-1.0, &exact.iterate);
-        let image = model.multiply(&difference.states);
-        let bodies = local_dot(&image, &difference.states).max(0.0);
+        let image = model.multiply(&difference.displacements);
+        let bodies = local_dot(&image, &difference.displacements).max(0.0);
         let between = layers(&model, &compression, &model.compression(&outcome.iterate.trace));
         let [reported, truth, distance] =
             [row.error * scale, (bodies + 2.0 * between).sqrt(), bodies.sqrt()].map(|error| error / norm);

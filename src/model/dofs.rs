@@ -12,51 +12,51 @@ use std::rc::Rc;
 /// K E = 0 holds for the rigid motions E that supports and springs leave free, but only in exact numbers. Entries of K and u are rounded, and
 /// f - K u has an error of eps |K| |u| however it is summed. A body that falls far onto a soft layer would lose its strains in that error. So
 /// the part E a of every step is taken out of the displacements and moved into the gap ([`Field::advance`](super::Field::advance)), and a residual r gets the
-/// work E'r that loads and contact forces do on the motions ([`States::balance`]).
+/// work E'r that loads and contact forces do on the motions ([`Dofs::balance`]).
 #[derive(Default)]
-pub struct States {
+pub struct Dofs {
     /// Number of dofs, or of those that this rank owns.
-    pub dofs: usize,
+    pub count: usize,
     /// Prescribed (dof, value), sorted by dof.
     pub prescribed: Vec<(usize, f64)>,
     /// B, one row for each contact point of each surface; columns: the dofs.
     pub rows: Csr,
     /// E, one vector over the dofs for each motion.
-    pub motions: Vec<Vec<f64>>,
+    pub unconstrained_modes: Vec<Vec<f64>>,
     /// (E'E)^-1 over all dofs of the body.
     inverse: DMatrix<f64>,
     /// How the dofs are distributed over the ranks, if they are. B and E then have the dofs that this rank owns.
     pub distribution: Option<Rc<Distribution>>,
 }
 
-impl States {
+impl Dofs {
     /// Make the dofs of a body.
     ///
     /// - `dofs` is their number.
     /// - `prescribed` lists the prescribed dofs with their values.
     /// - `rows` are the contact rows B of the body.
-    /// - `motions` are the displacements of independent rigid motions that its supports and springs leave, zero at prescribed dofs.
+    /// - `unconstrained_modes` are the displacements of independent rigid motions that its supports and springs leave, zero at prescribed dofs.
     ///
-    /// If the body is distributed, the columns of `rows` and the displacements of `motions` belong to the owned and ghost nodes of this rank.
+    /// If the body is distributed, the columns of `rows` and the displacements of `unconstrained_modes` belong to the owned and ghost nodes of this rank.
     pub fn new(
         dofs: usize,
         prescribed: Vec<(usize, f64)>,
         mut rows: Csr,
-        mut motions: Vec<Vec<f64>>,
+        mut unconstrained_modes: Vec<Vec<f64>>,
         distribution: Option<Rc<Distribution>>,
     ) -> Self {
-        let count = motions.len();
+        let motions = unconstrained_modes.len();
         let products = match &distribution {
-            None => DMatrix::from_fn(count, count, |i, j| dot(&motions[i], &motions[j])),
+            None => DMatrix::from_fn(motions, motions, |i, j| dot(&unconstrained_modes[i], &unconstrained_modes[j])),
             Some(distribution) => {
                 let place = |dof: usize| distribution.owned_positions.binary_search(&(dof as u32)).ok();
                 rows = rows.of_columns(distribution.owned_positions.len(), place);
-                motions.iter_mut().for_each(|motion| *motion = distribution.of_known(motion));
+                unconstrained_modes.iter_mut().for_each(|motion| *motion = distribution.of_known(motion));
                 distribution.products.clone()
             }
         };
         let Some(inverse) = products.try_inverse() else { unreachable!("rigid motions of a body are independent") };
-        Self { dofs, prescribed, rows, motions, inverse, distribution }
+        Self { count: dofs, prescribed, rows, unconstrained_modes, inverse, distribution }
     }
 
     /// Return whether this rank owns the body.
@@ -66,7 +66,7 @@ impl States {
 
     /// Return the undeformed state: zero on free dofs, prescribed values on supports.
     pub fn rest(&self) -> Vec<f64> {
-        let mut u = vec![0.0; self.dofs];
+        let mut u = vec![0.0; self.count];
         self.prescribe(&mut u);
         u
     }
@@ -84,13 +84,16 @@ impl States {
     /// Return the amounts a of the rigid motions in displacements u, for which u - E a is orthogonal to all of them. For a distributed body they are sums over
     /// ranks of what this returns.
     pub fn amounts(&self, u: &[f64]) -> Vec<f64> {
-        let products = DVector::from_iterator(self.motions.len(), self.motions.iter().map(|motion| dot(motion, u)));
+        let products = DVector::from_iterator(
+            self.unconstrained_modes.len(),
+            self.unconstrained_modes.iter().map(|motion| dot(motion, u)),
+        );
         (&self.inverse * products).as_slice().to_vec()
     }
 
     /// Add s E a to displacements u.
     pub fn add_motions(&self, s: f64, amounts: &[f64], u: &mut [f64]) {
-        self.motions.iter().zip(amounts).for_each(|(motion, a)| axpy(s * a, motion, u));
+        self.unconstrained_modes.iter().zip(amounts).for_each(|(motion, a)| axpy(s * a, motion, u));
     }
 
     /// Return the displacements v + E a.
@@ -103,7 +106,7 @@ impl States {
     /// Correct forces r such that their work on the rigid motions, E'r, is `work`. K and its product are rounded, and do some work on them. Collective for a
     /// distributed body.
     pub fn balance(&self, r: &mut [f64], work: &[f64]) {
-        let mut lacking: Vec<f64> = self.motions.iter().map(|motion| -dot(motion, r)).collect();
+        let mut lacking: Vec<f64> = self.unconstrained_modes.iter().map(|motion| -dot(motion, r)).collect();
         if let Some(distribution) = &self.distribution {
             distribution.exchange.sum(&mut lacking);
         }
@@ -194,16 +197,16 @@ mod tests {
     #[test]
     fn rigid_parts_are_taken_out() {
         let motions = vec![vec![1.0, 0.0, 1.0, 0.0, 1.0, 0.0], vec![0.5, 0.5, 0.5, 0.0, 0.5, -0.5]];
-        let states = States::new(6, Vec::new(), Csr::new(6), motions, None);
+        let dofs = Dofs::new(6, Vec::new(), Csr::new(6), motions, None);
         let all = [0.3, 1.0, -0.2, 0.4, 0.7, -2.0];
-        let (mut u, amounts) = (all, states.amounts(&all));
-        states.add_motions(-1.0, &amounts, &mut u);
-        assert!(states.motions.iter().all(|motion| dot(motion, &u).abs() < 1e-15), "{u:?}");
-        states.add_motions(1.0, &amounts, &mut u);
+        let (mut u, amounts) = (all, dofs.amounts(&all));
+        dofs.add_motions(-1.0, &amounts, &mut u);
+        assert!(dofs.unconstrained_modes.iter().all(|motion| dot(motion, &u).abs() < 1e-15), "{u:?}");
+        dofs.add_motions(1.0, &amounts, &mut u);
         assert!(u.iter().zip(all).all(|(a, b)| (a - b).abs() < 1e-15));
         let mut force = all;
-        states.balance(&mut force, &[0.25, -4.0]);
-        let work: Vec<f64> = states.motions.iter().map(|motion| dot(motion, &force)).collect();
+        dofs.balance(&mut force, &[0.25, -4.0]);
+        let work: Vec<f64> = dofs.unconstrained_modes.iter().map(|motion| dot(motion, &force)).collect();
         assert!((work[0] - 0.25).abs() < 1e-14 && (work[1] + 4.0).abs() < 1e-14, "{work:?}");
     }
 }

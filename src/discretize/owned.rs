@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// What one rank has of the dofs of a distributed body.
 #[derive(Clone, Serialize, Deserialize)]
-pub struct Share {
+pub struct OwnedDofs {
     /// Dofs of this rank.
     pub distribution: Distribution,
     /// Numbers of the nodes that this rank has, in the matrix with the rows of the body.
@@ -22,7 +22,7 @@ pub struct Share {
     pub own_coarse: usize,
 }
 
-impl Share {
+impl OwnedDofs {
     /// Return the rows of owned dofs of the interpolation that `whole` makes from coarse nodes. Columns are numbered through all
     /// bodies in one matrix.
     pub fn interpolation<const D: usize>(&self, whole: impl FnOnce(&[u32]) -> Prolongation) -> Prolongation {
@@ -43,7 +43,7 @@ impl Share {
 
     /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
     /// rows.
-    pub fn own<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
+    pub fn restrict<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
         let own = &self.distribution.owned_positions;
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;
         let mut starts = vec![0];
