@@ -130,7 +130,7 @@ pub fn estimate(
     let both = [0, 1].into_iter().flat_map(|side| (0..model.pairs.len()).map(move |pair| (pair, side)));
     let trace: Vec<f64> = both.flat_map(|(pair, side)| model.displacement(&trace, pair, side)).collect();
     let square = |values: &[f64]| -> f64 {
-        values.iter().zip(model.weight.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
+        values.iter().zip(model.area.iter().cycle()).map(|(value, weight)| weight * value * value).sum()
     };
     let (error, whole) = (square(&field.trace), square(&trace));
     Ok(Estimate {
@@ -196,7 +196,7 @@ fn nodal_errors(
     let (field, mut energy) = response.map_err(|failure| Error::new(Kind::Solver, failure.reason))?;
     let closing: Vec<f64> = field.closing().iter().zip(mean_error).map(|(w, mean)| w + mean).collect();
     for (q, mean) in mean_error.iter().enumerate() {
-        energy += model.weight[q] * layer.tangent[q] * mean * (2.0 * closing[q] - mean);
+        energy += model.area[q] * layer.tangent[q] * mean * (2.0 * closing[q] - mean);
     }
     Ok(NodalErrors { field, closing, energy })
 }
@@ -279,7 +279,7 @@ impl LocalErrors {
         }
         model.exchange.sum(&mut mean_error);
         let springs: Vec<f64> =
-            range.clone().zip(&mean_error).map(|(q, c)| model.weight[q] * layer.tangent[q] * c).collect();
+            range.clone().zip(&mean_error).map(|(q, c)| model.area[q] * layer.tangent[q] * c).collect();
         let of_layer = LayerError::new(pair, points, soft, layer, range.clone(), &compression, &mean_error);
         let force: Vec<f64> = of_layer.pressure.iter().zip(&points.each).map(|(p, point)| -point.weight * p).collect();
         for side in 0..2 {
@@ -351,7 +351,7 @@ pub fn lost_at(meshes: &dyn Meshes, model: &Model, estimate: &Estimate) -> Optio
 fn tolerance(model: &Model, layer: &Layer, mean_error: &[f64]) -> f64 {
     let (mut full, mut left) = (0.0, 0.0);
     for (q, rho) in meeting_slopes(model).into_iter().enumerate() {
-        let energy = model.weight[q] * layer.tangent[q] * mean_error[q].powi(2);
+        let energy = model.area[q] * layer.tangent[q] * mean_error[q].powi(2);
         full += energy;
         left += energy * rho / (rho + layer.tangent[q]);
     }

@@ -72,7 +72,7 @@ fn pair_to_json(built: &Built, i: usize) -> Value {
         "contact": built.discrete.specs[i].table,
         "carrier": pair.surfaces[0],
         "points": pair.len(),
-        "length": pair.weight.iter().sum::<f64>(),
+        "length": pair.area.iter().sum::<f64>(),
         "gap": [low, high],
         "facets_uncovered": pair.uncovered(),
         "pieces_lost": pair.lost.map_or(0, |lost| lost.pieces),
@@ -159,7 +159,7 @@ fn each_pair(built: &Built) -> Vec<String> {
             pair.len(),
             pair.surfaces[0],
             pair.measure,
-            pair.weight.iter().sum::<f64>(),
+            pair.area.iter().sum::<f64>(),
             sci(low, 3),
             sci(high, 3)
         ));
@@ -176,7 +176,7 @@ fn all_pairs(built: &Built) -> Vec<String> {
         pairs.len(),
         pairs.iter().map(ContactPair::len).sum::<usize>(),
         pairs[0].measure,
-        pairs.iter().flat_map(|pair| &pair.weight).sum::<f64>(),
+        pairs.iter().flat_map(|pair| &pair.area).sum::<f64>(),
         sci(low, 3),
         sci(high, 3)
     )]

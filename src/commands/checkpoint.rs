@@ -142,6 +142,6 @@ fn problem_digest(scene: &Scene, Built { mesh, discrete, .. }: &Built) -> String
     remove(&mut problem, "/mesh", &["timeout"]);
     let bodies = discrete.bodies.iter().map(|body| (&body.name, body.nodes, body.cells, body.dofs));
     // gaps follow from these and the scene, and may change from step to step
-    let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.weight));
+    let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.area));
     digest(&(problem.to_string(), mesh, bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
 }

@@ -85,7 +85,7 @@ impl ResultFiles<'_> {
         let has_plots = done.built.scene.output.plots;
         let (model, layer) = (done.model(), &done.outcome.layer);
         let compression = |i: usize| &layer.compression[model.range(i)];
-        let row = |(i, pair): (usize, &ContactPair)| PairRow::new(&pair.weight, &pair.gap, compression(i));
+        let row = |(i, pair): (usize, &ContactPair)| PairRow::new(&pair.area, &pair.gap, compression(i));
         let mut rows: Vec<PairRow> = model.pairs.iter().enumerate().map(row).collect();
         let stems = stems(done);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));

@@ -36,7 +36,7 @@ pub struct ContactPair {
     /// Positions of the points on side a in the scene, n.
     pub position: Vec<[f64; 3]>,
     /// omega_q > 0, the length in the plane, else the area (in bodies of revolution that of a ring) across the normal, n.
-    pub weight: Vec<f64>,
+    pub area: Vec<f64>,
     /// Unit normals from side a to side b, made of those of both sides, n.
     pub normal: Vec<[f64; 3]>,
     /// Length of the sum of the outer unit normals of both sides, n: zero where they are opposite.
@@ -63,7 +63,7 @@ pub struct ContactPair {
     pub uncertainty: f64,
     /// Whether the points run along curves in their order (plane problems).
     pub along_curve: bool,
-    /// What `weight` measures: `"length"`, or in space and for bodies of revolution `"area"`.
+    /// What `area` measures: `"length"`, or in space and for bodies of revolution `"area"`.
     #[serde(deserialize_with = "measure")]
     pub measure: Measure,
     /// Law of the layer. It does not go from rank to rank: whoever receives a pair makes its law anew.
@@ -195,7 +195,7 @@ pub fn assemble<const D: usize>(
     let mut pair = ContactPair {
         surfaces: [a.name.to_owned(), b.name.to_owned()],
         bodies,
-        weight: points.iter().zip(&nodes).map(across).collect(),
+        area: points.iter().zip(&nodes).map(across).collect(),
         normal: nodes.iter().map(|at| pad(at.direction)).collect(),
         tilt: nodes.iter().map(|at| at.tilt).collect(),
         gap: gaps(a, &points, &position, gap)?,
@@ -358,7 +358,7 @@ impl Accumulator {
 impl ContactPair {
     /// Return the number of contact points.
     pub fn len(&self) -> usize {
-        self.weight.len()
+        self.area.len()
     }
 
     /// Return the contact point of each of the `count` nodes of side a on its faces, if it is one.
@@ -381,7 +381,7 @@ impl ContactPair {
 
     /// Return whether the pair has no points, which no pair from [`assemble`] has.
     pub fn is_empty(&self) -> bool {
-        self.weight.is_empty()
+        self.area.is_empty()
     }
 }
 

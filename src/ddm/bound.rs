@@ -83,7 +83,7 @@ impl Reached {
             let changed = (p - layer.pressure[q]).powi(2) / rho[q];
             mismatch = mismatch.max((p - pair.law.pressure(point, c)).abs());
             let is_on_side = p >= 0.0 || pair.law.is_bonded();
-            gap += model.weight[q] * if is_on_side { pair.law.duality_gap(point, c, p) } else { changed };
+            gap += model.area[q] * if is_on_side { pair.law.duality_gap(point, c, p) } else { changed };
             is_bound &= is_on_side;
         }
         let (linear, energy) = (step.error, strain + layer.work);
@@ -159,10 +159,10 @@ impl Scale {
     /// Return the scales of a model, from traces (2n each) that a run may begin with.
     pub fn new(model: &Model, traces: &[&[f64]]) -> Self {
         let slopes = surface_slopes(model);
-        let compliance = slopes.iter().zip(&model.weight).map(|(slope, weight)| weight / slope).sum();
-        let stiffness = |(slope, weight): (&f64, &f64)| if slope.is_finite() { slope * weight } else { 0.0 };
-        let foundation = slopes.iter().zip(&model.weight).map(stiffness).collect();
-        let mut scale = Self { area: model.weight.iter().sum(), compliance, foundation, ..Self::default() };
+        let compliance = slopes.iter().zip(&model.area).map(|(slope, area)| area / slope).sum();
+        let stiffness = |(slope, area): (&f64, &f64)| if slope.is_finite() { slope * area } else { 0.0 };
+        let foundation = slopes.iter().zip(&model.area).map(stiffness).collect();
+        let mut scale = Self { area: model.area.iter().sum(), compliance, foundation, ..Self::default() };
         for trace in traces {
             let layer = start::at(model, trace);
             let approach = model.compression(trace);
@@ -263,7 +263,7 @@ pub(super) fn pressure_roundoff(model: &Model, trace: &[f64], layer: &Layer, ans
 mod tests {
     use super::*;
     use crate::model::Field;
-    use crate::model::sample::{WEIGHT, two_pairs};
+    use crate::model::sample::{AREA, two_pairs};
 
     fn close(x: f64, y: f64) {
         assert!((x - y).abs() <= 1e-12 * y.abs(), "{x} {y}");
@@ -302,7 +302,7 @@ mod tests {
         let model = two_pairs();
         let layer = Layer::new(&model, vec![0.5, -1.0, 2.0, 1.0]);
         let slopes = surface_slopes(&model);
-        let at = |q: usize| WEIGHT[q] * layer.pressure[q].powi(2) * (1.0 / layer.tangent[q] + 1.0 / slopes[q]);
+        let at = |q: usize| AREA[q] * layer.pressure[q].powi(2) * (1.0 / layer.tangent[q] + 1.0 / slopes[q]);
         let contact = contact_energy(&model, &layer);
         close(contact, at(0) + at(2) + at(3));
         // the first pressure is 4 c - 0.4

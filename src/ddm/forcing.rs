@@ -58,8 +58,8 @@ impl<'a> Forcing<'a> {
         let (mut change, mut largest_change, mut distance, mut peak) = (0.0, 0.0f64, 0.0, 0.0f64);
         for (q, old) in self.pressures[0].iter().enumerate() {
             let here = (p[q] - old).abs();
-            change += model.weight[q] * here;
-            distance += model.weight[q] * (p[q] - resolved.pressure[q]).abs();
+            change += model.area[q] * here;
+            distance += model.area[q] * (p[q] - resolved.pressure[q]).abs();
             (largest_change, peak) = (largest_change.max(here), peak.max(resolved.pressure[q].abs()));
         }
         // an error that is small relative to the energy of the bodies may be large for the pressures of stiff layers
@@ -132,7 +132,7 @@ pub fn resisting(model: &Model, layer: &Layer) -> Springs {
             break;
         }
         let surfaces: Vec<f64> =
-            surface_slopes(model).iter().zip(&model.weight).map(|(slope, weight)| slope * weight).collect();
+            surface_slopes(model).iter().zip(&model.area).map(|(slope, area)| slope * area).collect();
         while let Some(motion) = free.pop() {
             let closing = motions.closing(&motion);
             let half = 0.5 * closing.iter().fold(0.0, |most: f64, s| most.max(s.abs()));

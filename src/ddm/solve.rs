@@ -245,7 +245,7 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
 fn follows(model: &Model) -> Option<Moved> {
     let motions = Motions::of(model);
     let has_rigid = |all: &Vec<Moved>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
-    let all = motions.springs(&model.weight).factor().kernel();
+    let all = motions.springs(&model.area).factor().kernel();
     all.iter().map(|motion| motions.names(motion)).find(has_rigid)?.into_iter().next()
 }
 

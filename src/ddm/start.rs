@@ -117,7 +117,7 @@ impl Rigid<'_> {
 
     /// Return omega Pi'' (n): springs of law and surfaces in series.
     fn springs(&self, layer: &Layer) -> Vec<f64> {
-        let series = |q: usize| self.model.weight[q] * in_series(layer.tangent[q], self.slope[q]);
+        let series = |q: usize| self.model.area[q] * in_series(layer.tangent[q], self.slope[q]);
         (0..self.slope.len()).map(series).collect()
     }
 
@@ -125,7 +125,7 @@ impl Rigid<'_> {
     fn solve(&self, springs: &[f64], load: &DVector<f64>) -> DVector<f64> {
         let mut all = springs.to_vec();
         for (q, spring) in all.iter_mut().enumerate().filter(|(q, _)| self.slope[*q].is_finite()) {
-            *spring += PROXIMAL * self.slope[q] * self.model.weight[q];
+            *spring += PROXIMAL * self.slope[q] * self.model.area[q];
         }
         let mut stiffness = self.motions.springs(&all);
         self.ground.stored().for_each(|(i, j, block)| stiffness.add(i, j, block));

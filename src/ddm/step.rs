@@ -88,8 +88,8 @@ impl Progress {
         for (pair, answer) in self.answer.iter_mut().enumerate() {
             let (mut pressures, mut compressions) = (0.0, 0.0);
             for q in model.range(pair).filter(|&q| unit[q] < f64::INFINITY && dc[q].abs() > 2.0 * roundoff[q]) {
-                pressures += model.weight[q] * dp[q].powi(2) / unit[q];
-                compressions += model.weight[q] * dc[q].powi(2) * unit[q];
+                pressures += model.area[q] * dp[q].powi(2) / unit[q];
+                compressions += model.area[q] * dc[q].powi(2) * unit[q];
             }
             let stiffness = (pressures / compressions).sqrt();
             if stiffness.is_finite() {
@@ -205,7 +205,7 @@ impl Equilibrium<'_> {
         let known = |q: usize| rho[q] * roundoff[q] + f64::EPSILON * (pressure[q].abs() + resolved.pressure[q]);
         // `clamp` keeps NaN, which is not nearer than any distance
         let difference = |q: usize| ((pressure[q] - resolved.pressure[q]).abs() - known(q)).clamp(0.0, f64::INFINITY);
-        let squared = |q: usize| model.weight[q] * difference(q).powi(2) / rho[q];
+        let squared = |q: usize| model.area[q] * difference(q).powi(2) / rho[q];
         // on a line of infinite slope the state is that at c itself
         (0..model.points()).filter(|&q| rho[q] < f64::INFINITY).map(squared).sum()
     }
@@ -226,7 +226,7 @@ impl Path {
             return Vec::new();
         }
         self.shortened = 0;
-        let area: f64 = model.weight.iter().sum();
+        let area: f64 = model.area.iter().sum();
         let distance = state.distance(model, smoothing) / area;
         let mu = match smoothing.first() {
             None => AHEAD * distance,
@@ -281,7 +281,7 @@ mod tests {
         let (model, unit) = (two_pairs(), [2.0, 8.0, 1.0, 1.0]);
         // 3 times the stiffness of both points
         let (dc, dp) = ([1.0, -0.5, 1.0, 0.0], [-6.0, 12.0, 0.0, 0.0]);
-        let [w, v] = [model.weight[0], model.weight[1]];
+        let [w, v] = [model.area[0], model.area[1]];
         let times = ((w * 36.0 / 2.0 + v * 144.0 / 8.0) / (w * 2.0 + v * 0.25 * 8.0)).sqrt();
         let mut progress = Progress { unit: unit.to_vec(), ..Progress::default() };
         progress.observe(&model, &dc, &dp, &[0.0; 4]);
@@ -316,7 +316,7 @@ mod tests {
         assert!(path.smoothing(&model, &off, &[], 0.0).is_empty());
         path.note(0.25, false);
         let mu = path.smoothing(&model, &off, &[], 0.0);
-        let area: f64 = model.weight.iter().sum();
+        let area: f64 = model.area.iter().sum();
         assert!(mu.iter().all(|mu| (mu - 100.0 * distance / area).abs() < 1e-12), "{mu:?}");
         path.note(1.0, true);
         assert_eq!(path.smoothing(&model, &state(&[2.0, 40.0, 1.0, 1.0]), &mu, 0.0), mu);

@@ -23,9 +23,9 @@ const CANCELS: f64 = 1e-3;
 
 /// Return the mean unit normal of a pair from side a to side b, if it has one.
 pub fn mean_normal(pair: &ContactPair) -> Option<[f64; 3]> {
-    let points = || pair.weight.iter().zip(&pair.resultant[0]);
-    let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(weight, n)| weight * n[k]).sum());
-    let (size, total) = (length(sum), pair.weight.iter().sum::<f64>());
+    let points = || pair.area.iter().zip(&pair.resultant[0]);
+    let sum: [f64; 3] = std::array::from_fn(|k| points().map(|(area, n)| area * n[k]).sum());
+    let (size, total) = (length(sum), pair.area.iter().sum::<f64>());
     (size > CANCELS * total).then(|| sum.map(|n| n / size))
 }
 

@@ -64,7 +64,7 @@ impl<const D: usize> WholeBody<'_, D> {
     /// mesh.
     pub fn shared(&self, pairs: &[ContactPair], checked: &BodyCheck, plane: Plane) -> (BodySlot, BodyInfo) {
         let of_body = || self.segments.iter().map(|segment| &pairs[segment.pair]);
-        let surface: f64 = of_body().map(|pair| pair.weight.iter().sum::<f64>()).sum();
+        let surface: f64 = of_body().map(|pair| pair.area.iter().sum::<f64>()).sum();
         let (volume, moduli) = self.part.volume_and_moduli();
         let (modulus, depth) = (dot(&moduli, &along_axes(of_body())), volume / surface);
         let slot = BodySlot {
@@ -112,8 +112,8 @@ impl<const D: usize> WholeBody<'_, D> {
 fn along_axes<'p>(pairs: impl Iterator<Item = &'p ContactPair>) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for pair in pairs {
-        for (weight, normal) in pair.weight.iter().zip(&pair.normal) {
-            (0..3).for_each(|c| sum[c] += weight * normal[c] * normal[c]);
+        for (area, normal) in pair.area.iter().zip(&pair.normal) {
+            (0..3).for_each(|c| sum[c] += area * normal[c] * normal[c]);
         }
     }
     let total: f64 = sum.iter().sum();

@@ -128,12 +128,12 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     fn kernel(&self) -> Vec<DVector<f64>> {
         let points: Vec<usize> = self.pairs.iter().map(ContactPair::len).collect();
         let share = |pair: &ContactPair| {
-            let all: f64 = pair.weight.iter().sum();
-            pair.weight.iter().map(|weight| weight / all).collect::<Vec<_>>()
+            let all: f64 = pair.area.iter().sum();
+            pair.area.iter().map(|area| area / all).collect::<Vec<_>>()
         };
-        let weight: Vec<f64> = self.pairs.iter().flat_map(share).collect();
+        let shares: Vec<f64> = self.pairs.iter().flat_map(share).collect();
         let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..]));
-        Motions::new(motions, &points).springs(&weight).kernel(TOLERANCE.max(self.tilt * self.tilt))
+        Motions::new(motions, &points).springs(&shares).kernel(TOLERANCE.max(self.tilt * self.tilt))
     }
 
     /// Return the motion with these amounts.

@@ -33,8 +33,8 @@ pub struct Obstacle<'a> {
 impl<'a> Obstacle<'a> {
     /// Return the obstacle of a pair.
     pub fn new(pair: &'a ContactPair, spec: &'a ContactSpec) -> Self {
-        let area: f64 = pair.weight.iter().sum();
-        let middle = |c: usize| pair.weight.iter().zip(&pair.position).map(|(w, x)| w * x[c]).sum::<f64>() / area;
+        let area: f64 = pair.area.iter().sum();
+        let middle = |c: usize| pair.area.iter().zip(&pair.position).map(|(w, x)| w * x[c]).sum::<f64>() / area;
         let is_revolved = pair.along_curve && pair.measure == "area";
         let middle = |c: usize| if is_revolved && c == 0 { 0.0 } else { middle(c) };
         let at = spec.at.map_or_else(|| [0, 1, 2].map(middle), |at| at.0);

@@ -76,7 +76,7 @@ impl PressureErrors {
     fn add_pair(&mut self, points: &FinePoints, model: &Model, layer: &Layer, index: usize) {
         let (position, range) = (&model.pairs[index].position, model.range(index));
         let (pressure, tangent) = (&layer.pressure[range.clone()], &layer.tangent[range.clone()]);
-        let square = |values: &[f64]| -> f64 { range.clone().map(|q| model.weight[q] * values[q] * values[q]).sum() };
+        let square = |values: &[f64]| -> f64 { range.clone().map(|q| model.area[q] * values[q] * values[q]).sum() };
         let (squared, whole) = (square(&self.error), square(&layer.pressure));
         let rim = RimError::new(points, softness(model, index), pressure, tangent);
         let at_rims: BTreeSet<usize> = (0..points.each.len())
@@ -84,10 +84,10 @@ impl PressureErrors {
             .flat_map(|g| points.interpolation.row(g).map(|(q, _)| q))
             .collect();
         let of_points: f64 =
-            at_rims.iter().map(|q| range.start + q).map(|q| model.weight[q] * self.error[q].powi(2)).sum();
+            at_rims.iter().map(|q| range.start + q).map(|q| model.area[q] * self.error[q].powi(2)).sum();
         let relative = |squared: f64| if squared == 0.0 { 0.0 } else { SAFETY * f64::sqrt(squared / whole) };
         self.relative.push(relative(squared + rim.squared));
-        let sum = |value: &dyn Fn(usize) -> f64| range.clone().map(|q| model.weight[q] * value(q)).sum::<f64>();
+        let sum = |value: &dyn Fn(usize) -> f64| range.clone().map(|q| model.area[q] * value(q)).sum::<f64>();
         let (missed, force) = (sum(&|q| self.error[q]).abs(), sum(&|q| layer.pressure[q].abs()));
         self.force.push(if missed == 0.0 { 0.0 } else { SAFETY * missed / force });
         self.ends.push(relative(of_points + rim.squared));

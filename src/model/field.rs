@@ -214,7 +214,7 @@ impl<'a> LineEnergy<'a> {
         let mut sum = self.slope + t * self.curvature;
         for (q, pair, point) in self.model.each_point().filter(|(q, ..)| self.closing[*q] != 0.0) {
             let s = self.closing[q];
-            sum += self.model.weight[q] * pair.law.pressure(point, self.compression[q] + t * s) * s;
+            sum += self.model.area[q] * pair.law.pressure(point, self.compression[q] + t * s) * s;
         }
         // a law that leaves the range of numbers resists with an infinite force
         if sum.is_nan() { f64::INFINITY } else { sum }

@@ -37,17 +37,17 @@ impl Layer {
             let mut energy = 0.0;
             for q in model.range(i) {
                 let response = pair.law.response(q - model.offset[i], compression[q]);
-                energy += model.weight[q] * response.energy;
-                layer.push(model.weight[q], compression[q], response.pressure, response.tangent);
+                energy += model.area[q] * response.energy;
+                layer.push(model.area[q], compression[q], response.pressure, response.tangent);
             }
             layer.energy.push(energy);
         }
         layer
     }
 
-    /// Append the state of the next point, whose area is `weight`.
-    fn push(&mut self, weight: f64, compression: f64, pressure: f64, tangent: f64) {
-        let force = weight * pressure;
+    /// Append the state of the next point, with this area.
+    fn push(&mut self, area: f64, compression: f64, pressure: f64, tangent: f64) {
+        let force = area * pressure;
         // zero force does no work, even where the gap is infinite
         self.work += if force == 0.0 { 0.0 } else { force * compression };
         self.closed += usize::from(compression > 0.0);
@@ -75,14 +75,14 @@ impl Layer {
         let mut layer = Self { smoothing: smoothing.to_vec(), energy: vec![0.0; model.pairs.len()], ..Self::default() };
         for (q, pair, point) in model.each_point() {
             let state = law::resolve(&*pair.law, point, sum(q), rho[q], smoothing[q]);
-            layer.push(model.weight[q], state.compression, state.pressure, state.tangent);
+            layer.push(model.area[q], state.compression, state.pressure, state.tangent);
         }
         layer
     }
 
     /// Return omega kappa, n: the tangent stiffness of the layer at the points.
     pub fn springs(&self, model: &Model) -> Vec<f64> {
-        model.weight.iter().zip(&self.tangent).map(|(weight, tangent)| weight * tangent).collect()
+        model.area.iter().zip(&self.tangent).map(|(area, tangent)| area * tangent).collect()
     }
 
     /// Return p_q + kappa_q (c - c_q), n: the pressures of the linear model at other compressions c, n.
@@ -123,7 +123,7 @@ pub fn contact_slopes(model: &Model, closed: impl Fn(usize) -> bool) -> Vec<f64>
     let largest = meshed.map(|body| stiffness(body, 0.0)).fold(f64::MIN_POSITIVE, f64::max);
     let mut slopes = Vec::with_capacity(points);
     for (i, pair) in model.pairs.iter().enumerate() {
-        let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.weight[q]).sum();
+        let area: f64 = model.range(i).filter(|&q| closed(q)).map(|q| model.area[q]).sum();
         let is_plane = pair.measure == "length";
         let half = if is_plane { 0.5 * area } else { (area / std::f64::consts::PI).sqrt() };
         let foundation = FOUNDATION[usize::from(!is_plane)] / half;
@@ -156,7 +156,7 @@ pub fn meeting_slopes(model: &Model) -> Vec<f64> {
     let slope = |q: usize| {
         // a row without stiffness has prescribed dofs only, so the other side alone moves; without stiffness on both, rho is infinite and the resolvent is at c
         let sides = [rows[q], rows[points + q]].into_iter().filter(|stiffness| *stiffness > 0.0);
-        let softer = sides.fold(f64::INFINITY, f64::min) / model.weight[q];
+        let softer = sides.fold(f64::INFINITY, f64::min) / model.area[q];
         SLOPE * softer
     };
     (0..points).map(slope).collect()
@@ -201,7 +201,7 @@ mod tests {
         for q in 0..4 {
             let (here, there) = (smoothed.compression[q] + smoothed.pressure[q] / rho[q], c[q] + p[q] / rho[q]);
             assert!((here - there).abs() < 1e-12 && smoothed.pressure[q] > 0.0, "{q}: {here} {there}");
-            assert!((smoothed.force[q] - model.weight[q] * smoothed.pressure[q]).abs() < 1e-15 * smoothed.force[q]);
+            assert!((smoothed.force[q] - model.area[q] * smoothed.pressure[q]).abs() < 1e-15 * smoothed.force[q]);
         }
         assert_eq!(smoothed.smoothing, mu);
     }

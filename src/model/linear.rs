@@ -1,7 +1,7 @@
 //! The linear step: (K + B' diag(omega kappa) B) x = r over all bodies (35).
 //!
 //! How it is solved is a choice of the inner solver, not a method of its own. There may be one dense matrix of condensed bodies, one sparse
-//! factorisation, or conjugate gradients with a multigrid of all bodies or with the Robin sweep (`robin::Sweeps`). A new way is a new
+//! factorisation, or conjugate gradients with a multigrid of all bodies or with the Robin sweep (`robin::SweepCg`). A new way is a new
 //! file with an implementation of [`LinearStep`].
 
 use super::Model;

@@ -147,7 +147,7 @@ pub struct Model {
     /// First point of each pair, and the number of all points.
     pub offset: Vec<usize>,
     /// omega of all points, n: area, or length in the plane.
-    pub weight: Vec<f64>,
+    pub area: Vec<f64>,
     /// d of all points, n: the gaps, less the part that prescribed displacements close.
     pub gap: Vec<f64>,
     /// The Robin term that the bodies carry, omega psi kappa of all contact rows, 2n; empty before the first.
@@ -165,9 +165,9 @@ impl Model {
         for pair in &pairs {
             offset.push(offset[offset.len() - 1] + pair.len());
         }
-        let weight = pairs.iter().flat_map(|pair| pair.weight.iter().copied()).collect();
+        let area = pairs.iter().flat_map(|pair| pair.area.iter().copied()).collect();
         let (gap, robin) = (Vec::new(), Vec::new());
-        let mut model = Self { bodies, pairs, offset, weight, gap, robin, mechanism: None, exchange };
+        let mut model = Self { bodies, pairs, offset, area, gap, robin, mechanism: None, exchange };
         model.set_gaps();
         model
     }
@@ -205,7 +205,7 @@ impl Model {
 
     /// Return the forces omega p, for pressures p at the points (n).
     pub fn forces(&self, pressure: &[f64]) -> Vec<f64> {
-        self.weight.iter().zip(pressure).map(|(weight, pressure)| weight * pressure).collect()
+        self.area.iter().zip(pressure).map(|(area, pressure)| area * pressure).collect()
     }
 
     /// Return the compressions of the layers, n, that carry these pressures, n.
@@ -227,7 +227,7 @@ impl Model {
         for segment in self.bodies.iter().filter(|slot| slot.is_rigid).flat_map(|slot| &slot.segments) {
             for q in self.range(segment.pair) {
                 let before = all[points + q].max(all[q]);
-                all[points + q] = if before > 0.0 { before } else { self.weight[q] };
+                all[points + q] = if before > 0.0 { before } else { self.area[q] };
             }
         }
         all
@@ -263,7 +263,7 @@ impl Model {
 
     /// Return the number of contact points of all pairs.
     pub fn points(&self) -> usize {
-        self.weight.len()
+        self.area.len()
     }
 
     /// Return the numbers of the points of pair `i`.
@@ -382,7 +382,7 @@ pub(crate) mod sample {
     use crate::linalg::Csr;
 
     /// omega of the points.
-    pub const WEIGHT: [f64; 4] = [0.5, 2.0, 3.0, 0.25];
+    pub const AREA: [f64; 4] = [0.5, 2.0, 3.0, 0.25];
 
     /// The law p = s c^2, with s of each point.
     #[derive(Debug)]
@@ -407,7 +407,7 @@ pub(crate) mod sample {
             tilt: vec![0.0; 2],
             uncertainty: 0.0,
             position: vec![[0.0; 3]; 2],
-            weight: WEIGHT[2 * i..2 * i + 2].to_vec(),
+            area: AREA[2 * i..2 * i + 2].to_vec(),
             normal: vec![[0.0, 1.0, 0.0]; 2],
             gap: vec![0.0; 2],
             offset: 0.0,

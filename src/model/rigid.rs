@@ -106,12 +106,12 @@ impl<'a> Motions<'a> {
         ground
     }
 
-    /// Return (B E)' diag(`weight`) (B E) for springs at the points, one entry a point. The matrix has a row and column of blocks for each body.
-    pub fn springs(&self, weight: &[f64]) -> Blocks {
+    /// Return (B E)' diag(`stiffness`) (B E) for springs at the points, one entry a point. The matrix has a row and column of blocks for each body.
+    pub fn springs(&self, stiffness: &[f64]) -> Blocks {
         let mut springs = self.blocks();
         for sides in self.pairs.iter().filter(|sides| !sides.is_empty()) {
-            let weight = &weight[sides[0].points.clone()];
-            let force = |trace: &[f64]| trace.iter().zip(weight).map(|(t, w)| t * w).collect::<Vec<f64>>();
+            let stiffness = &stiffness[sides[0].points.clone()];
+            let force = |trace: &[f64]| trace.iter().zip(stiffness).map(|(t, k)| t * k).collect::<Vec<f64>>();
             let forces: Vec<Vec<Option<Vec<f64>>>> =
                 sides.iter().map(|side| side.traces.iter().map(|trace| trace.map(force)).collect()).collect();
             let block = |s: usize, t: usize| {

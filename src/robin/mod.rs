@@ -2,10 +2,10 @@
 //! body. Starts from a trace, linear steps, and bounds of the spectrum of G^-1 F1'' are made of sweeps alone. Where a function says nothing else, its
 //! errors are failures of the solver library.
 
+mod cg;
 mod obstacle;
 pub mod spectrum;
 pub mod sweep;
-mod sweeps;
 
+pub use cg::SweepCg;
 pub use sweep::{Coefficient, Sweep, prepare};
-pub use sweeps::Sweeps;

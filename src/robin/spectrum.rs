@@ -1,7 +1,7 @@
 //! The interval (33) of gamma, in which Theorem 3 promises convergence, from bounds of the spectrum of G^-1 F1''.
 
+use super::cg::{MOST_SWEEPS, conjugate_gradients};
 use super::sweep::Sweeper;
-use super::sweeps::{MOST_SWEEPS, conjugate_gradients};
 use crate::contact::law::LayerLaw;
 use crate::error::Result;
 use crate::model::Model;
@@ -46,7 +46,7 @@ const DIGITS: f64 = 1e-13;
 pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<Interval>> {
     let (mut least, mut most) = (Vec::new(), Vec::new());
     for (q, pair, point) in model.each_point() {
-        let weight = model.weight[q];
+        let weight = model.area[q];
         let [low, high] = tangents(&*pair.law, point, layer.compression[q], excess.max(0.0) / weight);
         least.push(weight * low);
         most.push(weight * high);
@@ -63,7 +63,7 @@ pub fn interval(model: &mut Model, layer: &Layer, excess: f64) -> Result<Option<
 /// cause. Every mode has a part in these forces: multiples of the golden ratio spread evenly over (0, 1) without a period.
 fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
     let (points, mut load) = (model.points(), Field::zero(model).displacements);
-    let force = |i: usize| model.weight[i % points] * (0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract());
+    let force = |i: usize| model.area[i % points] * (0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract());
     let rows: Vec<f64> = (0..2 * points).map(force).collect();
     for (index, load) in load.iter_mut().enumerate() {
         let body = model.bodies[index].local.as_ref();

@@ -168,7 +168,7 @@ impl Coefficient {
             RobinRule::Tangent => tangent,
             RobinRule::Floor(floor) => {
                 let points = model.points();
-                tangent.into_iter().enumerate().map(|(i, w)| w.max(floor * model.weight[i % points])).collect()
+                tangent.into_iter().enumerate().map(|(i, w)| w.max(floor * model.area[i % points])).collect()
             }
             RobinRule::Frozen | RobinRule::Auto => constrained(model, tangent),
         };
@@ -196,7 +196,7 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
                 0.0 => pair.law.robin_tangent(point, layer.compression[q]),
                 tangent => tangent,
             };
-            weight[q] = model.weight[q] * tangent;
+            weight[q] = model.area[q] * tangent;
         }
     }
     Ok(weight)

@@ -20,7 +20,7 @@ use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
-use crate::robin::{Coefficient, Sweeps};
+use crate::robin::{Coefficient, SweepCg};
 use crate::scene::Scene;
 use crate::scene::remove;
 use crate::solver::{Dense, Krylov, MakeSolver, options};
@@ -339,7 +339,7 @@ fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Resul
     }
     let rule = gamma::rule(&scene.method.gamma, &scene.own_rules)?;
     crate::robin::prepare(&mut built.discrete.model)?;
-    Ok(Method::Robin { rule, coefficient: coefficient_of(&scene), linear: Box::new(Sweeps::with_robin_term()) })
+    Ok(Method::Robin { rule, coefficient: coefficient_of(&scene), linear: Box::new(SweepCg::with_robin_term()) })
 }
 
 fn coefficient_of(scene: &Scene) -> Coefficient {
@@ -352,7 +352,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
     let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
     if linear == Linear::Sweeps {
         crate::robin::prepare(model)?;
-        return Ok(Box::new(Sweeps::new(coefficient_of(scene))));
+        return Ok(Box::new(SweepCg::new(coefficient_of(scene))));
     }
     // multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows
     let of_nodes = linear == Linear::Multigrid || model.is_distributed();

@@ -244,7 +244,7 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         peak_pressure: p[peak],
         peak_at: pair.position[peak],
         peak_compression: results::peak(c),
-        extent: Extent::new(pair.measure, &pair.weight, c),
+        extent: Extent::new(pair.measure, &pair.area, c),
         contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
         obstacle: results::obstacle(done, i),
         offset: results::offset(done, i),
@@ -279,7 +279,7 @@ pub fn contact_table(done: &Done, estimate: Option<&Estimate>, i: usize) -> Cont
     ContactTable {
         side_names: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
         points: pair.position.clone(),
-        weight: pair.weight.clone(),
+        weight: pair.area.clone(),
         gap: pair.gap.clone(),
         compression: outcome.layer.compression[range.clone()].to_vec(),
         pressure: outcome.layer.pressure[range.clone()].to_vec(),
@@ -337,7 +337,7 @@ pub fn contact_surface(name: &str, done: &Done, i: usize, displacement: &[[f64; 
             FieldArray::new("compression", 1, layer.compression[range.clone()].to_vec()),
             FieldArray::new("pressure", 1, layer.pressure[range].to_vec()),
             FieldArray::new("normal", 3, pair.normal.as_flattened().to_vec()),
-            FieldArray::new(pair.measure, 1, pair.weight.clone()),
+            FieldArray::new(pair.measure, 1, pair.area.clone()),
         ],
     );
     grid.at_points.push(FieldArray::new("displacement", 3, displacement.as_flattened().to_vec()));

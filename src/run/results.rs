@@ -286,7 +286,7 @@ fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
     StepPairReport {
         force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
         approach,
-        extent: Extent::new(pair.measure, &pair.weight, c),
+        extent: Extent::new(pair.measure, &pair.area, c),
         peak_pressure: layer.pressure[range].iter().copied().fold(f64::NEG_INFINITY, f64::max),
         peak_compression: peak(c),
         closed: c.iter().filter(|c| **c > 0.0).count(),

@@ -170,15 +170,15 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     let Chords { sagitta, height } =
         done.built.discrete.contacts[i].chords.as_ref().filter(|_| done.outcome.status.is_solved())?;
     let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range]);
-    let closed: f64 = (0..pair.len()).filter(|&q| pressure[q] > 0.0).map(|q| pair.weight[q]).sum();
+    let closed: f64 = (0..pair.len()).filter(|&q| pressure[q] > 0.0).map(|q| pair.area[q]).sum();
     let extent = if pair.measure == "length" { closed } else { closed.sqrt() };
     let give = softness(done.model(), i) * extent / PI;
     let (mut changed, mut whole) = (0.0, 0.0);
     for q in 0..pair.len() {
         let state = compression[q] + height[q] + give * pressure[q];
         let curved = if give > 0.0 { pair.law.resolvent(q, state, 1.0 / give) } else { state };
-        changed += pair.weight[q] * (pair.law.response(q, curved).pressure - pressure[q]).powi(2);
-        whole += pair.weight[q] * pressure[q].powi(2);
+        changed += pair.area[q] * (pair.law.response(q, curved).pressure - pressure[q]).powi(2);
+        whole += pair.area[q] * pressure[q].powi(2);
     }
     if changed <= BY_CHORDS.powi(2) * whole {
         return None;
@@ -241,7 +241,7 @@ const TILTED: f64 = 0.01;
 /// Return the warning for pair `i`, if the normals of its sides differ under pressure by more than small displacements allow.
 pub fn tilted(done: &Done, i: usize) -> Option<String> {
     let (pair, pressure) = (&done.model().pairs[i], &done.outcome.layer.pressure[done.model().range(i)]);
-    let force = |q: usize| pair.weight[q] * pressure[q];
+    let force = |q: usize| pair.area[q] * pressure[q];
     let all: f64 = (0..pair.len()).map(force).sum();
     let mean = |of: &dyn Fn(f64) -> f64| (0..pair.len()).map(|q| force(q) * of(pair.tilt[q])).sum::<f64>() / all;
     let along = mean(&|tilt| 0.5 * tilt * tilt);

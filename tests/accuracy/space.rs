@@ -115,7 +115,7 @@ fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: 
         for q in 0..pair.len() {
             for (dof, entry) in pair.rows[side].row(q) {
                 let mut f = [0.0; 3];
-                f[dof % D] = entry * pair.weight[q];
+                f[dof % D] = entry * pair.area[q];
                 let x = winkler::internals::fem::pad(space.nodes[dof / D]);
                 for c in 0..3 {
                     force[c] += f[c];
@@ -127,7 +127,7 @@ fn sums<const D: usize>(mesh: &Mesh<D>, order: [Order; 2], cut: Cut<D>, bodies: 
     let largest = |v: [f64; 3]| v.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let gaps = pair.gap.iter().copied();
     Sums {
-        measure: pair.weight.iter().sum(),
+        measure: pair.area.iter().sum(),
         gap: [gaps.clone().fold(f64::MAX, f64::min), gaps.fold(f64::MIN, f64::max)],
         forces: largest(force),
         moments: largest(moment),
@@ -214,7 +214,7 @@ fn points_of_quadratic_triangles() {
         let carriers: Vec<_> = pair.cover.iter().map(|cover| cover.carriers).collect();
         assert!(kinds.iter().all(|kind| carriers.contains(kind)), "{bodies:?}: {carriers:?}");
         assert!(carriers.iter().all(|kind| kinds.contains(kind)), "{bodies:?}: {carriers:?}");
-        assert!(pair.weight.iter().all(|&weight| weight > 0.0), "{bodies:?}: {:?}", pair.weight);
+        assert!(pair.area.iter().all(|&weight| weight > 0.0), "{bodies:?}: {:?}", pair.area);
         let sums = sums(&mesh, [Order::P2; 2], pieces::in_space, bodies, groups);
         assert!((sums.measure - 0.5 * 0.55).abs() < 1e-13, "{bodies:?}: {}", sums.measure);
         assert!(sums.forces < 1e-14 && sums.moments < 1e-10, "{bodies:?}: {} {}", sums.forces, sums.moments);

@@ -87,7 +87,7 @@ fn layers(model: &Model, c0: &[f64], c: &[f64]) -> f64 {
                 let [left, right] = [k, k + 1].map(|k| c0[q] + k as f64 * way);
                 (excess(left) + 4.0 * excess(0.5 * (left + right)) + excess(right)) * way / 6.0
             };
-            sum += model.weight[q] * (0..INTERVALS).map(simpson).sum::<f64>();
+            sum += model.area[q] * (0..INTERVALS).map(simpson).sum::<f64>();
         }
     }
     sum

@@ -291,14 +291,14 @@ fn check<const D: usize>(surfaces: &[Surface; 2], cut: Cut<D>, slack: f64) -> Re
             prop_assert!(covered < 1e-9, "no pair, but {covered} is covered");
             continue;
         };
-        let sum: f64 = pair.weight.iter().sum();
+        let sum: f64 = pair.area.iter().sum();
         prop_assert!((sum - covered).abs() < 1e-11 * covered, "weights {sum}, covered {covered}");
         let shares: f64 = pair.cover.iter().map(|cover| cover.share).fold(0.0, f64::max);
         prop_assert!(shares < 1.01, "a facet is covered {shares} times");
         // what a mean may amplify, times the largest sum of the sizes of shape functions on a facet, in space with what lies a tenth beside it
         let [linear, quadratic] = if D == 2 { [1.0, 1.25] } else { [1.6, 2.8] };
         for q in 0..pair.len() {
-            prop_assert!(pair.weight[q] > 0.0);
+            prop_assert!(pair.area[q] > 0.0);
             let n = pair.normal[q];
             for (side, sign) in [(0, 1.0), (1, -1.0)] {
                 let miss = (0..3).map(|c| (pair.resultant[side][q][c] - sign * n[c]).abs()).fold(0.0, f64::max);

@@ -27,8 +27,8 @@ const GAINS: usize = 4;
 /// Relative accuracy of iterative solves of bodies as preconditioner, and of a step.
 const ROUGH: f64 = 1e-2;
 
-/// A solver of linear steps by sweeps.
-pub struct Sweeps {
+/// The linear step by conjugate gradients around sweeps.
+pub struct SweepCg {
     coefficient: Option<Coefficient>,
     sweeper: Sweeper,
     systems: usize,
@@ -36,7 +36,7 @@ pub struct Sweeps {
     least: f64,
 }
 
-impl Sweeps {
+impl SweepCg {
     /// Return a solver that gives the bodies' matrices the Robin term of this coefficient.
     pub fn new(coefficient: Coefficient) -> Self {
         Self { coefficient: Some(coefficient), ..Self::with_robin_term() }
@@ -48,7 +48,7 @@ impl Sweeps {
     }
 }
 
-impl LinearStep for Sweeps {
+impl LinearStep for SweepCg {
     fn name(&self) -> &'static str {
         "newton-robin"
     }
