@@ -42,7 +42,7 @@ use crate::problem::contact::{Carrier, ContactSpec};
 use crate::scene::Scene;
 use assembly::Assembler;
 use body::BodyMesh;
-use meshes::{Kept, Meshes};
+use meshes::{KeptMeshes, Meshes};
 use prepare::{ReplicatedProblem, WholeProblem, prepare};
 use std::rc::Rc;
 
@@ -116,7 +116,7 @@ where
         }
     }
     let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
-    let meshes = keep.then(|| Rc::new(Kept { shapes, fine }) as Rc<dyn Meshes>);
+    let meshes = keep.then(|| Rc::new(KeptMeshes { shapes, fine }) as Rc<dyn Meshes>);
     let of_rank = |slot: BodySlot| match rank == 0 && !slot.motions.is_empty() {
         true => BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot },
         false => slot,

@@ -161,11 +161,17 @@ impl Newton<'_, '_> {
         })
     }
 
+    /// Return the compressions of the iterate, and those at the end of the whole step, n each.
+    fn ends(&self, step: &LinearSolution) -> [Vec<f64>; 2] {
+        let before = self.run.model.compression(&self.u.trace);
+        let whole = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
+        [before, whole]
+    }
+
     /// Return the part of a step that does not lead away from the laws.
     fn step_length(&mut self, step: &LinearSolution) -> StepLength {
         let model = &*self.run.model;
-        let before = model.compression(&self.u.trace);
-        let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
+        let [before, whole] = self.ends(step);
         let roundoff = compression_roundoff(model, &self.u.trace);
         let pressure = self.states.linear(&whole);
         self.progress.step_length(model, &self.states, [&before, &roundoff], [&whole, &pressure])
@@ -244,9 +250,8 @@ impl Newton<'_, '_> {
 
     /// Take this part of a step, and resolve the laws at its end.
     fn advance(&mut self, mut step: LinearSolution, part: StepLength) -> StepResult {
+        let [_, whole] = self.ends(&step);
         let model = &mut *self.run.model;
-        let before = model.compression(&self.u.trace);
-        let whole: Vec<f64> = before.iter().zip(step.field.closing()).map(|(c, closing)| c + closing).collect();
         step.field.scale(part.length);
         self.u.advance(model, 1.0, &step.field);
         self.u.retrace(model);
@@ -292,7 +297,7 @@ impl Newton<'_, '_> {
         let model = &*self.run.model;
         let unbalanced = unbalanced(model, rest, &self.states.springs(model));
         let mut sums = vec![energy.strain, energy.potential, unbalanced, 0.0, 0.0];
-        for body in model.bodies.iter().filter_map(|slot| slot.local.as_ref()).filter(|body| body.dofs().leads()) {
+        for (_, body) in model.locals().filter(|(_, body)| body.dofs().leads()) {
             let counts = body.counts();
             sums[3] += counts.factorizations as f64;
             sums[4] += counts.inner_iterations as f64;

@@ -9,14 +9,13 @@ use super::stop::Status;
 use super::{newton, robin};
 use crate::error::Result;
 use crate::linalg::axpy;
-use crate::model::Model;
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
-use crate::model::rigid::{self, Motions, Moved};
+use crate::model::rigid::{self, Motions, NamedMotion};
+use crate::model::{INNER_TOLERANCE, Model};
 use crate::problem::method::StopRule;
 use crate::robin::sweep::{Coefficient, extend, underconstrained};
-use crate::solver::preset::INNER_TOLERANCE;
 use nalgebra::DVector;
 use std::time::Instant;
 
@@ -242,9 +241,9 @@ fn find_start(model: &Model) -> std::result::Result<RigidStart, Status> {
 }
 
 /// Return a motion of a body together with rigid parts that changes no gap, if there is one: the parts follow the body wherever it goes.
-fn follows(model: &Model) -> Option<Moved> {
+fn follows(model: &Model) -> Option<NamedMotion> {
     let motions = Motions::of(model);
-    let has_rigid = |all: &Vec<Moved>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
+    let has_rigid = |all: &Vec<NamedMotion>| all.iter().any(|moved| model.bodies[moved.body].is_rigid);
     let all = motions.springs(&model.area).factor().kernel();
     all.iter().map(|motion| motions.names(motion)).find(has_rigid)?.into_iter().next()
 }

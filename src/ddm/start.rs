@@ -22,7 +22,7 @@ use crate::linalg::{Blocks, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{self, Unbounded};
 use crate::model::layer::{Layer, contact_slopes, in_series, surface_slopes};
-use crate::model::rigid::{Motions, Moved, PART};
+use crate::model::rigid::{Motions, NamedMotion, PART};
 use nalgebra::DVector;
 
 /// The start of a run.
@@ -51,7 +51,7 @@ pub(super) const SEARCH: f64 = 1e-3;
 ///
 /// # Errors
 /// The bodies and their motions along which the energy falls for ever, if there are such motions.
-pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<Moved>> {
+pub fn find(model: &Model, given: Option<&[f64]>) -> Result<RigidStart, Vec<NamedMotion>> {
     let motions = Motions::with_springs(model);
     let given = given.map_or_else(|| model.imposed(), <[f64]>::to_vec);
     let gap = model.compression(&given).into_iter().map(|c| -c).collect();

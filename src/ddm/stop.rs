@@ -3,7 +3,7 @@
 use super::bound::EXACT;
 use crate::model::Mechanism;
 use crate::model::linear::Failure;
-use crate::model::rigid::Moved;
+use crate::model::rigid::NamedMotion;
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,13 +27,13 @@ pub enum Status {
         energy: f64,
     },
     /// Neither supports nor the Robin term constrain a body.
-    Underconstrained(Moved),
+    Underconstrained(NamedMotion),
     /// Loads move several bodies together in a way that changes no gap and that nothing resists.
     Mechanism(Mechanism),
     /// F1 has no minimum: loads push bodies where neither a support nor a contact stops them.
     Unbounded {
         /// The bodies and their motions, where they are known.
-        moving: Vec<Moved>,
+        moving: Vec<NamedMotion>,
     },
     /// An inner solver failed.
     InnerSolver(Failure),

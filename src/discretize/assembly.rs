@@ -10,10 +10,8 @@ use crate::fem::rigid;
 use crate::fem::{ElasticBody, Prolongation};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
-use crate::model::{Body, BodySlot, Distribution};
+use crate::model::{Body, BodyFacts, BodySlot, Distribution, InterfaceDofs};
 use crate::problem::{BodySpec, Plane};
-use crate::solver::InterfaceDofs;
-use crate::solver::cost::BodyFacts;
 use std::cell::OnceCell;
 use std::rc::Rc;
 

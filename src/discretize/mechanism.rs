@@ -34,7 +34,7 @@ pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], l
 }
 
 /// A motion of some bodies, each of which is rigid.
-struct Moving<const D: usize> {
+struct GroupMotion<const D: usize> {
     /// Indices of the bodies that it moves.
     bodies: Vec<usize>,
     /// Motions of these bodies.
@@ -137,7 +137,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Return the motion with these amounts.
-    fn moving(&self, amounts: DVector<f64>) -> Moving<D> {
+    fn moving(&self, amounts: DVector<f64>) -> GroupMotion<D> {
         let (mut bodies, mut motions, mut first) = (Vec::new(), Vec::new(), 0);
         let least = PART * amounts.amax();
         for body in 0..self.bodies.len() {
@@ -149,19 +149,19 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
                 motions.push(rigid::sum(left, &own.into_owned()));
             }
         }
-        Moving { bodies, motions, amounts }
+        GroupMotion { bodies, motions, amounts }
     }
 
     /// Fix motions that nothing resists if no load works on them, and record them.
     fn settle(&mut self, all: Vec<DVector<f64>>) {
-        let mut sets: Vec<Vec<Moving<D>>> = Vec::new();
+        let mut sets: Vec<Vec<GroupMotion<D>>> = Vec::new();
         for moving in all.into_iter().map(|amounts| self.moving(amounts)) {
             match sets.iter_mut().find(|set| set[0].bodies == moving.bodies) {
                 Some(set) => set.push(moving),
                 None => sets.push(vec![moving]),
             }
         }
-        let named: Vec<Vec<(String, Moving<D>)>> = sets.into_iter().map(|set| self.named(set)).collect();
+        let named: Vec<Vec<(String, GroupMotion<D>)>> = sets.into_iter().map(|set| self.named(set)).collect();
         let works: Vec<Vec<f64>> =
             named.iter().map(|set| set.iter().map(|(_, moving)| self.work(moving).abs()).collect()).collect();
         let worst = works.iter().flatten().copied().fold(0.0, f64::max);
@@ -195,7 +195,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Return motions of the same bodies with their names. Where the bodies move as one, translations and rotations are apart.
-    fn named(&self, set: Vec<Moving<D>>) -> Vec<(String, Moving<D>)> {
+    fn named(&self, set: Vec<GroupMotion<D>>) -> Vec<(String, GroupMotion<D>)> {
         let whole = self.common(&set[0].bodies);
         let at = |bodies: &[usize], motion: &dyn Fn(usize) -> RigidMotion<D>| -> Vec<f64> {
             bodies.iter().enumerate().flat_map(|(k, &body)| self.at_corners(body, &motion(k))).collect()
@@ -207,7 +207,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let (size, amounts) = (dot(&rest, &rest), fit(&vectors, &rest));
             amounts.iter().zip(&vectors).for_each(|(&a, vector)| axpy(-a, vector, &mut rest));
             if dot(&rest, &rest) > PART * PART * size {
-                let name = |moving: Moving<D>| (self.name_of_each(&moving), moving);
+                let name = |moving: GroupMotion<D>| (self.name_of_each(&moving), moving);
                 return set.into_iter().map(name).collect();
             }
             spans.push((rigid::sum(&whole, &DVector::from_vec(amounts)), moving.amounts.clone()));
@@ -216,7 +216,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Return the name of a motion of several bodies, each of which has its own.
-    fn name_of_each(&self, moving: &Moving<D>) -> String {
+    fn name_of_each(&self, moving: &GroupMotion<D>) -> String {
         let each = moving.bodies.iter().zip(&moving.motions);
         let name = |(&body, motion): (&usize, &RigidMotion<D>)| {
             format!("{} of {}", motion.in_words(), self.bodies[body].part.spec.name.value)
@@ -225,7 +225,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Return the work of the loads on a motion, as a share of the work that forces of their sizes could do; zero if it is rounding.
-    fn work(&self, moving: &Moving<D>) -> f64 {
+    fn work(&self, moving: &GroupMotion<D>) -> f64 {
         let [work, largest] = moving.works(self.bodies);
         if work.abs() <= largest * NO_WORK { 0.0 } else { work / largest }
     }
@@ -240,7 +240,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     /// ```
     ///
     /// so that nodes with equal loads get equal corrections. Forces on rigid surfaces do not change.
-    fn balance(&mut self, all: Vec<&Moving<D>>) {
+    fn balance(&mut self, all: Vec<&GroupMotion<D>>) {
         let works: Vec<f64> = all.iter().map(|moving| moving.works(self.bodies)[0]).collect();
         if all.iter().all(|moving| self.work(moving) == 0.0) {
             return;
@@ -276,7 +276,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
 
     /// Fix a dof against a motion, without the parts that earlier dofs hold. Return its body, the largest one with a suitable node
     /// where the motion is not small.
-    fn pin(&mut self, moving: Moving<D>, pins: &mut Vec<Pin>) -> Option<usize> {
+    fn pin(&mut self, moving: GroupMotion<D>, pins: &mut Vec<Pin>) -> Option<usize> {
         let mut amounts = moving.amounts;
         for pin in pins.iter() {
             let there = self.moving(amounts.clone());
@@ -311,7 +311,7 @@ struct Pin {
     amounts: DVector<f64>,
 }
 
-impl<const D: usize> Moving<D> {
+impl<const D: usize> GroupMotion<D> {
     /// Return the work of the loads on the motion, and the largest work that forces of their magnitudes could do.
     fn works(&self, bodies: &[WholeBody<D>]) -> [f64; 2] {
         let mut sums = [0.0; 2];

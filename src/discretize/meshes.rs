@@ -75,14 +75,14 @@ pub trait RecoveredFields {
 }
 
 /// The implementation of [`Meshes`] in `D` dimensions.
-pub struct Kept<const D: usize> {
+pub struct KeptMeshes<const D: usize> {
     /// Bodies in the order of the scene.
     pub shapes: Vec<Rc<FemBody<D>>>,
     /// Integration points of each pair.
     pub fine: Vec<Fine<D>>,
 }
 
-impl<const D: usize> Meshes for Kept<D> {
+impl<const D: usize> Meshes for KeptMeshes<D> {
     fn displacements(&self, body: usize, state: &[f64]) -> Vec<f64> {
         self.shapes[body].mesh.held.frame.displacements(state)
     }
@@ -147,7 +147,7 @@ impl<const D: usize> Meshes for Kept<D> {
 }
 
 struct OnBody<'a, const D: usize> {
-    kept: &'a Kept<D>,
+    kept: &'a KeptMeshes<D>,
     shape: &'a FemBody<D>,
     split: &'a Split<D>,
     u: &'a [f64],

@@ -17,11 +17,9 @@ use crate::error::Result;
 use crate::exchange::Plain;
 use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
-use crate::model::{BodySlot, Mechanism};
+use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, compactness};
 use crate::problem::Order;
 use crate::scene::Scene;
-use crate::solver::InterfaceDofs;
-use crate::solver::cost::{BodyFacts, compactness};
 use serde::{Deserialize, Serialize};
 
 /// What all ranks have of a prepared problem.

@@ -27,7 +27,7 @@ pub struct Verified<const D: usize> {
     pub bodies: Vec<BodySpec>,
     /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
     pub checked: Rc<[BodyCheck]>,
-    /// What is to be said of surfaces that are sets of nodes, on the first rank.
+    /// What is to be said of the file, and of surfaces that are sets of nodes, on the first rank.
     pub notes: Vec<String>,
 }
 

@@ -342,10 +342,10 @@ fn pairs(cells: &BodyCells) -> (Vec<FacetPair>, Vec<[f64; 3]>) {
 fn limits(cells: &BodyCells) -> Vec<(u32, f64)> {
     let dimension = cells.stride - 1;
     let mut sums = vec![[0.0; 2]; cells.facets.len() / dimension];
-    for pair in pairs(cells).0.iter().filter(|pair| pair.turn < EDGE && pair.area > 0.0) {
+    for pair in pairs(cells).0.iter().filter(|pair| pair.turn < EDGE && pair.weight > 0.0) {
         for facet in pair.facets {
-            sums[facet][0] += pair.area * pair.curvature.powi(2);
-            sums[facet][1] += pair.area;
+            sums[facet][0] += pair.weight * pair.curvature.powi(2);
+            sums[facet][1] += pair.weight;
         }
     }
     let share = if dimension == 3 { 2.0 } else { 1.0 };

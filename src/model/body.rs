@@ -8,7 +8,7 @@ use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
 use crate::petsc::{Rows, Schur, Session};
 use crate::solver::options::Chosen;
-use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, RobinMatrix, Solved, rows_of};
+use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, RobinMatrix, SolveOutcome, rows_of};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
@@ -242,14 +242,14 @@ impl Body {
         self.robin_matrix()?.solver_mut().set_tolerance(rtol)
     }
 
-    /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`Solved`].
-    pub fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+    /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`SolveOutcome`].
+    pub fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.robin_matrix()?.apply(|solver| solver.solve(r, z))
     }
 
     /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
     /// a solve, and for an iterative inner solver only one application of its preconditioner.
-    pub fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+    pub fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.robin_matrix()?.apply(|solver| solver.precondition(r, z))
     }
 

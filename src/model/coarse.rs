@@ -53,14 +53,13 @@ impl RigidSpace {
         let points: Vec<usize> = (0..model.pairs.len()).map(|pair| model.range(pair).len()).collect();
         let (length, motions) = (offset[offset.len() - 1], motions_of(&bodies, &points));
         let mut columns = Vec::new();
-        for (body, slot) in model.bodies.iter().enumerate().filter(|(_, slot)| !slot.is_rigid) {
-            let shapes = slot.local.as_ref().into_iter().flat_map(|local| &local.dofs().unconstrained_modes);
+        for (body, local) in model.locals().filter(|(body, _)| !model.bodies[*body].is_rigid) {
             let column = |(motion, values): (usize, &Vec<f64>)| MotionColumn {
                 motion,
                 first: offset[body],
                 values: values.clone(),
             };
-            columns.extend(motions.of_body(body).zip(shapes).map(column));
+            columns.extend(motions.of_body(body).zip(&local.dofs().unconstrained_modes).map(column));
         }
         let space = Rc::new(Self {
             bodies,

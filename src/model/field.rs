@@ -29,8 +29,7 @@ impl Field {
     /// Return the field with the displacements that supports prescribe.
     #[must_use]
     pub fn supported(mut self, model: &Model) -> Field {
-        let bodies = model.bodies.iter().map(|slot| slot.local.as_ref()).zip(&mut self.displacements);
-        bodies.for_each(|(body, u)| body.into_iter().for_each(|body| body.dofs().prescribe(u)));
+        model.locals().for_each(|(index, body)| body.dofs().prescribe(&mut self.displacements[index]));
         self
     }
 
@@ -54,21 +53,17 @@ impl Field {
     pub fn of_step(model: &Model, displacements: Vec<Vec<f64>>, apart: &[Vec<f64>], more: &[f64]) -> (Field, Vec<f64>) {
         let (mut field, mut fallen) = (Field { displacements, ..Self::zero(model) }, Self::zero(model).rigid);
         field.trace_here(model);
-        for (index, slot) in model.bodies.iter().enumerate() {
-            if let Some(body) = slot.local.as_ref() {
-                field.rigid[index] = body.dofs().amounts(&field.displacements[index]);
-                fallen[index].iter_mut().zip(&apart[index]).for_each(|(sum, a)| *sum = *a);
-            }
+        for (index, body) in model.locals() {
+            field.rigid[index] = body.dofs().amounts(&field.displacements[index]);
+            fallen[index].iter_mut().zip(&apart[index]).for_each(|(sum, a)| *sum = *a);
         }
         let mut message = [&field.trace[..], &field.rigid.concat(), &fallen.concat(), more].concat();
         model.exchange.sum(&mut message);
         let mut numbers = message.into_iter();
         let rigid = field.rigid.iter_mut().chain(&mut fallen).flatten();
         field.trace.iter_mut().chain(rigid).zip(&mut numbers).for_each(|(to, sum)| *to = sum);
-        for ((slot, state), rigid) in model.bodies.iter().zip(&mut field.displacements).zip(&field.rigid) {
-            if let Some(body) = slot.local.as_ref() {
-                body.dofs().add_motions(-1.0, rigid, state);
-            }
+        for (index, body) in model.locals() {
+            body.dofs().add_motions(-1.0, &field.rigid[index], &mut field.displacements[index]);
         }
         axpy(1.0, &rigid::trace(model, &fallen), &mut field.trace);
         field.rigid.iter_mut().zip(&fallen).for_each(|(rigid, a)| axpy(1.0, a, rigid));
@@ -118,12 +113,10 @@ impl Field {
     /// Set the traces to those of the local bodies, and to zero for other bodies.
     fn trace_here(&mut self, model: &Model) {
         let mut trace = vec![0.0; self.trace.len()];
-        for (index, slot) in model.bodies.iter().enumerate() {
-            if let Some(body) = slot.local.as_ref() {
-                let mut rows = vec![0.0; slot.row_stiffness.len()];
-                body.dofs().rows.multiply(&self.displacements[index], &mut rows);
-                model.add(index, &rows, &mut trace);
-            }
+        for (index, body) in model.locals() {
+            let mut rows = vec![0.0; body.dofs().rows.rows()];
+            body.dofs().rows.multiply(&self.displacements[index], &mut rows);
+            model.add(index, &rows, &mut trace);
         }
         self.trace = trace;
     }
@@ -163,18 +156,13 @@ pub fn residual(model: &Model, products: Vec<Vec<f64>>, u: &Field, force: &[f64]
 /// Return the squared energy norm of unbalanced forces r of the local bodies, taken for each dof alone: r'D^-1 r with the diagonal D of
 /// K + B' diag(`springs`) B, for springs omega kappa at the points (n). The caller adds the sums of all ranks.
 pub fn unbalanced(model: &Model, r: &[Vec<f64>], springs: &[f64]) -> f64 {
-    let of_body = |(index, slot): (usize, &BodySlot)| {
-        slot.local.as_ref().map_or(0.0, |body| body.unbalanced(&r[index], &model.at_rows(index, springs)))
-    };
-    model.bodies.iter().enumerate().map(of_body).sum()
+    model.locals().map(|(index, body)| body.unbalanced(&r[index], &model.at_rows(index, springs))).sum()
 }
 
 /// Add B' `force` to y for every local body, for forces at the points (n).
 pub fn add_forces(model: &Model, force: &[f64], y: &mut [Vec<f64>]) {
-    for (index, y) in y.iter_mut().enumerate() {
-        if let Some(body) = model.bodies[index].local.as_ref() {
-            body.dofs().rows.add_transpose(1.0, &model.at_rows(index, force), y);
-        }
+    for (index, body) in model.locals() {
+        body.dofs().rows.add_transpose(1.0, &model.at_rows(index, force), &mut y[index]);
     }
 }
 

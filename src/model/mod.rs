@@ -14,14 +14,16 @@ pub mod layer;
 pub mod linear;
 pub mod rigid;
 
-pub use crate::solver::BodyCounts;
+pub use crate::solver::cost::{BodyFacts, compactness};
+pub use crate::solver::preset::INNER_TOLERANCE;
+pub use crate::solver::{BodyCounts, InterfaceDofs};
 pub use body::Body;
 pub use dofs::{Distribution, Dofs};
 pub use field::Field;
 pub use joint::Joint;
 pub use layer::Layer;
 pub use linear::LinearStep;
-pub use rigid::{Motions, Moved};
+pub use rigid::{Motions, NamedMotion};
 
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -231,6 +233,11 @@ impl Model {
             }
         }
         all
+    }
+
+    /// Return the bodies that live on this rank, with their numbers.
+    pub fn locals(&self) -> impl Iterator<Item = (usize, &Body)> {
+        self.bodies.iter().enumerate().filter_map(|(body, slot)| Some((body, slot.local.as_ref()?)))
     }
 
     /// Return the number of bodies with a mesh; the rigid parts follow them.

@@ -32,7 +32,7 @@ struct PairSide<'a> {
 
 /// A combined motion of one body, named after the motions that it combines: "translation along x and rotation".
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Moved {
+pub struct NamedMotion {
     /// Number of the body.
     pub body: usize,
     /// Name of the motion.
@@ -175,9 +175,9 @@ impl<'a> Motions<'a> {
     /// Return E'r for forces r on the dofs of the local bodies of a model, whose motions these are. One message.
     pub fn work_of(&self, model: &Model, r: &[Vec<f64>]) -> DVector<f64> {
         let mut work = DVector::zeros(self.count());
-        for (body, (slot, r)) in model.bodies.iter().zip(r).enumerate() {
-            let motions = slot.local.as_ref().into_iter().flat_map(|local| &local.dofs().unconstrained_modes);
-            self.of_body(body).zip(motions).for_each(|(i, motion)| work[i] = dot(motion, r));
+        for (index, body) in model.locals() {
+            let modes = &body.dofs().unconstrained_modes;
+            self.of_body(index).zip(modes).for_each(|(i, mode)| work[i] = dot(mode, &r[index]));
         }
         model.exchange.sum(work.as_mut_slice());
         work
@@ -201,12 +201,12 @@ impl<'a> Motions<'a> {
     }
 
     /// Return the bodies that a combined motion moves, with the name of the motion of each.
-    pub fn names(&self, amounts: &DVector<f64>) -> Vec<Moved> {
+    pub fn names(&self, amounts: &DVector<f64>) -> Vec<NamedMotion> {
         let least = PART * amounts.amax();
         let of_body = |(body, motions): (usize, &&[Motion])| {
             let own = amounts.rows(self.first[body], motions.len());
             let name = || combined(motions.iter().map(|motion| &motion.name[..]), own.iter().copied());
-            (own.amax() > least).then(|| Moved { body, name: name() })
+            (own.amax() > least).then(|| NamedMotion { body, name: name() })
         };
         self.bodies.iter().enumerate().filter(|(_, motions)| !motions.is_empty()).filter_map(of_body).collect()
     }

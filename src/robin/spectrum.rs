@@ -65,9 +65,8 @@ fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
     let (points, mut load) = (model.points(), Field::zero(model).displacements);
     let force = |i: usize| model.area[i % points] * (0.1 + (0.618_033_988_749_895 * (i + 1) as f64).fract());
     let rows: Vec<f64> = (0..2 * points).map(force).collect();
-    for (index, load) in load.iter_mut().enumerate() {
-        let body = model.bodies[index].local.as_ref();
-        body.into_iter().for_each(|body| body.dofs().rows.add_transpose(1.0, &model.of_body(index, &rows), load));
+    for (index, body) in model.locals() {
+        body.dofs().rows.add_transpose(1.0, &model.of_body(index, &rows), &mut load[index]);
     }
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(SEEN);
     let found =

@@ -10,7 +10,7 @@ use crate::model::body::Energy;
 use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
-use crate::model::rigid::{self, Moved, TOLERANCE, combined};
+use crate::model::rigid::{self, NamedMotion, TOLERANCE, combined};
 use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
@@ -204,7 +204,7 @@ fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f
 
 /// Return the first body that is unconstrained under the Robin term `weight` (omega psi kappa of the contact rows, 2n), and its motion. Springs
 /// below [`TOLERANCE`] of the largest stiffness in the body are lost in its rounding.
-pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
+pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<NamedMotion> {
     (0..model.bodies.len()).find_map(|body| {
         let slot = &model.bodies[body];
         let springs = springs(model, body, &model.of_body(body, weight));
@@ -212,7 +212,7 @@ pub fn underconstrained(model: &Model, weight: &[f64]) -> Option<Moved> {
         let full = if slot.is_rigid { springs.diagonal().max().max(f64::MIN_POSITIVE) } else { slot.scale };
         let free = Blocks::free(&springs, full, TOLERANCE);
         let names = slot.motions.iter().map(|motion| &motion.name[..]);
-        Some(Moved { body, name: combined(names, free.first()?.iter().copied()) })
+        Some(NamedMotion { body, name: combined(names, free.first()?.iter().copied()) })
     })
 }
 

@@ -1,7 +1,7 @@
 //! The inner solvers: those requested, or the program's choice with its reason ([`plan`](super::plan)), and how they are made.
 
 use super::in_words;
-use super::plan::{Asked, BodyPlan, Plan, plan};
+use super::plan::{BodyPlan, Plan, SolverRequest, plan};
 use crate::discretize::{Assembled, Factory};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
@@ -23,7 +23,7 @@ use std::collections::{BTreeMap, HashMap};
 /// A factory that makes the inner solvers of a scene's bodies by its plan.
 pub struct SolverFactory<'a> {
     session: &'a Session,
-    asked: Asked,
+    asked: SolverRequest,
     /// Options that the user wrote for the solvers.
     typed: UserOptions,
     /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and multigrid.
@@ -43,7 +43,7 @@ impl<'a> SolverFactory<'a> {
             session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
         }
         let typed = UserOptions::read(session);
-        let asked = Asked {
+        let asked = SolverRequest {
             preset: scene.solver.preset,
             linear: scene.method.linear,
             method: scene.method.name,

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
-use crate::mesh::{self, Loaded};
+use crate::mesh;
 use crate::model::{BodySlot, Joint, LinearStep};
 use crate::output;
 use crate::parallel::{Ranks, collectively};
@@ -91,11 +91,11 @@ where
 {
     let stage = session.stage("mesh");
     clock.begin();
-    let (mut verified, read) = verified::<D>(session, &scene, interrupt)?;
+    let (mut verified, file) = verified::<D>(session, &scene, interrupt)?;
     clock.phase("mesh");
     drop(stage);
     verified.mesh.forget_tags();
-    let source = MeshedScene { session: session.clone(), scene, verified, read, cut };
+    let source = MeshedScene { session: session.clone(), scene, verified, file, cut };
     let history = &source.scene.method.steps;
     let begun = history.begun;
     let mut built = source.build(begun, kept, clock)?;
@@ -105,22 +105,13 @@ where
     Ok(built)
 }
 
-/// The facts of the file of a mesh, on the rank that has read it.
-struct FileRead {
-    digest: String,
-    /// The file.
-    path: PathBuf,
-    /// What is to be said about the file, and why the mesh is made anew in each run, if it is.
-    warnings: Vec<String>,
-}
-
 /// A scene with its mesh, from which discrete problems are built.
 struct MeshedScene<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
-    /// Facts of the file, on the rank that has read the mesh.
-    read: Option<FileRead>,
+    /// SHA-256 and path of the file of the mesh, on the rank that has read it.
+    file: Option<(String, PathBuf)>,
     cut: Cut<D>,
 }
 
@@ -131,7 +122,7 @@ where
 {
     /// Build the problem under the loads of a step of the scene's history, or under the full loads. Collective.
     fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, verified, read, cut, .. } = self;
+        let Self { session, verified, file, cut, .. } = self;
         let stage = session.stage("discretize");
         let mut scene = Scene { bodies: verified.bodies.clone(), ..(*self.scene).clone() };
         self.scene.method.steps.apply(step, &mut scene.bodies, &mut scene.contacts);
@@ -163,8 +154,8 @@ where
             },
             discrete,
             splits: verified.splits(),
-            mesh: read.as_ref().map(|read| read.digest.clone()),
-            mesh_file: read.as_ref().map(|read| read.path.clone()),
+            mesh: file.as_ref().map(|(digest, _)| digest.clone()),
+            mesh_file: file.as_ref().map(|(_, path)| path.clone()),
             linear: inner.plan.linear,
             interpolation: inner.interpolation.take(),
             choice: inner.reason(),
@@ -178,12 +169,9 @@ where
 
     /// Return the warnings about the mesh and its file.
     fn of_mesh(&self) -> Vec<String> {
-        let Self { verified, read, .. } = self;
-        let changed = warnings::in_parts(verified.mesh.split)
-            .into_iter()
-            .chain(warnings::made_straight(verified.mesh.straightened));
-        let of_file = read.iter().flat_map(|read| &read.warnings).chain(&verified.notes);
-        changed.chain(of_file.cloned()).collect()
+        let Verified { mesh, notes, .. } = &self.verified;
+        let changed = warnings::in_parts(mesh.split).into_iter().chain(warnings::made_straight(mesh.straightened));
+        changed.chain(notes.iter().cloned()).collect()
     }
 }
 
@@ -203,23 +191,25 @@ where
     }
 }
 
-/// Return the bodies of a scene and their mesh. The first rank runs Gmsh, reads the mesh and checks it. Collective.
+/// Return the bodies of a scene and their mesh, with SHA-256 and path of its file. The first rank runs Gmsh, reads the mesh and checks it. Collective.
 fn verified<const D: usize>(
     session: &Session,
     scene: &Scene,
     interrupt: &Interrupt,
-) -> Result<(Verified<D>, Option<FileRead>)> {
+) -> Result<(Verified<D>, Option<(String, PathBuf)>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let mut file = None;
+    let (mut file, mut notes) = (None, Vec::new());
     let read = || {
         interrupt.release()?;
-        let Loaded { mesh, file: path, digest, notes: warnings, .. } = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        file = Some(FileRead { digest, path, warnings });
-        Ok(mesh)
+        let loaded = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        (file, notes) = (Some((loaded.digest, loaded.file)), loaded.notes);
+        Ok(loaded.mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);
     let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
-    Ok((collectively(session, verified)?, file))
+    let mut verified = collectively(session, verified)?;
+    verified.notes.splice(0..0, notes);
+    Ok((verified, file))
 }
 
 /// Make the method and factor every body for the start. Then refuse options that no solver has read.

@@ -6,14 +6,14 @@
 use crate::parallel::owners;
 use crate::problem::{Linear, MethodName, Preset};
 use crate::solver::InterfaceDofs;
-use crate::solver::cost::{BodyFacts, Comparison};
+use crate::solver::cost::{self, BodyFacts};
 use crate::solver::options::Chosen;
 use crate::solver::preset;
 use serde::{Deserialize, Serialize};
 
 /// What the user asks for, and what the machine has.
 #[derive(Debug, Clone)]
-pub struct Asked {
+pub struct SolverRequest {
     /// Preset that the scene names.
     pub preset: Option<Preset>,
     /// Solver of linear steps that the scene names.
@@ -62,7 +62,7 @@ const DENSE: usize = 3000;
 type Choice = (Preset, String);
 
 /// Return the plan for these bodies, without the interface dofs of condensed ones.
-pub fn plan(facts: Vec<BodyFacts>, asked: &Asked) -> Plan {
+pub fn plan(facts: Vec<BodyFacts>, asked: &SolverRequest) -> Plan {
     let mut seconds = None;
     let mut chosen: Vec<Option<Choice>> = facts.iter().map(|body| asked.for_body(body)).collect();
     let open: Vec<usize> = (0..facts.len()).filter(|&body| chosen[body].is_none()).collect();
@@ -98,7 +98,7 @@ pub fn plan(facts: Vec<BodyFacts>, asked: &Asked) -> Plan {
     Plan { linear, bodies, seconds }
 }
 
-impl Asked {
+impl SolverRequest {
     /// Return whether Newton's method may use one matrix of all bodies.
     pub fn may_join(&self) -> bool {
         let newton = matches!(self.method, MethodName::Auto | MethodName::Newton);
@@ -134,7 +134,7 @@ impl Asked {
 }
 
 /// Choose the solver of a body in the plane, and take its memory.
-fn in_plane(body: &BodyFacts, asked: &Asked, memory: &mut usize) -> Choice {
+fn in_plane(body: &BodyFacts, asked: &SolverRequest, memory: &mut usize) -> Choice {
     let (mut preset, reason) = preset::in_plane(body, if body.is_kept { usize::MAX } else { *memory });
     if preset == Preset::Condensed && !asked.may_condense(body) {
         preset = Preset::Mumps;
@@ -146,16 +146,16 @@ fn in_plane(body: &BodyFacts, asked: &Asked, memory: &mut usize) -> Choice {
 }
 
 /// Choose the solvers of bodies in space, which are solved together or are one body, and take their memory. Return the estimated seconds, too.
-fn in_space(bodies: &[BodyFacts], asked: &Asked, memory: &mut usize) -> (Vec<Choice>, f64) {
+fn in_space(bodies: &[BodyFacts], asked: &SolverRequest, memory: &mut usize) -> (Vec<Choice>, f64) {
     let is_kept = bodies.iter().all(|body| body.is_kept);
-    let comparison = Comparison::new(bodies, |body| asked.may_condense(body), asked.method, asked.may_join());
-    let is_direct = comparison.is_direct(if is_kept { usize::MAX } else { *memory });
+    let [direct, multigrid] = cost::of_both(bodies, |body| asked.may_condense(body), asked.method, asked.may_join());
+    let fits = is_kept || direct.bytes <= *memory as f64;
+    let is_direct = direct.seconds <= multigrid.seconds && fits;
     if is_direct && !is_kept {
-        *memory = memory.saturating_sub(comparison.direct.bytes as usize);
+        *memory = memory.saturating_sub(direct.bytes as usize);
     }
     let (dofs, interface): (usize, usize) =
         (bodies.iter().map(|body| body.dofs).sum(), bodies.iter().map(|body| body.interface).sum());
-    let Comparison { direct, multigrid } = comparison;
     let (factored, iterated) = (direct.words(), multigrid.words());
     let reason = format!(
         "{dofs} dofs in space, {interface} of them on the contact; estimates: factored {factored}, multigrid {iterated}"
@@ -170,7 +170,7 @@ fn in_space(bodies: &[BodyFacts], asked: &Asked, memory: &mut usize) -> (Vec<Cho
 }
 
 /// Return the solver of linear steps for bodies with these presets. Where the program chose them, bodies first get presets that one matrix can have.
-fn linear_step(asked: &Asked, bodies: &mut [BodyPlan]) -> Linear {
+fn linear_step(asked: &SolverRequest, bodies: &mut [BodyPlan]) -> Linear {
     let is_auto = asked.method == MethodName::Auto;
     let is_typed = |body: &BodyPlan| body.facts.options.asks_for_ksp();
     // options typed for one body apply to that body alone, so the bodies are not joined
@@ -289,11 +289,11 @@ mod tests {
         }
     }
 
-    fn asked(method: MethodName) -> Asked {
-        Asked { preset: None, linear: None, method, whole: Chosen::default(), memory: GIGABYTES, ranks: 1 }
+    fn asked(method: MethodName) -> SolverRequest {
+        SolverRequest { preset: None, linear: None, method, whole: Chosen::default(), memory: GIGABYTES, ranks: 1 }
     }
 
-    fn of(facts: &[BodyFacts], asked: &Asked) -> (Linear, Vec<Preset>) {
+    fn of(facts: &[BodyFacts], asked: &SolverRequest) -> (Linear, Vec<Preset>) {
         let plan = plan(facts.to_vec(), asked);
         (plan.linear, plan.bodies.iter().map(|body| body.preset).collect())
     }
@@ -313,7 +313,7 @@ mod tests {
         assert_eq!(of_auto(&sheets(100)), (Linear::Dense, vec![Condensed; 2]));
         assert_eq!(of_auto(&sheets(1499)), (Linear::Dense, vec![Condensed; 2]));
         assert_eq!(of_auto(&sheets(1500)), (Linear::Direct, vec![Mumps; 2]));
-        let short = Asked { memory: 50_000_000, ..asked(MethodName::Auto) };
+        let short = SolverRequest { memory: 50_000_000, ..asked(MethodName::Auto) };
         assert_eq!(of(&sheets(300), &short), (Linear::Multigrid, vec![Hypre; 2]));
         // bodies get multigrid if one of them needs it
         assert_eq!(of(&[body(2, 10, 10), body(2, 300, 100)], &short), (Linear::Multigrid, vec![Hypre; 2]));
@@ -329,12 +329,13 @@ mod tests {
         use Preset::{Condensed, Hypre, Icc, Mumps};
         let cubes = [body(3, 8, 8), body(3, 8, 8)];
         let auto = asked(MethodName::Auto);
-        let linear = |linear: Linear| of(&cubes, &Asked { linear: Some(linear), ..auto.clone() });
+        let linear = |linear: Linear| of(&cubes, &SolverRequest { linear: Some(linear), ..auto.clone() });
         assert_eq!(linear(Linear::Dense), (Linear::Dense, vec![Condensed; 2]));
         assert_eq!(linear(Linear::Direct), (Linear::Direct, vec![Mumps; 2]));
         assert_eq!(linear(Linear::Multigrid), (Linear::Multigrid, vec![Hypre; 2]));
         assert_eq!(linear(Linear::Sweeps), (Linear::Sweeps, vec![Condensed; 2]));
-        let preset = |preset: Preset, method: MethodName| of(&cubes, &Asked { preset: Some(preset), ..asked(method) });
+        let preset =
+            |preset: Preset, method: MethodName| of(&cubes, &SolverRequest { preset: Some(preset), ..asked(method) });
         assert_eq!(preset(Mumps, MethodName::Auto), (Linear::Direct, vec![Mumps; 2]));
         assert_eq!(preset(Icc, MethodName::Auto), (Linear::Sweeps, vec![Icc; 2]));
         assert_eq!(preset(Icc, MethodName::Newton), (Linear::Direct, vec![Icc; 2]));
@@ -347,7 +348,7 @@ mod tests {
         let of_pc = |pc: &str, has_own: bool| {
             let name = if has_own { "-newton_pc_type" } else { "-pc_type" };
             let whole = UserOptions::of_test(&[(name, pc)]).of("newton");
-            of(&cubes, &Asked { whole, ..auto.clone() }).0
+            of(&cubes, &SolverRequest { whole, ..auto.clone() }).0
         };
         assert_eq!(
             ["hypre", "cholesky", "jacobi", "mg"].map(|pc| of_pc(pc, false)),

@@ -5,7 +5,7 @@ use super::recorder;
 use super::stages::Done;
 use crate::ddm::{Outcome, Status};
 use crate::error::Kind;
-use crate::model::{Mechanism, Model, Moved};
+use crate::model::{Mechanism, Model, NamedMotion};
 use crate::output::report::readable;
 use crate::output::{StepReport, sci};
 
@@ -60,7 +60,7 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
              and lengths are nearer to 1",
             sci(*energy, 1)
         ),
-        Status::Underconstrained(Moved { body, name: motion }) => format!(
+        Status::Underconstrained(NamedMotion { body, name: motion }) => format!(
             "body `{}`: neither a support nor a spring nor a closed contact holds its {motion} in iteration {k}: add a support, \
              or a start that closes the contact (method.start), or try {other}",
             name(body)
@@ -109,8 +109,8 @@ fn unbalanced_mechanism(Mechanism { bodies, motion, work, support, .. }: &Mechan
 }
 
 /// Return the message on unresisted motions of bodies.
-fn unbounded(moving: &[Moved], model: &Model) -> String {
-    let motion = |moved: &Moved| format!("{} of `{}`", moved.name, model.bodies[moved.body].name);
+fn unbounded(moving: &[NamedMotion], model: &Model) -> String {
+    let motion = |moved: &NamedMotion| format!("{} of `{}`", moved.name, model.bodies[moved.body].name);
     let what = match moving {
         [] => "a motion of a body".to_owned(),
         all => all.iter().map(motion).collect::<Vec<_>>().join(" and "),

@@ -93,43 +93,27 @@ impl Cost {
     }
 }
 
-/// The costs of both ways to solve for some bodies in space.
-#[derive(Debug, Clone, Copy)]
-pub struct Comparison {
-    /// Cost of condensed bodies, or of factored ones where nothing can be condensed.
-    pub direct: Cost,
-    /// Cost of conjugate gradients with multigrid.
-    pub multigrid: Cost,
-}
-
-impl Comparison {
-    /// Compare both ways to solve for these bodies by a method, which may join them in one matrix. `may_condense` says of each whether it can be condensed; every
-    /// factorisation of another one is of the whole body.
-    pub fn new(
-        bodies: &[BodyFacts],
-        may_condense: impl Fn(&BodyFacts) -> bool,
-        method: MethodName,
-        are_joined: bool,
-    ) -> Self {
-        // On the first scenes of the table `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies, and `robin` 5.4 to 12 times.
-        let times = match method {
-            _ if are_joined => 1.0,
-            MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => 1.2,
-            _ => 7.0,
-        };
-        let interfaces = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface);
-        let interface = if are_joined { interfaces.sum() } else { interfaces.max().unwrap_or(0) } as f64;
-        let dense =
-            Cost { seconds: NEWTON_STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
-        let direct = bodies.iter().map(|body| body.factored(may_condense(body))).fold(dense, Cost::and);
-        let multigrid = bodies.iter().map(|body| body.multigrid(times)).fold(Cost::default(), Cost::and);
-        Self { direct, multigrid }
-    }
-
-    /// Return whether the factorisation takes no more time than multigrid and fits into `memory` bytes.
-    pub fn is_direct(&self, memory: usize) -> bool {
-        self.direct.seconds <= self.multigrid.seconds && self.direct.bytes <= memory as f64
-    }
+/// Return the costs of both ways to solve for some bodies in space by a method, which may join them in one matrix: of condensed bodies, or of factored ones
+/// where nothing can be condensed, and of conjugate gradients with multigrid. `may_condense` says of each body whether it can be condensed; every
+/// factorisation of another one is of the whole body.
+pub fn of_both(
+    bodies: &[BodyFacts],
+    may_condense: impl Fn(&BodyFacts) -> bool,
+    method: MethodName,
+    are_joined: bool,
+) -> [Cost; 2] {
+    // On the first scenes of the table `newton-robin` took 1.0 to 1.9 times as long as with one matrix of all bodies, and `robin` 5.4 to 12 times.
+    let times = match method {
+        _ if are_joined => 1.0,
+        MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin => 1.2,
+        _ => 7.0,
+    };
+    let interfaces = bodies.iter().filter(|body| may_condense(body)).map(|body| body.interface);
+    let interface = if are_joined { interfaces.sum() } else { interfaces.max().unwrap_or(0) } as f64;
+    let dense = Cost { seconds: NEWTON_STEPS * interface.powi(3) / 3.0 / RATE, bytes: 36.0 * interface * interface };
+    let direct = bodies.iter().map(|body| body.factored(may_condense(body))).fold(dense, Cost::and);
+    let multigrid = bodies.iter().map(|body| body.multigrid(times)).fold(Cost::default(), Cost::and);
+    [direct, multigrid]
 }
 
 impl BodyFacts {

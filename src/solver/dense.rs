@@ -1,6 +1,6 @@
 //! Dense Cholesky factorisation by the LAPACK that PETSc uses, for matrices without zeros.
 
-use super::{Change, InnerSolver, Solved};
+use super::{Change, InnerSolver, SolveOutcome};
 use crate::error::Result;
 use crate::petsc::{Rows, cholesky, cholesky_solve};
 
@@ -39,16 +39,16 @@ impl InnerSolver for Dense {
         Ok(())
     }
 
-    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.set_up()?;
         if self.made == Some(false) {
             z.fill(0.0);
             let failure = Some("the Robin matrix is not positive definite".to_owned());
-            return Ok(Solved { iterations: 0, failure });
+            return Ok(SolveOutcome { iterations: 0, failure });
         }
         z.copy_from_slice(r);
         cholesky_solve(&self.factor, self.rows, z)?;
-        Ok(Solved::default())
+        Ok(SolveOutcome::default())
     }
 
     fn factorizations(&self) -> [usize; 3] {

@@ -1,7 +1,7 @@
 //! Any KSP and PC of PETSc as inner solver.
 
-use super::options::{Chosen, Group};
-use super::{Change, InnerSolver, Solved};
+use super::options::{Chosen, OptionGroup};
+use super::{Change, InnerSolver, SolveOutcome};
 use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::linalg::Csr;
@@ -17,7 +17,7 @@ pub struct Krylov {
     session: Session,
     chosen: Chosen,
     /// The options in PETSc's table.
-    _group: Rc<Group>,
+    _group: Rc<OptionGroup>,
     matrix: Matrix,
     ksp: Ksp,
     /// Whether G has changed since the last set-up.
@@ -121,13 +121,13 @@ impl Krylov {
     }
 
     /// Make a solve within the stage of PETSc's log for solves.
-    fn staged(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<Solved> {
+    fn staged(&mut self, solve: impl FnOnce(&Ksp) -> Result<crate::petsc::Solved>) -> Result<SolveOutcome> {
         self.set_up()?;
         let stage = self.session.stage("linear solve");
         let solved = solve(&self.ksp)?;
         drop(stage);
         let direct = self.ksp.ksp_type() == "preonly";
-        Ok(Solved {
+        Ok(SolveOutcome {
             iterations: if direct { 0 } else { solved.iterations },
             failure: (!solved.reason.converged()).then(|| solved.reason.to_string()),
         })
@@ -179,7 +179,7 @@ impl Krylov {
     }
 
     /// Compare the iterations per digit of a solve with those of the first solve. The next change of G gets a new preconditioner if they have grown too much.
-    fn judge(&mut self, solved: &Solved) {
+    fn judge(&mut self, solved: &SolveOutcome) {
         if self.keeps && solved.iterations > FEW {
             let pace = solved.iterations as f64 / -log10(self.reached);
             self.stale |= pace > WORN * *self.fresh.get_or_insert(pace);
@@ -226,14 +226,14 @@ impl InnerSolver for Krylov {
         Ok(())
     }
 
-    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.reached = self.ksp.tolerance();
         let solved = self.staged(|ksp| ksp.solve(r, z))?;
         self.judge(&solved);
         Ok(solved)
     }
 
-    fn solve_until(&mut self, r: &[f64], z: &mut [f64], enough: &mut ConvergenceTest) -> Result<Solved> {
+    fn solve_until(&mut self, r: &[f64], z: &mut [f64], enough: &mut ConvergenceTest) -> Result<SolveOutcome> {
         if !self.free {
             return self.solve(r, z);
         }
@@ -263,13 +263,13 @@ impl InnerSolver for Krylov {
         }
     }
 
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         if !self.multigrid {
             return self.solve(r, z);
         }
         self.set_up()?;
         self.ksp.precondition(r, z)?;
-        Ok(Solved { iterations: 1, failure: self.ksp.failure() })
+        Ok(SolveOutcome { iterations: 1, failure: self.ksp.failure() })
     }
 
     fn factorizations(&self) -> [usize; 3] {

@@ -41,7 +41,7 @@ fn integers(part: Vec<i32>) -> Vec<Int> {
 
 /// The outcome of a solve G z = r.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Solved {
+pub struct SolveOutcome {
     /// Krylov iterations; 0 for a direct solver.
     pub iterations: usize,
     /// Why the inner solver gave up, in its own message; `None` if it reached its tolerance.
@@ -124,11 +124,11 @@ pub trait InnerSolver {
     /// Solve G z = r with zero initial guess.
     ///
     /// # Errors
-    /// Failures of the solver library. A solve that does not converge is reported in [`Solved`].
-    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved>;
+    /// Failures of the solver library. A solve that does not converge is reported in [`SolveOutcome`].
+    fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome>;
 
     /// Solve G z = r until `enough` accepts an iterate, for iterative solvers. If the user set a tolerance, that ends the solve instead.
-    fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut ConvergenceTest) -> Result<Solved> {
+    fn solve_until(&mut self, r: &[f64], z: &mut [f64], _enough: &mut ConvergenceTest) -> Result<SolveOutcome> {
         self.solve(r, z)
     }
 
@@ -144,7 +144,7 @@ pub trait InnerSolver {
 
     /// Compute z = M^-1 r with a fixed symmetric M that approximates G: one application of the preconditioner of an iterative solver, a
     /// whole solve of a direct one.
-    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<Solved> {
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
         self.solve(r, z)
     }
 

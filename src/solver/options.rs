@@ -5,7 +5,7 @@
 //!
 //! 1. [`UserOptions`] gives each solver its options ([`Chosen`]). A plain option of a PETSc object (KSP, PC, Mat) applies to every solver that has no
 //!    own option of that name. The program adds its choice where the user wrote nothing.
-//! 2. PETSc does not fall back from a prefixed name to the plain one. So these options stand in its table under the prefix of a [`Group`] for as long as
+//! 2. PETSc does not fall back from a prefixed name to the plain one. So these options stand in its table under the prefix of a [`OptionGroup`] for as long as
 //!    its solvers live. The prefix is the name of the body if the body has options of its own, and `newton` for the matrix of all bodies. Other
 //!    bodies with the same options share a prefix, such as `hypre_bodies`, since the table holds only 512 options.
 //! 3. When all solvers are set up, [`unread()`] goes through what nobody has read. A mistyped name ends the run before it starts.
@@ -184,7 +184,7 @@ impl Chosen {
     ///
     /// # Errors
     /// PETSc's table is full, at 512 options.
-    pub fn group(&self, session: &Session) -> Result<Rc<Group>> {
+    pub fn group(&self, session: &Session) -> Result<Rc<OptionGroup>> {
         let live = live_groups();
         let is_apart = self.has_own() || self.prefix == WHOLE;
         if let Some(same) = live.iter().find(|group| !is_apart && group.options.choices == self.choices) {
@@ -194,7 +194,7 @@ impl Chosen {
         let names = std::iter::once(shared.clone()).chain((2..).map(|number| format!("{shared}{number}")));
         let is_free = |name: &String| !live.iter().any(|group| group.prefix == *name);
         let prefix = if is_apart { self.prefix.clone() } else { names.into_iter().find(is_free).unwrap_or(shared) };
-        let mut group = Group { prefix, options: self.clone(), copies: Vec::new(), table: session.options() };
+        let mut group = OptionGroup { prefix, options: self.clone(), copies: Vec::new(), table: session.options() };
         for choice in self.choices.values().filter(|choice| choice.origin != OptionOrigin::Own) {
             let copy = format!("-{}_{}", group.prefix, choice.name);
             group.table.put(&copy, choice.value.as_deref())?;
@@ -207,7 +207,7 @@ impl Chosen {
 }
 
 /// Solvers with the same options, which stand in PETSc's table under one prefix.
-pub struct Group {
+pub struct OptionGroup {
     /// The prefix, without its underscore.
     pub prefix: String,
     options: Chosen,
@@ -218,18 +218,18 @@ pub struct Group {
 
 thread_local! {
     /// The groups of this process, which has one table of options.
-    static GROUPS: RefCell<Vec<Weak<Group>>> = const { RefCell::new(Vec::new()) };
+    static GROUPS: RefCell<Vec<Weak<OptionGroup>>> = const { RefCell::new(Vec::new()) };
 }
 
 /// Return the groups whose solvers live.
-fn live_groups() -> Vec<Rc<Group>> {
+fn live_groups() -> Vec<Rc<OptionGroup>> {
     GROUPS.with_borrow_mut(|groups| {
         groups.retain(|group| group.strong_count() > 0);
         groups.iter().filter_map(Weak::upgrade).collect()
     })
 }
 
-impl Drop for Group {
+impl Drop for OptionGroup {
     fn drop(&mut self) {
         let live = live_groups();
         let is_kept = |copy: &str| live.iter().any(|group| group.copies.iter().any(|(other, _)| other == copy));

@@ -1,6 +1,6 @@
 //! The matrix G = K + B' diag(d) B of a linear system with springs d at contact points, together with its solver.
 
-use super::{BodyCounts, Change, InnerSolver, Solved};
+use super::{BodyCounts, Change, InnerSolver, SolveOutcome};
 use crate::error::Result;
 use crate::linalg::Csr;
 use crate::petsc::{Rows, Subspace};
@@ -93,7 +93,7 @@ impl RobinMatrix {
     }
 
     /// Make one solve, or one application of the preconditioner. It is counted and timed apart from the set-up that it may need.
-    pub fn apply(&mut self, solve: impl FnOnce(&mut dyn InnerSolver) -> Result<Solved>) -> Result<Solved> {
+    pub fn apply(&mut self, solve: impl FnOnce(&mut dyn InnerSolver) -> Result<SolveOutcome>) -> Result<SolveOutcome> {
         self.set_up()?;
         self.counts.solves += 1;
         let began = Instant::now();
