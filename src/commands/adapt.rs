@@ -13,6 +13,7 @@ use crate::output::{ContactTable, RoundReport};
 use crate::parallel::collectively;
 use crate::petsc::Session;
 use crate::problem::history::History;
+use crate::problem::mesh::AdaptedMesh;
 use crate::problem::{MeshSource, MethodName, Order};
 use crate::run::{self, Begin, Built, Clock, Done, report};
 use crate::scene::{AdaptSpec, Quantity, Scene};
@@ -91,7 +92,7 @@ pub struct AdaptiveRun {
     /// The error at sharp ends on the mesh before.
     last_end: Option<MeshError>,
     /// Sizes that the mesh of the round before follows.
-    last_sizes: Option<Arc<str>>,
+    last_sizes: Option<Arc<AdaptedMesh>>,
     /// Number of cells that was predicted for this round from its sizes.
     predicted_cells: Option<f64>,
     /// The load steps that follow on the last mesh, while meshes are adapted under the largest of them.
@@ -141,7 +142,7 @@ impl AdaptiveRun {
             if head.is_none() {
                 let bodies = own.discrete.bodies.len();
                 let cells = bodies * pace.first_cells;
-                let coarse = |meshes: &Rc<dyn Meshes>| view(&sizes::coarse(&**meshes, bodies, cells));
+                let coarse = |meshes: &Rc<dyn Meshes>| mesh_of(&sizes::coarse(&**meshes, bodies, cells));
                 follow(scene, own.discrete.meshes.as_ref().map(coarse).map(Into::into));
                 plan.defer_steps();
             }
@@ -173,7 +174,7 @@ impl AdaptiveRun {
     /// Go on where the checkpoint with this head ended: on its mesh, and in its load steps.
     fn resume(&mut self, head: &CheckpointHeader) {
         let scene = Rc::make_mut(&mut self.scene);
-        follow(scene, head.sizes.as_deref().map(Into::into));
+        follow(scene, head.adapted.clone().map(Into::into));
         self.limit.clone_from(&head.limit);
         if self.goal.is_none() || head.on_last_mesh {
             scene.method.steps.begun = head.steps.len();
@@ -255,7 +256,7 @@ impl AdaptiveRun {
     pub fn head(&self) -> CheckpointHeader {
         CheckpointHeader {
             rounds: self.rounds.clone(),
-            sizes: self.sizes().map(|view| view.to_string()),
+            adapted: self.sizes().map(|adapted| (*adapted).clone()),
             on_last_mesh: self.is_stepping(),
             limit: self.limit.clone(),
             ..CheckpointHeader::default()
@@ -304,7 +305,7 @@ impl AdaptiveRun {
         self.start_from = contact_tables(done);
         self.predicted_cells = Some(next.cells);
         self.last_sizes = self.sizes();
-        follow(Rc::make_mut(&mut self.scene), Some(view(&next).into()));
+        follow(Rc::make_mut(&mut self.scene), Some(mesh_of(&next).into()));
         true
     }
 
@@ -396,10 +397,10 @@ impl AdaptiveRun {
         self.seconds = total;
     }
 
-    /// Return the view of the sizes that the mesh of this round follows.
-    fn sizes(&self) -> Option<Arc<str>> {
+    /// Return what was asked of the mesh of this round.
+    fn sizes(&self) -> Option<Arc<AdaptedMesh>> {
         match &self.scene.mesh {
-            MeshSource::Geo { sizes, .. } => sizes.clone(),
+            MeshSource::Geo { adapted, .. } => adapted.clone(),
             _ => None,
         }
     }
@@ -411,8 +412,8 @@ impl AdaptiveRun {
         }
         let tables = contact_tables(done);
         let Some(meshes) = &done.built.discrete.meshes else { return };
-        let degrees: Vec<usize> = done.model().pairs.iter().map(|pair| meshes.degree(pair.bodies[0])).collect();
-        self.previous.iter().for_each(|previous| previous.correct(&tables, &degrees, estimate));
+        let orders: Vec<Order> = (0..done.model().pairs.len()).map(|pair| meshes.points(pair).order).collect();
+        self.previous.iter().for_each(|previous| previous.correct(&tables, &orders, estimate));
         self.previous = Some(EstimatedSolution::new(estimate, tables));
     }
 }
@@ -422,13 +423,13 @@ fn contact_tables(done: &Done) -> Vec<ContactTable> {
     (0..done.model().pairs.len()).map(|i| report::contact_table(done, None, i)).collect()
 }
 
-fn view(sizes: &Sizes) -> String {
-    mesh::view(sizes.stride, &sizes.corners, &sizes.sizes)
+fn mesh_of(sizes: &Sizes) -> AdaptedMesh {
+    AdaptedMesh { sizes: mesh::view(sizes.stride, &sizes.corners, &sizes.sizes), vertices: sizes.vertices.clone() }
 }
 
-/// Let the mesh of a scene follow a view of sizes.
-fn follow(scene: &mut Scene, view: Option<Arc<str>>) {
-    if let MeshSource::Geo { sizes, .. } = &mut scene.mesh {
-        *sizes = view;
+/// Let the mesh of a scene be an adapted one.
+fn follow(scene: &mut Scene, mesh: Option<Arc<AdaptedMesh>>) {
+    if let MeshSource::Geo { adapted, .. } = &mut scene.mesh {
+        *adapted = mesh;
     }
 }

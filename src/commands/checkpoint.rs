@@ -10,6 +10,7 @@ use crate::exchange::{Exchange, broadcast};
 use crate::file::digest;
 use crate::model::Field;
 use crate::output::{RoundReport, StepReport, write_whole};
+use crate::problem::mesh::AdaptedMesh;
 use crate::run::stages::{Begin, Built, Done};
 use crate::scene::Scene;
 use crate::scene::remove;
@@ -24,7 +25,7 @@ pub const FILE: &str = "checkpoint";
 pub const ASIDE: &str = "checkpoint.old";
 
 /// The first line.
-const FORMAT: &str = "winkler checkpoint 7";
+const FORMAT: &str = "winkler checkpoint 8";
 
 /// The beginning of the first line in all versions.
 const ANY_FORMAT: &[u8] = b"winkler checkpoint ";
@@ -39,8 +40,8 @@ pub struct CheckpointHeader {
     pub problem: String,
     /// Reports of the meshes of an adaptation before this one.
     pub rounds: Vec<RoundReport>,
-    /// Sizes that the mesh follows, if it does.
-    pub sizes: Option<String>,
+    /// What the adaptation asked of the mesh, if there is one.
+    pub adapted: Option<AdaptedMesh>,
     /// Reports of the load steps that have ended.
     pub steps: Vec<StepReport>,
     /// Whether the run ends with this mesh of an adaptation: it makes all load steps on it, or it is the best mesh once more.

@@ -5,6 +5,7 @@ use crate::contact::ContactPair;
 use crate::discretize::Discrete;
 use crate::estimate::Estimate;
 use crate::output::ContactTable;
+use crate::problem::Order;
 
 /// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for each pair.
 pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
@@ -70,12 +71,12 @@ impl EstimatedSolution {
     /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
     /// nothing is compared.
     ///
-    /// `degrees` are those of the bodies that carry the points, one for each pair.
-    pub fn correct(&self, tables: &[ContactTable], degrees: &[usize], estimate: &mut Estimate) {
+    /// `orders` are those of the bodies that carry the points, one for each pair.
+    pub fn correct(&self, tables: &[ContactTable], orders: &[Order], estimate: &mut Estimate) {
         if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
             return;
         }
-        let norms = norms(&self.tables, tables, degrees);
+        let norms = norms(&self.tables, tables, orders);
         for (i, error) in estimate.pressure.iter_mut().enumerate() {
             let excess = excess(&norms.pressure[i], *error, self.pressure[i]);
             *error *= excess;
@@ -118,20 +119,21 @@ struct SolutionNorms {
 /// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
 ///
 /// The values of `new` are brought to these points by planes through the nearest points: they bend by less than what the old mesh leaves out. On curves
-/// with elements of a degree above two, polynomials of this degree through the nearest points do so.
-fn norms(old: &[ContactTable], new: &[ContactTable], degrees: &[usize]) -> SolutionNorms {
+/// with elements of an order above two, the polynomials of their edges do so.
+fn norms(old: &[ContactTable], new: &[ContactTable], orders: &[Order]) -> SolutionNorms {
     let (mut pressure, mut displacement) = (Vec::new(), Squares::default());
-    for ((old, new), &degree) in old.iter().zip(new).zip(degrees) {
+    for ((old, new), &order) in old.iter().zip(new).zip(orders) {
         let scattered = PointTree::new(&new.points);
         let mut of_pair = Squares::default();
         for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
-            let weights = match degree {
-                1 | 2 => scattered.plane(point, DAMPED),
-                _ => scattered.polynomial(point, degree),
+            // a peak between the points of an edge is higher than all of them
+            let (weights, value): (Weights, fn(&[(usize, f64)], &[f64]) -> f64) = match order {
+                Order::P1 | Order::P2 => (scattered.plane(point, DAMPED), clamped_mean),
+                _ => (scattered.polynomial(point, order), mean),
             };
-            of_pair.add(*area, old.pressure[q], clamped_mean(&weights, &new.pressure));
+            of_pair.add(*area, old.pressure[q], value(&weights, &new.pressure));
             for (new, old) in new.displacement.iter().zip(&old.displacement) {
-                displacement.add(*area, old[q], clamped_mean(&weights, new));
+                displacement.add(*area, old[q], value(&weights, new));
             }
         }
         pressure.push(of_pair.norms());

@@ -8,7 +8,7 @@ use super::pair::{ContactPair, Coverage};
 use super::pieces::{IntegrationPoint, Intersection};
 use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
-use crate::fem::{Facets, element, length, minus, unit};
+use crate::fem::{Facets, element, lagrange, length, minus, unit};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
@@ -52,6 +52,8 @@ pub struct FinePoints {
     /// Matrix from the pressures of the contact points to the pressures that the discrete problem has at the integration
     /// points, by the functions mu_q of the contact points.
     pub pressing: Csr,
+    /// Places of the scene where the gap that the scene adds has a kink, on facets in the plane of order three or more.
+    pub kinks: Vec<[f64; 3]>,
 }
 
 /// The integration points of a pair.
@@ -131,6 +133,7 @@ impl<const D: usize> Fine<D> {
             each: shared.iter().map(of_point).collect(),
             interpolation: Csr::new(pair.len()),
             pressing: Csr::new(pair.len()),
+            kinks: kinks(a, &pair.cover, gap),
         };
         points.push_rows(a, b, shared, pair);
         Self {
@@ -187,6 +190,57 @@ fn gap_at<const D: usize>(
     let rounding = rounding.max(1e-12 * length(a.area(point.facet_a)).powf(1.0 / (D - 1) as f64));
     let distance = if point.gap.abs() < rounding { 0.0 } else { point.gap };
     distance + gap(a.space.in_scene(at))
+}
+
+/// Return where the gap has a kink on the covered facets of side a, if these are edges of order three or more.
+fn kinks<const D: usize>(a: &Side<D>, cover: &[Coverage], gap: &dyn Fn([f64; 3]) -> f64) -> Vec<[f64; 3]> {
+    if D > 2 || a.facets.order <= Order::P2 {
+        return Vec::new();
+    }
+    let of_facet = |facet: usize| {
+        let place = |along: f64| {
+            let l: [f64; D] = std::array::from_fn(|k| if k == 0 { 1.0 - along } else { along });
+            a.space.in_scene(a.facets.point(facet, a.space, &l))
+        };
+        kink(a.facets.order, &|along| gap(place(along))).map(place)
+    };
+    (0..a.facets.count()).filter(|&facet| cover[facet].share > 0.0).filter_map(of_facet).collect()
+}
+
+/// Halvings of an edge that find a kink to a millionth of it, and the least number of them that show that there is one.
+const HALVINGS: [usize; 2] = [20, 8];
+
+/// Return where a function on \[0, 1\] has a kink, if it has one: the limit of the halves in which polynomials of the order of the elements miss it most.
+///
+/// What polynomials of degree k miss of a smooth function falls by 2^-(k + 1) in each halving, and of |x|^s by 2^-s. The mean of both powers, with s = 1,
+/// tells them apart. The first interval is a little larger, so that neither an end nor the middle of an edge is an end of a half.
+fn kink(order: Order, function: &dyn Fn(f64) -> f64) -> Option<f64> {
+    let (shapes, tests) = (lagrange::of(order, 2), lagrange::gauss(order.degree() + 1));
+    let missed = |from: f64, size: f64| -> f64 {
+        let at_nodes: Vec<f64> = shapes.nodes.iter().map(|l| function(from + size * l[1])).collect();
+        let missed_at =
+            |along: f64| function(from + size * along) - dot(&shapes.values(&[1.0 - along, along]), &at_nodes);
+        tests.iter().map(|(along, _)| missed_at(*along).abs()).fold(0.0, f64::max)
+    };
+    let rounding = 1e3 * f64::EPSILON * tests.iter().map(|(along, _)| function(*along).abs()).fold(0.0, f64::max);
+    let (mut from, mut size) = (-0.06, 1.11);
+    let mut least = missed(from, size);
+    for halving in 1.. {
+        size *= 0.5;
+        least *= 0.5f64.powf(0.5 * (order.degree() as f64 + 2.0));
+        let [left, right] = [from, from + size].map(|from| missed(from, size));
+        if right > left {
+            from += size;
+        }
+        let worse = left.max(right);
+        if worse <= rounding || halving == HALVINGS[0] {
+            return (halving >= HALVINGS[1]).then_some(from + 0.5 * size);
+        }
+        if worse < least {
+            return None;
+        }
+    }
+    None
 }
 
 /// Return the size of the facet of side a under an integration point.

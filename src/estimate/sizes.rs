@@ -29,6 +29,8 @@ pub struct Sizes {
     pub sizes: Vec<f64>,
     /// Approximate number of cells of a mesh with these sizes.
     pub cells: f64,
+    /// Places where boundaries get vertices, since the solution is not smooth there.
+    pub vertices: Vec<[f64; 3]>,
 }
 
 /// How much the sizes of the cells of a body may differ from those of the mesh before, and from each other.
@@ -91,8 +93,16 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     let errors = of_all(&estimate.cells);
     let dimension = meshes.cells(0).stride as f64 - 1.0;
     let gradings = (0..bodies).flat_map(|body| std::iter::repeat_n(grading(meshes, body), counts[body]));
-    let known = errors.iter().zip(of_all(&estimate.rates)).zip(gradings);
-    let all: Vec<CellError> = known.map(|((&squared, rate), grading)| CellError { squared, rate, grading }).collect();
+    let known = errors.iter().zip(of_all(&estimate.rates)).zip(gradings).zip(remoteness(meshes, model));
+    let of_cell = |(((&squared, rate), grading), remote): (((&f64, f64), &'static Grading), f64)| {
+        if grading.is_steep && remote > 1.0 {
+            CellError { squared: squared * remote.powf(-2.0 * rate), rate: 2.0 * rate, grading }
+        } else {
+            CellError { squared, rate, grading }
+        }
+    };
+    let all: Vec<CellError> = known.map(of_cell).collect();
+    let errors: Vec<f64> = all.iter().map(|cell| cell.squared).collect();
     let goal = share * errors.iter().sum::<f64>();
     let left = |level: f64| -> f64 { all.iter().map(|cell| cell.left(cell.ratio(level, dimension))).sum() };
     let cells = |level: f64| -> f64 { all.iter().map(|cell| cell.ratio(level, dimension).powf(-dimension)).sum() };
@@ -110,7 +120,74 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     }
     let level = low.exp();
     let size = |cell: usize, size: f64| size * all[cell].ratio(level, dimension);
-    gather(meshes, &counts, &touching(meshes, model, layer), size).within(most)
+    let sizes = gather(meshes, &counts, &touching(meshes, model, layer), size).within(most);
+    Sizes { vertices: singular_places(meshes, model, layer), ..sizes }
+}
+
+/// Return where contacts end and gaps have kinks on edges of order three or more, whose polynomials converge fast only beside these places.
+fn singular_places(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<[f64; 3]> {
+    let mut places = Vec::new();
+    for (index, pair) in model.pairs.iter().enumerate() {
+        let points = meshes.points(index);
+        places.extend(&points.kinks);
+        let (body, compression) = (pair.bodies[0], &layer.compression[model.range(index)]);
+        if pair.law.is_bonded() || !grading(meshes, body).is_steep {
+            continue;
+        }
+        let nodes = meshes.cells(body).nodes;
+        let mut first = 0;
+        for facet in points.each.chunk_by(|p, q| p.facet == q.facet) {
+            let at: Vec<f64> = facet.iter().map(|point| point.along).collect();
+            let values: Vec<f64> = (first..first + facet.len())
+                .map(|g| points.interpolation.row(g).map(|(q, shape)| shape * compression[q]).sum())
+                .collect();
+            let ends = meshes.vertices(index, 0, first);
+            if let (Some(along), [a, b]) = (zero_between(&at, &values), &ends[..]) {
+                places.push(std::array::from_fn(|c| {
+                    along * nodes[a.0 as usize][c] + (1.0 - along) * nodes[b.0 as usize][c]
+                }));
+            }
+            first += facet.len();
+        }
+    }
+    places
+}
+
+/// Return where on \[0, 1\] the polynomial through values at some points changes its sign, if it does, by bisection.
+fn zero_between(at: &[f64], values: &[f64]) -> Option<f64> {
+    let polynomial = |x: f64| -> f64 {
+        let weight =
+            |i: usize| -> f64 { (0..at.len()).filter(|&j| j != i).map(|j| (x - at[j]) / (at[i] - at[j])).product() };
+        values.iter().enumerate().map(|(i, value)| weight(i) * value).sum()
+    };
+    let mut sorted: Vec<f64> = at.iter().copied().chain([0.0, 1.0]).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let is_open = |x: f64| polynomial(x) <= 0.0;
+    let [mut low, mut high] = sorted.array_windows().copied().find(|&[p, q]| is_open(p) != is_open(q))?;
+    let open_below = is_open(low);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        *(if is_open(middle) == open_below { &mut low } else { &mut high }) = middle;
+    }
+    Some(0.5 * (low + high))
+}
+
+/// Return the distance of each cell from the contact points of its body, as a multiple of its size.
+fn remoteness(meshes: &dyn Meshes, model: &Model) -> Vec<f64> {
+    let mut all = Vec::new();
+    for body in 0..model.meshed() {
+        let cells = meshes.cells(body);
+        let touching = model.pairs.iter().filter(|pair| pair.bodies.contains(&body));
+        let points: Vec<[f64; 3]> = touching.flat_map(|pair| pair.position.iter().copied()).collect();
+        for (corners, size) in cells.corners.chunks_exact(cells.stride).zip(&cells.sizes) {
+            let centre: [f64; 3] = std::array::from_fn(|c| {
+                corners.iter().map(|&node| cells.nodes[node as usize][c]).sum::<f64>() / corners.len() as f64
+            });
+            let least = points.iter().map(|point| length(minus(*point, centre))).fold(f64::INFINITY, f64::min);
+            all.push(least / size);
+        }
+    }
+    all
 }
 
 /// The error of a cell of the present mesh.
@@ -245,7 +322,8 @@ fn gather(meshes: &dyn Meshes, counts: &[usize], touching: &[Touching], wanted: 
         first += count;
     }
     join(&bodies, &mut sizes, touching);
-    let mut field = Sizes { stride: bodies[0].stride, corners: Vec::new(), sizes: Vec::new(), cells: 0.0 };
+    let mut field =
+        Sizes { stride: bodies[0].stride, corners: Vec::new(), sizes: Vec::new(), cells: 0.0, vertices: Vec::new() };
     for (body, (of_body, sizes)) in bodies.iter().zip(&mut sizes).enumerate() {
         grade(of_body, sizes, grading(meshes, body).growth);
         for (corners, old) in of_body.corners.chunks_exact(of_body.stride).zip(&of_body.sizes) {

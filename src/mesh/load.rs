@@ -4,12 +4,13 @@ use super::builder::MeshProducer;
 use super::cache::{self, Cache, write};
 use super::gmsh::{Gmsh, MeshingTask};
 use super::msh;
+use super::msh2::Contents;
 use super::script::{self, Script, quoted};
 use super::{Mesh, abaqus, arrays, foreign};
 use crate::error::{Error, Located, Place, Result};
 use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
-use crate::problem::mesh::is_shape;
+use crate::problem::mesh::{AdaptedMesh, is_shape};
 use crate::problem::{Guard, MeshSource, Order};
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -51,13 +52,13 @@ pub enum MeshOrigin {
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let order = order.of_shape();
     let mut loaded = match source {
-        MeshSource::Geo { file, set, places, sizes, guard } => {
+        MeshSource::Geo { file, set, places, adapted, guard } => {
             if let (true, Some(place)) = (is_shape(&file.value), places.first()) {
                 return Err(Error::scene(place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            let sizes = sizes.as_deref();
-            Meshing { file, set, places, sizes, order, guard, interrupt }.mesh(&Cache::of_user()?)
+            let adapted = adapted.as_deref();
+            Meshing { file, set, places, adapted, order, guard, interrupt }.mesh(&Cache::of_user()?)
         }
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => Ok(Loaded {
@@ -106,6 +107,13 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
         _ => loaded.mesh,
     };
     Ok(loaded)
+}
+
+/// Move vertices of the boundaries of a mesh in the plane, in its file. `shown` is the file that the user named.
+fn move_vertices(shown: &Path, file: &Path, places: &[[f64; 3]]) -> Result<()> {
+    let mut mesh: Mesh<2> = read_file(shown, file, MeshProducer::Script, MeshOrigin::Gmsh)?.mesh;
+    mesh.move_vertices_to(places);
+    write(file, Contents::of(&mesh).written())
 }
 
 /// Read a `.msh` file. `shown` is the file that the user named.
@@ -213,17 +221,17 @@ impl Wanted<'_> {
     }
 }
 
-/// Return the name in the cache of the mesh of a script, with the numbers that are set in it, the sizes to follow, and the
+/// Return the name in the cache of the mesh of a script, with the numbers that are set in it, what an adaptation asks, and the
 /// settings of Gmsh.
 fn key(
     path: &Path,
     script: &Script,
     dimension: usize,
     order: Order,
-    (set, sizes, guard): (&[(String, f64)], Option<&str>, &Guard),
+    (set, adapted, guard): (&[(String, f64)], Option<&AdaptedMesh>, &Guard),
 ) -> String {
     // The algorithm depends on whether a number of threads is given, not on the number.
-    let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, sizes);
+    let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, adapted);
     let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
     cache::name((asked, files, script.is_ended()), path)
 }
@@ -235,8 +243,8 @@ pub(super) struct Meshing<'a> {
     pub set: &'a [(String, f64)],
     /// Their places in the scene, where these differ from that of the script.
     pub places: &'a [Place],
-    /// The view of the sizes to follow.
-    pub sizes: Option<&'a str>,
+    /// What an adaptation asks of the mesh.
+    pub adapted: Option<&'a AdaptedMesh>,
     pub order: Order,
     pub guard: &'a Guard,
     pub interrupt: &'a Interrupt,
@@ -245,18 +253,22 @@ pub(super) struct Meshing<'a> {
 impl Meshing<'_> {
     /// Return the mesh from a cache, or by Gmsh.
     pub fn mesh<const D: usize>(&self, cache: &Cache) -> Result<Loaded<D>> {
-        let Self { file, set, places, sizes, order, guard, interrupt } = *self;
+        let Self { file, set, places, adapted, order, guard, interrupt } = *self;
         let path = &file.value;
         let script = Script::read(path).map_err(|error| error.at(&file.place))?;
         for (number, (name, _)) in set.iter().enumerate() {
             script.check(name, path, places.get(number).unwrap_or(&file.place))?;
         }
-        let name = key(path, &script, D, order, (set, sizes, guard));
+        let name = key(path, &script, D, order, (set, adapted, guard));
         let wanted = Wanted { path, name, order: Some(order), is_kept: !script.may_change };
         wanted.find_or_make(cache, |gmsh, work, made| {
             let script = &self.written::<D>(&script, work)?;
             let task = MeshingTask { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt };
-            gmsh.run(&task, made, work)
+            gmsh.run(&task, made, work)?;
+            match adapted {
+                Some(AdaptedMesh { vertices, .. }) if !vertices.is_empty() => move_vertices(path, made, vertices),
+                _ => Ok(()),
+            }
         })
     }
 
@@ -268,8 +280,10 @@ impl Meshing<'_> {
             true => foreign::script(path, &script.files[0], D, self.guard.size, work)?,
             false => path.clone(),
         };
-        match self.sizes {
-            Some(view) => script::sized(&Located::new(own, self.file.place.clone()), script, view, work),
+        match self.adapted {
+            Some(AdaptedMesh { sizes, .. }) => {
+                script::sized(&Located::new(own, self.file.place.clone()), script, sizes, work)
+            }
             None if script.is_ended() || own != *path => Ok(own),
             None => {
                 let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;

@@ -26,6 +26,7 @@ mod simplex;
 mod split;
 #[cfg(test)]
 mod tests;
+mod vertices;
 
 pub use builder::MeshProducer;
 pub use check::{Asked, BodyCheck, Components, Duty};

@@ -4,9 +4,10 @@
 //! that groups are those of the physical tags alone. Entities are groups in a dimension without physical groups. An element of several groups
 //! stands in the file once for each of them.
 
+use super::Mesh;
 use super::builder::{MeshBuilder, kind_of};
 use super::scan::{Flaw, Scanner};
-use super::simplex::ElementType;
+use super::simplex::{ElementType, LINE, POINT, TRIANGLE};
 use crate::error::Result;
 use std::collections::HashSet;
 use std::fmt::Write;
@@ -140,6 +141,21 @@ pub struct Contents {
 }
 
 impl Contents {
+    /// Return the contents of a mesh in the plane. Each element is written once for each of its groups.
+    pub fn of(mesh: &Mesh<2>) -> Self {
+        let nodes = (1..).zip(mesh.points.iter().map(|&x| mesh.in_scene(x))).collect();
+        let mut contents = Self { nodes, ..Self::default() };
+        for (tag, group) in (1..).zip(mesh.groups.iter()) {
+            contents.groups.push((group.dimension, group.name.clone()));
+            let kind = ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride);
+            for simplex in group.simplices() {
+                let number = contents.elements.len() as u64 + 1;
+                contents.elements.push((number, kind, tag, simplex.iter().map(|&node| u64::from(node) + 1).collect()));
+            }
+        }
+        contents
+    }
+
     /// Return the file as text.
     pub fn written(&self) -> String {
         let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n{}\n", self.groups.len());

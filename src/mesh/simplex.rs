@@ -24,7 +24,8 @@ pub struct Shape {
     pub faces: &'static [&'static [usize]],
 }
 
-const POINT: Shape = Shape { name: "point", dimension: 0, corners: 1, edges: &[], faces: &[] };
+/// The point.
+pub const POINT: Shape = Shape { name: "point", dimension: 0, corners: 1, edges: &[], faces: &[] };
 /// The line.
 pub const LINE: Shape = Shape { name: "line", dimension: 1, corners: 2, edges: &[[0, 1]], faces: &[] };
 /// The triangle.

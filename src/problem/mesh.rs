@@ -64,8 +64,8 @@ pub enum MeshSource {
         set: Vec<(String, f64)>,
         /// Place of each name in `set`.
         places: Vec<Place>,
-        /// Sizes of elements that Gmsh follows instead of those of the script, as the text of a view (`.pos`). No scene file has them.
-        sizes: Option<Arc<str>>,
+        /// What an adaptation asks of the mesh. No scene file has it.
+        adapted: Option<Arc<AdaptedMesh>>,
         /// Limits and settings of Gmsh.
         guard: Guard,
     },
@@ -78,6 +78,15 @@ pub enum MeshSource {
     Arrays(Rc<MeshArrays>),
 }
 
+/// What an adaptation asks of a mesh.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AdaptedMesh {
+    /// Sizes of elements that Gmsh follows instead of those of the script, as the text of a view (`.pos`).
+    pub sizes: String,
+    /// Places of the scene where the boundaries in the plane get vertices.
+    pub vertices: Vec<[f64; 3]>,
+}
+
 impl MeshSource {
     /// Return a Gmsh script with the numbers `set` in it. Its mesh is made once and kept in the cache. A script is a program: it
     /// can start others and write files.
@@ -88,7 +97,7 @@ impl MeshSource {
         set.sort_by(|a, b| a.0.cmp(&b.0));
         let place = Place::here(&file.display().to_string());
         let (places, file) = (vec![place.clone(); set.len()], Located::new(file.to_owned(), place));
-        Self::Geo { file, set, places, sizes: None, guard: Guard::default() }
+        Self::Geo { file, set, places, adapted: None, guard: Guard::default() }
     }
 
     /// Return the mesh of a file that was typed as an argument: a script or shape for Gmsh, or a mesh.
@@ -174,7 +183,7 @@ impl MeshKeys {
             threads: self.threads.map(|threads| threads.value),
             seconds: seconds.unwrap_or(Guard::default().seconds),
         };
-        Ok(MeshSource::Geo { file, set, places, sizes: None, guard })
+        Ok(MeshSource::Geo { file, set, places, adapted: None, guard })
     }
 }
 

@@ -1,0 +1,128 @@
+//! Vertices of boundaries that are moved to given places, so that a solution is smooth in each cell beside them.
+//!
+//! Elements of high order converge fast where the solution is smooth. At an end of the contact, and where a gap has a kink, it is smooth on both sides, but
+//! not in a cell that holds the place. A mesher knows only sizes, so that its mesh is changed afterwards.
+
+use super::Mesh;
+use crate::linalg::{dot, length, minus};
+use std::collections::{HashMap, HashSet};
+
+/// Least ratio of the area of a cell after a move to that before it. A vertex that moves by half of an edge along a boundary halves that of a regular cell.
+const AREA: f64 = 0.25;
+
+/// A vertex of a boundary in the plane with the two quadratic edges that meet there: their points in a row, mid-edge points included.
+type Passage = [u32; 5];
+
+impl Mesh<2> {
+    /// Move the nearest vertex of each boundary that passes at one of the places to this place. The mesh has the order 2.
+    ///
+    /// A vertex moves along the curve of order four through the points of both edges by at most half an edge, once. It stays where other groups begin, where it
+    /// has a name of its own, and where a cell would become too small.
+    pub fn move_vertices_to(&mut self, places: &[[f64; 3]]) {
+        let passages = self.passages();
+        let mut cells: HashMap<u32, Vec<[u32; 6]>> = HashMap::new();
+        for cell in self.groups.iter().filter(|group| group.dimension == 2).flat_map(|group| group.simplices()) {
+            let Ok(cell) = <[u32; 6]>::try_from(cell) else { continue };
+            cell[..3].iter().for_each(|&vertex| cells.entry(vertex).or_default().push(cell));
+        }
+        let mut moved: HashSet<u32> = HashSet::new();
+        for place in places {
+            let place = [place[0] - self.datum[0], place[1] - self.datum[1]];
+            for passage in &passages {
+                if passage.iter().any(|point| moved.contains(point)) {
+                    continue;
+                }
+                let Some(points) = self.moved_passage(passage, place) else { continue };
+                if self.set_passage(passage, points, &cells[&passage[2]]) {
+                    moved.extend(passage);
+                }
+            }
+        }
+    }
+
+    /// Return the passages of all vertices that may move along a boundary, in the order of their numbers.
+    fn passages(&self) -> Vec<Passage> {
+        let mut groups_of: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+        let mut fixed: HashSet<u32> = HashSet::new();
+        for (index, group) in self.groups.iter().enumerate().filter(|(_, group)| group.dimension < 2) {
+            for simplex in group.simplices() {
+                match *simplex {
+                    [a, b, middle] => groups_of.entry([a.min(b), a.max(b), middle]).or_default().push(index),
+                    _ => fixed.extend(simplex),
+                }
+            }
+        }
+        let mut edges_at: HashMap<u32, Vec<[u32; 3]>> = HashMap::new();
+        for edge in groups_of.keys() {
+            edge[..2].iter().for_each(|&vertex| edges_at.entry(vertex).or_default().push(*edge));
+        }
+        let passage = |(&vertex, edges): (&u32, &Vec<[u32; 3]>)| {
+            let &[first, second] = &edges[..] else { return None };
+            let (first, second) = if first < second { (first, second) } else { (second, first) };
+            let other = |edge: [u32; 3]| if edge[0] == vertex { edge[1] } else { edge[0] };
+            let is_free = groups_of[&first] == groups_of[&second] && !fixed.contains(&vertex);
+            is_free.then(|| [other(first), first[2], vertex, second[2], other(second)])
+        };
+        let mut passages: Vec<Passage> = edges_at.iter().filter_map(passage).collect();
+        passages.sort_unstable_by_key(|passage| passage[2]);
+        passages
+    }
+
+    /// Return the points of a passage with its vertex at `place`, or at the point of the curve that is nearest to it; none unless this vertex is the nearest
+    /// one of its curve and the place less than an edge away from it.
+    fn moved_passage(&self, passage: &Passage, place: [f64; 2]) -> Option<[[f64; 2]; 5]> {
+        let points = passage.map(|point| self.points[point as usize]);
+        let mut at = [0.0; 5];
+        (1..5).for_each(|i| at[i] = at[i - 1] + length(minus(points[i], points[i - 1])));
+        // differences from the first point keep a straight boundary straight to the last digit
+        let curve = |s: f64| -> [f64; 2] {
+            let weight =
+                |i: usize| -> f64 { (0..5).filter(|&j| j != i).map(|j| (s - at[j]) / (at[i] - at[j])).product() };
+            let weights: [f64; 5] = std::array::from_fn(weight);
+            std::array::from_fn(|c| {
+                points[0][c] + (1..5).map(|i| weights[i] * (points[i][c] - points[0][c])).sum::<f64>()
+            })
+        };
+        let along = minus(points[4], points[0]).map(|x| x / length(minus(points[4], points[0])));
+        let mut s = at[2];
+        for _ in 0..10 {
+            s += dot(&minus(place, curve(s)), &along);
+            // the nearest vertex of the curve is another one
+            if s < at[1] || s > at[3] {
+                return None;
+            }
+        }
+        let nearest = curve(s);
+        (length(minus(place, nearest)) < 0.5 * at[4])
+            .then(|| [points[0], curve(0.5 * s), nearest, curve(0.5 * (s + at[4])), points[4]])
+    }
+
+    /// Give the points of a passage new places, and the other edges at its vertex straight shifts. Return false, and change nothing, if a cell at the vertex
+    /// becomes too small.
+    fn set_passage(&mut self, passage: &Passage, points: [[f64; 2]; 5], cells: &[[u32; 6]]) -> bool {
+        let (vertex, step) = (passage[2], minus(points[2], self.points[passage[2] as usize]));
+        let area = |cell: &[u32; 6], step: [f64; 2]| {
+            let corner = |k: usize| -> [f64; 2] {
+                let x = self.points[cell[k] as usize];
+                if cell[k] == vertex { std::array::from_fn(|c| x[c] + step[c]) } else { x }
+            };
+            let (a, b) = (minus(corner(1), corner(0)), minus(corner(2), corner(0)));
+            a[0] * b[1] - a[1] * b[0]
+        };
+        if !cells.iter().all(|cell| area(cell, step) >= AREA * area(cell, [0.0; 2])) {
+            return false;
+        }
+        // mid-edge points of a triangle follow its vertices as 01 12 02
+        let middles = |cell: &[u32; 6]| match cell[..3].iter().position(|&corner| corner == vertex) {
+            Some(0) => [cell[3], cell[5]],
+            Some(1) => [cell[3], cell[4]],
+            _ => [cell[4], cell[5]],
+        };
+        let inner: HashSet<u32> = cells.iter().flat_map(middles).filter(|middle| !passage.contains(middle)).collect();
+        for middle in inner {
+            (0..2).for_each(|c| self.points[middle as usize][c] += 0.5 * step[c]);
+        }
+        passage.iter().zip(points).for_each(|(&point, x)| self.points[point as usize] = x);
+        true
+    }
+}
