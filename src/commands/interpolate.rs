@@ -73,10 +73,10 @@ impl PointTree {
     ///
     /// A solution may have a kink where edges meet, so that a polynomial through points of two edges would miss it. The points of one edge stand as those of
     /// Gauss and Lobatto.
-    pub fn polynomial(&self, at: &[f64; 3], order: Order) -> Weights {
+    pub fn polynomials(&self, at: &[f64; 3], order: Order) -> [Weights; 2] {
         let count = order.degree() + 1;
         let nearest: Vec<_> = self.0.nearest_neighbor_iter_with_distance_2(*at).take(NEIGHBOURS * count).collect();
-        let Some((farthest, squared)) = nearest.last() else { return Vec::new() };
+        let Some((farthest, squared)) = nearest.last() else { return Default::default() };
         let line = minus(*farthest.geom(), *at);
         let along = |near: &GeomWithData<[f64; 3], usize>| dot(&line, &minus(*near.geom(), *at)) / squared;
         let mut places: Vec<(usize, f64)> = nearest.iter().map(|(near, _)| (near.data, along(near))).collect();
@@ -91,11 +91,15 @@ impl PointTree {
         let holds = |edge: &&[(usize, f64)]| edge[0].1 <= 1e-9 && edge[edge.len() - 1].1 >= -1e-9;
         let best = places.windows(count).filter(holds).min_by(|p, q| differs(p).total_cmp(&differs(q)));
         let edge = best.unwrap_or(&places[..count.min(places.len())]);
-        let weight = |&(point, place): &(usize, f64)| {
-            let others = edge.iter().map(|(_, other)| *other).filter(|other| *other != place);
-            (point, others.map(|other| other / (other - place)).product())
+        let through = |edge: &[(usize, f64)]| {
+            let weight = |&(point, place): &(usize, f64)| {
+                let others = edge.iter().map(|(_, other)| *other).filter(|other| *other != place);
+                (point, others.map(|other| other / (other - place)).product())
+            };
+            edge.iter().map(weight).collect()
         };
-        edge.iter().map(weight).collect()
+        let middle = edge.len() / 2;
+        [through(edge), through(&[&edge[..middle], &edge[middle + 1..]].concat())]
     }
 }
 
@@ -158,7 +162,7 @@ mod tests {
         let function = |s: f64| if s < 0.3 { 1.0 - 2.0 * s + s.powi(4) } else { 0.4081 + (s - 0.3).powi(5) };
         let values: Vec<f64> = places.iter().map(|&s| function(s)).collect();
         for s in [0.0, 0.05, 0.29, 0.3, 0.31, 0.41, 0.66, 0.97] {
-            let weights = tree.polynomial(&[2.0 * s, 1.0 - s, 0.5], order);
+            let weights = tree.polynomials(&[2.0 * s, 1.0 - s, 0.5], order)[0].clone();
             assert!((mean(&weights, &values) - function(s)).abs() < 1e-12, "{s}: {weights:?}");
         }
     }

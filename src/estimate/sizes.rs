@@ -93,15 +93,10 @@ pub fn wanted(meshes: &dyn Meshes, model: &Model, layer: &Layer, estimate: &Esti
     let errors = of_all(&estimate.cells);
     let dimension = meshes.cells(0).stride as f64 - 1.0;
     let gradings = (0..bodies).flat_map(|body| std::iter::repeat_n(grading(meshes, body), counts[body]));
-    let known = errors.iter().zip(of_all(&estimate.rates)).zip(gradings).zip(remoteness(meshes, model));
-    let of_cell = |(((&squared, rate), grading), remote): (((&f64, f64), &'static Grading), f64)| {
-        if grading.is_steep && remote > 1.0 {
-            CellError { squared: squared * remote.powf(-2.0 * rate), rate: 2.0 * rate, grading }
-        } else {
-            CellError { squared, rate, grading }
-        }
-    };
-    let all: Vec<CellError> = known.map(of_cell).collect();
+    let known = errors.iter().zip(of_all(&estimate.rates)).zip(gradings.zip(distances(meshes, model)));
+    let all: Vec<CellError> = known
+        .map(|((&squared, rate), (grading, distance))| CellError { squared, rate, grading }.of_contact(distance))
+        .collect();
     let errors: Vec<f64> = all.iter().map(|cell| cell.squared).collect();
     let goal = share * errors.iter().sum::<f64>();
     let left = |level: f64| -> f64 { all.iter().map(|cell| cell.left(cell.ratio(level, dimension))).sum() };
@@ -173,16 +168,19 @@ fn zero_between(at: &[f64], values: &[f64]) -> Option<f64> {
 }
 
 /// Return the distance of each cell from the contact points of its body, as a multiple of its size.
-fn remoteness(meshes: &dyn Meshes, model: &Model) -> Vec<f64> {
+fn distances(meshes: &dyn Meshes, model: &Model) -> Vec<f64> {
     let mut all = Vec::new();
     for body in 0..model.meshed() {
         let cells = meshes.cells(body);
-        let touching = model.pairs.iter().filter(|pair| pair.bodies.contains(&body));
-        let points: Vec<[f64; 3]> = touching.flat_map(|pair| pair.position.iter().copied()).collect();
+        if !grading(meshes, body).is_steep {
+            all.extend(cells.sizes.iter().map(|_| 0.0));
+            continue;
+        }
+        let pairs = model.pairs.iter().filter(|pair| pair.bodies.contains(&body));
+        let points: Vec<[f64; 3]> = pairs.flat_map(|pair| &pair.position).copied().collect();
         for (corners, size) in cells.corners.chunks_exact(cells.stride).zip(&cells.sizes) {
-            let centre: [f64; 3] = std::array::from_fn(|c| {
-                corners.iter().map(|&node| cells.nodes[node as usize][c]).sum::<f64>() / corners.len() as f64
-            });
+            let mean = |c: usize| corners.iter().map(|&node| cells.nodes[node as usize][c]).sum::<f64>();
+            let centre: [f64; 3] = std::array::from_fn(|c| mean(c) / cells.stride as f64);
             let least = points.iter().map(|point| length(minus(*point, centre))).fold(f64::INFINITY, f64::min);
             all.push(least / size);
         }
@@ -200,6 +198,17 @@ struct CellError {
 }
 
 impl CellError {
+    /// Return the part of the error in pressures and displacements of the contact, whose `distance` is in sizes of the cell.
+    ///
+    /// A cell of size h changes these by a(e, z - I z), where z is the response to a load on the contact. At the distance r from it z changes over lengths of r,
+    /// so that the error z - I z of its interpolant is less by (h/r)^p than beside the contact. For order two and less the whole error counts.
+    fn of_contact(self, distance: f64) -> Self {
+        if !self.grading.is_steep || distance <= 1.0 {
+            return self;
+        }
+        Self { squared: self.squared * distance.powf(-2.0 * self.rate), rate: 2.0 * self.rate, ..self }
+    }
+
     /// Return the ratio of the new size to the old one for which s^-D new cells have the error `level` together.
     fn ratio(&self, level: f64, dimension: f64) -> f64 {
         let free = (level / self.squared.max(f64::MIN_POSITIVE)).powf(1.0 / (2.0 * self.rate + dimension));
@@ -278,29 +287,21 @@ fn join(bodies: &[BodyCells], sizes: &mut [Vec<f64>], touching: &[Touching]) {
     }
 }
 
-/// The sizes of the cells around a corner.
-#[derive(Clone)]
-struct NodeSize {
-    /// Sum of the logarithms, and number of the cells.
-    logs: (f64, f64),
-    least: f64,
+/// The geometric mean of the sizes of the cells around a corner.
+#[derive(Clone, Default)]
+struct MeanSize {
+    logs: f64,
+    count: f64,
 }
 
-impl Default for NodeSize {
-    fn default() -> Self {
-        Self { logs: (0.0, 0.0), least: f64::INFINITY }
-    }
-}
-
-impl NodeSize {
+impl MeanSize {
     fn add(&mut self, size: f64) {
-        self.logs = (self.logs.0 + size.ln(), self.logs.1 + 1.0);
-        self.least = self.least.min(size);
+        self.logs += size.ln();
+        self.count += 1.0;
     }
 
-    /// Return the size at the corner: the geometric mean, or with steep grading the least, since a singular place may lie anywhere in one cell.
-    fn value(&self, grading: &Grading) -> f64 {
-        if grading.is_steep { self.least } else { (self.logs.0 / self.logs.1).exp() }
+    fn value(&self) -> f64 {
+        (self.logs / self.count).exp()
     }
 }
 
@@ -310,13 +311,13 @@ fn gather(meshes: &dyn Meshes, counts: &[usize], touching: &[Touching], wanted: 
     let bodies: Vec<BodyCells> = (0..counts.len()).map(|body| meshes.cells(body)).collect();
     let (mut first, mut sizes) = (0, Vec::new());
     for (body, (of_body, &count)) in bodies.iter().zip(counts).enumerate() {
-        let mut of_nodes = vec![NodeSize::default(); of_body.nodes.len()];
+        let mut of_nodes = vec![MeanSize::default(); of_body.nodes.len()];
         for (index, corners) in of_body.corners.chunks_exact(of_body.stride).enumerate() {
             let size = wanted(first + index, of_body.sizes[index]);
             corners.iter().for_each(|&node| of_nodes[node as usize].add(size));
         }
         let grading = grading(meshes, body);
-        let mut of_nodes: Vec<f64> = of_nodes.iter().map(|sizes| sizes.value(grading)).collect();
+        let mut of_nodes: Vec<f64> = of_nodes.iter().map(MeanSize::value).collect();
         smooth(of_body, &mut of_nodes, grading.growth);
         sizes.push(of_nodes);
         first += count;
