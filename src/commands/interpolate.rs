@@ -68,8 +68,9 @@ impl PointTree {
         nearest.map(|(i, (near, squared))| (near.data, inverse[(0, i)] * far * far / squared)).collect()
     }
 
-    /// Return the weights of the values of the points of an edge of an order in the value at one of its points, by the polynomial through them over the way
-    /// along the line to the farthest of the nearest points. Of points with one place the first counts.
+    /// Return the weights of the values of the points of an edge of an order in the value at one of its points, by the polynomial through them, and by that
+    /// through all but the middle one. The polynomials are those of the way along the line to the farthest of the nearest points. Of points with one place
+    /// the first counts.
     ///
     /// A solution may have a kink where edges meet, so that a polynomial through points of two edges would miss it. The points of one edge stand as those of
     /// Gauss and Lobatto.

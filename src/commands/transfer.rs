@@ -69,8 +69,7 @@ impl EstimatedSolution {
     ///
     /// If the error e of the next mesh and the error e' of this mesh are right, the solutions differ by e + e' at most. Where they differ by more,
     /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
-    /// nothing is compared. Beside a singular place, pressures of high order are much nearer to the exact ones at the points than between them, where another
-    /// mesh has its points. Displacements are smoother, and their ratio serves there.
+    /// nothing is compared.
     ///
     /// `orders` are those of the bodies that carry the points, one for each pair.
     pub fn correct(&self, tables: &[ContactTable], orders: &[Order], estimate: &mut Estimate) {
@@ -119,38 +118,53 @@ struct SolutionNorms {
 }
 
 /// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
-///
-/// The values of `new` are brought to these points by planes through the nearest points: they bend by less than what the old mesh leaves out. On curves
-/// with elements of an order above two, the polynomials of their edges do so.
 fn norms(old: &[ContactTable], new: &[ContactTable], orders: &[Order]) -> SolutionNorms {
     let (mut pressure, mut displacement) = (Vec::new(), Squares::default());
     for ((old, new), &order) in old.iter().zip(new).zip(orders) {
         let scattered = PointTree::new(&new.points);
         let mut of_pair = Squares::default();
         for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
-            let pressure = match order {
-                Order::P1 | Order::P2 => {
-                    let weights = scattered.plane(point, DAMPED);
-                    for (new, old) in new.displacement.iter().zip(&old.displacement) {
-                        displacement.add(*area, old[q], clamped_mean(&weights, new));
-                    }
-                    clamped_mean(&weights, &new.pressure)
-                }
-                _ => {
-                    let [weights, lower] = scattered.polynomials(point, order);
-                    for (new, old) in new.displacement.iter().zip(&old.displacement) {
-                        displacement.add(*area, old[q], mean(&weights, new));
-                    }
-                    let value = mean(&weights, &new.pressure);
-                    let rough = (value - mean(&lower, &new.pressure)).abs();
-                    value + (old.pressure[q] - value).clamp(-rough, rough)
-                }
-            };
-            of_pair.add(*area, old.pressure[q], pressure);
+            let at_point = Interpolation::new(&scattered, point, order);
+            of_pair.add(*area, old.pressure[q], at_point.nearest(&new.pressure, old.pressure[q]));
+            for (new, old) in new.displacement.iter().zip(&old.displacement) {
+                displacement.add(*area, old[q], at_point.nearest(new, old[q]));
+            }
         }
         pressure.push(of_pair.norms());
     }
     SolutionNorms { pressure, displacement: displacement.norms() }
+}
+
+/// The interpolation of a column of a table at a point.
+enum Interpolation {
+    /// By a plane through the nearest points, which bends by less than what a coarser mesh leaves out.
+    Plane(Weights),
+    /// By the polynomial of an edge of order three or more, and by that without one of its points.
+    Edge([Weights; 2]),
+}
+
+impl Interpolation {
+    fn new(scattered: &PointTree, point: &[f64; 3], order: Order) -> Self {
+        match order {
+            Order::P1 | Order::P2 => Self::Plane(scattered.plane(point, DAMPED)),
+            _ => Self::Edge(scattered.polynomials(point, order)),
+        }
+    }
+
+    /// Return the value in the column that is nearest to `old` within its uncertainty.
+    ///
+    /// Beside a singular place, pressures of high order are much nearer to the exact ones at their points than between them. The difference of both
+    /// polynomials shows by how much.
+    fn nearest(&self, column: &[f64], old: f64) -> f64 {
+        match self {
+            Self::Plane(weights) => clamped_mean(weights, column),
+            Self::Edge([weights, fewer]) => {
+                let value = mean(weights, column);
+                let uncertainty = (value - mean(fewer, column)).abs();
+                value + (old - value).clamp(-uncertainty, uncertainty)
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -177,7 +191,7 @@ mod tests {
             let mut later = estimate(0.05);
             EstimatedSolution::new(&estimate(of_earlier), vec![table(5, 1.0)]).correct(
                 &[table(5, 1.1)],
-                &[1],
+                &[Order::P1],
                 &mut later,
             );
             assert_eq!(later.pressure, [0.1]);
@@ -199,15 +213,15 @@ mod tests {
 
     #[test]
     fn linear_functions_do_not_differ_and_others_by_what_they_do() {
-        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)], &[1]);
+        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)], &[Order::P1]);
         // but for the weight of the slopes
         assert!(same.pressure[0].difference < 2e-3 * same.pressure[0].new, "{:?}", same.pressure);
-        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)], &[1]);
+        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)], &[Order::P1]);
         let L2Norms { difference, old, new } = off.pressure[0];
         assert!((difference / new - 0.1).abs() < 2e-3 && (old / new - 1.1).abs() < 2e-3, "{:?}", off.pressure);
         assert!((off.displacement.difference / off.displacement.new - 0.1).abs() < 2e-3);
         // fewer points than a plane through the nearest ones takes
-        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)], &[1]).pressure[0];
+        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)], &[Order::P1]).pressure[0];
         assert!((few.difference / few.new - 0.2).abs() < 1e-12, "{few:?}");
     }
 }

@@ -407,3 +407,22 @@ fn is_mirrored<const D: usize>(side: &Side<D>, i: usize, edge: [u32; D]) -> bool
         side.facet_nodes(i).filter(|at| edge[..D - 1].contains(&at.node)).map(|at| (at.node, at.normal)).collect();
     nodes.iter().all(|(node, _)| side.space.on_axis(*node)) || side.mirrors.continue_beyond(&nodes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Kinks of several powers are found inside an edge, at its middle and at its ends; smooth functions have none.
+    #[test]
+    fn kinks_of_gaps_are_found() {
+        for order in (3..=8).filter_map(Order::new) {
+            for (place, power) in [(0.3, 1.0), (0.3, 1.5), (0.5, 1.0), (0.0, 1.0), (1.0, 1.5), (0.71, 2.0)] {
+                let found = kink(order, &|x| 2.0 + x + (x - place).abs().powf(power) * f64::from(u8::from(x > place)));
+                assert!(found.is_some_and(|x| (x - place).abs() < 1e-4), "{order:?} {place} {power}: {found:?}");
+            }
+            let smooth: [&dyn Fn(f64) -> f64; 4] =
+                [&|_| 0.0, &|x| 3.0 - x * x, &|x| (2.0 * x).cos(), &|x| (3.0 * x).exp()];
+            assert!(smooth.iter().all(|function| kink(order, function).is_none()), "{order:?}");
+        }
+    }
+}

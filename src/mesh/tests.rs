@@ -7,7 +7,7 @@ use super::load::{Meshing, load};
 use super::{Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
-use crate::problem::mesh::MeshSource;
+use crate::problem::mesh::{AdaptedMesh, MeshSource};
 use crate::problem::{Guard, Order};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -53,16 +53,16 @@ fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache
     meshed_with(geo, set, order, (None, &Guard::default()), cache)
 }
 
-/// Return the mesh of a script that follows sizes, with settings of Gmsh.
+/// Return the mesh of a script as an adaptation asks, with settings of Gmsh.
 fn meshed_with<const D: usize>(
     geo: &Path,
     set: &[(String, f64)],
     order: Order,
-    (sizes, guard): (Option<&str>, &Guard),
+    (adapted, guard): (Option<&AdaptedMesh>, &Guard),
     cache: &Path,
 ) -> Result<Loaded<D>> {
     let (file, interrupt) = (&located(geo.to_owned()), &Interrupt::default());
-    Meshing { file, set, places: &[], sizes, order, guard, interrupt }.mesh(&Cache::at(cache.to_owned()))
+    Meshing { file, set, places: &[], adapted, order, guard, interrupt }.mesh(&Cache::at(cache.to_owned()))
 }
 
 /// Return the bytes of the mesh of a script in the form that these arguments request.
@@ -279,13 +279,33 @@ fn the_last_line_of_a_script_need_not_end() {
     let geo = folder.path().join("main.geo");
     std::fs::write(folder.path().join("part.geo"), SQUARE.trim_end()).unwrap();
     let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
-    let sizes = view(3, &corners, &[0.5; 3]);
+    let adapted = AdaptedMesh { sizes: view(3, &corners, &[0.5; 3]), vertices: Vec::new() };
     for script in [SQUARE.trim_end(), "Include 'part.geo';"] {
         std::fs::write(&geo, script).unwrap();
-        for sizes in [None, Some(&sizes[..])].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
-            let loaded = meshed_with::<2>(&geo, &[], Order::P1, (sizes, &Guard::default()), &cache).unwrap();
+        for adapted in [None, Some(&adapted)].into_iter().take(if script.contains("Include") { 1 } else { 2 }) {
+            let loaded = meshed_with::<2>(&geo, &[], Order::P1, (adapted, &Guard::default()), &cache).unwrap();
             assert!(loaded.mesh.group("outside").is_some(), "{script}");
         }
+    }
+}
+
+/// Vertices are in the file of the cache, which the next run reads.
+#[test]
+fn an_adapted_mesh_has_vertices_where_they_are_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let (cache, geo) = (folder.path().join("cache"), folder.path().join("square.geo"));
+    std::fs::write(&geo, SQUARE).unwrap();
+    let free = meshed::<2>(&geo, &[], Order::P2, &cache).unwrap().mesh;
+    let place = [0.6137, 0.0, 0.0];
+    let corners = [[-9.0, -9.0, 0.0], [9.0, -9.0, 0.0], [0.0, 9.0, 0.0]];
+    let adapted = AdaptedMesh { sizes: view(3, &corners, &[0.1; 3]), vertices: vec![place, [0.27, 0.0, 0.0]] };
+    for origin in [MeshOrigin::Gmsh, MeshOrigin::Cache] {
+        let loaded = meshed_with::<2>(&geo, &[], Order::P2, (Some(&adapted), &Guard::default()), &cache).unwrap();
+        assert_eq!(loaded.origin, origin);
+        assert!(loaded.mesh.points.iter().any(|x| (x[0] - place[0]).abs() < 1e-12 && x[1] == 0.0));
+        assert!(loaded.mesh.points.contains(&[0.25, 0.0]), "the materials meet where they did");
+        let names = |mesh: &Mesh<2>| mesh.groups.iter().map(|group| group.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&loaded.mesh), names(&free));
     }
 }
 

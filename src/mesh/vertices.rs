@@ -17,7 +17,7 @@ impl Mesh<2> {
     /// Move the nearest vertex of each boundary that passes at one of the places to this place. The mesh has the order 2.
     ///
     /// A vertex moves along the curve of order four through the points of both edges by at most half an edge, once. It stays where other groups begin, where it
-    /// has a name of its own, and where a cell would become too small.
+    /// has a name of its own or belongs to two bodies, and where a cell would become too small.
     pub fn move_vertices_to(&mut self, places: &[[f64; 3]]) {
         let passages = self.passages();
         let mut cells: HashMap<u32, Vec<[u32; 6]>> = HashMap::new();
@@ -43,12 +43,16 @@ impl Mesh<2> {
     /// Return the passages of all vertices that may move along a boundary, in the order of their numbers.
     fn passages(&self) -> Vec<Passage> {
         let mut groups_of: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
-        let mut fixed: HashSet<u32> = HashSet::new();
-        for (index, group) in self.groups.iter().enumerate().filter(|(_, group)| group.dimension < 2) {
+        let (mut fixed, mut body_of) = (HashSet::new(), HashMap::new());
+        for (index, group) in self.groups.iter().enumerate() {
             for simplex in group.simplices() {
                 match *simplex {
+                    [point] => {
+                        fixed.insert(point);
+                    }
                     [a, b, middle] => groups_of.entry([a.min(b), a.max(b), middle]).or_default().push(index),
-                    _ => fixed.extend(simplex),
+                    // a vertex of two bodies or materials belongs to their interface
+                    _ => fixed.extend(simplex.iter().filter(|&&point| *body_of.entry(point).or_insert(index) != index)),
                 }
             }
         }
@@ -124,5 +128,75 @@ impl Mesh<2> {
         }
         passage.iter().zip(points).for_each(|(&point, x)| self.points[point as usize] = x);
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Group, Mesh};
+    use crate::problem::Order;
+
+    /// Return `count` squares in a row, each two quadratic triangles, with the curve `top` of all and the curve `end` at the last edge. `shape` gives places.
+    fn row(count: u32, shape: impl Fn([f64; 2]) -> [f64; 2]) -> Mesh<2> {
+        let points = (0..=2 * count).flat_map(|i| (0..3).map(move |j| [f64::from(i), f64::from(j)].map(|x| 0.5 * x)));
+        let at = |i: u32, j: u32| 3 * i + j;
+        let (mut cells, mut top) = (Vec::new(), Vec::new());
+        for i in (0..2 * count).step_by(2) {
+            cells.extend([at(i, 0), at(i + 2, 0), at(i + 2, 2), at(i + 1, 0), at(i + 2, 1), at(i + 1, 1)]);
+            cells.extend([at(i, 0), at(i + 2, 2), at(i, 2), at(i + 1, 1), at(i + 1, 2), at(i, 1)]);
+            top.extend([at(i, 2), at(i + 2, 2), at(i + 1, 2)]);
+        }
+        let end = top[top.len() - 3..].to_vec();
+        let group = |name: &str, dimension: usize, stride: usize, connectivity: Vec<u32>| Group {
+            name: name.to_owned(),
+            dimension,
+            stride,
+            connectivity,
+            tags: Vec::new(),
+        };
+        let groups = vec![group("block", 2, 6, cells), group("top", 1, 3, top), group("end", 1, 3, end)];
+        Mesh::new("row.msh".into(), points.map(shape).collect(), Order::P2, groups.into())
+    }
+
+    #[test]
+    fn the_nearest_vertex_moves_along_a_straight_boundary() {
+        let still = row(4, |x| x);
+        let mut mesh = still.clone();
+        mesh.move_vertices_to(&[[1.3, 1.1, 0.0]]);
+        let changed: Vec<usize> = (0..still.points.len()).filter(|&i| mesh.points[i] != still.points[i]).collect();
+        // the vertex at (1, 1), the middles of its edges on the boundary, and those of the edges to (0, 0) and (1, 0)
+        assert_eq!(changed, [3 + 1, 3 + 2, 6 + 1, 6 + 2, 9 + 2]);
+        assert!((mesh.points[6 + 2][0] - 1.3).abs() < 1e-12);
+        for (index, at) in [(3 + 1, [0.65, 0.5]), (3 + 2, [0.65, 1.0]), (6 + 1, [1.15, 0.5]), (9 + 2, [1.65, 1.0])] {
+            assert!((0..2).all(|c| (mesh.points[index][c] - at[c]).abs() < 1e-12), "{index} {:?}", mesh.points[index]);
+        }
+        assert!(mesh.points.iter().enumerate().all(|(i, x)| i % 3 < 2 || x[1] == 1.0));
+    }
+
+    /// A corner, a vertex where another group begins, and vertices far from the place stay.
+    #[test]
+    fn other_vertices_stay() {
+        let still = row(4, |x| x);
+        for place in [[0.3, 1.0, 0.0], [2.9, 1.0, 0.0], [3.8, 1.0, 0.0], [1.3, 9.0, 0.0]] {
+            let mut mesh = still.clone();
+            mesh.move_vertices_to(&[place]);
+            assert_eq!(mesh.points, still.points, "{place:?}");
+        }
+    }
+
+    /// On an arc the vertex and the middles of its edges stay on the arc, to the error of a curve of order four.
+    #[test]
+    fn vertices_move_along_an_arc() {
+        let arc = |angle: f64, radius: f64| [radius * angle.sin(), radius * angle.cos()];
+        let mut mesh = row(4, |[x, y]| arc(0.2 * x, 1.0 + y));
+        let place = arc(0.2 * 1.7, 2.0);
+        mesh.move_vertices_to(&[[place[0], place[1], 0.0]]);
+        let moved = [9, 12, 15].map(|first| mesh.points[first + 2]);
+        for x in moved {
+            assert!((x[0].hypot(x[1]) - 2.0).abs() < 1e-6, "{x:?}");
+        }
+        assert!((0..2).all(|c| (moved[1][c] - place[c]).abs() < 1e-6), "{moved:?}");
+        let angle = |x: [f64; 2]| x[0].atan2(x[1]) / 0.2;
+        assert!((angle(moved[0]) - 1.35).abs() < 1e-3 && (angle(moved[2]) - 2.35).abs() < 1e-3, "{moved:?}");
     }
 }
