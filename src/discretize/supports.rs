@@ -14,16 +14,14 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 
 /// One condition n.u = value at a node, with the direction n.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(bound = "[f64; D]: Plain")]
 struct Condition<const D: usize> {
     direction: [f64; D],
     value: f64,
     /// Index of the support in the scene; `None` for the symmetry of a body of revolution.
     support: Option<usize>,
 }
-
-/// A constrained direction, with the index of its support if it comes from one.
-type Direction<const D: usize> = ([f64; D], Option<usize>);
 
 /// The constraints from the supports and rigid surfaces of a body.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -33,8 +31,8 @@ pub struct Constraints<const D: usize> {
     pub frame: Frame<D>,
     /// Prescribed dofs and their values.
     pub prescribed: HashMap<usize, f64>,
-    /// Independent constrained directions at each node. Those of tied nodes are at their master.
-    directions: BTreeMap<u32, Vec<Direction<D>>>,
+    /// Conditions with independent directions at each node. Those of tied nodes are at their master.
+    conditions: BTreeMap<u32, Vec<Condition<D>>>,
     /// The rigid surfaces.
     pub rigid: Vec<RigidSurface<D>>,
 }
@@ -51,7 +49,7 @@ pub struct RigidSurface<const D: usize> {
     pub forces: Vec<(u32, [f64; D])>,
 }
 
-/// Sine below which two directions are the same.
+/// Sine below which two directions are the same: half of the digits, so that what is left of the second has the other half.
 const PARALLEL: f64 = 1e-8;
 
 impl<const D: usize> Constraints<D> {
@@ -99,7 +97,7 @@ impl<const D: usize> Constraints<D> {
     pub fn on(&self, nodes: &[u32]) -> Self {
         let here = |node: u32| place(nodes, node);
         let prescribed = |(dof, value): (&usize, &f64)| Some((D * here((dof / D) as u32)? as usize + dof % D, *value));
-        let directions = self.directions.iter().filter_map(|(node, at)| Some((here(*node)?, at.clone())));
+        let conditions = self.conditions.iter().filter_map(|(node, at)| Some((here(*node)?, at.clone())));
         let rigid = self.rigid.iter().map(|surface| RigidSurface {
             load: surface.load,
             nodes: surface.nodes.iter().filter_map(|&node| here(node)).collect(),
@@ -108,7 +106,7 @@ impl<const D: usize> Constraints<D> {
         Self {
             frame: self.frame.on(nodes),
             prescribed: self.prescribed.iter().filter_map(prescribed).collect(),
-            directions: directions.collect(),
+            conditions: conditions.collect(),
             rigid: rigid.collect(),
         }
     }
@@ -189,7 +187,7 @@ impl<const D: usize> Constraints<D> {
     /// Turn the conditions at a node into prescribed dofs. If the conditions are inclined, the node gets axes of its own.
     fn hold(&mut self, node: u32, conditions: &[Condition<D>], spec: &BodySpec, space: &Space<D>) -> Result<()> {
         let mut basis: Vec<([f64; D], f64)> = Vec::new();
-        let kept = self.directions.entry(node).or_default();
+        let kept = self.conditions.entry(node).or_default();
         for (position, condition) in conditions.iter().enumerate() {
             let (mut rest, mut value) = (condition.direction, condition.value);
             for (axis, known) in &basis {
@@ -203,7 +201,7 @@ impl<const D: usize> Constraints<D> {
                 // A coordinate axis stays exact to the last digit.
                 let along = (0..D).find(|&c| axis[c].abs() > 1.0 - 1e-14);
                 basis.push(along.map_or((axis, value / size), |c| (axis_vector(c), value / size * axis[c].signum())));
-                kept.push((condition.direction, condition.support));
+                kept.push(*condition);
                 continue;
             }
             let largest = conditions[..=position].iter().map(|other| other.value.abs()).fold(0.0, f64::max);
@@ -263,7 +261,7 @@ impl<const D: usize> Constraints<D> {
             let load = &spec.load[*load];
             let LoadKind::Force { total, .. } = &load.kind else { continue };
             let force: [f64; D] = std::array::from_fn(|c| total[c]);
-            for (direction, support) in self.directions.get(&nodes[0]).into_iter().flatten() {
+            for Condition { direction, support, .. } in self.conditions.get(&nodes[0]).into_iter().flatten() {
                 let Some(support) = support else { continue };
                 if dot(&force, direction).abs() > 1e-12 * dot(&force, &force).sqrt() {
                     let on = &spec.fix[*support].on;
@@ -282,21 +280,20 @@ impl<const D: usize> Constraints<D> {
 
     /// Split a reaction at a node among the supports that constrain it: (support, force).
     pub fn split(&self, node: u32, reaction: [f64; D]) -> Vec<(usize, [f64; D])> {
-        let Some(directions) = self.directions.get(&node).filter(|directions| !directions.is_empty()) else {
+        let Some(conditions) = self.conditions.get(&node).filter(|conditions| !conditions.is_empty()) else {
             return Vec::new();
         };
-        let n = DMatrix::from_fn(directions.len(), D, |i, c| directions[i].0[c]);
+        let n = DMatrix::from_fn(conditions.len(), D, |i, c| conditions[i].direction[c]);
         let right = &n * DVector::from_fn(D, |c, _| reaction[c]);
         let Some(shares) = (&n * n.transpose()).lu().solve(&right) else { return Vec::new() };
-        let part =
-            |(i, (direction, support)): (usize, &Direction<D>)| Some(((*support)?, direction.map(|d| d * shares[i])));
-        directions.iter().enumerate().filter_map(part).collect()
+        let part = |(i, at): (usize, &Condition<D>)| Some((at.support?, at.direction.map(|d| d * shares[i])));
+        conditions.iter().enumerate().filter_map(part).collect()
     }
 
     /// Return the nodes at which supports act, and the tied nodes.
     pub fn nodes(&self) -> impl Iterator<Item = u32> + '_ {
         let tied = self.rigid.iter().flat_map(|surface| surface.nodes.iter().copied());
-        self.directions.keys().copied().chain(tied)
+        self.conditions.keys().copied().chain(tied)
     }
 
     /// Return the number of prescribed dofs without those of tied nodes.

@@ -79,18 +79,24 @@ impl Joint {
         Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness: of_nodes, motions, border: None })
     }
 
-    /// Solve G x = r with the matrix until `enough` accepts an iterate. Return x, and the estimated energy norm of its error, or why the solver gave up.
-    fn solve_matrix(&mut self, model: &Model, r: &[f64], enough: &mut StoppingTest) -> Result<MatrixSolution> {
-        let (rows, first) = (&self.rows, self.first);
-        let (mut x, mut last_error) = (vec![0.0; r.len()], None);
+    /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error of x, by an iterative solver, or why the
+    /// solver gave up.
+    fn solve_matrix(
+        &mut self,
+        model: &Model,
+        r: &[f64],
+        x: &mut [f64],
+        enough: &mut StoppingTest,
+    ) -> Result<std::result::Result<Option<f64>, String>> {
+        let (rows, first, mut last_error) = (&self.rows, self.first, None);
         let mut test = |iterate: &KspIterate| {
             let (closing, energy) = closing_and_energy(model, rows, first, iterate.x, r);
             let error = estimated_error(iterate, energy);
             last_error = Some(error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
-        let failure = self.matrix.apply(|solver| solver.solve_until(r, &mut x, &mut test))?.failure;
-        Ok(MatrixSolution { x, last_error, failure })
+        let failure = self.matrix.apply(|solver| solver.solve_until(r, x, &mut test))?.failure;
+        Ok(failure.map_or(Ok(last_error), Err))
     }
 
     /// Return B' `force` in the rows of this rank, for forces at the points, n.
@@ -122,14 +128,17 @@ impl Joint {
             self.matrix.multiply_stiffness(&self.rows, &column, &mut product);
             axpy(-1.0, &product, &mut rest);
             let is_enough = |trial: &Trial| trial.error <= border::ACCURACY * (known + trial.energy).sqrt();
-            let solution = self.solve_matrix(model, &rest, &mut |_, trial| is_enough(trial))?;
-            if solution.failure.is_some() {
-                self.motions = motions;
-                return Ok(solution.failure);
-            }
-            axpy(1.0, &solution.x, &mut column);
+            let mut change = vec![0.0; length];
+            let last_error = match self.solve_matrix(model, &rest, &mut change, &mut |_, trial| is_enough(trial))? {
+                Ok(last_error) => last_error,
+                Err(reason) => {
+                    self.motions = motions;
+                    return Ok(Some(reason));
+                }
+            };
+            axpy(1.0, &change, &mut column);
             let (closing, energy) = closing_and_energy(model, &self.rows, self.first, &column, &load);
-            let error = solution.last_error.unwrap_or(self.matrix.solver().accuracy() * energy.sqrt());
+            let error = last_error.unwrap_or(self.matrix.solver().accuracy() * energy.sqrt());
             border.push(motion, column, &closing, error);
         }
         (self.motions, self.border) = (motions, Some(border));
@@ -222,7 +231,11 @@ impl LinearStep for Joint {
             let (energy, error) = (trial.energy + moved.energy, trial.error + moved.error);
             enough(model, &Trial { closing: &closing, energy, error })
         };
-        let MatrixSolution { mut x, mut last_error, failure } = self.solve_matrix(model, &r, &mut test)?;
+        let mut x = vec![0.0; r.len()];
+        let (mut last_error, failure) = match self.solve_matrix(model, &r, &mut x, &mut test)? {
+            Ok(last_error) => (last_error, None),
+            Err(reason) => (None, Some(reason)),
+        };
         if let (false, Some(reason)) = (self.is_redundant, &failure) {
             return Ok(Err(Failure { body: None, reason: reason.clone() }));
         }
@@ -262,16 +275,6 @@ impl LinearStep for Joint {
     fn describe(&self) -> String {
         self.matrix.solver().describe()
     }
-}
-
-/// The outcome of a solve with the matrix.
-struct MatrixSolution {
-    /// x in the rows of this rank.
-    x: Vec<f64>,
-    /// Estimated energy norm of its error, by an iterative solver.
-    last_error: Option<f64>,
-    /// Why the solver gave up.
-    failure: Option<String>,
 }
 
 /// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this rank, from number `first` on. One message.

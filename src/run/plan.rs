@@ -58,13 +58,10 @@ pub struct BodyPlan {
 /// Largest number of dofs of all condensed bodies together for which their dense matrix is factored. It takes 0.2 s and 250 MB.
 const DENSE: usize = 3000;
 
-/// A preset with its reason.
-type Choice = (Preset, String);
-
 /// Return the plan for these bodies, without the interface dofs of condensed ones.
 pub fn plan(facts: Vec<BodyFacts>, asked: &SolverRequest) -> Plan {
     let mut seconds = None;
-    let mut chosen: Vec<Option<Choice>> = facts.iter().map(|body| asked.for_body(body)).collect();
+    let mut chosen: Vec<Option<(Preset, String)>> = facts.iter().map(|body| asked.for_body(body)).collect();
     let open: Vec<usize> = (0..facts.len()).filter(|&body| chosen[body].is_none()).collect();
     let mut memory = asked.memory;
     match facts.first().map(|body| body.dimension) {
@@ -83,7 +80,7 @@ pub fn plan(facts: Vec<BodyFacts>, asked: &SolverRequest) -> Plan {
             }
         }
     }
-    let of_body = |(facts, (preset, reason)): (BodyFacts, Choice)| BodyPlan {
+    let of_body = |(facts, (preset, reason)): (BodyFacts, (Preset, String))| BodyPlan {
         facts,
         preset,
         is_distributed: false,
@@ -115,8 +112,8 @@ impl SolverRequest {
         (1..body.dofs).contains(&body.interface) && !self.wants_ksp(body)
     }
 
-    /// Return the solver of a body that the user asks for, or `None` for the program's choice.
-    fn for_body(&self, body: &BodyFacts) -> Option<Choice> {
+    /// Return the solver of a body that the user asks for, with its reason, or `None` for the program's choice.
+    fn for_body(&self, body: &BodyFacts) -> Option<(Preset, String)> {
         let may_condense = self.may_condense(body);
         let (preset, why) = match (self.preset, self.linear) {
             (Some(Preset::Condensed), _) if !may_condense => (
@@ -133,8 +130,8 @@ impl SolverRequest {
     }
 }
 
-/// Choose the solver of a body in the plane, and take its memory.
-fn in_plane(body: &BodyFacts, asked: &SolverRequest, memory: &mut usize) -> Choice {
+/// Choose the solver of a body in the plane with its reason, and take its memory.
+fn in_plane(body: &BodyFacts, asked: &SolverRequest, memory: &mut usize) -> (Preset, String) {
     let (mut preset, reason) = preset::in_plane(body, if body.is_kept { usize::MAX } else { *memory });
     if preset == Preset::Condensed && !asked.may_condense(body) {
         preset = Preset::Mumps;
@@ -145,8 +142,8 @@ fn in_plane(body: &BodyFacts, asked: &SolverRequest, memory: &mut usize) -> Choi
     (preset, reason)
 }
 
-/// Choose the solvers of bodies in space, which are solved together or are one body, and take their memory. Return the estimated seconds, too.
-fn in_space(bodies: &[BodyFacts], asked: &SolverRequest, memory: &mut usize) -> (Vec<Choice>, f64) {
+/// Choose the solvers of bodies in space with their reasons, which are solved together or are one body, and take their memory. Return the estimated seconds, too.
+fn in_space(bodies: &[BodyFacts], asked: &SolverRequest, memory: &mut usize) -> (Vec<(Preset, String)>, f64) {
     let is_kept = bodies.iter().all(|body| body.is_kept);
     let [direct, multigrid] = cost::of_both(bodies, |body| asked.may_condense(body), asked.method, asked.may_join());
     let fits = is_kept || direct.bytes <= *memory as f64;
