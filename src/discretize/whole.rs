@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::fem::{NodalForces, RigidMotion, rigid};
 use crate::linalg::{Blocks, Csr, PART, TOLERANCE, dot};
 use crate::mesh::Mesh;
-use crate::model::{Motion, Segment, Sprung, rigid as joint};
+use crate::model::{Motion, Segment, Sprung, rigid::combined};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashSet;
 
@@ -75,7 +75,7 @@ impl<'a, const D: usize> WholeBody<'a, D> {
         let resisted = DMatrix::from_fn(motions.len(), motions.len(), |i, j| dot(&motions[i].trace, &motions[j].trace));
         let rows = motions.first().map_or(1, |motion| motion.trace.len().max(1));
         let names = || motions.iter().map(|motion| motion.name.as_str());
-        let named = |weights: DVector<f64>| joint::combined(names(), weights.iter().copied());
+        let named = |weights: DVector<f64>| combined(names(), weights.iter().copied());
         Blocks::free(&resisted, rows as f64, TOLERANCE).into_iter().map(named).collect()
     }
 

@@ -8,7 +8,7 @@ use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
 use crate::petsc::{Rows, Schur, Session};
 use crate::solver::options::Chosen;
-use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, RobinMatrix, SolveOutcome, rows_of};
+use crate::solver::{BodyCounts, Dense, InterfaceDofs, MakeSolver, SolveOutcome, SpringMatrix, rows_of};
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
@@ -34,7 +34,7 @@ pub struct Body {
     /// The diagonal of K, if K itself is in a solver or was given away; else empty.
     diagonal: Vec<f64>,
     /// G, which is made when something is first solved. A body that is only measured, or joined with others, needs none.
-    robin: Option<RobinMatrix>,
+    matrix: Option<SpringMatrix>,
     /// The function that makes the solver of G; `None` once it was used.
     make: Option<MakeSolver>,
     /// Whether K stays here when a solver is made of it.
@@ -82,7 +82,7 @@ impl Body {
         let prescribed = std::mem::take(&mut elastic.prescribed);
         let dofs = Dofs::new(elastic.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
         let (diagonal, make) = (Vec::new(), Some(make));
-        Self { dofs, elastic, diagonal, robin: None, make, keeps_stiffness: false, words, interior: None }
+        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: false, words, interior: None }
     }
 
     /// Return a rigid part, whose dofs are the amounts of its `motions`, without a stiffness.
@@ -131,7 +131,7 @@ impl Body {
         let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
         let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
         let (make, interior) = (Some(make), Some(interior));
-        Self { dofs, elastic, diagonal, robin: None, make, keeps_stiffness: true, words, interior }
+        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: true, words, interior }
     }
 
     /// Eliminate the interior, if the body is to be condensed and is not yet.
@@ -186,9 +186,9 @@ impl Body {
 
     /// Compute y = K u, for a body that has not given its K away.
     pub fn apply_stiffness(&mut self, u: &[f64], y: &mut [f64]) {
-        match &mut self.robin {
-            Some(robin) if self.elastic.stiffness.rows() == 0 => {
-                robin.multiply_stiffness(self.dofs.matrix_rows(), u, y)
+        match &mut self.matrix {
+            Some(matrix) if self.elastic.stiffness.rows() == 0 => {
+                matrix.multiply_stiffness(self.dofs.matrix_rows(), u, y)
             }
             _ => self.elastic.stiffness.multiply(u, y),
         }
@@ -196,7 +196,7 @@ impl Body {
 
     /// Give K away to a matrix of all bodies, and keep its diagonal. Return `None` if the body needs it itself.
     pub fn give_stiffness(&mut self) -> Option<Csr> {
-        (self.robin.is_none() && self.interior.is_none()).then(|| self.take_stiffness())
+        (self.matrix.is_none() && self.interior.is_none()).then(|| self.take_stiffness())
     }
 
     fn take_stiffness(&mut self) -> Csr {
@@ -208,7 +208,7 @@ impl Body {
     }
 
     /// Return G, which is made of K first if it does not exist.
-    fn robin_matrix(&mut self) -> Result<&mut RobinMatrix> {
+    fn spring_matrix(&mut self) -> Result<&mut SpringMatrix> {
         if let Some(make) = self.make.take() {
             let stiffness = if self.keeps_stiffness { self.elastic.stiffness.clone() } else { self.take_stiffness() };
             let diagonal = |i: usize| self.diagonal.get(i).map_or_else(|| stiffness.diagonal(i), |value| *value);
@@ -219,38 +219,38 @@ impl Body {
             }
             let start = self.dofs.distribution.as_ref().map(|distribution| distribution.start);
             let rows = self.dofs.matrix_rows();
-            self.robin = Some(RobinMatrix::new(rows_of(stiffness, start)?, rows, row_stiffness, None, make)?);
+            self.matrix = Some(SpringMatrix::new(rows_of(stiffness, start)?, rows, row_stiffness, None, make)?);
         }
-        self.robin.as_mut().ok_or_else(|| Error::new(Kind::Solver, "an inner solver could not be made"))
+        self.matrix.as_mut().ok_or_else(|| Error::new(Kind::Solver, "an inner solver could not be made"))
     }
 
     /// Form the Robin matrix G = K + B' diag(weight) B (37)-(38), with `weight` = omega psi kappa at each row. Nothing happens if the weights
     /// are those of the last call.
     pub fn robin(&mut self, weight: &[f64]) -> Result<()> {
-        self.robin_matrix()?;
+        self.spring_matrix()?;
         let rows = self.dofs.matrix_rows();
-        self.robin.as_mut().map_or(Ok(()), |robin| robin.update(rows, weight))
+        self.matrix.as_mut().map_or(Ok(()), |matrix| matrix.update(rows, weight))
     }
 
     /// Factor G, or set up its preconditioner, if that has not been done since G changed.
     pub fn set_up(&mut self) -> Result<()> {
-        self.robin_matrix()?.set_up()
+        self.spring_matrix()?.set_up()
     }
 
     /// Set the relative tolerance of iterative solves, unless the user has set one.
     pub fn set_tolerance(&mut self, rtol: f64) -> Result<()> {
-        self.robin_matrix()?.solver_mut().set_tolerance(rtol)
+        self.spring_matrix()?.solver_mut().set_tolerance(rtol)
     }
 
     /// Solve G z = r (41) with zero initial guess. A solve that does not converge is reported in [`SolveOutcome`].
     pub fn solve(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
-        self.robin_matrix()?.apply(|solver| solver.solve(r, z))
+        self.spring_matrix()?.apply(|solver| solver.solve(r, z))
     }
 
     /// Compute z = M^-1 r with a fixed symmetric M that approximates G. This preconditions conjugate gradients over all bodies. It costs no more than
     /// a solve, and for an iterative inner solver only one application of its preconditioner.
     pub fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
-        self.robin_matrix()?.apply(|solver| solver.precondition(r, z))
+        self.spring_matrix()?.apply(|solver| solver.precondition(r, z))
     }
 
     /// Return a load on all dofs as a force on those of the body, and its work while the interface dofs do not move: r_I' K_II^-1 r_I with the load r_I on
@@ -269,14 +269,14 @@ impl Body {
 
     /// Return the counters of the work so far.
     pub fn counts(&self) -> BodyCounts {
-        let counts = self.robin.as_ref().map_or_else(BodyCounts::default, RobinMatrix::counts);
+        let counts = self.matrix.as_ref().map_or_else(BodyCounts::default, SpringMatrix::counts);
         self.interior.as_ref().map_or(counts, |interior| interior.count(counts))
     }
 
     /// Set the counters to zero for another run with the same K and f. Work that need not be repeated counts as avoided.
     pub fn begin_anew(&mut self) {
         self.interior.iter_mut().for_each(|interior| interior.is_reused = true);
-        self.robin.iter_mut().for_each(RobinMatrix::begin_anew);
+        self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
     }
 
     /// Replace the loads f and the `prescribed` (dof, value) of a condensed body and keep what was made of K. Return false, with nothing changed, if
@@ -305,8 +305,8 @@ impl Body {
 
     /// Return one line about the inner solver.
     pub fn describe(&self) -> String {
-        match &self.robin {
-            Some(robin) if self.interior.is_none() => robin.solver().describe(),
+        match &self.matrix {
+            Some(matrix) if self.interior.is_none() => matrix.solver().describe(),
             _ => self.words.clone(),
         }
     }

@@ -13,7 +13,7 @@ use crate::error::{Error, Kind, Result};
 use crate::exchange::all_gather;
 use crate::linalg::{Csr, axpy, countable, dot};
 use crate::petsc::KspIterate;
-use crate::solver::{BodyCounts, MakeSolver, RobinMatrix, rows_of};
+use crate::solver::{BodyCounts, MakeSolver, SpringMatrix, rows_of};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -25,8 +25,8 @@ use std::ops::Range;
 /// are *pins*, as many as it has free motions. Its displacements are v + E a, v is zero at the pins, and a stands in their place among the unknowns. Since K E = 0, the
 /// rows of K for a are zero, exactly, and a contact row has B E there. All dofs of a rigid part are pins. A matrix of complete nodes has no rigid parts:
 /// they are eliminated around it ([`border`]).
-pub struct Joint {
-    matrix: RobinMatrix,
+pub struct JointStep {
+    matrix: SpringMatrix,
     /// B of all bodies: one row [B_a B_b] for each contact point, also for those of other ranks.
     rows: Csr,
     /// First entry of each body in a vector of this rank, and the length of that vector.
@@ -45,7 +45,7 @@ pub struct Joint {
     border: Option<Border>,
 }
 
-impl Joint {
+impl JointStep {
     /// Join the bodies of a model. `make` makes a solver of their K; with `is_dense` it gets all entries of K, row by row.
     ///
     /// With `of_nodes` the bodies give their K away, and the unknowns are the displacements of nodes, as multigrid and distributed bodies need them. Otherwise
@@ -73,7 +73,7 @@ impl Joint {
         let sides = model.row_stiffness();
         let (side_a, side_b) = sides.split_at(model.points());
         let row_stiffness = side_a.iter().zip(side_b).map(|(a, b)| a + b).collect();
-        let matrix = RobinMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
+        let matrix = SpringMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         let is_redundant = !of_nodes && model.exchange.ranks() > 1;
         let motions = if of_nodes { border::motions(model) } else { Vec::new() };
         Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness: of_nodes, motions, border: None })
@@ -192,7 +192,7 @@ impl Joint {
     }
 }
 
-impl LinearStep for Joint {
+impl LinearStep for JointStep {
     fn name(&self) -> &'static str {
         "newton"
     }

@@ -20,7 +20,7 @@ pub use crate::solver::{BodyCounts, InterfaceDofs};
 pub use body::Body;
 pub use dofs::{Distribution, Dofs};
 pub use field::Field;
-pub use joint::Joint;
+pub use joint::JointStep;
 pub use layer::Layer;
 pub use linear::LinearStep;
 pub use rigid::{Motions, NamedMotion};

@@ -14,7 +14,7 @@ use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
 use crate::mesh;
-use crate::model::{BodySlot, Joint, LinearStep};
+use crate::model::{BodySlot, JointStep, LinearStep};
 use crate::output;
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -354,7 +354,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         let block = if of_nodes { scene.dimension.value } else { 1 };
         Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &[], interpolation)?)))
     };
-    let mut step: Box<dyn LinearStep> = Box::new(Joint::new(model, of_nodes, is_dense, make)?);
+    let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
     if let Some(springs) = first_springs(model, start) {
         step.set_up(&springs)?;
     }

@@ -1,6 +1,6 @@
 //! Inner solvers: how G z = r is solved, where G is the stiffness K of one body, or of all bodies, plus springs at contact points.
 //!
-//! A [`RobinMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]: [`Krylov`] or [`Dense`]. [`InterfaceDofs`] are those of a body that is
+//! A [`SpringMatrix`] holds G = K + B' diag(d) B and solves with it by an [`InnerSolver`]: [`Krylov`] or [`Dense`]. [`InterfaceDofs`] are those of a body that is
 //! condensed to its contact. A new way to solve is a new file with an implementation of `InnerSolver`.
 //!
 //! Where a function says nothing else, its errors are failures of the solver library, and PETSc being out of memory.
@@ -12,12 +12,12 @@ mod krylov;
 pub mod names;
 pub mod options;
 pub mod preset;
-mod robin;
+mod springs;
 
 pub use dense::Dense;
 pub use interface::InterfaceDofs;
 pub use krylov::Krylov;
-pub use robin::{MakeSolver, MakeSubspace, RobinMatrix};
+pub use springs::{MakeSolver, MakeSubspace, SpringMatrix};
 
 use crate::error::Result;
 use crate::linalg::Csr;

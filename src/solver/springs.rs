@@ -17,10 +17,10 @@ pub type MakeSubspace = Box<dyn Fn(&[f64]) -> Box<dyn Subspace>>;
 ///
 /// Only the entries of K that differ from G are stored here; the others are in the solver alone. The rows B stay with the owner, who passes the same rows
 /// to every call that needs them.
-pub struct RobinMatrix {
+pub struct SpringMatrix {
     solver: Box<dyn InnerSolver>,
     /// Spring stiffnesses d of G, one a row of B.
-    weight: Vec<f64>,
+    springs: Vec<f64>,
     /// Spring stiffnesses that double the stiffness under a row.
     soft: Vec<f64>,
     coupling: Coupling,
@@ -31,7 +31,7 @@ pub struct RobinMatrix {
     before: [usize; 3],
 }
 
-impl RobinMatrix {
+impl SpringMatrix {
     /// Start from G = K, whose pattern holds that of B'B. `make` turns K into its solver. `row_stiffness` is b diag(K) b' of each row b of B, with the parts
     /// of all ranks. With a `coarse` space, rigid motions are put around the preconditioner.
     pub fn new(
@@ -41,11 +41,11 @@ impl RobinMatrix {
         coarse: Option<MakeSubspace>,
         make: MakeSolver,
     ) -> Result<Self> {
-        let weight = vec![0.0; rows.rows()];
+        let springs = vec![0.0; rows.rows()];
         let square = |q| rows.row(q).map(|(_, b)| b * b).sum::<f64>();
         let soft = row_stiffness.iter().enumerate().map(|(q, stiffness)| stiffness / square(q).powi(2)).collect();
         Ok(Self {
-            weight,
+            springs,
             soft,
             coupling: Coupling::new(&stiffness, rows),
             coarse,
@@ -56,19 +56,19 @@ impl RobinMatrix {
     }
 
     /// Set the spring stiffnesses d, one a row of B.
-    pub fn update(&mut self, rows: &Csr, weight: &[f64]) -> Result<()> {
-        if weight == self.weight {
+    pub fn update(&mut self, rows: &Csr, springs: &[f64]) -> Result<()> {
+        if springs == self.springs {
             self.counts.robin_skipped += 1;
             return Ok(());
         }
-        self.weight.copy_from_slice(weight);
+        self.springs.copy_from_slice(springs);
         self.counts.robin_updates += 1;
         let change = Change {
-            write: &|g| self.coupling.write(rows, weight, g),
+            write: &|g| self.coupling.write(rows, springs, g),
             rows,
-            springs: weight,
+            springs,
             soft: &self.soft,
-            coarse: &|| self.coarse.as_ref().map(|coarse| coarse(weight)),
+            coarse: &|| self.coarse.as_ref().map(|coarse| coarse(springs)),
         };
         let began = Instant::now();
         self.solver.update(change)?;
@@ -109,7 +109,7 @@ impl RobinMatrix {
 
     /// Return the largest ratio of a spring stiffness to the stiffness under its row, if it is so large that more than half of the digits of K are lost in G.
     fn steepest(&self) -> Option<f64> {
-        let ratios = self.weight.iter().zip(&self.soft).map(|(weight, soft)| weight / soft);
+        let ratios = self.springs.iter().zip(&self.soft).map(|(spring, soft)| spring / soft);
         let largest = ratios.filter(|ratio| ratio.is_finite()).fold(0.0, f64::max);
         (largest > f64::EPSILON.sqrt().recip()).then_some(largest)
     }
@@ -117,11 +117,11 @@ impl RobinMatrix {
     /// Compute y = K x with G, from which the springs are taken out meanwhile. The solver must store G in rows. If PETSc fails, y is NaN, and the run ends
     /// with that.
     pub fn multiply_stiffness(&mut self, rows: &Csr, x: &[f64], y: &mut [f64]) {
-        let (coupling, weight) = (&self.coupling, &self.weight);
+        let (coupling, springs) = (&self.coupling, &self.springs);
         let product = self
             .solver
             .matrix_mut()
-            .map(|matrix| matrix.multiply_changed(|g| coupling.reset(g), |g| coupling.write(rows, weight, g), x, y));
+            .map(|matrix| matrix.multiply_changed(|g| coupling.reset(g), |g| coupling.write(rows, springs, g), x, y));
         if !matches!(product, Some(Ok(()))) {
             y.fill(f64::NAN);
         }
@@ -196,19 +196,19 @@ impl Coupling {
     }
 
     /// Write K + B' diag(d) B into the values of G, where it differs from K. Elsewhere the values are those of K already.
-    fn write(&self, rows: &Csr, weight: &[f64], g: &mut [f64]) {
+    fn write(&self, rows: &Csr, springs: &[f64], g: &mut [f64]) {
         self.reset(g);
         let mut remaining = &self.positions[..];
-        for (q, &weight) in weight.iter().enumerate() {
+        for (q, &spring) in springs.iter().enumerate() {
             let b = &rows.values[rows.range(q)];
             let owned = rows.row(q).filter(|(i, _)| self.own.contains(i));
             let (positions, others) = remaining.split_at(owned.clone().count() * b.len());
             remaining = others;
-            if weight == 0.0 {
+            if spring == 0.0 {
                 continue;
             }
             let products = owned.flat_map(|(_, x)| b.iter().map(move |y| x * y));
-            positions.iter().zip(products).for_each(|(&at, product)| g[at as usize] += weight * product);
+            positions.iter().zip(products).for_each(|(&at, product)| g[at as usize] += spring * product);
         }
     }
 }
