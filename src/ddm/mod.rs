@@ -30,7 +30,7 @@
 //! | `stop::FALLS`, `NEAR_FALLS` | 0.9, 0.5 | what is progress far from the solution, and near it | random scenes, none lost |
 //! | `stop::PATIENCE` | 3 | how many steps without progress end a run | random scenes, none lost |
 //! | `solve::TIMES` | 10 | how many tolerances of imbalance are no solution | the two norms differ by less |
-//! | `solve::ONE_DIGIT` | 0.1 | when roundoff leaves no result | no digit is left |
+//! | `linalg::DIGIT` | 0.1 | when roundoff leaves no result | no digit is left |
 
 mod bound;
 mod forcing;

@@ -11,6 +11,7 @@ use super::gamma::{GammaRule, Iterate};
 use super::run::{Outcome, Row, Run};
 use super::stop::Status;
 use crate::error::Result;
+use crate::linalg::DIGIT;
 use crate::model::field::{Field, unbalanced};
 use crate::model::layer::Layer;
 use crate::robin::Sweep;
@@ -146,10 +147,7 @@ fn found_interval(run: &mut Run, layer: &Layer) -> Result<Option<Interval>> {
     }
 }
 
-/// Share of an earlier residual below which the pressures of that iterate give an estimate: a digit.
-const FALLEN: f64 = 0.1;
-
-/// Earlier iterates, whose residuals fall from each to the next at least to the share [`FALLEN`].
+/// Earlier iterates, whose residuals fall from each to the next at least by a [`DIGIT`].
 ///
 /// They estimate the error of the pressures from their change while the residual fell.
 ///
@@ -167,7 +165,7 @@ impl Settling {
     /// count as the peak: laws are far from linear there, so that larger errors say nothing about those that follow.
     fn error(&self, residual: f64, now: &[f64], peak: f64) -> f64 {
         // from a good start the residual may never have fallen so far
-        let earlier = self.past.iter().rfind(|(earlier, _)| residual <= FALLEN * earlier).or(self.past.first());
+        let earlier = self.past.iter().rfind(|(earlier, _)| residual <= DIGIT * earlier).or(self.past.first());
         earlier.map_or(0.0, |(earlier, pressure)| {
             let changes = pressure.iter().zip(now).map(|(before, now)| (now - before).abs());
             let change = changes.fold(0.0, f64::max).min(peak);
@@ -179,7 +177,7 @@ impl Settling {
     /// Note an iterate.
     fn note(&mut self, residual: f64, pressure: &[f64]) {
         self.past.retain(|(earlier, _)| *earlier > residual);
-        if self.past.last().is_none_or(|(earlier, _)| residual <= FALLEN * earlier) {
+        if self.past.last().is_none_or(|(earlier, _)| residual <= DIGIT * earlier) {
             self.past.push((residual, pressure.to_vec()));
         }
     }

@@ -8,7 +8,7 @@ use super::start::{self, RigidStart};
 use super::stop::Status;
 use super::{newton, robin};
 use crate::error::Result;
-use crate::linalg::axpy;
+use crate::linalg::{DIGIT, axpy};
 use crate::model::field::Field;
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
@@ -167,7 +167,7 @@ impl Run<'_> {
             return Status::Unbalanced(end.unbalanced);
         }
         let lost = if end.status == Status::RoundoffLimited { reached.max(rounding) } else { rounding };
-        if lost > ONE_DIGIT {
+        if lost > DIGIT {
             return Status::NoDigits(lost);
         }
         let tolerance = self.stop.increment.map_or(tolerance, |increment| increment.max(tolerance));
@@ -183,9 +183,6 @@ fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// A run reports unbalanced forces, or the roundoff of pressures, if they are larger than this number of tolerances. The norms in which the two are measured
 /// differ by less than a factor of ten.
 const TIMES: f64 = 10.0;
-
-/// Relative error beyond which a number has no correct digit. A run that rounding ended there has no result.
-const ONE_DIGIT: f64 = 0.1;
 
 /// The start of a run.
 #[derive(Debug, Clone, Default)]

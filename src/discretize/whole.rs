@@ -12,7 +12,8 @@ use crate::model::{Motion, Segment, Sprung, rigid::combined};
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashSet;
 
-/// Share of the largest possible work below which the work of the loads is rounding.
+/// Share of the largest possible work below which the work of the loads is rounding: the sum of a million works, each rounded by 1e-16 of it, is rounded by 1e-10
+/// at most.
 pub const NO_WORK: f64 = 1e-9;
 
 /// A whole body before its matrix is assembled.

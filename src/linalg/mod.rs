@@ -211,6 +211,9 @@ pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     }
 }
 
+/// A decimal digit: a number with a larger relative error has none, and what has fallen to this share has lost one.
+pub const DIGIT: f64 = 0.1;
+
 /// Return the amounts of some vectors whose combination is nearest to the vector `to` (least squares).
 pub fn fit<V: AsRef<[f64]>>(vectors: &[V], to: &[f64]) -> Vec<f64> {
     let count = vectors.len();

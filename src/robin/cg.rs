@@ -6,7 +6,7 @@
 
 use super::sweep::{Coefficient, Sweep, Sweeper};
 use crate::error::Result;
-use crate::linalg::{Factor, axpy, dot};
+use crate::linalg::{DIGIT, Factor, axpy, dot};
 use crate::model::Model;
 use crate::model::field::{Field, add_forces, local_dot};
 use crate::model::linear::{Failure, LinearResult, LinearSolution, LinearStep, StoppingTest, System, Trial};
@@ -15,10 +15,6 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Most iterations of a linear step: long before, rounding spoils the conjugacy of the directions.
 pub(super) const MOST_SWEEPS: usize = 400;
-
-/// Relative error of a linear step above which it counts as not solved after [`MOST_SWEEPS`] iterations. Newton's method converges with
-/// any relative error below one, more slowly the larger it is (Dembo, Eisenstat, Steihaug, Inexact Newton methods, 1982).
-const UNSOLVED: f64 = 0.1;
 
 /// Iterations whose gain of energy estimates the error before them (Hestenes and Stiefel). What later iterations gain is missing; the least eigenvalue covers that
 /// ([`Lanczos::squared_error`]).
@@ -73,14 +69,15 @@ impl LinearStep for SweepCg {
             Ok(found) => found,
             Err(failure) => return Ok(Err(failure)),
         };
-        self.least = found.spectrum.map_or(self.least, |(low, _)| low.min(self.least));
-        let LinearSolution { energy, error, .. } = found.solution;
-        if self.sweeper.sweeps - before > MOST_SWEEPS && error * error > UNSOLVED * UNSOLVED * energy {
+        let (solution, lanczos) = found;
+        self.least = lanczos.spectrum().map_or(self.least, |(low, _)| low.min(self.least));
+        let LinearSolution { energy, error, .. } = solution;
+        if self.sweeper.sweeps - before > MOST_SWEEPS && error * error > DIGIT * DIGIT * energy {
             let relative = error / energy.sqrt();
             let reason = format!("{MOST_SWEEPS} sweeps leave an error of {relative:.0e} of the linear step");
             return Ok(Err(Failure { body: None, reason }));
         }
-        Ok(Ok(found.solution))
+        Ok(Ok(solution))
     }
 
     /// In its first iterations, the estimated error of a solve that stagnates is too small.
@@ -93,14 +90,8 @@ impl LinearStep for SweepCg {
     }
 }
 
-/// Result of conjugate gradients.
-pub(super) struct CgResult {
-    pub solution: LinearSolution,
-    /// Bounds of the spectrum of G^-1 H from the Lanczos matrix of the iteration.
-    pub spectrum: Option<(f64, f64)>,
-}
-
-/// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. `springs`
+/// Solve (K + B' diag(springs) B) x = r with the Robin term that the model carries, until `enough` says so or for `most` iterations. Return the solution
+/// with the coefficients of the iteration. `springs`
 /// are omega kappa at the points (n). `least` is the least eigenvalue of earlier systems, infinite if there were none: the first iterations do
 /// not see the slow modes.
 pub(super) fn conjugate_gradients(
@@ -110,7 +101,7 @@ pub(super) fn conjugate_gradients(
     residual: &[Vec<f64>],
     (enough, most): (&mut StoppingTest, usize),
     least: f64,
-) -> Result<std::result::Result<CgResult, Failure>> {
+) -> Result<std::result::Result<(LinearSolution, Lanczos), Failure>> {
     let mut state = Gradients::new(model, springs, residual, least);
     let squared = loop {
         let before = state.previous.as_ref().map_or(&state.r, |previous| &previous.residual);
@@ -134,7 +125,7 @@ pub(super) fn conjugate_gradients(
     };
     let Gradients { x, lanczos, .. } = state;
     let solution = LinearSolution { field: x, energy: lanczos.energy, error: squared.max(0.0).sqrt(), is_exact: false };
-    Ok(Ok(CgResult { solution, spectrum: lanczos.spectrum() }))
+    Ok(Ok((solution, lanczos)))
 }
 
 /// Conjugate gradients under way.
@@ -226,7 +217,7 @@ fn add_motions(model: &Model, s: f64, y: &DVector<f64>, v: &mut Field) {
 
 /// The coefficients of conjugate gradients, from which the spectrum and the error are estimated.
 #[derive(Default)]
-struct Lanczos {
+pub(super) struct Lanczos {
     alphas: Vec<f64>,
     betas: Vec<f64>,
     /// Least eigenvalue known from earlier systems.
@@ -271,7 +262,7 @@ impl Lanczos {
     }
 
     /// Return the extreme eigenvalues of the Lanczos matrix; none before the first iteration, or if they are not positive and finite.
-    fn spectrum(&self) -> Option<(f64, f64)> {
+    pub fn spectrum(&self) -> Option<(f64, f64)> {
         let (n, alphas, betas) = (self.alphas.len(), &self.alphas, &self.betas);
         let mut t = DMatrix::zeros(n, n);
         for i in 0..n {

@@ -71,7 +71,7 @@ fn extremes(model: &mut Model, springs: &[f64]) -> Result<Option<(f64, f64)>> {
     let mut enough = |_: &Model, trial: &Trial| trial.is_within(SEEN);
     let found =
         conjugate_gradients(model, &mut Sweeper::default(), springs, &load, (&mut enough, MOST_SWEEPS), f64::INFINITY)?;
-    Ok(found.ok().and_then(|found| found.spectrum))
+    Ok(found.ok().and_then(|(_, lanczos)| lanczos.spectrum()))
 }
 
 /// Return the least and the largest p' at a point over the compressions that it can have in the level set, if it has c at the solution. F1 is convex, and
