@@ -3,7 +3,7 @@
 
 use super::body::{Body, Energy};
 use super::layer::Layer;
-use super::{BodySlot, Model, rigid};
+use super::{BodySlot, Model, closing, rigid};
 use crate::linalg::{axpy, dot};
 
 /// Displacements v + E a of all bodies, with rigid motions E that supports and springs leave free.
@@ -123,8 +123,7 @@ impl Field {
 
     /// Return the change of compression at each point: B_a v_a + B_b v_b.
     pub fn closing(&self) -> Vec<f64> {
-        let points = self.trace.len() / 2;
-        (0..points).map(|q| self.trace[q] + self.trace[points + q]).collect()
+        closing(&self.trace).collect()
     }
 }
 

@@ -194,15 +194,13 @@ impl Model {
 
     /// Subtract the closings of a trace vector (2n) from the gaps.
     pub fn close_gap(&mut self, trace: &[f64]) {
-        let points = self.points();
-        self.gap.iter_mut().enumerate().for_each(|(q, gap)| *gap -= trace[q] + trace[points + q]);
+        self.gap.iter_mut().zip(closing(trace)).for_each(|(gap, s)| *gap -= s);
     }
 
     /// Return c = B u - d at the points (n), for a trace vector (2n).
     pub fn compression(&self, trace: &[f64]) -> Vec<f64> {
-        let points = self.points();
         // adding 0.0 turns -0.0, which depends on the order of a sum, into 0.0
-        (0..points).map(|q| trace[q] + trace[points + q] - self.gap[q] + 0.0).collect()
+        closing(trace).zip(&self.gap).map(|(s, gap)| s - gap + 0.0).collect()
     }
 
     /// Return the forces omega p, for pressures p at the points (n).
@@ -373,6 +371,12 @@ impl Model {
         }
         Ok(())
     }
+}
+
+/// Return B u = u_a + u_b at the points (n), by which a trace vector (2n) closes them.
+pub fn closing(trace: &[f64]) -> impl Iterator<Item = f64> {
+    let (a, b) = trace.split_at(trace.len() / 2);
+    a.iter().zip(b).map(|(a, b)| a + b)
 }
 
 /// Return the gap at local point `q` of a pair, less the part that prescribed displacements close.
