@@ -158,7 +158,8 @@ fn zero_between(at: &[f64], values: &[f64]) -> Option<f64> {
     let mut sorted: Vec<f64> = at.iter().copied().chain([0.0, 1.0]).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let is_open = |x: f64| polynomial(x) <= 0.0;
-    let [mut low, mut high] = sorted.array_windows().copied().find(|&[p, q]| is_open(p) != is_open(q))?;
+    let mut ends = sorted.windows(2).map(|ends| [ends[0], ends[1]]);
+    let [mut low, mut high] = ends.find(|&[p, q]| is_open(p) != is_open(q))?;
     let open_below = is_open(low);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
