@@ -1,7 +1,7 @@
 """The groove solved by NGSolve, and compared with winkler. scripts/order calls it.
 
 order.py solve P HMAX H0 RATIO B A END FILE    one solve by NGSolve; prints a line of JSON
-order.py compare WINKLER FOLDER [--quick]      all solves; writes docs/benchmark-order.csv and prints a table
+order.py compare WINKLER FOLDER [--quick]      all solves; writes docs/benchmark-order.csv, its plot, and prints a table
 """
 
 import csv
@@ -260,6 +260,33 @@ def ours(winkler, folder, order, tolerance, layer):
     return numbers, columns
 
 
+def plot(rows, file):
+    """Plot seconds of the solve against the error: for each layer the fastest solves of both programs to each error."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "order", "font.size": 9})
+    figure, all_axes = pyplot.subplots(1, len(LAYERS), sharey=True, figsize=(9, 3.2), layout="constrained")
+    for axes, layer in zip(all_axes, LAYERS):
+        for program, colour in (("NGSolve", "#7a7a7a"), ("winkler", "#1f6fb2")):
+            solves = sorted((row["error"], row["solve"]) for row in rows if row["program"] == program and row["a"] == layer[1])
+            axes.loglog(*zip(*solves), ".", color=colour, alpha=0.4) if solves else None
+            front, least = [], float("inf")
+            for error, seconds in solves:
+                if seconds < least:
+                    front.append((error, seconds))
+                    least = seconds
+            axes.loglog(*zip(*front), "o-", color=colour, label=program) if front else None
+        axes.set_title(f"a = {layer[1]:g}")
+        axes.set_xlabel("error of the pressures")
+        axes.grid(alpha=0.3)
+    all_axes[0].set_ylabel("CPU s of the solve")
+    all_axes[0].legend()
+    figure.savefig(file, metadata={"Date": None})
+
+
 def compare(winkler, folder, quick):
     """Solve all cases, write the table, and print the fastest solve to each error."""
     rows = []
@@ -267,7 +294,7 @@ def compare(winkler, folder, quick):
         {"program": program, "a": layer[1], "settings": settings, **numbers, "error": error})
     for layer in LAYERS[1:2] if quick else LAYERS:
         _, reference = peer(folder, REFERENCE, layer)
-        grids = [(h, h0, r) for h in (0.5, 1) for h0 in (0.3, 0.1, 0.03) for r in (2, 3)]
+        grids = [(h, h0, r) for h in (0.5, 1) for h0 in (0.3, 0.1, 0.03, 0.01) for r in (2, 3)]
         for order in (4,) if quick else (2, 3, 4, 5, 6):
             for grid in grids[:2] if quick else grids:
                 numbers, pressures = peer(folder, (order, *grid), layer)
@@ -284,6 +311,7 @@ def compare(winkler, folder, quick):
         table = csv.DictWriter(out, names, extrasaction="ignore", lineterminator="\n")
         table.writeheader()
         table.writerows({k: f"{v:.3g}" if isinstance(v, float) else v for k, v in row.items()} for row in rows)
+    plot(rows, file.replace(".csv", "-time-error.svg"))
     print("| a | error | NGSolve, s | winkler, s | ratio | all meshes, s |\n| --- | --- | ---: | ---: | ---: | ---: |")
     for layer in LAYERS:
         for least in (1e-3, 1e-4, 1e-5, 1e-6):
