@@ -283,7 +283,7 @@ def plot(rows, file):
         axes.set_xlabel("error of the pressures")
         axes.grid(alpha=0.3)
     all_axes[0].set_ylabel("CPU s of the solve")
-    all_axes[0].legend()
+    all_axes[1].legend()
     figure.savefig(file, metadata={"Date": None})
 
 
