@@ -103,7 +103,7 @@ pub fn estimate(
     let displacements = displacements(meshes, model, iterate)?;
     let each = displacements.iter().enumerate();
     let recovered: Vec<_> = each.map(|(body, u)| Some(meshes.recover(body, u.as_ref()?))).collect();
-    let mut local = LocalErrors::of_bodies(meshes, &recovered, &work_on_missed(meshes, model, layer, &recovered));
+    let mut local = LocalErrors::of_bodies(&recovered, &work_on_missed(meshes, model, layer, &recovered));
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, (pair, &rigid_closing(model, iterate, pair)));
     }
@@ -235,15 +235,14 @@ struct LocalErrors {
 
 impl LocalErrors {
     /// Return the errors of the bodies, without those of the layers. `work_on_missed` has an entry for each body.
-    fn of_bodies(meshes: &dyn Meshes, recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
+    fn of_bodies(recovered: &RecoveredBodies, work_on_missed: &[f64]) -> Self {
         let count = recovered.len();
         let none = || vec![Vec::new(); count];
         let (cells, rates, strips, loads) = (none(), none(), none(), none());
         let mut local = Self { cells, rates, strips, loads, layers: Vec::new(), mean_error: Vec::new() };
         for (body, recovered) in recovered.iter().enumerate() {
             if let Some(recovered) = recovered {
-                let Errors { cells, rates, strips, mut load } = recovered.errors(work_on_missed[body]);
-                load.iter_mut().zip(meshes.missed_load(body)).for_each(|(load, missed)| *load += missed);
+                let Errors { cells, rates, strips, load } = recovered.errors(work_on_missed[body]);
                 (local.cells[body], local.rates[body]) = (cells, rates);
                 (local.strips[body], local.loads[body]) = (strips, load);
             }

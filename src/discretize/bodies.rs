@@ -6,12 +6,11 @@ use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
 use crate::error::{Error, Result, shown};
-use crate::expression::Field;
 use crate::fem::elasticity::Flaw;
 use crate::fem::{
     ElasticBody, Elasticity, Facets, NodalForces, NodeGraph, PointExtent, Space, assemble, support, surface,
 };
-use crate::linalg::{Csr, Total, axpy, countable};
+use crate::linalg::{Csr, Total, countable};
 use crate::mesh::{self, Group, Mesh};
 use crate::problem::{BodySpec, Constants, ElasticitySpec, Order, Plane};
 use crate::problem::{Load, LoadKind};
@@ -66,42 +65,15 @@ impl<'a, const D: usize> SceneBody<'a, D> {
     /// # Errors
     /// A load is not finite somewhere, or a surface is not on the body or has no area.
     pub fn load(&self, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
-        let load = self.load_by(mesh, false)?;
+        let mut load = body_force(self.spec, &self.mesh.space)?;
+        for spec in &self.spec.load {
+            load = load.and(self.on_surface(spec, spec.factor, mesh)?);
+        }
         if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) }
     }
 
-    /// Return the nodal forces of all loads that the quadrature misses: those of the same rules on halves of all edges, less those of the
-    /// rules. The result is empty if all loads are constant.
-    ///
-    /// # Errors
-    /// See [`SceneBody::load`].
-    pub fn missed_load(&self, mesh: &Mesh<D>) -> Result<Vec<f64>> {
-        let is_constant = |load: &Load| match &load.kind {
-            LoadKind::Pressure(pressure) => pressure.is_constant(),
-            LoadKind::Traction(traction) => traction.iter().all(Field::is_constant),
-            LoadKind::Force { .. } | LoadKind::Moment(_) | LoadKind::Turning { .. } => true,
-        };
-        let mut force = self.spec.force.iter().flat_map(|force| force.iter());
-        if self.spec.load.iter().all(is_constant) && force.all(Field::is_constant) {
-            return Ok(Vec::new());
-        }
-        let nodes = self.mesh.space.nodes.len();
-        let mut missed = self.load_by(mesh, true)?.all(nodes);
-        axpy(-1.0, &self.load_by(mesh, false)?.all(nodes), &mut missed);
-        Ok(missed)
-    }
-
-    /// Return the nodal forces of the loads by their quadrature rules, or by these on halves of all edges.
-    fn load_by(&self, mesh: &Mesh<D>, on_halves: bool) -> Result<NodalForces<D>> {
-        let mut load = body_force(self.spec, &self.mesh.space, on_halves)?;
-        for spec in &self.spec.load {
-            load = load.and(self.on_surface(spec, spec.factor, mesh, on_halves)?);
-        }
-        Ok(load)
-    }
-
-    /// Return the nodal forces of `factor` times a load of the scene, integrated on facets or their halves. They are zero if its surface is rigid.
-    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>, on_halves: bool) -> Result<NodalForces<D>> {
+    /// Return the nodal forces of `factor` times a load of the scene. They are zero if its surface is rigid.
+    fn on_surface(&self, spec: &Load, factor: f64, mesh: &Mesh<D>) -> Result<NodalForces<D>> {
         let name = &self.spec.name;
         let group = spec.group(mesh)?;
         if let (0, LoadKind::Force { total, .. }) = (group.dimension, &spec.kind) {
@@ -120,9 +92,7 @@ impl<'a, const D: usize> SceneBody<'a, D> {
             return if load.is_finite() { Ok(load) } else { Err(too_large(self.spec)) };
         }
         let values = FieldValues::of("this load", &name.value);
-        let rule = surface::rule(&self.mesh.space);
-        let rule = if on_halves { rule.on_parts() } else { rule };
-        let load = surface::surface_load_by(&self.mesh.space, &facets, &rule, &|x, n| match &spec.kind {
+        let load = surface::surface_load(&self.mesh.space, &facets, &|x, n| match &spec.kind {
             LoadKind::Pressure(field) => {
                 let pressure = factor * values.at(field, self.mesh.space.in_scene(x));
                 n.map(|n| -pressure * n)
@@ -160,9 +130,9 @@ impl<'a, const D: usize> SceneBody<'a, D> {
         match load.kind {
             LoadKind::Force { total, rigid: true } | LoadKind::Turning { force: total, .. } => {
                 let kind = LoadKind::Force { total, rigid: false };
-                self.on_surface(&Load { kind, ..load.clone() }, 1.0, mesh, false)
+                self.on_surface(&Load { kind, ..load.clone() }, 1.0, mesh)
             }
-            _ => self.on_surface(load, 1.0, mesh, false),
+            _ => self.on_surface(load, 1.0, mesh),
         }
     }
 
@@ -219,15 +189,14 @@ impl<'a, const D: usize> SceneBody<'a, D> {
 ///
 /// # Errors
 /// The force is not finite somewhere, or beyond the range of numbers.
-fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>, on_halves: bool) -> Result<NodalForces<D>> {
+fn body_force<const D: usize>(spec: &BodySpec, space: &Space<D>) -> Result<NodalForces<D>> {
     let (name, Some(fields)) = (&spec.name, &spec.force) else { return Ok(NodalForces::default()) };
     let values = FieldValues::of("this body force", &name.value);
     let density = |x: [f64; D]| {
         let x = space.in_scene(x);
         std::array::from_fn(|c| spec.force_factor * values.at(&fields[c], x))
     };
-    let rule = assemble::load_rule(space);
-    let load = assemble::body_force_by(space, &if on_halves { rule.on_parts() } else { rule }, &density);
+    let load = assemble::body_force(space, &density);
     values.refused()?;
     if !load.is_finite() {
         return Err(Error::scene(&name.place, format!("body `{}`: the body force is too large", name.value))
@@ -273,7 +242,6 @@ pub fn parts<'a, const D: usize>(scene: &'a Scene, verified: &Verified<D>) -> Re
             nodal_rows,
             approach,
             load: NodalForces::default(),
-            missed_load: Vec::new(),
             unconstrained_modes: Vec::new(),
             unsupported_modes: Vec::new(),
             prescribed: Vec::new(),

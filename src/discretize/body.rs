@@ -36,8 +36,6 @@ pub struct BodyMesh<const D: usize> {
     pub approach: Csr,
     /// Nodal forces of the loads without those on rigid surfaces. On a part they are those at owned nodes, and at nodes tied to these.
     pub load: NodalForces<D>,
-    /// Nodal forces of the loads that their quadrature misses, at all nodes, if an estimate of the error needs them.
-    pub missed_load: Vec<f64>,
     /// Rigid motions that supports and springs leave.
     pub unconstrained_modes: Vec<RigidMotion<D>>,
     /// Rigid motions that supports alone leave.

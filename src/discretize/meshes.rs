@@ -18,9 +18,6 @@ pub trait Meshes {
     /// Recover smoother fields from the displacements `u` of all nodes of a body.
     fn recover<'a>(&'a self, body: usize, u: &'a [f64]) -> Box<dyn RecoveredFields + 'a>;
 
-    /// Return the nodal forces of a body that the quadrature of its loads misses. The slice is empty if there are none.
-    fn missed_load(&self, body: usize) -> &[f64];
-
     /// Return the displacements of all nodes of a body in the rigid motions that its supports leave, with these amounts.
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64>;
 
@@ -96,10 +93,6 @@ impl<const D: usize> Meshes for KeptMeshes<D> {
         let split = shape.split();
         let recovery = Recovery::new(&split.space, &shape.elasticity, split.values(u));
         Box::new(OnBody { kept: self, shape, split, u, recovery })
-    }
-
-    fn missed_load(&self, body: usize) -> &[f64] {
-        &self.shapes[body].mesh.missed_load
     }
 
     fn moved(&self, body: usize, amounts: &[f64]) -> Vec<f64> {

@@ -158,7 +158,6 @@ impl Partition {
             nodal_rows: rows_here(&body.nodal_rows),
             approach: rows_here(&body.approach),
             load: body.load.only(is_assembled).on(&nodes),
-            missed_load: body.missed_load.clone(),
             unconstrained_modes: body.unconstrained_modes.clone(),
             unsupported_modes: body.unsupported_modes.clone(),
             prescribed: body.prescribed.iter().filter_map(prescribed_here).collect(),

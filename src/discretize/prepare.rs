@@ -107,9 +107,6 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
         let body = &mut bodies[index];
         (body.owner, body.ranks) = (owner, ranks);
-        if keep {
-            body.part.mesh.missed_load = body.part.missed_load(mesh)?;
-        }
     }
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();

@@ -462,27 +462,15 @@ impl<const D: usize> FromIterator<(u32, [f64; D])> for NodalForces<D> {
     }
 }
 
-/// Return the quadrature rule of body forces.
-pub fn load_rule<const D: usize>(space: &Space<D>) -> Rule {
-    let low = space.order == Order::P1 && !space.axisymmetric;
-    element::rule(D + 1, if low { 2 } else { (2 * space.order.degree() + 1).max(5) }).with_shapes(space.order)
-}
-
 /// Return the nodal forces of a body force `density` (per volume) on the cells of a space.
 pub fn body_force<const D: usize>(space: &Space<D>, density: &dyn Fn([f64; D]) -> [f64; D]) -> NodalForces<D> {
-    body_force_by(space, &load_rule(space), density)
-}
-
-/// Return the nodal forces of a body force by another quadrature rule.
-pub fn body_force_by<const D: usize>(
-    space: &Space<D>,
-    rule: &Rule,
-    density: &dyn Fn([f64; D]) -> [f64; D],
-) -> NodalForces<D> {
+    let low = space.order == Order::P1 && !space.axisymmetric;
+    let degree = if low { 2 } else { (2 * space.order.degree() + 1).max(5) };
+    let rule = element::rule(D + 1, degree).with_shapes(space.order);
     let (space, nodes) = space.part(0..space.cell_count());
     let mut load = vec![0.0; space.dofs()];
     for index in 0..space.cell_count() {
-        for point in space.points(index, rule).flatten() {
+        for point in space.points(index, &rule).flatten() {
             let force = density(point.at);
             for (phi, &node) in point.phi.iter().zip(point.cell) {
                 for c in 0..D {

@@ -217,32 +217,6 @@ impl Rule {
     pub fn iter(&self) -> impl Iterator<Item = (&[f64], f64)> {
         self.points.iter().map(Vec::as_slice).zip(self.weights.iter().copied())
     }
-
-    /// Return the same rule on each of the equal parts, half as wide, into which a simplex of two to four vertices is divided.
-    pub fn on_parts(&self) -> Self {
-        let n = self.points[0].len();
-        // There is a part at each vertex. In a triangle one more remains, and in a tetrahedron an octahedron, which is divided into
-        // four parts around a diagonal.
-        let mut parts: Vec<Vec<(usize, usize)>> = (0..n).map(|i| (0..n).map(|j| (i, j)).collect()).collect();
-        match n {
-            3 => parts.push(vec![(0, 1), (1, 2), (2, 0)]),
-            4 => {
-                let rings = [(0, 1), (1, 2), (2, 3), (3, 0), (0, 1)];
-                parts.extend(rings.windows(2).map(|ring| vec![(0, 2), (1, 3), ring[0], ring[1]]));
-            }
-            _ => {}
-        }
-        let share = 1.0 / parts.len() as f64;
-        let mut rule = Self::default();
-        for part in parts {
-            let part: Vec<[f64; 4]> = part.into_iter().map(middle).collect();
-            for (l, weight) in self.iter() {
-                let point = |k: usize| (0..n).map(|vertex| l[vertex] * part[vertex][k]).sum();
-                rule.add(&(0..n).map(point).collect::<Vec<f64>>(), share * weight);
-            }
-        }
-        rule
-    }
 }
 
 /// Return the rule on the simplex with so many vertices that is exact for polynomials of `degree`, at most 5 on tetrahedra, whose elements
@@ -384,11 +358,7 @@ mod tests {
 
     /// The mean of a monomial in barycentric coordinates over a simplex is n! prod(a_i!) / (n + sum a)!.
     fn check(n: usize, degree: usize) {
-        check_rule(n, degree, &rule(n, degree));
-        check_rule(n, degree, &rule(n, degree).on_parts());
-    }
-
-    fn check_rule(n: usize, degree: usize, rule: &Rule) {
+        let rule = rule(n, degree);
         let mut powers = vec![0usize; n];
         loop {
             if powers.iter().sum::<usize>() <= degree {

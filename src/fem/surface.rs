@@ -7,9 +7,10 @@ use super::frame::place;
 use super::length;
 use super::space::Space;
 
-/// Return the quadrature rule of loads and springs on the surface of a body.
+/// Return the quadrature rule of loads and springs on the surface of a body. It has ten degrees more than constant loads need: of a bell exp(-(s/r)^2)
+/// with r a third of a linear facet it loses 1e-5 in place of a fifth.
 pub fn rule<const D: usize>(space: &Space<D>) -> Rule {
-    element::rule(D, 2 * space.order.degree() + 1)
+    element::rule(D, 2 * space.order.degree() + 11)
 }
 
 /// Return the nodal forces of a surface load. `traction(x, n)` is the force per area at a point x with outer unit normal n.
@@ -18,19 +19,9 @@ pub fn surface_load<const D: usize>(
     facets: &Facets<D>,
     traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
 ) -> NodalForces<D> {
-    surface_load_by(space, facets, &rule(space), traction)
-}
-
-/// Return the nodal forces of a surface load by another quadrature rule.
-pub fn surface_load_by<const D: usize>(
-    space: &Space<D>,
-    facets: &Facets<D>,
-    rule: &Rule,
-    traction: &dyn Fn([f64; D], [f64; D]) -> [f64; D],
-) -> NodalForces<D> {
     let surface_nodes = facets.distinct_nodes();
     let mut load = vec![0.0; D * surface_nodes.len()];
-    visit(space, facets, rule, |FacetPoint { nodes, phi, weight, x, normal }| {
+    visit(space, facets, &rule(space), |FacetPoint { nodes, phi, weight, x, normal }| {
         let force = traction(x, normal);
         for (a, at) in nodes.iter().enumerate().filter_map(|(a, &node)| Some((a, place(&surface_nodes, node)?))) {
             for c in 0..D {

@@ -179,9 +179,9 @@ fn straight_edges_away_from_the_contact_are_seen() {
     }
 }
 
-/// A load that bends within an element: what its quadrature misses presses or lacks.
+/// A load that bends within an element: its quadrature misses little of it.
 #[test]
-fn quadrature_of_loads_is_seen() {
+fn a_load_that_bends_within_an_element() {
     let solved = |order: usize, n: usize| {
         let mut all = sets(order, n);
         all.push("contact.0.gap=0".to_owned());
@@ -197,7 +197,8 @@ fn quadrature_of_loads_is_seen() {
             fine["pressure"][place.expect("nodes of a mesh are nodes of a finer one")]
         };
         let exact = pressure_error(&table, order, at);
-        assert!(order == 2 || exact > 0.02, "{exact}");
+        // degrees of constant loads miss a fiftieth on linear elements
+        assert!(exact < 1e-3, "{exact}");
         is_effective(run.number("discretization_error/pressure/0"), exact, &format!("P{order}"));
     }
 }
@@ -465,8 +466,8 @@ fn the_linear_step_does_not_change_the_estimate() {
     }
 }
 
-/// Springs to the ground that only hold bodies whose loads balance: the estimate is the same however soft they are, while what quadrature misses of the
-/// loads moves the bodies by more than all of their deformation. Springs that carry a load count.
+/// Springs to the ground that only hold bodies whose loads balance: the estimate is the same however soft they are, while a millionth of the
+/// loads, which does not balance, moves the bodies by more than all of their deformation. Springs that carry a load count.
 #[test]
 fn springs_that_only_hold() {
     let bump = "10*exp(-4*(x - 0.5)^2)";
@@ -490,8 +491,9 @@ fn springs_that_only_hold() {
         let errors = errors.map(|name| run.number(&format!("discretization_error/{name}")));
         (run.number("bodies/0/max_displacement"), errors)
     };
-    let (held, stiff) = pressed(bump, "1");
-    let (moved, soft) = pressed(bump, "1e-3");
+    let nearly = "10.00001*exp(-4*(x - 0.5)^2)";
+    let (held, stiff) = pressed(nearly, "1");
+    let (moved, soft) = pressed(nearly, "1e-3");
     assert!(moved > 10.0 * held, "{moved} {held}");
     for (soft, stiff) in soft.iter().zip(stiff) {
         assert!((soft / stiff - 1.0).abs() < 1e-3, "{soft} {stiff}");
@@ -502,13 +504,13 @@ fn springs_that_only_hold() {
     assert!(10.0 * loaded[0] < stiff[0] && 10.0 * loaded[2] < stiff[2], "{loaded:?} {stiff:?}");
 }
 
-/// A wave of pressure that the mesh cannot have: the estimate is called a guess, with the body and a place under the load.
+/// Linear elements that lock have hardly any of the solution: the estimate is called a guess, with the body and a place under the load.
 #[test]
 fn an_estimate_as_large_as_the_solution_is_a_guess() {
     let scene = Scene::new(format!(
         "dimension = 2\nestimate = true\nmesh = {{ geo = \"{}\", set = {{ n = 4 }} }}\n[[body]]\nname = \"lower\"\nyoung = 2.1e5\n\
-         poisson = 0.3\nfix = [{{ on = \"lower_sides\", x = 0 }}, {{ on = \"lower_face\", y = 0 }}]\n\
-         load = [{{ on = \"lower_top\", pressure = \"10*cos(12*pi*x)\" }}]\n",
+         poisson = 0.4999\nfix = [{{ on = \"lower_sides\", x = 0 }}, {{ on = \"lower_face\", y = 0 }}]\n\
+         load = [{{ on = \"lower_top\", pressure = \"10*cos(4*pi*x)\" }}]\n",
         root().join("meshes/wavy/wavy.geo").display()
     ));
     let coarse = solve(&scene, &[]).converged();
@@ -518,8 +520,8 @@ fn an_estimate_as_large_as_the_solution_is_a_guess() {
         said.contains("is a guess") && said.contains("of all bodies `lower` has most of it") && said.contains(", 0.9"),
         "{said}"
     );
-    let fine = solve(&scene, &["--set", "mesh.set.n=24"]).converged();
-    assert!(!fine.warnings().contains("guess"), "{}", fine.warnings());
+    let free = solve(&scene, &["--set", "body.0.poisson=0.3"]).converged();
+    assert!(!free.warnings().contains("guess"), "{}", free.warnings());
 }
 
 /// Solves `groove-held` on adapted meshes with a Gmsh that makes no mesh of sizes when the shell finds `fails` true. `$n` is the number of the mesh
