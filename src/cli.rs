@@ -1,10 +1,11 @@
 //! The command line: arguments -> request -> command -> exit code.
 
-use crate::commands::{bench, check, gone, mesh, new, solve, sweep};
+use crate::commands::{bench, check, mesh, new, solve, sweep};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
 use crate::output::say;
 use crate::petsc::Session;
+use crate::scene::gone;
 use crate::solver::options;
 use clap::error::ContextKind;
 use clap::{CommandFactory, Parser, Subcommand};
@@ -184,7 +185,7 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
     }
     let command = refusal.get(ContextKind::InvalidSubcommand).map(ToString::to_string).unwrap_or_default();
     for name in [&word, &command] {
-        if let Some(advice) = gone::advice(name) {
+        if let Some(advice) = gone::advice(gone::OPTIONS, name) {
             return refuse(format!("`{name}` is gone"), advice.to_owned());
         }
     }

@@ -27,6 +27,7 @@ mod whole;
 pub use approach::mean_normal;
 pub use assembly::{Assembled, Factory};
 pub use facts::BodyInfo;
+pub use groups::find_group;
 pub use marks::marks;
 pub use pairs::ContactFacts;
 pub use post::ForceBalance;

@@ -163,18 +163,14 @@ impl Field {
 
     /// Return the value at a point (z = 0 in plane problems), with NaN for k. It is NaN or infinite where the expression is not defined.
     pub fn eval(&self, x: [f64; 3]) -> f64 {
-        match self {
-            Field::Constant(value) => *value,
-            Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], f64::NAN]),
-            Field::Function(function) => function(x),
-        }
+        self.eval_at(x, f64::NAN)
     }
 
-    /// Return the value at a point in iteration `k`. Messages call it psi.
-    pub fn eval_at(&self, x: [f64; 3], k: usize) -> f64 {
+    /// Return the value at a point in iteration `k`.
+    fn eval_at(&self, x: [f64; 3], k: f64) -> f64 {
         match self {
             Field::Constant(value) => *value,
-            Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], k as f64]),
+            Field::Expression(expression) => expression.eval(&[x[0], x[1], x[2], k]),
             Field::Function(function) => function(x),
         }
     }
@@ -214,7 +210,7 @@ impl Field {
     /// # Errors
     /// A point where it is not defined.
     pub fn is_true_at(&self, x: [f64; 3], k: usize) -> Result<bool> {
-        let value = self.eval_at(x, k);
+        let value = self.eval_at(x, k as f64);
         if value.is_nan() { Err(self.refuse("psi", &[x[0], x[1], x[2], k as f64], value)) } else { Ok(value > 0.0) }
     }
 

@@ -407,7 +407,7 @@ impl AdaptiveRun {
     /// Return what was asked of the mesh of this round.
     fn sizes(&self) -> Option<Arc<AdaptedMesh>> {
         match &self.scene.mesh {
-            MeshSource::Geo { adapted, .. } => adapted.clone(),
+            MeshSource::Geo(source) => source.adapted.clone(),
             _ => None,
         }
     }
@@ -436,7 +436,7 @@ fn mesh_of(sizes: &Sizes) -> AdaptedMesh {
 
 /// Let the mesh of a scene be an adapted one.
 fn follow(scene: &mut Scene, mesh: Option<Arc<AdaptedMesh>>) {
-    if let MeshSource::Geo { adapted, .. } = &mut scene.mesh {
-        *adapted = mesh;
+    if let MeshSource::Geo(source) = &mut scene.mesh {
+        source.adapted = mesh;
     }
 }

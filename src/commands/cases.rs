@@ -1,6 +1,7 @@
 //! The plan of `sweep` and `bench`: axes with values, and a case for each combination of them.
 
 use crate::error::{Error, Kind, Result};
+use crate::output::tables::Cell;
 use std::path::PathBuf;
 
 /// What varies between cases.
@@ -124,6 +125,11 @@ impl Plan {
     pub fn value<'a>(&self, case: &'a Case, column: &str) -> &'a str {
         let place = self.columns.iter().position(|name| name == column);
         place.map_or("", |place| &case.key[place])
+    }
+
+    /// Return the values of a case as fields of a table.
+    pub fn fields(&self, case: &Case) -> impl Iterator<Item = Cell> {
+        self.columns.iter().cloned().zip(case.key.iter().cloned())
     }
 
     /// Return the columns that differ between some keys.

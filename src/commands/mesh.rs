@@ -1,6 +1,6 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
-use crate::discretize::{Verified, verify};
+use crate::discretize::{Verified, find_group, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
 use crate::fem::Space;
@@ -10,7 +10,7 @@ use crate::mesh::{Group, Loaded, Mesh, MeshOrigin};
 use crate::output::report::readable;
 use crate::output::terminal::ProgressLine;
 use crate::output::{say, write_whole};
-use crate::problem::{MeshSource, Order};
+use crate::problem::{BodySpec, MeshSource, Order};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
 use serde::Serialize;
@@ -82,7 +82,11 @@ struct GroupFacts {
 /// Refusals of scene and mesh, a body without cells, a file that cannot be written.
 pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
     let facts = match request.scene.extension().is_none_or(|ending| ending == "toml") {
-        true => of_scene(interrupt, request)?,
+        true => {
+            let scene = crate::scene::load(&request.scene, &request.overrides)?;
+            let of_scene = if scene.dimension.value == 2 { facts::<2> } else { facts::<3> };
+            of_scene(&scene.mesh, Some(&scene), interrupt, request)?
+        }
         false => of_file(interrupt, request)?,
     };
     match request.json {
@@ -90,30 +94,6 @@ pub fn mesh(interrupt: &Interrupt, request: &MeshArgs) -> Result<i32> {
         false => say(in_lines(&facts))?,
     }
     Ok(0)
-}
-
-/// Return the facts of a scene's mesh.
-fn of_scene(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
-    let scene = crate::scene::load(&request.scene, &request.overrides)?;
-    match scene.dimension.value {
-        2 => checked::<2>(&scene, interrupt, request),
-        _ => checked::<3>(&scene, interrupt, request),
-    }
-}
-
-/// Load the mesh of a scene and check its bodies.
-fn checked<const D: usize>(scene: &Scene, interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
-    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let (facts, mesh) = load::<D>(&scene.mesh, order, interrupt, request)?;
-    let verified = verify(scene, &Serial, || Ok(mesh))?;
-    Ok(MeshFacts {
-        title: scene.title.clone(),
-        warnings: [facts.warnings, verified.notes.clone()].concat(),
-        splits: verified.splits(),
-        bodies: bodies(&verified)?,
-        groups: group_facts(&verified.mesh),
-        ..facts
-    })
 }
 
 /// Return the facts of a mesh, or of a shape or script that Gmsh meshes: in space, or in the plane where it has no cells in space.
@@ -126,20 +106,19 @@ fn of_file(interrupt: &Interrupt, request: &MeshArgs) -> Result<MeshFacts> {
         .help("write a scene with this file as its mesh"));
     }
     let source = MeshSource::of_argument(&request.scene)?;
-    let facts = |dimension: usize| match dimension {
-        2 => load::<2>(&source, Order::P1, interrupt, request).map(|(facts, _)| facts),
-        _ => load::<3>(&source, Order::P1, interrupt, request).map(|(facts, _)| facts),
-    };
-    facts(3).or_else(|error| facts(2).map_err(|_| error))
+    facts::<3>(&source, None, interrupt, request)
+        .or_else(|error| facts::<2>(&source, None, interrupt, request).map_err(|_| error))
 }
 
-/// Load a mesh, and write it if a file was asked for. Return it with the facts that need no scene.
-fn load<const D: usize>(
+/// Load a mesh, write it if a file was asked for, and check the bodies of a scene.
+fn facts<const D: usize>(
     source: &MeshSource,
-    order: Order,
+    scene: Option<&Scene>,
     interrupt: &Interrupt,
     request: &MeshArgs,
-) -> Result<(MeshFacts, Mesh<D>)> {
+) -> Result<MeshFacts> {
+    let orders = scene.into_iter().flat_map(|scene| &scene.bodies).map(|body| body.order);
+    let order = orders.max().unwrap_or(Order::P1);
     let began = Instant::now();
     let line = (!request.json).then(|| ProgressLine::new("mesh", None));
     let Loaded { mesh, origin, file, notes, .. } = crate::mesh::load::<D>(source, order, interrupt)?;
@@ -147,7 +126,7 @@ fn load<const D: usize>(
     let seconds = began.elapsed().as_secs_f64();
     request.output.as_ref().map_or(Ok(()), |path| write(path, &file, D))?;
     let of_mesh = [in_parts(mesh.split), made_straight(mesh.straightened)];
-    let facts = MeshFacts {
+    let mut facts = MeshFacts {
         title: request.scene.display().to_string(),
         file,
         origin: match origin {
@@ -164,34 +143,34 @@ fn load<const D: usize>(
         bodies: Vec::new(),
         groups: group_facts(&mesh),
     };
-    Ok((facts, mesh))
+    if let Some(scene) = scene {
+        let verified = verify(scene, &Serial, || Ok(mesh))?;
+        facts.title.clone_from(&scene.title);
+        facts.warnings.extend(verified.notes.iter().cloned());
+        (facts.splits, facts.bodies) = (verified.splits(), bodies(&verified)?);
+        facts.groups = group_facts(&verified.mesh);
+    }
+    Ok(facts)
 }
 
 fn bodies<const D: usize>(verified: &Verified<D>) -> Result<Vec<BodyFacts>> {
     let mesh = &verified.mesh;
-    let mut checked = verified.checked.iter();
-    let mut bodies = Vec::new();
-    for body in &verified.bodies {
-        let name = &body.name.value;
-        let Some(group) = mesh.group(name).filter(|group| group.dimension == D) else {
-            let known: Vec<&str> = mesh.group_names(D).collect();
-            return Err(Error::scene(&body.name.place, format!("the mesh has no cells named `{name}`"))
-                .help(format!("its groups of cells: {}", known.join(", "))));
-        };
+    // bodies without cells, which are refused here, were not checked
+    let facts = |(index, body): (usize, &BodySpec)| {
+        let group = find_group(mesh, &body.name, &[D], "body")?;
+        let checked = &verified.checked[index];
         let space = Space::new(mesh, group, body.order);
-        let [inner_facets, boundary_facets, parts] =
-            checked.next().map(|found| [found.inner, found.outer, found.parts.count]).unwrap_or_default();
-        bodies.push(BodyFacts {
-            name: name.clone(),
+        Ok(BodyFacts {
+            name: body.name.value.clone(),
             cells: group.len(),
             nodes: space.nodes.len(),
             dofs: space.dofs(),
-            inner_facets,
-            boundary_facets,
-            parts,
-        });
-    }
-    Ok(bodies)
+            inner_facets: checked.inner,
+            boundary_facets: checked.outer,
+            parts: checked.parts.count,
+        })
+    };
+    verified.bodies.iter().enumerate().map(facts).collect()
 }
 
 fn group_facts<const D: usize>(mesh: &Mesh<D>) -> Vec<GroupFacts> {

@@ -6,7 +6,6 @@ pub(crate) mod bench;
 mod cases;
 pub(crate) mod check;
 pub mod checkpoint;
-pub(crate) mod gone;
 mod interpolate;
 pub(crate) mod mesh;
 pub(crate) mod new;

@@ -3,10 +3,11 @@
 use crate::contact::ContactPair;
 use crate::ddm::Row;
 use crate::error::Result;
+use crate::expression::Field;
 use crate::fem::length;
 use crate::linalg::bounds;
-use crate::output::{Color, ConvergenceSeries, Folder, Plot, Series, StepReport, Style, UnitWords};
-use crate::problem::{Plane, Units, force_labels, label};
+use crate::output::{Color, Folder, Plot, PlotAxis, Series, StepReport, Style, UnitWords};
+use crate::problem::{Plane, Units, label};
 use crate::run::{Done, numbered, results};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
@@ -16,9 +17,9 @@ use std::collections::BTreeMap;
 pub struct Plots {
     /// Title of the first run.
     title: String,
-    /// Residual, increment and error of each run.
-    histories: Vec<ConvergenceSeries>,
-    /// The pressures of all runs along each pair.
+    /// Label and iterations of each run.
+    histories: Vec<(String, Vec<Row>)>,
+    /// The pressures of all runs along each pair, and last the reference.
     pressures: BTreeMap<usize, Plot>,
 }
 
@@ -29,13 +30,12 @@ impl Plots {
         if self.histories.is_empty() {
             self.title.clone_from(&done.built.scene.title);
         }
-        self.histories.push(ConvergenceSeries { label: label.to_owned(), rows: history(done) });
+        self.histories.push((label.to_owned(), history(done)));
         for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
-            let plot = self.pressures.entry(i).or_insert_with(|| pressure_plot(done, i));
-            plot.series.push(pressure_curve(label, done, i));
-            if plot.series.iter().all(|curve| curve.style != Style::Dashed) {
-                plot.series.extend(reference_curve(done, i));
-            }
+            let Plot { series, .. } = self.pressures.entry(i).or_insert_with(|| pressure_plot(done, i));
+            let pressure = &done.outcome.layer.pressure[done.model().range(i)];
+            let curve = curve(label, &pairs[i], Style::Line, |q, _| pressure[q]);
+            series.insert(series.iter().position(|curve| curve.style == Style::Dashed).unwrap_or(series.len()), curve);
         }
     }
 
@@ -51,15 +51,36 @@ impl Plots {
         self.files().zip(self.pressures()).try_for_each(|((_, file), plot)| folder.write(&file, |out| plot.write(out)))
     }
 
-    /// Return the plot of residuals over iterations.
+    /// Return the plot of residual (solid) and increment (dashed) of the runs over the iteration, and of the error of a single one.
     pub fn convergence(&self) -> Plot {
-        Plot::convergence(&self.title, &self.histories)
+        let runs = &self.histories;
+        let is_one = runs.len() == 1;
+        let has_increments = runs.iter().flat_map(|(_, rows)| rows).any(|row| row.increment > 0.0);
+        let mut series = Vec::new();
+        for (index, (label, rows)) in runs.iter().enumerate() {
+            let curve = |label: &str, style, value: fn(&Row) -> f64| {
+                let points = rows.iter().map(|row| (row.iteration as f64, value(row))).collect();
+                Series::new(label, points, style).color(Color::Palette(index))
+            };
+            series.push(curve(if is_one { "residual" } else { label }, Style::Line, |row| row.residual));
+            if has_increments {
+                series.push(curve(if is_one { "increment" } else { "" }, Style::Dashed, |row| row.increment));
+            }
+            if is_one && rows.iter().any(|row| row.error > 0.0) {
+                series.push(curve("error", Style::LineMarkers, |row| row.error).color(Color::Palette(1)));
+            }
+        }
+        if !is_one && has_increments {
+            for (label, style) in [("residual", Style::Line), ("increment", Style::Dashed)] {
+                series.push(Series::new(label, Vec::new(), style).color(Color::Grey));
+            }
+        }
+        Plot { title: self.title.clone(), x: PlotAxis::linear("iteration"), y: PlotAxis::log("relative size"), series }
     }
 
     /// Return the plots of pressures, in the order of [`Self::files`].
-    pub fn pressures(&self) -> impl Iterator<Item = Plot> {
-        let sorted = |Plot { title, x, y, series }: &Plot| Plot::pressure(title, &x.label, &y.label, series.clone());
-        self.pressures.values().map(sorted)
+    pub fn pressures(&self) -> impl Iterator<Item = &Plot> {
+        self.pressures.values()
     }
 }
 
@@ -91,55 +112,49 @@ pub fn unit_words(scene: &Scene) -> UnitWords {
     })
 }
 
-/// Return the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps.
+/// Return the plot of the contact force of the `shown` pairs over their approach, if the run has several load steps. A single curve has no name.
 pub fn approaches(done: &Done, shown: &[usize]) -> Option<Plot> {
-    let names = results::pair_names(&done.built);
-    let curves = shown.iter().map(|&i| (names[i].as_str(), approach(&done.steps, i)));
-    let scene = &done.built.scene;
-    (done.steps.len() > 1).then(|| Plot::approach(&scene.title, force_labels(units(scene).as_ref()), curves))
-}
-
-/// Return the approach and the force of pair `i` in each step.
-fn approach(steps: &[StepReport], i: usize) -> Vec<(f64, f64)> {
-    let of_step = |step: &StepReport| {
-        let pair = &step.pairs[i];
-        (pair.approach.unwrap_or(f64::NAN), length(pair.force))
+    let (names, steps) = (results::pair_names(&done.built), &done.steps);
+    let curve = |&i: &usize| {
+        let of_step = |step: &StepReport| (step.pairs[i].approach.unwrap_or(f64::NAN), length(step.pairs[i].force));
+        let name = if shown.len() == 1 { "" } else { &names[i] };
+        Series::new(name, steps.iter().map(of_step).collect(), Style::LineMarkers)
     };
-    steps.iter().map(of_step).collect()
+    let scene = &done.built.scene;
+    let (unit, force) = units(scene).map(|units| (units.length, units.force)).unzip();
+    (steps.len() > 1).then(|| Plot {
+        title: scene.title.clone(),
+        x: PlotAxis::linear(label("approach", unit.as_deref())),
+        y: PlotAxis::linear(label("contact force", force.as_deref())),
+        series: shown.iter().map(curve).collect(),
+    })
 }
 
-/// Return the plot of pressures along pair `i` without its curves, in the units of the scene. Among several pairs each has the names of its surfaces.
+/// Return the plot of pressures along pair `i` in the units of the scene, with the curve of its reference alone. Among several pairs each has the names of
+/// its surfaces.
 fn pressure_plot(done: &Done, i: usize) -> Plot {
     let (scene, pairs) = (&done.built.scene, &done.model().pairs);
     let title = match pairs.len() {
         1 => scene.title.clone(),
         _ => format!("{}: {}", scene.title, done.built.discrete.surfaces(i).join(" - ")),
     };
-    let units = scene.units.as_ref();
-    let along = label(["x", "y", "z"][main_axis(&pairs[i])], units.as_ref().map(|units| units.length.as_str()));
-    Plot::pressure(
-        &title,
-        &along,
-        &label("contact pressure", units.as_ref().map(|units| units.stress.as_str())),
-        Vec::new(),
-    )
+    let (unit, stress) = scene.units.as_ref().map(|units| (units.length.as_str(), units.stress.as_str())).unzip();
+    let reference = done.built.discrete.specs[i].reference.as_ref();
+    let curve = |field: &Field| curve("reference", &pairs[i], Style::Dashed, |_, x| field.eval(x)).color(Color::Grey);
+    Plot {
+        title,
+        x: PlotAxis::linear(label(["x", "y", "z"][main_axis(&pairs[i])], unit)),
+        y: PlotAxis::linear(label("contact pressure", stress)),
+        series: reference.map(curve).into_iter().collect(),
+    }
 }
 
-/// Return the pressure of pair `i` along its surface, against the coordinate that varies most.
-fn pressure_curve(label: &str, done: &Done, i: usize) -> Series {
-    let (model, pair) = (done.model(), &done.model().pairs[i]);
+/// Return the values at the points of a pair, given by their number and place, against the coordinate that varies most.
+fn curve(label: &str, pair: &ContactPair, style: Style, value: impl Fn(usize, [f64; 3]) -> f64) -> Series {
     let axis = main_axis(pair);
-    let pressure = &done.outcome.layer.pressure[model.range(i)];
-    Series::new(label, pair.position.iter().zip(pressure).map(|(x, &p)| (x[axis], p)).collect(), Style::Line)
-}
-
-/// Return the scene's reference pressure of pair `i`, if it has one.
-fn reference_curve(done: &Done, i: usize) -> Option<Series> {
-    let field = done.built.discrete.specs[i].reference.as_ref()?;
-    let pair = &done.model().pairs[i];
-    let axis = main_axis(pair);
-    let points = pair.position.iter().map(|&x| (x[axis], field.eval(x))).collect();
-    Some(Series::new("reference", points, Style::Dashed).color(Color::Grey))
+    let mut points: Vec<(f64, f64)> = pair.position.iter().enumerate().map(|(q, &x)| (x[axis], value(q, x))).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Series::new(label, points, style)
 }
 
 /// Return the coordinate along which a pair's points spread most.

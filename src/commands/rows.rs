@@ -1,11 +1,13 @@
 //! The rows of `sweep` and `bench`: what a run was and what it took.
 
+use crate::output::tables::Cell;
 use crate::output::{sci, seconds};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// What is known of the run of a case, or of several runs of it. Numbers that a run does not have are empty fields.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Row {
     /// Status of the report, or why there is none, and the status in words; the method that ran.
     pub status: String,
@@ -57,28 +59,10 @@ impl Row {
     /// Return what a report says.
     pub fn of_report(report: &Value) -> Self {
         let number = |path: &str| report.pointer(path).and_then(Value::as_f64);
-        let count = |path: &str| number(path).map(|count| count as usize);
-        let text = |key: &str| report[key].as_str().unwrap_or_default().to_owned();
         let pairs = report["pairs"].as_array().filter(|pairs| !pairs.is_empty());
-        let of_pairs = |value: fn(&Value) -> Option<f64>| -> Vec<f64> {
-            pairs.map_or(Vec::new(), |pairs| pairs.iter().filter_map(value).collect())
-        };
-        let largest_of = |values: Vec<f64>| values.into_iter().reduce(f64::max);
         Self {
-            status: text("status"),
-            message: text("message"),
-            method: text("method"),
-            dofs: count("/dofs"),
-            points: pairs.map(|_| of_pairs(|pair| pair["points"].as_f64()).iter().sum::<f64>() as usize),
-            iterations: count("/iterations"),
-            sweeps: count("/sweeps"),
-            inner_iterations: count("/inner_iterations"),
-            factorizations: count("/factorizations"),
-            dense_factorizations: count("/dense_factorizations"),
-            residual: number("/residual"),
-            increment: number("/increment"),
-            f1: number("/F1"),
-            peak_pressure: largest_of(of_pairs(|pair| pair["peak_pressure"].as_f64())),
+            points: pairs.map(|pairs| pairs.iter().filter_map(|pair| pair["points"].as_u64()).sum::<u64>() as usize),
+            peak_pressure: largest(&report["pairs"], "peak_pressure"),
             seconds: number("/times/total"),
             mesh_seconds: number("/times/mesh"),
             discretize_seconds: number("/times/discretize"),
@@ -87,12 +71,13 @@ impl Row {
             factor_seconds: number("/inner_times/factor"),
             solve_seconds: number("/inner_times/solve"),
             memory_mb: number("/memory/iterate"),
-            error: largest(report, "error_l2"),
-            error_h1: largest(report, "error_h1"),
-            error_energy: largest(report, "error_energy"),
-            error_of: largest(report, "error_l2").map_or(String::new(), |_| "displacement, exact".to_owned()),
+            error: largest(&report["bodies"], "error_l2"),
+            error_h1: largest(&report["bodies"], "error_h1"),
+            error_energy: largest(&report["bodies"], "error_energy"),
+            error_of: largest(&report["bodies"], "error_l2")
+                .map_or(String::new(), |_| "displacement, exact".to_owned()),
             runs: 1,
-            ..Self::default()
+            ..Self::deserialize(report).unwrap_or_default()
         }
     }
 
@@ -106,24 +91,15 @@ impl Row {
         matches!(self.status.as_str(), "converged" | "roundoff-limited")
     }
 
-    /// Return the names of the columns.
-    pub fn columns() -> Vec<String> {
-        let row = Self { runs: 1, ..Self::default() };
+    /// Return the fields of the row.
+    pub fn fields(&self) -> Vec<Cell> {
         let mut csv = csv::Writer::from_writer(Vec::new());
         // writing to memory does not fail
-        let _ = csv.serialize(row);
-        let text = String::from_utf8(csv.into_inner().unwrap_or_default()).unwrap_or_default();
-        text.lines().next().unwrap_or_default().split(',').map(str::to_owned).collect()
-    }
-
-    /// Return the fields of the row, in the order of [`Self::columns`].
-    pub fn fields(&self) -> Vec<String> {
-        let mut csv = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
         let _ = csv.serialize(self);
         let bytes = csv.into_inner().unwrap_or_default();
-        let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(bytes.as_slice());
-        let record = reader.records().next().and_then(Result::ok).unwrap_or_default();
-        record.iter().map(str::to_owned).collect()
+        let mut lines = csv::ReaderBuilder::new().has_headers(false).from_reader(&bytes[..]).into_records().flatten();
+        let (names, texts) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
+        names.iter().zip(&texts).map(|(name, text)| (name.to_owned(), text.to_owned())).collect()
     }
 
     /// Return the row as a line for the terminal.
@@ -146,9 +122,9 @@ impl Row {
     }
 }
 
-/// Return the largest number of this name of the bodies of a report.
-fn largest(report: &Value, key: &str) -> Option<f64> {
-    report["bodies"].as_array()?.iter().filter_map(|body| body[key].as_f64()).reduce(f64::max)
+/// Return the largest number of this name in a list of bodies or pairs.
+fn largest(list: &Value, key: &str) -> Option<f64> {
+    list.as_array()?.iter().filter_map(|item| item[key].as_f64()).reduce(f64::max)
 }
 
 /// Return rows of texts as a table with columns to the right, all but the first `left` ones.
@@ -175,11 +151,7 @@ mod tests {
             "pairs": [{ "points": 3, "peak_pressure": null }, { "points": 4 }],
         });
         let row = Row::of_report(&report);
-        let value = |name: &str| {
-            let place = Row::columns().iter().position(|column| column == name).expect("a column");
-            row.fields()[place].clone()
-        };
-        assert_eq!(Row::columns().len(), row.fields().len());
+        let value = |name: &str| row.fields().into_iter().find(|(column, _)| column == name).expect("a column").1;
         let names = ["status", "message", "dofs", "points", "residual", "F1", "peak_pressure"];
         assert_eq!(names.map(value), ["converged", "a, b", "12", "7", "1e-9", "", ""]);
     }

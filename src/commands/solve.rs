@@ -11,7 +11,7 @@ use crate::estimate::Estimate;
 use crate::interrupt::Interrupt;
 use crate::output::terminal::ProgressLine;
 use crate::output::{
-    Folder, HistoryWriter, IterationTable, PairColumns, Report, RoundReport, RowFile, StepTable, say, warning_lines,
+    Folder, HistoryWriter, IterationTable, Report, RoundReport, RowFile, StepTable, say, warning_lines,
 };
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
@@ -288,16 +288,13 @@ impl Tables {
     /// Open the tables of a round. The table of load steps begins with those of another process.
     fn open(folder: &Folder, ready: &Prepared) -> Result<Self> {
         let (built, history) = (&ready.built, &ready.built.scene.method.steps);
-        let bodies: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
-        let rows = HistoryWriter::create(folder, &bodies, !history.is_empty())?;
-        let mut tables = Self { history: Some(rows), steps: None };
+        let rows = RowFile::create(folder, "history.csv")?;
+        let bodies = built.discrete.bodies.iter().map(|body| body.name.clone()).collect();
+        let mut tables = Self { history: Some(HistoryWriter::new(rows, bodies, !history.is_empty())), steps: None };
         if !history.is_empty() {
-            let columns = built.discrete.specs.iter().map(results::columns);
-            let pairs: Vec<(String, PairColumns)> = results::pair_names(built).into_iter().zip(columns).collect();
-            let reactions = results::reaction_names(built);
-            let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
-            let mut steps = StepTable::create(folder, &history.names, &pairs, &reactions, dimension, measure)?;
-            ready.steps.iter().for_each(|step| steps.row(&history.names, step));
+            let (rows, names) = (RowFile::create(folder, "steps.csv")?, results::names_of_results(built));
+            let mut steps = StepTable { rows, count: 0, factors: history.names.clone(), names };
+            ready.steps.iter().for_each(|step| steps.row(step));
             tables.steps = Some(steps);
         }
         Ok(tables)
@@ -337,7 +334,7 @@ impl Recorder for Solver<'_> {
         let scene = &done.built.scene;
         let history = &scene.method.steps;
         if let (Some(table), Some(step)) = (&mut self.tables.steps, done.steps.last()) {
-            table.row(&history.names, step);
+            table.row(step);
         }
         let is_interrupted = matches!(done.outcome.status, Status::Interrupted { .. });
         let ends = done.steps.len() == history.steps.len() || is_interrupted;

@@ -10,11 +10,11 @@ use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
 use crate::ddm::Status;
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::tables::{contact_column, vector_columns, vector_fields};
-use crate::output::{Folder, LISTED, Report, RowFile, busiest, say, terminal};
+use crate::output::tables::{self, Cell};
+use crate::output::{Folder, LISTED, Report, ResultNames, RowFile, busiest, say, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::run::{self, Begin, Built, Clock, Done, Prepared, report, results, verdict};
+use crate::run::{self, Begin, Clock, Done, Prepared, report, results, verdict};
 use crate::scene::Scene;
 use indicatif::ProgressBar;
 use std::path::PathBuf;
@@ -59,8 +59,8 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         terminal,
         folder,
         bar,
-        columns: plan.columns.clone(),
-        header: None,
+        plan: &plan,
+        names: None,
         table: None,
         shown: None,
         plots: Plots::default(),
@@ -107,10 +107,9 @@ struct Sweep<'a> {
     terminal: Terminal,
     folder: Folder,
     bar: ProgressBar,
-    /// Names of the axes.
-    columns: Vec<String>,
-    /// All columns of the table, from the first run on.
-    header: Option<Vec<String>>,
+    plan: &'a Plan,
+    /// Names of pairs and reactions, the same for all runs.
+    names: Option<ResultNames>,
     /// `sweep.csv`, on the first rank and from the first run on.
     table: Option<RowFile>,
     /// Pairs whose pressures are drawn, the same for all runs.
@@ -124,14 +123,14 @@ impl Sweep<'_> {
     fn prepare(&mut self, case: &Case, scene: &Rc<Scene>, before: Option<Done>, clock: &mut Clock) -> Result<Prepared> {
         let session = self.session;
         let built = run::build_after(session, scene.clone(), before, self.interrupt, clock)?;
-        let own = [self.columns.clone(), Row::columns(), pair_columns(&built)].concat();
-        let header = self.header.get_or_insert_with(|| own.clone());
-        collectively(session, refuse_other_columns(header, &own, &case.label))?;
+        let own = results::names_of_results(&built);
+        let is_same = *self.names.get_or_insert_with(|| own.clone()) == own;
+        collectively(session, if is_same { Ok(()) } else { Err(other_columns(&case.label)) })?;
         let ready = run::set_up(session, built, Begin::default(), clock)?;
         if session.rank() == 0 && self.table.is_none() {
             // before anything is computed that could be lost
             self.folder.clear()?;
-            self.table = Some(RowFile::create(&self.folder, "sweep.csv", &own)?);
+            self.table = Some(RowFile::create(&self.folder, "sweep.csv")?);
         }
         let decisions = self.terminal.decisions(session, &ready)?;
         self.bar.suspend(|| decisions.iter().for_each(|line| eprintln!("{line}")));
@@ -142,8 +141,10 @@ impl Sweep<'_> {
     fn add(&mut self, case: &Case, done: &Done, report: Report) -> Result<()> {
         let row = Row::of_report(&serde_json::json!(report));
         let scene = &done.built.scene;
-        let fields = [case.key.clone(), row.fields(), pair_fields(&report, scene.dimension.value)].concat();
-        self.table.iter_mut().for_each(|table| table.push(&fields));
+        if let (Some(table), Some(names)) = (&mut self.table, &self.names) {
+            let fields = self.plan.fields(case).chain(row.fields()).chain(result_fields(&report, names));
+            table.push(&fields.collect::<Vec<_>>());
+        }
         self.bar.inc(1);
         // with `-q` only runs that are not solved are printed
         if self.terminal.is_loud() || (!self.terminal.json && verdict::exit_code(done) != 0) {
@@ -171,41 +172,24 @@ impl Sweep<'_> {
     }
 }
 
-/// Return the names of the columns of all pairs and reactions; [`pair_fields`] has their texts.
-fn pair_columns(built: &Built) -> Vec<String> {
-    let (dimension, measure) = (built.scene.dimension.value, results::of_points(built));
-    let mut header = Vec::new();
-    for pair in results::pair_names(built) {
-        let what = ["peak_pressure", &contact_column(measure), "layer_energy"];
-        header.extend(what.map(|what| format!("{what} {pair}")));
-        header.extend(vector_columns("force", &pair, dimension));
-        header.push(format!("approach {pair}"));
-    }
-    header.extend(results::reaction_names(built).iter().flat_map(|name| vector_columns("reaction", name, dimension)));
-    header
-}
-
-fn pair_fields(report: &Report, dimension: usize) -> Vec<String> {
+/// Return the fields of all pairs and reactions.
+fn result_fields(report: &Report, names: &ResultNames) -> Vec<Cell> {
     let mut fields = Vec::new();
-    for pair in &report.pairs {
-        fields.extend([pair.peak_pressure, pair.extent.contact(), pair.layer_energy].map(|value| format!("{value:?}")));
-        fields.extend(vector_fields(&pair.force[0], dimension));
-        fields.push(pair.approach.map_or(String::new(), |approach| format!("{approach:?}")));
+    for (pair, name) in report.pairs.iter().zip(&names.pairs) {
+        fields.push(tables::number(format!("peak_pressure {name}"), pair.peak_pressure));
+        fields.push(names.contact(name, &pair.extent));
+        fields.push(tables::number(format!("layer_energy {name}"), pair.layer_energy));
+        fields.extend(tables::vector("force", name, &pair.force[0], names.dimension));
+        fields.push(tables::number(format!("approach {name}"), pair.approach));
     }
-    let reactions = results::reported(&report.bodies);
-    fields.extend(reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, dimension)));
+    fields.extend(names.reactions(&results::reported(&report.bodies)));
     fields
 }
 
-/// Refuse a run, named by its label, whose row would have other columns than those before.
-fn refuse_other_columns(columns: &[String], own: &[String], label: &str) -> Result<()> {
-    if columns == own {
-        return Ok(());
-    }
-    Err(Error::new(
-        Kind::Usage,
-        format!("with {label} the scene has other contacts or supports than in the runs before"),
-    )
-    .because("all rows of sweep.csv have the same columns")
-    .help("sweep over values that leave them as they are; the rows so far are kept"))
+/// Return the refusal of a run, named by its label, whose row would have other columns than those before.
+fn other_columns(label: &str) -> Error {
+    let message = format!("with {label} the scene has other contacts or supports than in the runs before");
+    Error::new(Kind::Usage, message)
+        .because("all rows of sweep.csv have the same columns")
+        .help("sweep over values that leave them as they are; the rows so far are kept")
 }

@@ -56,13 +56,15 @@ impl Sample {
 }
 
 /// The settings of a file of data in a scene.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataSpec {
     /// Name of the function.
+    #[serde(skip)]
     pub name: String,
     /// The file.
     pub file: PathBuf,
     /// The place in the scene where the file is named.
+    #[serde(skip)]
     pub place: Place,
     /// Place of the first height.
     pub origin: [f64; 2],
@@ -73,6 +75,7 @@ pub struct DataSpec {
     /// The shape that is subtracted.
     pub detrend: Detrend,
     /// Interpolation between the points.
+    #[serde(rename = "interpolate")]
     pub interpolation: Interpolation,
     /// Values beyond the points.
     pub outside: Outside,

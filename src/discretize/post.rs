@@ -146,7 +146,7 @@ impl<const D: usize> Post for FemBody<D> {
         BodyField {
             name: self.name.clone(),
             points: points.iter().map(|&x| owned.in_scene(x)).collect(),
-            cell: CellKind::simplex(D, self.mesh.space.order.degree()),
+            cell: CellKind { dimension: D, order: self.mesh.space.order.degree() },
             connectivity: owned.cells,
             displacement,
             von_mises,

@@ -32,7 +32,7 @@ impl ContactSurface {
         };
         let mut surface = Self {
             points: Vec::new(),
-            cell: CellKind::simplex(D - 1, order.degree()),
+            cell: CellKind { dimension: D - 1, order: order.degree() },
             connectivity: Vec::new(),
             sources: Vec::new(),
             cover: Vec::new(),

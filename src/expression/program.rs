@@ -6,6 +6,7 @@
 
 use crate::data::Data;
 use crate::linalg::portable;
+use smallvec::SmallVec;
 use std::sync::Arc;
 
 /// Largest number of variables of an expression.
@@ -91,42 +92,31 @@ impl Program {
     }
 
     /// Return the value, and call `watch` for each use of data with its place.
-    fn eval_with<T: Number>(&self, variables: &Values<T>, watch: impl FnMut(&Arc<Data>, &[T])) -> T {
-        match self.depth {
-            ..=SHALLOW => self.run(variables, &mut [T::default(); SHALLOW], watch),
-            depth => self.run(variables, &mut vec![T::default(); depth], watch),
-        }
-    }
-
-    /// Return the value, with a stack that is deep enough.
-    fn run<T: Number>(&self, variables: &Values<T>, stack: &mut [T], mut watch: impl FnMut(&Arc<Data>, &[T])) -> T {
-        let mut top = 0;
+    fn eval_with<T: Number>(&self, variables: &Values<T>, mut watch: impl FnMut(&Arc<Data>, &[T])) -> T {
+        let mut stack = SmallVec::<[T; SHALLOW]>::from_elem(T::default(), self.depth);
+        let (stack, mut top) = (&mut stack[..], 0);
         for step in &self.steps {
-            match step {
-                Operation::Number(value) => {
-                    stack[top] = T::constant(*value);
-                    top += 1;
-                }
-                Operation::Variable(place) => {
-                    stack[top] = variables[*place];
-                    top += 1;
-                }
-                Operation::Factor(_) => {
-                    stack[top] = T::constant(f64::NAN);
-                    top += 1;
-                }
-                Operation::Unary(function) => stack[top - 1] = stack[top - 1].one(function),
-                Operation::Binary(function) => {
+            let value = match step {
+                Operation::Number(value) => T::constant(*value),
+                Operation::Variable(place) => variables[*place],
+                Operation::Factor(_) => T::constant(f64::NAN),
+                Operation::Unary(function) => {
                     top -= 1;
-                    stack[top - 1] = stack[top - 1].two(stack[top], function);
+                    stack[top].one(function)
+                }
+                Operation::Binary(function) => {
+                    top -= 2;
+                    stack[top].two(stack[top + 1], function)
                 }
                 Operation::Data(data) => {
-                    let first = top - data.arguments();
-                    watch(data, &stack[first..top]);
-                    stack[first] = T::data(data, &stack[first..top]);
-                    top = first + 1;
+                    let end = top;
+                    top -= data.arguments();
+                    watch(data, &stack[top..end]);
+                    T::data(data, &stack[top..end])
                 }
-            }
+            };
+            stack[top] = value;
+            top += 1;
         }
         stack[0]
     }

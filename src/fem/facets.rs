@@ -51,8 +51,8 @@ impl<const D: usize> Space<D> {
 
     /// Return the cell that each of these facets of the boundary bounds.
     pub fn cells_at(&self, facets: &Facets<D>) -> Vec<usize> {
-        let faces = Faces::new(self.simplices(), self.nodes.len());
-        (0..facets.count()).map(|i| faces.at(facets.facet(i))[0].cell()).collect()
+        let faces = Faces::new(self.simplices());
+        (0..facets.count()).map(|i| faces.at(facets.facet(i)).next().map_or(0, Face::cell)).collect()
     }
 
     /// Return the cells without coordinates.
@@ -67,7 +67,7 @@ impl<const D: usize> Space<D> {
 
     /// Return the same facets in the order of the cells, each as its cell and the local vertex opposite to it.
     pub fn lone_facets(&self) -> Vec<(usize, usize)> {
-        let faces = Faces::new(self.simplices(), self.nodes.len());
+        let faces = Faces::new(self.simplices());
         let mut places: Vec<_> = faces.outer().map(|face| (face.cell(), face.opposite())).collect();
         places.sort_unstable();
         places

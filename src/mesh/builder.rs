@@ -25,6 +25,7 @@ pub enum MeshProducer {
 }
 
 /// The parts of a mesh as they are read: names of groups, then nodes, then elements.
+#[derive(Default)]
 pub struct MeshBuilder<const D: usize> {
     /// The groups, which are empty until the elements are read.
     groups: Vec<Group>,
@@ -61,20 +62,7 @@ pub fn kind_of(number: i32) -> std::result::Result<ElementType, Flaw> {
 impl<const D: usize> MeshBuilder<D> {
     /// Start a mesh by its maker. Groups of other programs, and of old formats, may have no names.
     pub fn new(maker: MeshProducer) -> Self {
-        Self {
-            groups: Vec::new(),
-            group_of: HashMap::new(),
-            names: HashSet::new(),
-            named_by_number: maker == MeshProducer::Other,
-            points: Vec::new(),
-            tags: Vec::new(),
-            numbers: Numbering::default(),
-            flat: 0.0,
-            orders: [None; 4],
-            middles: HashMap::new(),
-            split: 0,
-            nodes: Vec::new(),
-        }
+        Self { named_by_number: maker == MeshProducer::Other, ..Self::default() }
     }
 
     /// Add a physical group with its name.

@@ -37,11 +37,9 @@ impl<'a, const D: usize> Simplices<'a, D> {
 /// Corners of a cell of positive volume on the face opposite each of its corners, in the order in which the normal points outwards.
 const OUTWARD: [&[[usize; 3]]; 2] = [&[[1, 2, 0], [2, 0, 0], [0, 1, 0]], &[[1, 2, 3], [2, 0, 3], [0, 1, 3], [1, 0, 2]]];
 
-/// A face of a cell in twelve bytes. The list has D + 1 faces per cell, which is most of the memory of a check.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+/// A face of a cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Face<const D: usize> {
-    /// Corners except the least one, sorted; in the plane there is one.
-    rest: [u32; 2],
     /// Four times the index of the cell, plus the local number of the corner that is not on the face.
     place: u32,
 }
@@ -49,7 +47,7 @@ pub struct Face<const D: usize> {
 impl<const D: usize> Face<D> {
     /// Return the face of a cell opposite to one of its corners.
     pub fn at(cell: usize, opposite: usize) -> Self {
-        Self { rest: [0; 2], place: (4 * cell + opposite) as u32 }
+        Self { place: (4 * cell + opposite) as u32 }
     }
 
     /// Return the cell.
@@ -92,42 +90,22 @@ impl<const D: usize> Face<D> {
     }
 }
 
-/// All faces of the cells of a body. Faces with the same corners follow each other.
-pub struct Faces<const D: usize> {
-    /// The faces, ordered by their least corners. Those with the same least corner are sorted.
-    list: Vec<Face<D>>,
-    /// Index of the first face of each least corner; the last entry is the number of faces.
-    first: Vec<u32>,
-}
+/// All faces of the cells of a body, each with its sorted corners, ordered by these. The list has D + 1 faces per cell, which is most of the memory
+/// of a check.
+pub struct Faces<const D: usize>(Vec<([u32; D], Face<D>)>);
 
 impl<const D: usize> Faces<D> {
-    /// Sort the faces of a body with so many nodes by their corners. The time is linear, since few faces have the same least corner.
-    pub fn new(cells: Simplices<D>, nodes: usize) -> Self {
-        // This returns the least corner of a face, and the face.
-        let face = |cell: usize, opposite: usize| {
-            let mut face = Face::at(cell, opposite);
-            let (key, _) = face.sorted(cells);
-            face.rest[..D - 1].copy_from_slice(&key[1..]);
-            (key[0] as usize, face)
-        };
-        let all = || (0..cells.count()).flat_map(|cell| (0..=D).map(move |opposite| face(cell, opposite)));
-        let mut first = vec![0; nodes + 1];
-        all().for_each(|(least, _)| first[least + 1] += 1);
-        (1..first.len()).for_each(|i| first[i] += first[i - 1]);
-        let (mut list, mut next) = (vec![Face::default(); first[nodes] as usize], first.clone());
-        for (least, face) in all() {
-            let next = &mut next[least];
-            list[*next as usize] = face;
-            *next += 1;
-        }
-        first.windows(2).for_each(|ends| list[ends[0] as usize..ends[1] as usize].sort_unstable());
-        Self { list, first }
+    /// Sort the faces of a body by their corners.
+    pub fn new(cells: Simplices<D>) -> Self {
+        let all = (0..cells.count()).flat_map(|cell| (0..=D).map(move |opposite| Face::at(cell, opposite)));
+        let mut list: Vec<_> = all.map(|face| (face.sorted(cells).0, face)).collect();
+        list.sort_unstable();
+        Self(list)
     }
 
     /// Return the faces in groups with the same corners.
-    pub fn alike(&self) -> impl Iterator<Item = &[Face<D>]> {
-        let of_least = self.first.windows(2).map(|ends| ends[0] as usize..ends[1] as usize);
-        of_least.flat_map(|ends| self.list[ends].chunk_by(|a, b| a.rest == b.rest))
+    pub fn alike(&self) -> impl Iterator<Item = &[([u32; D], Face<D>)]> {
+        self.0.chunk_by(|a, b| a.0 == b.0)
     }
 
     /// Return the number of faces between two cells.
@@ -137,17 +115,14 @@ impl<const D: usize> Faces<D> {
 
     /// Return the faces of one cell alone.
     pub fn outer(&self) -> impl Iterator<Item = Face<D>> {
-        self.alike().filter_map(|alike| if let [one] = alike { Some(*one) } else { None })
+        self.alike().filter_map(|alike| if let [(_, one)] = alike { Some(*one) } else { None })
     }
 
     /// Return the faces with these corners, in any order.
-    pub fn at(&self, corners: &[u32]) -> &[Face<D>] {
+    pub fn at(&self, corners: &[u32]) -> impl Iterator<Item = Face<D>> {
         let mut key: [u32; D] = std::array::from_fn(|i| corners[i]);
         key.sort_unstable();
-        let [from, to] = [0, 1].map(|next| self.first[key[0] as usize + next] as usize);
-        let alike = &self.list[from..to];
-        let start = alike.partition_point(|face| face.rest[..D - 1] < key[1..]);
-        let count = alike[start..].iter().take_while(|face| face.rest[..D - 1] == key[1..]).count();
-        &alike[start..start + count]
+        let alike = &self.0[self.0.partition_point(|(corners, _)| *corners < key)..];
+        alike.iter().take_while(move |(corners, _)| *corners == key).map(|(_, face)| *face)
     }
 }

@@ -1,6 +1,6 @@
 //! Calls of the program Gmsh, with a limit of time. Gmsh ends with this program.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Located, Result};
 use crate::interrupt::{self, Interrupt};
 use crate::problem::{Guard, Order};
 use signal_hook::consts::SIGXFSZ;
@@ -23,7 +23,7 @@ pub struct MeshingTask<'a> {
     /// The file that the user named.
     pub shown: &'a Path,
     /// Names and values of the numbers to set in the script.
-    pub set: &'a [(String, f64)],
+    pub set: &'a [(Located<String>, f64)],
     /// Whether the script is already a mesh, which is only to be written in another form.
     pub is_mesh: bool,
     /// Dimension of the cells.
@@ -132,7 +132,7 @@ impl Gmsh {
             command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
         }
         for (name, value) in task.set {
-            command.args(["-setnumber", name, &value.to_string()]);
+            command.args(["-setnumber", &name.value, &value.to_string()]);
         }
         // An absolute path cannot be mistaken for an option.
         let script = std::path::absolute(task.script).map_err(|cause| Error::file(task.script, "find", &cause))?;

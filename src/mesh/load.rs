@@ -6,12 +6,12 @@ use super::gmsh::{Gmsh, MeshingTask};
 use super::msh;
 use super::msh2::Contents;
 use super::script::{self, Script, quoted};
-use super::{Mesh, abaqus, arrays, foreign};
-use crate::error::{Error, Located, Place, Result};
+use super::{Mesh, abaqus, arrays, digits, foreign};
+use crate::error::{Error, Located, Result};
 use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{AdaptedMesh, is_shape};
-use crate::problem::{Guard, MeshSource, Order};
+use crate::problem::{GmshSource, Guard, MeshSource, Order};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -52,13 +52,12 @@ pub enum MeshOrigin {
 pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Interrupt) -> Result<Loaded<D>> {
     let order = order.of_shape();
     let mut loaded = match source {
-        MeshSource::Geo { file, set, places, adapted, guard } => {
-            if let (true, Some(place)) = (is_shape(&file.value), places.first()) {
-                return Err(Error::scene(place, "numbers for a shape of another program, which has none")
+        MeshSource::Geo(source) => {
+            if let (true, Some((name, _))) = (is_shape(&source.file), source.set.first()) {
+                return Err(Error::scene(&name.place, "numbers for a shape of another program, which has none")
                     .help("give sizes of elements by mesh = { geo = \"...\", size = 0.1 }, or a script (.geo) that merges the file"));
             }
-            let adapted = adapted.as_deref();
-            Meshing { file, set, places, adapted, order, guard, interrupt }.mesh(&Cache::of_user()?)
+            Meshing { source, order, interrupt }.mesh(&Cache::of_user()?)
         }
         MeshSource::Msh { file } => from_file(file, order, interrupt),
         MeshSource::Arrays(arrays) => Ok(Loaded {
@@ -69,7 +68,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
             notes: Vec::new(),
         }),
     }?;
-    loaded.mesh.find_uncertainty();
+    loaded.mesh.uncertainty = digits::uncertainty(&loaded.mesh.points);
     loaded.mesh.straighten();
     Ok(loaded)
 }
@@ -221,45 +220,24 @@ impl Wanted<'_> {
     }
 }
 
-/// Return the name in the cache of the mesh of a script, with the numbers that are set in it, what an adaptation asks, and the
-/// settings of Gmsh.
-fn key(
-    path: &Path,
-    script: &Script,
-    dimension: usize,
-    order: Order,
-    (set, adapted, guard): (&[(String, f64)], Option<&AdaptedMesh>, &Guard),
-) -> String {
-    // The algorithm depends on whether a number of threads is given, not on the number.
-    let asked = (dimension, order.degree(), guard.threads.is_some(), guard.size, set, adapted);
-    let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
-    cache::name((asked, files, script.is_ended()), path)
-}
-
 /// A script or shape to mesh.
 pub(super) struct Meshing<'a> {
-    pub file: &'a Located<PathBuf>,
-    /// The numbers to set in it.
-    pub set: &'a [(String, f64)],
-    /// Their places in the scene, where these differ from that of the script.
-    pub places: &'a [Place],
-    /// What an adaptation asks of the mesh.
-    pub adapted: Option<&'a AdaptedMesh>,
+    pub source: &'a GmshSource,
     pub order: Order,
-    pub guard: &'a Guard,
     pub interrupt: &'a Interrupt,
 }
 
 impl Meshing<'_> {
     /// Return the mesh from a cache, or by Gmsh.
     pub fn mesh<const D: usize>(&self, cache: &Cache) -> Result<Loaded<D>> {
-        let Self { file, set, places, adapted, order, guard, interrupt } = *self;
-        let path = &file.value;
+        let Self { source: GmshSource { file, set, adapted, guard }, order, interrupt } = *self;
+        let (path, adapted) = (&file.value, adapted.as_deref());
         let script = Script::read(path).map_err(|error| error.at(&file.place))?;
-        for (number, (name, _)) in set.iter().enumerate() {
-            script.check(name, path, places.get(number).unwrap_or(&file.place))?;
-        }
-        let name = key(path, &script, D, order, (set, adapted, guard));
+        set.iter().try_for_each(|(name, _)| script.check(name, path))?;
+        // the algorithm depends on whether a number of threads is given, not on the number
+        let asked = (D, order.degree(), guard.threads.is_some(), guard.size, set, adapted);
+        let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
+        let name = cache::name((asked, files, script.is_ended()), path);
         let wanted = Wanted { path, name, order: Some(order), is_kept: !script.may_change };
         wanted.find_or_make(cache, |gmsh, work, made| {
             let script = &self.written::<D>(&script, work)?;
@@ -275,15 +253,14 @@ impl Meshing<'_> {
     /// Return the path of the script for Gmsh: the user's own, or one in the folder `work` that loads a shape, follows sizes, or includes a script whose
     /// last line is not ended.
     fn written<const D: usize>(&self, script: &Script, work: &Path) -> Result<PathBuf> {
-        let path = &self.file.value;
+        let GmshSource { file, adapted, guard, .. } = self.source;
+        let path = &file.value;
         let own = match is_shape(path) {
-            true => foreign::script(path, &script.files[0], D, self.guard.size, work)?,
+            true => foreign::script(path, &script.files[0], D, guard.size, work)?,
             false => path.clone(),
         };
-        match self.adapted {
-            Some(AdaptedMesh { sizes, .. }) => {
-                script::sized(&Located::new(own, self.file.place.clone()), script, sizes, work)
-            }
+        match adapted {
+            Some(adapted) => script::sized(&Located::new(own, file.place.clone()), script, &adapted.sizes, work),
             None if script.is_ended() || own != *path => Ok(own),
             None => {
                 let whole = std::path::absolute(path).map_err(|cause| Error::file(path, "find", &cause))?;

@@ -106,11 +106,6 @@ impl<const D: usize> Mesh<D> {
         }
     }
 
-    /// Find the uncertainty of the coordinates, which must be those of the file.
-    fn find_uncertainty(&mut self) {
-        self.uncertainty = digits::uncertainty(&self.points);
-    }
-
     /// Drop the numbers of the elements in the file, which only messages of the checks need.
     pub fn forget_tags(&mut self) {
         self.groups.iter_mut().for_each(|group| group.tags = Vec::new());

@@ -6,7 +6,7 @@
 
 use super::cache::write;
 use super::foreign::is_data;
-use crate::error::{Error, Kind, Located, Place, Result};
+use crate::error::{Error, Kind, Located, Result};
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::ops::Range;
@@ -71,7 +71,8 @@ impl Script {
     ///
     /// # Errors
     /// No file of the script has the name.
-    pub fn check(&self, name: &str, file: &Path, place: &Place) -> Result<()> {
+    pub fn check(&self, name: &Located<String>, file: &Path) -> Result<()> {
+        let Located { value: name, place } = name;
         if self.words.contains(name) {
             return Ok(());
         }
@@ -264,7 +265,7 @@ mod tests {
                       DefineConstant[ h = {1e-3, Name \"Sizes/h\"} ];\nIf(!Exists(length)) length = 4; EndIf\n";
         std::fs::write(&path, script).unwrap();
         let script = Script::read(&path).unwrap();
-        let verdict = |name: &str| script.check(name, &path, &Place::here("mesh")).err().map(|error| error.to_string());
+        let verdict = |name: &str| script.check(&Located::here(name), &path).err().map(|error| error.to_string());
         assert!(["n", "h", "Sizes/h", "length"].into_iter().all(|name| verdict(name).is_none()));
         for (name, expected) in [
             ("slip", "has no number `slip` to set"),

@@ -8,7 +8,7 @@ use super::{Group, Loaded, Mesh, MeshOrigin, MeshProducer, msh, simplex, view};
 use crate::error::{Located, Place, Result, Source};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{AdaptedMesh, MeshSource};
-use crate::problem::{Guard, Order};
+use crate::problem::{GmshSource, Guard, Order};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -49,20 +49,22 @@ fn located(path: PathBuf) -> Located<PathBuf> {
 }
 
 /// Return the mesh of a script with these numbers, kept in a cache.
-fn meshed<const D: usize>(geo: &Path, set: &[(String, f64)], order: Order, cache: &Path) -> Result<Loaded<D>> {
+fn meshed<const D: usize>(geo: &Path, set: &[(&str, f64)], order: Order, cache: &Path) -> Result<Loaded<D>> {
     meshed_with(geo, set, order, (None, &Guard::default()), cache)
 }
 
 /// Return the mesh of a script as an adaptation asks, with settings of Gmsh.
 fn meshed_with<const D: usize>(
     geo: &Path,
-    set: &[(String, f64)],
+    set: &[(&str, f64)],
     order: Order,
     (adapted, guard): (Option<&AdaptedMesh>, &Guard),
     cache: &Path,
 ) -> Result<Loaded<D>> {
-    let (file, interrupt) = (&located(geo.to_owned()), &Interrupt::default());
-    Meshing { file, set, places: &[], adapted, order, guard, interrupt }.mesh(&Cache::at(cache.to_owned()))
+    let (file, guard, adapted) = (located(geo.to_owned()), *guard, adapted.cloned().map(Into::into));
+    let named = |&(name, number): &(&str, f64)| (Located::new(name.to_owned(), file.place.clone()), number);
+    let source = &GmshSource { set: set.iter().map(named).collect(), file, adapted, guard };
+    Meshing { source, order, interrupt: &Interrupt::default() }.mesh(&Cache::at(cache.to_owned()))
 }
 
 /// Return the bytes of the mesh of a script in the form that these arguments request.
@@ -242,7 +244,7 @@ fn scripts_are_meshed_once_for_each_key() {
     let part = folder.path().join("part.geo");
     std::fs::write(&geo, "Include \"part.geo\";\n").unwrap();
     std::fs::write(&part, SQUARE).unwrap();
-    let run = |n: f64, order| meshed::<2>(&geo, &[("n".into(), n)], order, &cache).unwrap();
+    let run = |n: f64, order| meshed::<2>(&geo, &[("n", n)], order, &cache).unwrap();
 
     let first = run(4.0, Order::P1);
     assert_eq!(first.origin, MeshOrigin::Gmsh);
@@ -313,7 +315,7 @@ fn an_adapted_mesh_has_vertices_where_they_are_asked() {
 fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("cache");
-    let refuse = |script: &str, set: &[(String, f64)], order| {
+    let refuse = |script: &str, set: &[(&str, f64)], order| {
         let geo = folder.path().join("a.geo");
         std::fs::write(&geo, script).unwrap();
         meshed::<2>(&geo, set, order, &cache).unwrap_err().to_string()
@@ -321,7 +323,7 @@ fn scripts_in_error_are_refused_with_what_gmsh_says() {
     let message = refuse("Line(1) = {1, 7};", &[], Order::P1);
     assert!(message.contains("a.geo: Gmsh cannot mesh this script"), "{message}");
     assert!(message.contains("Unknown control point"), "{message}");
-    let message = refuse(SQUARE, &[("m".into(), 1.0)], Order::P1);
+    let message = refuse(SQUARE, &[("m", 1.0)], Order::P1);
     assert!(message.contains("did you mean `n`?") && message.contains("scene.toml"), "{message}");
     let message = refuse(&format!("{SQUARE}Mesh.ElementOrder = 1;"), &[], Order::P2);
     assert!(message.contains("remove `Mesh.ElementOrder`"), "{message}");

@@ -2,81 +2,33 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The kind of the cells of a body. The local numbering of the points is that of VTK.
+/// The kind of the cells of a body: simplices of a dimension (1 to 3) and an order, which is at most 2 in space.
+///
+/// Their points are numbered as in VTK: vertices, then those inside the edges 01 12 02 03 13 23, equally spaced and from order three on along 01 12 20,
+/// then those inside the triangle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum CellKind {
-    /// Two ends.
-    Line,
-    /// Two ends, then the middle.
-    QuadraticLine,
-    /// Two ends, then equally spaced points between them, of this order.
-    LagrangeLine(u8),
-    /// Three vertices.
-    Triangle,
-    /// Three vertices, then mid-edges 01 12 02.
-    QuadraticTriangle,
-    /// Three vertices, then equally spaced points inside the edges 01 12 20 and inside the triangle, of this order.
-    LagrangeTriangle(u8),
-    /// Four vertices.
-    Tetra,
-    /// Four vertices, then mid-edges 01 12 02 03 13 23.
-    QuadraticTetra,
+pub struct CellKind {
+    /// Dimension of the simplices.
+    pub dimension: usize,
+    /// Their order.
+    pub order: usize,
 }
 
 impl CellKind {
-    /// Return the kind of the simplices of a dimension (1 to 3) and order.
-    pub fn simplex(dimension: usize, order: usize) -> Self {
-        match (dimension, order) {
-            (1, 1) => CellKind::Line,
-            (1, 2) => CellKind::QuadraticLine,
-            (1, _) => CellKind::LagrangeLine(order as u8),
-            (2, 3..) => CellKind::LagrangeTriangle(order as u8),
-            (2, 1) => CellKind::Triangle,
-            (2, _) => CellKind::QuadraticTriangle,
-            (_, 1) => CellKind::Tetra,
-            (_, _) => CellKind::QuadraticTetra,
-        }
-    }
-
-    /// Return the number of points per cell.
+    /// Return the number of points per cell, the binomial coefficient of order + dimension over dimension.
     pub fn stride(self) -> usize {
-        match self {
-            CellKind::Line => 2,
-            CellKind::QuadraticLine | CellKind::Triangle => 3,
-            CellKind::QuadraticTriangle => 6,
-            CellKind::LagrangeLine(order) => usize::from(order) + 1,
-            CellKind::LagrangeTriangle(order) => (usize::from(order) + 1) * (usize::from(order) + 2) / 2,
-            CellKind::Tetra => 4,
-            CellKind::QuadraticTetra => 10,
-        }
+        (1..=self.dimension).fold(1, |count, d| count * (self.order + d) / d)
     }
 
-    /// Return the number of the kind in VTK.
+    /// Return the number of the kind in VTK, where orders above two have one.
     pub(super) fn vtk(self) -> u8 {
-        match self {
-            CellKind::Line => 3,
-            CellKind::QuadraticLine => 21,
-            CellKind::Triangle => 5,
-            CellKind::QuadraticTriangle => 22,
-            CellKind::LagrangeLine(_) => 68,
-            CellKind::LagrangeTriangle(_) => 69,
-            CellKind::Tetra => 10,
-            CellKind::QuadraticTetra => 24,
-        }
+        [[3, 21, 68], [5, 22, 69], [10, 24, 71]][self.dimension - 1][self.order.min(3) - 1]
     }
 
     /// Return the dimension of the kind and its number in Gmsh.
     pub(super) fn gmsh(self) -> (i32, i32) {
-        match self {
-            CellKind::Line => (1, 1),
-            CellKind::QuadraticLine => (1, 8),
-            CellKind::Triangle => (2, 2),
-            CellKind::QuadraticTriangle => (2, 9),
-            CellKind::LagrangeLine(order) => (1, [26, 27, 28, 62, 63, 64][usize::from(order) - 3]),
-            CellKind::LagrangeTriangle(order) => (2, [21, 23, 25, 42, 43, 45][usize::from(order) - 3]),
-            CellKind::Tetra => (3, 4),
-            CellKind::QuadraticTetra => (3, 11),
-        }
+        const KINDS: [&[i32]; 3] = [&[1, 8, 26, 27, 28, 62, 63, 64], &[2, 9, 21, 23, 25, 42, 43, 45], &[4, 11]];
+        (self.dimension as i32, KINDS[self.dimension - 1][self.order - 1])
     }
 }
 

@@ -17,13 +17,13 @@ pub mod vtu;
 pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGrid};
 pub use folder::{Folder, make_folder, safe_name, write_whole};
 pub use mark::{Mark, Role};
-pub use plot::{Color, ConvergenceSeries, Plot, PlotAxis, Series, Style};
+pub use plot::{Color, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
     PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, busiest,
     warning_lines,
 };
-pub use tables::{ContactTable, HistoryWriter, PairColumns, PairRow, RowFile, StepTable};
+pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;
 
 use crate::error::{Error, Result};

@@ -1,7 +1,6 @@
 //! Plots: curves over two axes, as SVG, with a legend beside the axes, where it hides nothing.
 
 use super::axis::Axis;
-use crate::ddm::Row;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -85,64 +84,6 @@ impl PlotAxis {
     /// Return a logarithmic axis.
     pub fn log(label: impl Into<String>) -> Self {
         Self { label: label.into(), log: true }
-    }
-}
-
-/// The history of one run, for [`Plot::convergence`].
-#[derive(Debug, Clone, PartialEq)]
-pub struct ConvergenceSeries {
-    /// Name of the run.
-    pub label: String,
-    /// The iterations.
-    pub rows: Vec<Row>,
-}
-
-impl Plot {
-    /// Return the plot of residual (solid) and increment (dashed) of one or more runs over the iteration, on a logarithmic axis, and of the error
-    /// of a single one.
-    pub fn convergence(title: &str, runs: &[ConvergenceSeries]) -> Self {
-        let is_one = runs.len() == 1;
-        let has_increments = runs.iter().flat_map(|run| &run.rows).any(|row| row.increment > 0.0);
-        let mut series = Vec::new();
-        for (index, run) in runs.iter().enumerate() {
-            let curve = |label: &str, style, value: fn(&Row) -> f64| {
-                let points = run.rows.iter().map(|row| (row.iteration as f64, value(row))).collect();
-                Series::new(label, points, style).color(Color::Palette(index))
-            };
-            series.push(curve(if is_one { "residual" } else { &run.label }, Style::Line, |row| row.residual));
-            if has_increments {
-                series.push(curve(if is_one { "increment" } else { "" }, Style::Dashed, |row| row.increment));
-            }
-            if is_one && run.rows.iter().any(|row| row.error > 0.0) {
-                series.push(curve("error", Style::LineMarkers, |row| row.error).color(Color::Palette(1)));
-            }
-        }
-        if !is_one && has_increments {
-            for (label, style) in [("residual", Style::Line), ("increment", Style::Dashed)] {
-                series.push(Series::new(label, Vec::new(), style).color(Color::Grey));
-            }
-        }
-        Self { title: title.into(), x: PlotAxis::linear("iteration"), y: PlotAxis::log("relative size"), series }
-    }
-
-    /// Return the plot of the contact force of pairs over their approach, step by step, with the labels `[x, y]`. A single curve
-    /// has no name.
-    pub fn approach<'a>(
-        title: &str,
-        [x, y]: [String; 2],
-        pairs: impl ExactSizeIterator<Item = (&'a str, Vec<(f64, f64)>)>,
-    ) -> Self {
-        let one = pairs.len() == 1;
-        let curve = |(name, points)| Series::new(if one { "" } else { name }, points, Style::LineMarkers);
-        Self { title: title.into(), x: PlotAxis::linear(x), y: PlotAxis::linear(y), series: pairs.map(curve).collect() }
-    }
-
-    /// Return the plot of the contact pressure along a surface from points (coordinate, pressure) in any order. Dashed reference
-    /// curves are drawn on top.
-    pub fn pressure(title: &str, x: &str, y: &str, mut series: Vec<Series>) -> Self {
-        series.iter_mut().for_each(|series| series.points.sort_by(|a, b| a.0.total_cmp(&b.0)));
-        series.sort_by_key(|series| series.style == Style::Dashed);
-        Self { title: title.into(), x: PlotAxis::linear(x), y: PlotAxis::linear(y), series }
     }
 }
 

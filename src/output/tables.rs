@@ -3,37 +3,72 @@
 
 use super::field;
 use super::folder::{Folder, failed};
-use super::report::{PairReport, StepReport};
+use super::report::{Extent, PairReport, ReactionReport, StepReport};
 use crate::ddm::{Observer, Row};
 use crate::error::Result;
 use std::fs::File;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// A CSV file to which every row is written at once, so that a killed run keeps all that it had computed. After a row that cannot be written, as on
-/// a full disk, no more are.
+/// A field of a table: the name of its column and its text.
+pub type Cell = (String, String);
+
+/// Return the field of a number, which may be missing.
+pub fn number(column: impl Into<String>, value: impl Into<Option<f64>>) -> Cell {
+    (column.into(), value.into().map_or(String::new(), field))
+}
+
+/// Return the field of a count.
+fn count(column: impl Into<String>, value: usize) -> Cell {
+    (column.into(), value.to_string())
+}
+
+/// Return the fields `what_x name` and so on of a vector, one per dimension of the scene.
+pub fn vector(what: &str, name: &str, vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = Cell> {
+    ["x", "y", "z"]
+        .into_iter()
+        .zip(vector)
+        .take(dimension)
+        .map(move |(axis, &v)| number(format!("{what}_{axis} {name}"), v))
+}
+
+/// A CSV file to which every row is written at once, so that a killed run keeps all that it had computed. The first row brings the header. After a
+/// row that cannot be written, as on a full disk, no more are.
 pub struct RowFile {
     path: PathBuf,
     csv: csv::Writer<File>,
+    /// Names of the columns; empty before the header.
+    columns: Vec<String>,
     written: std::result::Result<(), csv::Error>,
 }
 
 impl RowFile {
-    /// Open a file with its header. It replaces a file of this name.
+    /// Open a file. It replaces a file of this name.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn create(folder: &Folder, name: &str, header: &[String]) -> Result<Self> {
+    pub fn create(folder: &Folder, name: &str) -> Result<Self> {
         let csv = csv::Writer::from_writer(folder.open(name)?);
-        let mut rows = Self { path: folder.path().join(name), csv, written: Ok(()) };
-        rows.push(header);
-        Ok(rows)
+        Ok(Self { path: folder.path().join(name), csv, columns: Vec::new(), written: Ok(()) })
+    }
+
+    /// Write the header, which is that of this row.
+    pub fn begin(&mut self, row: &[Cell]) {
+        self.columns = row.iter().map(|(column, _)| column.clone()).collect();
+        self.record(&self.columns.clone());
     }
 
     /// Append a row.
-    pub fn push(&mut self, fields: &[String]) {
+    pub fn push(&mut self, row: &[Cell]) {
+        if self.columns.is_empty() {
+            self.begin(row);
+        }
+        self.record(&row.iter().map(|(_, text)| text.clone()).collect::<Vec<_>>());
+    }
+
+    fn record(&mut self, texts: &[String]) {
         if self.written.is_ok() {
-            self.written = self.csv.write_record(fields).and_then(|()| Ok(self.csv.flush()?));
+            self.written = self.csv.write_record(texts).and_then(|()| Ok(self.csv.flush()?));
         }
     }
 
@@ -50,76 +85,47 @@ impl RowFile {
 pub struct HistoryWriter {
     /// The file.
     pub rows: RowFile,
-    bodies: usize,
-    /// Whether rows have the column of load steps.
+    /// Names of the bodies in the order of [`Row::increments`].
+    bodies: Vec<String>,
+    /// Whether rows begin with their load step.
     steps: bool,
 }
 
 impl HistoryWriter {
-    /// Open `history.csv` and write its header; `bodies` are the names in the order of [`Row::increments`]. With `steps`, each
-    /// row begins with its load step.
-    pub fn create<S: AsRef<str>>(folder: &Folder, bodies: &[S], steps: bool) -> Result<Self> {
-        let mut header: Vec<String> = if steps { vec!["step".into()] } else { Vec::new() };
-        header.extend(["iteration", "residual", "error", "increment"].map(String::from));
-        header.extend(bodies.iter().map(|body| format!("increment_{}", body.as_ref())));
-        let last = "gamma energy closed points sweeps factorizations inner_iterations smoothed seconds";
-        header.extend(last.split_whitespace().map(String::from));
-        Ok(Self { rows: RowFile::create(folder, "history.csv", &header)?, bodies: bodies.len(), steps })
+    /// Begin the file, which has its header whether or not there is an iterate.
+    pub fn new(rows: RowFile, bodies: Vec<String>, steps: bool) -> Self {
+        let mut history = Self { rows, bodies, steps };
+        history.rows.begin(&history.fields(&Row::default()));
+        history
+    }
+
+    fn fields(&self, row: &Row) -> Vec<Cell> {
+        let mut fields: Vec<Cell> = self.steps.then(|| count("step", row.step)).into_iter().collect();
+        fields.push(count("iteration", row.iteration));
+        let sizes = [("residual", row.residual), ("error", row.error), ("increment", row.increment)];
+        fields.extend(sizes.map(|(name, size)| number(name, size)));
+        // row 0 may have no increments
+        let increment =
+            |(k, body): (usize, &String)| number(format!("increment_{body}"), row.increments.get(k).copied());
+        fields.extend(self.bodies.iter().enumerate().map(increment));
+        fields.extend([number("gamma", row.gamma), number("energy", row.energy)]);
+        let counts = [
+            ("closed", row.closed),
+            ("points", row.points),
+            ("sweeps", row.sweeps),
+            ("factorizations", row.factorizations),
+            ("inner_iterations", row.inner_iterations),
+            ("smoothed", row.smoothed),
+        ];
+        fields.extend(counts.map(|(name, value)| count(name, value)));
+        fields.push(number("seconds", row.seconds));
+        fields
     }
 }
 
 impl Observer for HistoryWriter {
     fn row(&mut self, row: &Row) {
-        let mut fields = if self.steps { vec![row.step.to_string()] } else { Vec::new() };
-        fields.push(row.iteration.to_string());
-        fields.extend([row.residual, row.error, row.increment].map(field));
-        // row 0 may have no increments
-        fields.extend((0..self.bodies).map(|body| row.increments.get(body).map_or(String::new(), |&v| field(v))));
-        fields.extend([field(row.gamma), field(row.energy)]);
-        fields.extend(
-            [row.closed, row.points, row.sweeps, row.factorizations, row.inner_iterations, row.smoothed]
-                .map(|count| count.to_string()),
-        );
-        fields.push(field(row.seconds));
-        self.rows.push(&fields);
-    }
-}
-
-/// Return the name of the column of the contact size, from the measure of the pairs.
-pub fn contact_column(measure: &str) -> String {
-    format!("contact_{measure}")
-}
-
-/// Return the column names `what_x name` and so on of a vector, one per dimension of the scene.
-pub fn vector_columns(what: &str, name: &str, dimension: usize) -> Vec<String> {
-    ["x", "y", "z"][..dimension].iter().map(|axis| format!("{what}_{axis} {name}")).collect()
-}
-
-/// Return the fields of a vector in the columns of [`vector_columns`].
-pub fn vector_fields(vector: &[f64; 3], dimension: usize) -> impl Iterator<Item = String> {
-    vector[..dimension].iter().map(|&value| field(value))
-}
-
-/// The columns that the table of load steps has for a pair beside those of all pairs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PairColumns {
-    /// No others.
-    None,
-    /// Turn and moment of an obstacle: about z in the plane, in space their components.
-    Obstacle,
-    /// The offset of the gap.
-    Offset,
-}
-
-impl PairColumns {
-    fn names(self, dimension: usize) -> impl Iterator<Item = &'static str> {
-        let names: &[&str] = match self {
-            Self::None => &[],
-            Self::Obstacle if dimension == 2 => &["tilt_z", "moment_z"],
-            Self::Obstacle => &["tilt_x", "tilt_y", "tilt_z", "moment_x", "moment_y", "moment_z"],
-            Self::Offset => &["offset"],
-        };
-        names.iter().copied()
+        self.rows.push(&self.fields(row));
     }
 }
 
@@ -127,54 +133,65 @@ impl PairColumns {
 pub struct StepTable {
     /// The file.
     pub rows: RowFile,
-    dimension: usize,
-    count: usize,
+    /// Number of steps so far.
+    pub count: usize,
+    /// Names of the factors of loads.
+    pub factors: Vec<String>,
+    /// Names of the pairs and of the reactions, each of which occurs once.
+    pub names: ResultNames,
+}
+
+/// The names of pairs and reactions in the columns of tables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultNames {
+    /// Names of the pairs.
+    pub pairs: Vec<String>,
+    /// Names of the reactions.
+    pub reactions: Vec<String>,
+    /// Dimension of the scene.
+    pub dimension: usize,
+    /// What measures the size of contacts: `length` or `area`.
+    pub measure: &'static str,
+}
+
+impl ResultNames {
+    /// Return the field of the size of a contact.
+    pub fn contact(&self, pair: &str, extent: &Extent) -> Cell {
+        number(format!("contact_{} {pair}", self.measure), extent.contact())
+    }
+
+    /// Return the fields of all reactions.
+    pub fn reactions(&self, reactions: &[ReactionReport]) -> impl Iterator<Item = Cell> {
+        let named = self.reactions.iter().zip(reactions);
+        named.flat_map(|(name, reaction)| vector("reaction", name, &reaction.force, self.dimension))
+    }
 }
 
 impl StepTable {
-    /// Open `steps.csv` and write its header from the names of `factors`, `pairs` and `reactions`, each of which occurs once. The
-    /// `measure` is that of the pairs.
-    pub fn create(
-        folder: &Folder,
-        factors: &[String],
-        pairs: &[(String, PairColumns)],
-        reactions: &[String],
-        dimension: usize,
-        measure: &str,
-    ) -> Result<Self> {
-        let mut header = vec!["step".to_owned(), "time".to_owned()];
-        header.extend_from_slice(factors);
-        header.extend(["status", "iterations", "residual"].map(str::to_owned));
-        for (pair, columns) in pairs {
-            header.extend(vector_columns("force", pair, dimension));
-            let numbers = ["approach", &contact_column(measure), "peak_pressure", "closed"];
-            header.extend(numbers.map(|what| format!("{what} {pair}")));
-            header.extend(columns.names(dimension).map(|what| format!("{what} {pair}")));
-        }
-        header.extend(reactions.iter().flat_map(|name| vector_columns("reaction", name, dimension)));
-        Ok(Self { rows: RowFile::create(folder, "steps.csv", &header)?, dimension, count: 0 })
-    }
-
-    /// Write a step; `names` are those of its factors in the order of the header.
-    pub fn row(&mut self, names: &[String], step: &StepReport) {
+    /// Write a step.
+    pub fn row(&mut self, step: &StepReport) {
         self.count += 1;
-        let number = |value: Option<f64>| value.map_or(String::new(), field);
-        let mut line = vec![self.count.to_string(), field(step.time)];
-        line.extend(names.iter().map(|name| number(step.factors.get(name).copied())));
-        line.extend([step.status.clone(), step.iterations.to_string(), number(step.residual)]);
-        for pair in &step.pairs {
-            line.extend(vector_fields(&pair.force, self.dimension));
-            line.extend([number(pair.approach), field(pair.extent.contact()), field(pair.peak_pressure)]);
-            line.push(pair.closed.to_string());
+        let dimension = self.names.dimension;
+        let mut line = vec![count("step", self.count), number("time", step.time)];
+        line.extend(self.factors.iter().map(|name| number(name, step.factors.get(name).copied())));
+        line.push(("status".to_owned(), step.status.clone()));
+        line.extend([count("iterations", step.iterations), number("residual", step.residual)]);
+        for (pair, name) in step.pairs.iter().zip(&self.names.pairs) {
+            line.extend(vector("force", name, &pair.force, dimension));
+            line.push(number(format!("approach {name}"), pair.approach));
+            line.push(self.names.contact(name, &pair.extent));
+            line.push(number(format!("peak_pressure {name}"), pair.peak_pressure));
+            line.push(count(format!("closed {name}"), pair.closed));
             if let Some(obstacle) = &pair.obstacle {
-                let about = if self.dimension == 2 { 2..3 } else { 0..3 };
-                line.extend(
-                    [obstacle.tilt, obstacle.moment].iter().flat_map(|v| v[about.clone()].iter().map(|&c| field(c))),
-                );
+                // about z in the plane
+                let others = if dimension == 2 { 2 } else { 0 };
+                for (what, v) in [("tilt", obstacle.tilt), ("moment", obstacle.moment)] {
+                    line.extend(vector(what, name, &v, 3).skip(others));
+                }
             }
-            line.extend(pair.offset.map(field));
+            line.extend(pair.offset.map(|offset| number(format!("offset {name}"), offset)));
         }
-        line.extend(step.reactions.iter().flat_map(|reaction| vector_fields(&reaction.force, self.dimension)));
+        line.extend(self.names.reactions(&step.reactions));
         self.rows.push(&line);
     }
 }
@@ -211,59 +228,45 @@ impl PairRow {
     }
 }
 
+/// Return the fields of a pair in `contacts.csv`.
+fn pair_fields(pair: &PairReport, row: &PairRow) -> Vec<Cell> {
+    let text = |column: &str, text: &str| (column.to_owned(), text.to_owned());
+    let three = |columns: [&str; 3], values: [f64; 3]| [0, 1, 2].map(|k| number(columns[k], values[k]));
+    // others than obstacles do not turn
+    let (tilt, moment) =
+        pair.obstacle.as_ref().map_or(([f64::NAN; 3], [f64::NAN; 3]), |found| (found.tilt, found.moment));
+    let mut fields = vec![
+        text("a", &pair.bodies[0]),
+        text("b", &pair.bodies[1]),
+        text("surface_a", &pair.surfaces[0]),
+        text("surface_b", &pair.surfaces[1]),
+        count("points", pair.points),
+        count("closed", row.closed),
+    ];
+    fields.extend(three(["force_x", "force_y", "force_z"], pair.force[0]));
+    fields.push(number("peak_pressure", pair.peak_pressure));
+    fields.extend(three(["peak_x", "peak_y", "peak_z"], pair.peak_at));
+    fields.extend([number("contact", pair.extent.contact()), number("open", pair.extent.open())]);
+    fields.extend(three(["gap_least", "gap_mean", "gap_largest"], row.gap));
+    fields.extend([number("opening_mean", row.opening[0]), number("opening_largest", row.opening[1])]);
+    fields.extend([number("energy", pair.layer_energy), number("approach", pair.approach)]);
+    fields.extend(three(["tilt_x", "tilt_y", "tilt_z"], tilt));
+    fields.extend(three(["moment_x", "moment_y", "moment_z"], moment));
+    fields.extend([number("offset", pair.offset), text("table", &row.table), text("plot", &row.plot)]);
+    fields
+}
+
 /// Write the pairs to `contacts.csv`, in the order of the scene.
 pub fn save(folder: &Folder, pairs: &[PairReport], rows: &[PairRow]) -> Result<()> {
-    folder.write("contacts.csv", |out| write(out, pairs, rows))
-}
-
-fn write(out: &mut dyn Write, pairs: &[PairReport], rows: &[PairRow]) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(out);
-    csv.write_record(fields(&PairReport::default(), &PairRow::default()).map(|(column, _)| column))?;
-    for (pair, row) in pairs.iter().zip(rows) {
-        csv.write_record(fields(pair, row).map(|(_, text)| text))?;
-    }
-    csv.flush()
-}
-
-/// Return the names of the columns in their order, each with the value of a pair.
-fn fields(pair: &PairReport, row: &PairRow) -> [(&'static str, String); 31] {
-    let [force, _] = pair.force;
-    let number = |value: Option<f64>| value.map_or(String::new(), field);
-    let turn = |c: usize| number(pair.obstacle.as_ref().map(|obstacle| obstacle.tilt[c]));
-    let moment = |c: usize| number(pair.obstacle.as_ref().map(|obstacle| obstacle.moment[c]));
-    [
-        ("a", pair.bodies[0].clone()),
-        ("b", pair.bodies[1].clone()),
-        ("surface_a", pair.surfaces[0].clone()),
-        ("surface_b", pair.surfaces[1].clone()),
-        ("points", pair.points.to_string()),
-        ("closed", row.closed.to_string()),
-        ("force_x", field(force[0])),
-        ("force_y", field(force[1])),
-        ("force_z", field(force[2])),
-        ("peak_pressure", field(pair.peak_pressure)),
-        ("peak_x", field(pair.peak_at[0])),
-        ("peak_y", field(pair.peak_at[1])),
-        ("peak_z", field(pair.peak_at[2])),
-        ("contact", field(pair.extent.contact())),
-        ("open", field(pair.extent.open())),
-        ("gap_least", field(row.gap[0])),
-        ("gap_mean", field(row.gap[1])),
-        ("gap_largest", field(row.gap[2])),
-        ("opening_mean", field(row.opening[0])),
-        ("opening_largest", field(row.opening[1])),
-        ("energy", field(pair.layer_energy)),
-        ("approach", number(pair.approach)),
-        ("tilt_x", turn(0)),
-        ("tilt_y", turn(1)),
-        ("tilt_z", turn(2)),
-        ("moment_x", moment(0)),
-        ("moment_y", moment(1)),
-        ("moment_z", moment(2)),
-        ("offset", number(pair.offset)),
-        ("table", row.table.clone()),
-        ("plot", row.plot.clone()),
-    ]
+    let header = pair_fields(&PairReport::default(), &PairRow::default());
+    folder.write("contacts.csv", |out| {
+        let mut csv = csv::Writer::from_writer(out);
+        csv.write_record(header.iter().map(|(column, _)| column))?;
+        for (pair, row) in pairs.iter().zip(rows) {
+            csv.write_record(pair_fields(pair, row).iter().map(|(_, text)| text))?;
+        }
+        csv.flush()
+    })
 }
 
 /// The result on one pair of contact surfaces; all vectors have one entry per contact point.
@@ -322,7 +325,8 @@ mod tests {
     fn rows_are_in_the_file_before_the_end() {
         let base = tempfile::tempdir().unwrap();
         let folder = Folder::create(base.path()).unwrap();
-        let mut history = HistoryWriter::create(&folder, &["upper", "lower"], true).unwrap();
+        let rows = RowFile::create(&folder, "history.csv").unwrap();
+        let mut history = HistoryWriter::new(rows, ["upper", "lower"].map(str::to_owned).to_vec(), true);
         let first =
             Row { residual: 1.0, error: f64::NAN, increment: f64::NAN, gamma: f64::NAN, points: 9, ..Row::default() };
         history.row(&first);
@@ -356,10 +360,10 @@ mod tests {
             }),
             ..PairReport::default()
         };
-        let mut out = Vec::new();
         let row = PairRow { table: "contact-up-low.csv".into(), ..row };
-        write(&mut out, &[pair], &[row]).unwrap();
-        let text = String::from_utf8(out).unwrap();
+        let base = tempfile::tempdir().unwrap();
+        save(&Folder::create(base.path()).unwrap(), &[pair], &[row]).unwrap();
+        let text = std::fs::read_to_string(base.path().join("contacts.csv")).unwrap();
         let (header, line) = text.trim().split_once('\n').unwrap();
         assert_eq!(header.split(',').count(), 31);
         assert_eq!(

@@ -72,7 +72,7 @@ impl UnstructuredGrid {
         for (number, cell) in cells.enumerate() {
             let mut line = vec![tags.cells + 1 + number];
             line.extend(cell.iter().map(|&point| tags.points + 1 + point as usize));
-            if self.cell == CellKind::QuadraticTetra {
+            if self.cell == (CellKind { dimension: 3, order: 2 }) {
                 // Gmsh has the mid-edge 23 before 13
                 line.swap(9, 10);
             }

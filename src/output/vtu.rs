@@ -3,49 +3,27 @@
 use super::fields::{BodyField, FieldArray, UnstructuredGrid};
 use std::io::{self, Write};
 
-/// The numbers of an array as they stand in a file. A block begins with the number of its bytes, eight bytes of its own.
-enum Block<'a> {
-    Reals {
-        values: &'a [f64],
-        single: bool,
-    },
-    Points(&'a [u32]),
-    /// Ends of cells with this number of points each.
-    Ends {
-        cells: usize,
-        stride: usize,
-    },
-    Kinds {
-        cells: usize,
-        kind: u8,
-    },
+/// A function that writes to a file.
+type Writing<'a> = dyn Fn(&mut dyn Write) -> io::Result<()> + 'a;
+
+/// The numbers of an array as they stand in a file: the name of their type, the number of their bytes, and how they are written.
+struct Block<'a> {
+    kind: &'static str,
+    bytes: usize,
+    write: Box<Writing<'a>>,
 }
 
-impl Block<'_> {
-    /// Return the name of the type of the numbers, and the number of bytes of all.
-    fn format(&self) -> (&'static str, usize) {
-        match *self {
-            Block::Reals { values, single: false } => ("Float64", 8 * values.len()),
-            Block::Reals { values, single: true } => ("Float32", 4 * values.len()),
-            Block::Points(points) => ("UInt32", 4 * points.len()),
-            Block::Ends { cells, .. } => ("Int64", 8 * cells),
-            Block::Kinds { cells, .. } => ("UInt8", cells),
-        }
-    }
+/// Return a block of so many numbers, given by their bytes.
+fn block<'a, const N: usize>(kind: &'static str, count: usize, number: impl Fn(usize) -> [u8; N] + 'a) -> Block<'a> {
+    let write = move |out: &mut dyn Write| (0..count).try_for_each(|k| out.write_all(&number(k)));
+    Block { kind, bytes: N * count, write: Box::new(write) }
+}
 
-    fn write(&self, out: &mut dyn Write) -> io::Result<()> {
-        out.write_all(&(self.format().1 as u64).to_le_bytes())?;
-        match *self {
-            Block::Reals { values, single: false } => values.iter().try_for_each(|x| out.write_all(&x.to_le_bytes())),
-            Block::Reals { values, single: true } => {
-                values.iter().try_for_each(|&x| out.write_all(&(x as f32).to_le_bytes()))
-            }
-            Block::Points(points) => points.iter().try_for_each(|point| out.write_all(&point.to_le_bytes())),
-            Block::Ends { cells, stride } => {
-                (1..=cells).try_for_each(|cell| out.write_all(&((cell * stride) as i64).to_le_bytes()))
-            }
-            Block::Kinds { cells, kind } => out.write_all(&vec![kind; cells]),
-        }
+/// Return a block of real numbers, with four bytes a number if `single`.
+fn reals(values: &[f64], single: bool) -> Block<'_> {
+    match single {
+        true => block("Float32", values.len(), move |k| (values[k] as f32).to_le_bytes()),
+        false => block("Float64", values.len(), move |k| values[k].to_le_bytes()),
     }
 }
 
@@ -59,11 +37,10 @@ struct Document<'a> {
 
 impl<'a> Document<'a> {
     fn array(&mut self, name: &str, components: usize, block: Block<'a>) -> io::Result<()> {
-        let (kind, bytes) = block.format();
-        let offset = self.offset;
-        let attributes = attributes(name, components);
+        let (kind, offset, attributes) = (block.kind, self.offset, attributes(name, components));
         writeln!(self.out, r#"<DataArray type="{kind}"{attributes} format="appended" offset="{offset}"/>"#)?;
-        self.offset += 8 + bytes;
+        // a block begins with the number of its bytes, eight bytes of its own
+        self.offset += 8 + block.bytes;
         self.blocks.push(block);
         Ok(())
     }
@@ -71,7 +48,7 @@ impl<'a> Document<'a> {
     fn arrays(&mut self, element: &str, arrays: &'a [FieldArray], single: bool) -> io::Result<()> {
         writeln!(self.out, "<{element}>")?;
         for FieldArray { name, components, values } in arrays {
-            self.array(name, *components, Block::Reals { values, single })?;
+            self.array(name, *components, reals(values, single))?;
         }
         writeln!(self.out, "</{element}>")
     }
@@ -85,17 +62,21 @@ impl UnstructuredGrid {
         begin("UnstructuredGrid", out)?;
         writeln!(out, "<UnstructuredGrid>\n<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n<Points>")?;
         let mut document = Document { out, blocks: Vec::new(), offset: 0 };
-        document.array("Points", 3, Block::Reals { values: self.points.as_flattened(), single })?;
+        document.array("Points", 3, reals(self.points.as_flattened(), single))?;
         writeln!(document.out, "</Points>\n<Cells>")?;
-        document.array("connectivity", 1, Block::Points(&self.connectivity))?;
-        document.array("offsets", 1, Block::Ends { cells, stride })?;
-        document.array("types", 1, Block::Kinds { cells, kind: self.cell.vtk() })?;
+        let nodes = &self.connectivity;
+        document.array("connectivity", 1, block("UInt32", nodes.len(), |k| nodes[k].to_le_bytes()))?;
+        document.array("offsets", 1, block("Int64", cells, move |k| ((k + 1) * stride).to_le_bytes()))?;
+        document.array("types", 1, block("UInt8", cells, |_| [self.cell.vtk()]))?;
         writeln!(document.out, "</Cells>")?;
         document.arrays("PointData", &self.at_points, single)?;
         document.arrays("CellData", &self.at_cells, single)?;
         let Document { out, blocks, .. } = document;
         write!(out, "</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_")?;
-        blocks.iter().try_for_each(|block| block.write(out))?;
+        for Block { bytes, write, .. } in &blocks {
+            out.write_all(&(*bytes as u64).to_le_bytes())?;
+            write(out)?;
+        }
         writeln!(out, "\n</AppendedData>\n</VTKFile>")
     }
 }
@@ -170,7 +151,7 @@ mod tests {
         let grid = UnstructuredGrid {
             title: String::new(),
             points: vec![[0.5, 1.0, 0.0], [2.0, 3.0, 0.25]],
-            cell: CellKind::Line,
+            cell: CellKind { dimension: 1, order: 1 },
             connectivity: vec![1, 0],
             at_points: vec![FieldArray::new("stress", 6, (0..12).map(f64::from).collect())],
             at_cells: Vec::new(),

@@ -137,11 +137,6 @@ impl Schur {
         block_size > 2 || rows > SMALL
     }
 
-    /// Return the order of elimination that MUMPS took: INFOG(7), with the numbers of ICNTL(7).
-    pub fn ordering(&self) -> MumpsInt {
-        self.mumps.infog[6]
-    }
-
     /// Return the memory in megabytes that the factorisation will take, without S.
     pub fn expected_megabytes(&self) -> usize {
         self.mumps.infog[15].max(0) as usize

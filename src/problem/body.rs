@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 /// A body: a named group of cells with its elasticity, supports and loads. In a scene file the name may be a
 /// pattern; the table then stands for all bodies whose names match.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BodySpec {
     /// group of cells, or a pattern such as "brick_*" for many bodies
@@ -75,23 +75,8 @@ impl BodySpec {
     pub fn new(name: &str, young: impl Into<Field>, poisson: impl Into<Field>) -> Self {
         let place = Place::here("young, poisson");
         let [young, poisson] = [young.into(), poisson.into()].map(|field| Some(Located::new(field, place.clone())));
-        Self {
-            name: Located::here(&plain_pattern(name)),
-            young,
-            poisson,
-            orthotropic: None,
-            anisotropic: None,
-            axes: None,
-            split: false,
-            order: Order::P1,
-            fix: Vec::new(),
-            load: Vec::new(),
-            spring: Vec::new(),
-            force: None,
-            exact: None,
-            regions: Vec::new(),
-            force_factor: 1.0,
-        }
+        let name = Located::here(&plain_pattern(name));
+        Self { name, young, poisson, force_factor: 1.0, ..Self::default() }
     }
 
     /// Let each connected part of the group be a body of its own: `NAME_1`, `NAME_2`, ...

@@ -6,7 +6,6 @@ use crate::error::{Error, Located, Place, Result as Checked};
 use crate::expression::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serializer};
-use serde_json::json;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use toml::Spanned;
@@ -98,14 +97,7 @@ impl DataKeys {
 /// # Errors
 /// Those of the serializer.
 pub fn write<S: Serializer>(library: &Library, serializer: S) -> Result<S::Ok, S::Error> {
-    let keys =
-        |DataSpec { name: _, file, place: _, origin, spacing, unit, detrend, interpolation, outside }: &DataSpec| {
-            json!({
-                "file": file.display().to_string(), "origin": origin, "spacing": spacing, "unit": unit, "detrend": detrend,
-                "interpolate": interpolation, "outside": outside,
-            })
-        };
-    serializer.collect_map(library.iter().map(|(name, data)| (name, keys(&data.spec))))
+    serializer.collect_map(library.iter().map(|(name, data)| (name, &data.spec)))
 }
 
 /// Two numbers; a single one stands for both.

@@ -37,7 +37,7 @@ pub enum Constants {
 
 /// The directions of the material's axes.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(try_from = "AxesKeys", into = "AxesKeys")]
+#[serde(try_from = "AxesKeys", untagged)]
 pub enum AxesSpec {
     /// A direction along axis 1, and one towards axis 2.
     Directions {
@@ -254,7 +254,7 @@ fn check_isotropic(young: Option<&Field>, poisson: Option<&Field>) -> Result<(),
 }
 
 /// The axes of a material.
-#[derive(Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct AxesKeys {
     /// direction of axis 1
@@ -294,19 +294,5 @@ impl TryFrom<AxesKeys> for AxesSpec {
             return Err(missing("second"));
         }
         Ok(Self::Directions { first, second })
-    }
-}
-
-impl From<AxesSpec> for AxesKeys {
-    fn from(axes: AxesSpec) -> Self {
-        let direction = |fields| Some(Direction(fields).into());
-        match axes {
-            AxesSpec::Directions { first, second } => {
-                Self { first: direction(first), second: second.and_then(direction), ..Self::default() }
-            }
-            AxesSpec::Angle { angle, axis } => {
-                Self { angle: Some(angle.into()), axis: direction(axis), ..Self::default() }
-            }
-        }
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// The law of a Winkler layer. Parameters are numbers or expressions in the coordinates.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
-#[serde(try_from = "LayerKeys", into = "LayerKeys")]
+#[serde(try_from = "LayerKeys", rename_all = "lowercase")]
 pub enum LayerSpec {
     /// p = (c/B)^(1/a), the layer of the paper.
     Power(Power),
@@ -24,8 +24,10 @@ pub enum LayerSpec {
     /// The law of this name from a Rust program ([`Scene::law`](crate::scene::Scene::law)).
     Own(String),
     /// An expression p(c), which may use the coordinates, too.
+    #[serde(untagged)]
     Pressure {
         /// The expression; its first variable is c.
+        #[serde(rename = "pressure")]
         law: Expression,
         /// The compression (a length) beyond which p goes on linearly, if given.
         up_to: Option<f64>,
@@ -141,7 +143,7 @@ impl Bounds {
 }
 
 /// The keys of a layer.
-#[derive(Clone, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct LayerKeys {
     /// write power = { B = ..., a = ... }
@@ -158,16 +160,13 @@ struct LayerKeys {
     pressure: Option<Located<String>>,
     /// compression beyond which the expression goes on linearly
     up_to: Option<Located<f64>>,
-    /// Name of a law of a Rust program, for the echo.
-    #[serde(skip_deserializing)]
-    own: Option<String>,
 }
 
 impl TryFrom<LayerKeys> for LayerSpec {
     type Error = Refused;
 
     fn try_from(keys: LayerKeys) -> Result<Self, Refused> {
-        let LayerKeys { power, linear, exponential, cubic, table, pressure, up_to, own: _ } = keys;
+        let LayerKeys { power, linear, exponential, cubic, table, pressure, up_to } = keys;
         let given = [
             ("power", place(&power)),
             ("linear", place(&linear)),
@@ -215,26 +214,6 @@ fn of_points(given: Vec<Located<Vec<f64>>>) -> Result<LayerSpec, Refused> {
         points.remove(0); // every law begins at the origin
     }
     Ok(LayerSpec::Table(points))
-}
-
-impl From<LayerSpec> for LayerKeys {
-    fn from(layer: LayerSpec) -> Self {
-        let none = Self::default();
-        match layer {
-            LayerSpec::Power(law) => Self { power: Some(law.into()), ..none },
-            LayerSpec::Linear(law) => Self { linear: Some(law.into()), ..none },
-            LayerSpec::Exponential(law) => Self { exponential: Some(law.into()), ..none },
-            LayerSpec::Cubic(law) => Self { cubic: Some(law.into()), ..none },
-            LayerSpec::Table(points) => {
-                let points: Vec<Located<Vec<f64>>> = points.into_iter().map(|point| point.to_vec().into()).collect();
-                Self { table: Some(points.into()), ..none }
-            }
-            LayerSpec::Own(name) => Self { own: Some(name), ..none },
-            LayerSpec::Pressure { law, up_to } => {
-                Self { pressure: Some(law.text().to_owned().into()), up_to: up_to.map(Located::from), ..none }
-            }
-        }
-    }
 }
 
 impl Check for LayerSpec {

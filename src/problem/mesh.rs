@@ -56,19 +56,8 @@ struct MeshKeys {
 #[derive(Debug, Clone, JsonSchema)]
 #[schemars(with = "Either<String, MeshKeys>")]
 pub enum MeshSource {
-    /// A Gmsh script with numbers set in it (`gmsh -setnumber NAME VALUE`), or a shape of another program.
-    Geo {
-        /// The script, or the file of the shape.
-        file: Located<PathBuf>,
-        /// Names and numbers, sorted by name.
-        set: Vec<(String, f64)>,
-        /// Place of each name in `set`.
-        places: Vec<Place>,
-        /// What an adaptation asks of the mesh. No scene file has it.
-        adapted: Option<Arc<AdaptedMesh>>,
-        /// Limits and settings of Gmsh.
-        guard: Guard,
-    },
+    /// What Gmsh meshes.
+    Geo(GmshSource),
     /// A mesh file: Gmsh's format 4.1 or 2.2, text or binary, a deck (`.inp`), or a format that Gmsh converts.
     Msh {
         /// The mesh file.
@@ -76,6 +65,19 @@ pub enum MeshSource {
     },
     /// Arrays from a Rust program.
     Arrays(Rc<MeshArrays>),
+}
+
+/// A Gmsh script with numbers set in it (`gmsh -setnumber NAME VALUE`), or a shape of another program.
+#[derive(Debug, Clone)]
+pub struct GmshSource {
+    /// The script, or the file of the shape.
+    pub file: Located<PathBuf>,
+    /// Names and numbers, sorted by name.
+    pub set: Vec<(Located<String>, f64)>,
+    /// What an adaptation asks of the mesh. No scene file has it.
+    pub adapted: Option<Arc<AdaptedMesh>>,
+    /// Limits and settings of Gmsh.
+    pub guard: Guard,
 }
 
 /// What an adaptation asks of a mesh.
@@ -93,11 +95,12 @@ impl MeshSource {
     #[track_caller]
     pub fn script(file: impl AsRef<Path>, set: &[(&str, f64)]) -> Self {
         let file = file.as_ref();
-        let mut set: Vec<(String, f64)> = set.iter().map(|&(name, value)| (name.to_owned(), value)).collect();
-        set.sort_by(|a, b| a.0.cmp(&b.0));
         let place = Place::here(&file.display().to_string());
-        let (places, file) = (vec![place.clone(); set.len()], Located::new(file.to_owned(), place));
-        Self::Geo { file, set, places, adapted: None, guard: Guard::default() }
+        let named = |&(name, value): &(&str, f64)| (Located::new(name.to_owned(), place.clone()), value);
+        let mut set: Vec<_> = set.iter().map(named).collect();
+        set.sort_by(|(a, _), (b, _)| a.value.cmp(&b.value));
+        let file = Located::new(file.to_owned(), place);
+        Self::Geo(GmshSource { file, set, adapted: None, guard: Guard::default() })
     }
 
     /// Return the mesh of a file that was typed as an argument: a script or shape for Gmsh, or a mesh.
@@ -170,12 +173,11 @@ impl MeshKeys {
                 .help("it is for shapes (.step, .iges, .brep, .stl): give scripts numbers by set = { n = 32 }"));
         }
         let numbers = self.set.map(|set| set.value).unwrap_or_default();
-        let (mut set, mut places) = (Vec::new(), Vec::new());
+        let mut set = Vec::new();
         for (name, number) in numbers {
             let place = place_of(name.span());
             check_number(name.get_ref(), number, &place)?;
-            set.push((name.into_inner(), number));
-            places.push(place);
+            set.push((Located::new(name.into_inner(), place), number));
         }
         let [size, seconds] = [self.size, self.timeout].map(|number| number.map(|number| number.value));
         let guard = Guard {
@@ -183,7 +185,7 @@ impl MeshKeys {
             threads: self.threads.map(|threads| threads.value),
             seconds: seconds.unwrap_or(Guard::default().seconds),
         };
-        Ok(MeshSource::Geo { file, set, places, adapted: None, guard })
+        Ok(MeshSource::Geo(GmshSource { file, set, adapted: None, guard }))
     }
 }
 
@@ -201,7 +203,7 @@ fn check_number(name: &str, number: f64, place: &Place) -> Checked<()> {
 
 impl Check for MeshSource {
     fn check(&self, _: Geometry) -> Result<(), Flaw> {
-        let Self::Geo { guard, .. } = self else { return Ok(()) };
+        let Self::Geo(GmshSource { guard, .. }) = self else { return Ok(()) };
         positive("timeout", "the timeout", guard.seconds)?;
         guard.threads.map_or(Ok(()), |threads| at_least_one("threads", threads))?;
         guard.size.map_or(Ok(()), |size| positive("size", "the size", size))
@@ -226,8 +228,8 @@ impl Serialize for MeshSource {
         let echo = match self {
             Self::Arrays(arrays) => json!({ "points": arrays.points.len(), "groups": arrays.groups.len() }),
             Self::Msh { file } => json!({ "msh": file.display().to_string() }),
-            Self::Geo { file, set, guard: Guard { size, threads, seconds }, .. } => {
-                let set: BTreeMap<_, _> = set.iter().cloned().collect();
+            Self::Geo(GmshSource { file, set, guard: Guard { size, threads, seconds }, .. }) => {
+                let set: BTreeMap<_, _> = set.iter().map(|(name, number)| (&name.value, number)).collect();
                 let geo = file.display().to_string();
                 json!({ "geo": geo, "set": set, "size": size, "threads": threads, "timeout": seconds })
             }

@@ -151,19 +151,22 @@ impl Linear {
 }
 
 /// The relaxation gamma^k of iteration k.
-#[derive(Debug, Clone, PartialEq, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
 #[schemars(with = "Either<f64, Either<Vec<f64>, Rule>>")]
+#[serde(rename_all = "kebab-case")]
 pub enum Gamma {
-    /// The same number > 0 in every iteration.
-    Stationary(f64),
-    /// Numbers > 0 for k = 0, 1, ...; the last one is kept.
-    Schedule(Vec<f64>),
     /// Exact line search on the functional F1.
     LineSearch,
     /// Aitken's rule.
     Aitken,
     /// The rule of this name from a Rust program ([`Scene::rule`](crate::scene::Scene::rule)).
     Own(String),
+    /// The same number > 0 in every iteration.
+    #[serde(untagged)]
+    Stationary(f64),
+    /// Numbers > 0 for k = 0, 1, ...; the last one is kept.
+    #[serde(untagged)]
+    Schedule(Vec<f64>),
 }
 
 impl Default for Gamma {
@@ -207,8 +210,9 @@ pub enum RobinRule {
 }
 
 /// The Robin zone: psi of (38), a characteristic function of a part of the contact surfaces. c is the compression of the layer.
-#[derive(Debug, Clone, Default, JsonSchema)]
+#[derive(Debug, Clone, Default, Serialize, JsonSchema)]
 #[schemars(with = "String")]
+#[serde(rename_all = "lowercase")]
 pub enum Zone {
     /// psi = 0: Neumann-Neumann.
     None,
@@ -218,6 +222,7 @@ pub enum Zone {
     #[default]
     Active,
     /// psi = 1 where the expression in x, y, z and the iteration k = 0, 1, ... is > 0 (true is 1).
+    #[serde(untagged, serialize_with = "as_text")]
     Subset(Field),
 }
 
@@ -332,7 +337,7 @@ impl<'de> Deserialize<'de> for SolverSpec {
 }
 
 /// The rules for gamma by name.
-#[derive(Deserialize, Serialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 enum Rule {
     LineSearch,
@@ -350,18 +355,6 @@ impl<'de> Deserialize<'de> for Gamma {
                 Rule::Aitken => Self::Aitken,
             }),
             other => Err(other.unexpected()),
-        }
-    }
-}
-
-impl Serialize for Gamma {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::Stationary(gamma) => gamma.serialize(serializer),
-            Self::Schedule(list) => list.serialize(serializer),
-            Self::LineSearch => Rule::LineSearch.serialize(serializer),
-            Self::Aitken => Rule::Aitken.serialize(serializer),
-            Self::Own(name) => serializer.collect_map([("own", name)]),
         }
     }
 }
@@ -386,14 +379,7 @@ impl<'de> Deserialize<'de> for Zone {
     }
 }
 
-impl Serialize for Zone {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Self::None => serializer.serialize_str("none"),
-            Self::Full => serializer.serialize_str("full"),
-            Self::Active => serializer.serialize_str("active"),
-            // a text, as the key takes no number
-            Self::Subset(condition) => serializer.serialize_str(&condition.text()),
-        }
-    }
+/// Write a condition as a text, as the key takes no number.
+fn as_text<S: Serializer>(condition: &Field, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&condition.text())
 }

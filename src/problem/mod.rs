@@ -30,10 +30,10 @@ pub use geometry::Plane;
 pub use history::{History, LoadStep};
 pub use layer::LayerSpec;
 pub use load::{Load, LoadKind, SpringKind, SpringSpec, Support};
-pub use mesh::{GroupArrays, Guard, MeshArrays, MeshSource};
+pub use mesh::{GmshSource, GroupArrays, Guard, MeshArrays, MeshSource};
 pub use method::{Gamma, Linear, MethodName, MethodSpec, Preset, RobinRule, SolverSpec, Start, StopRule, Zone};
 pub use order::Order;
-pub use units::{Units, force_labels, label};
+pub use units::{Units, label};
 
 use crate::error::{Error, Kind, Result};
 use std::collections::BTreeMap;

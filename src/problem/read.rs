@@ -83,14 +83,8 @@ impl Default for Context {
     }
 }
 
-/// A refusal on its way through serde.
-struct Kept {
-    error: Error,
-    /// Span of the table that it is about, if it is known better than serde knows it.
-    span: Option<Range<usize>>,
-    /// The key of the table that it is about.
-    key: String,
-}
+/// A refusal on its way through serde, and the span of the table that it is about, if it is known better than serde knows it.
+type Kept = (Flaw, Option<Range<usize>>);
 
 thread_local! {
     static CONTEXT: RefCell<Context> = RefCell::default();
@@ -122,12 +116,12 @@ pub fn place_of(span: Range<usize>) -> Place {
 
 /// Keep a refusal aside, and return the error of serde that stands for it.
 pub fn kept<E: de::Error>(error: Error) -> E {
-    keep(Flaw { key: String::new(), error }, None)
+    keep(error.into(), None)
 }
 
-fn keep<E: de::Error>(Flaw { key, error }: Flaw, span: Option<Range<usize>>) -> E {
-    let message = error.message().to_owned();
-    KEPT.replace(Some(Kept { error, span, key }));
+fn keep<E: de::Error>(flaw: Flaw, span: Option<Range<usize>>) -> E {
+    let message = flaw.error.message().to_owned();
+    KEPT.replace(Some((flaw, span)));
     E::custom(message)
 }
 
@@ -136,7 +130,7 @@ pub struct Refused;
 
 impl From<Error> for Refused {
     fn from(error: Error) -> Self {
-        KEPT.replace(Some(Kept { error, span: None, key: String::new() }));
+        KEPT.replace(Some((error.into(), None)));
         Self
     }
 }
@@ -154,7 +148,7 @@ pub fn refusal(
     span: Option<Range<usize>>,
     key_in: impl Fn(&Range<usize>, &str) -> Option<Range<usize>>,
 ) -> Option<Error> {
-    let Kept { error, span: own, key } = KEPT.take()?;
+    let (Flaw { key, error }, own) = KEPT.take()?;
     let Some(span) = own.or(span) else { return Some(error) };
     let span = if key.is_empty() { None } else { key_in(&span, &key) }.unwrap_or(span);
     Some(error.or_at(&sources.place(span)))
@@ -590,7 +584,7 @@ impl<'de> Deserialize<'de> for OneOrVector {
 }
 
 /// A direction in space. In the plane the third component may be left out.
-#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[derive(JsonSchema)]
 #[schemars(with = "Vec<Field>")]
 pub struct Direction(pub [Field; 3]);
 

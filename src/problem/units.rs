@@ -53,12 +53,6 @@ impl<'de> Deserialize<'de> for Units {
     }
 }
 
-/// Return the labels of an approach and a contact force.
-pub fn force_labels(units: Option<&Units>) -> [String; 2] {
-    let (length, force) = units.map(|units| (units.length.as_str(), units.force.as_str())).unzip();
-    [label("approach", length), label("contact force", force)]
-}
-
 /// Return a label with its unit, if there is one.
 pub fn label(what: &str, unit: Option<&str>) -> String {
     unit.map_or_else(|| what.to_owned(), |unit| format!("{what}, {unit}"))

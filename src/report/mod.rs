@@ -32,7 +32,7 @@ pub struct Page<'a> {
     /// Contact surfaces in space.
     pub contacts: Vec<Surface>,
     /// Pressures along contacts in the plane.
-    pub pressures: Vec<Plot>,
+    pub pressures: Vec<&'a Plot>,
     /// Contact forces over approaches, if there are load steps.
     pub approach: Option<Plot>,
     /// Residuals and errors over the iterations, if there are any.
@@ -110,7 +110,7 @@ impl Page<'_> {
         let report = self.report;
         let is_space = report.settings["dimension"] == 3;
         let figure = |plot: &Plot| format!("<figure class=\"plot\">{}</figure>", plot.svg());
-        let figures: String = self.pressures.iter().map(figure).collect();
+        let figures: String = self.pressures.iter().copied().map(figure).collect();
         let approach = self.approach.as_ref().map(figure);
         let convergence = self.convergence.as_ref().map(figure);
         let view = surface::view(&self.bodies, &self.contacts, is_space).to_string();

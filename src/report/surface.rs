@@ -40,21 +40,20 @@ impl Surface {
     /// Return the surface of a part of a body: all of its cells in the plane, the faces of one cell alone in space.
     pub fn of_body(field: &BodyField, origin: &[u32]) -> Self {
         let cells = field.connectivity.chunks_exact(field.cell.stride());
-        let corners = match field.cell {
-            CellKind::Tetra => 3,
-            CellKind::QuadraticTetra => 6,
+        let points = match field.cell {
+            CellKind { dimension: 3, order } => 3 * order,
             _ => 0,
         };
-        let faces: Vec<Vec<u32>> = match corners {
+        let faces: Vec<Vec<u32>> = match points {
             0 => cells.map(<[u32]>::to_vec).collect(),
-            _ => cells.flat_map(|cell| FACES.map(|face| face[..corners].iter().map(|&k| cell[k]).collect())).collect(),
+            _ => cells.flat_map(|cell| FACES.map(|face| face[..points].iter().map(|&k| cell[k]).collect())).collect(),
         };
         Self {
             name: field.name.clone(),
             points: field.points.clone(),
             displacement: field.displacement.clone(),
             value: field.von_mises.clone(),
-            faces: if corners > 0 { single(faces) } else { faces },
+            faces: if points > 0 { single(faces) } else { faces },
             origin: origin.to_vec(),
             ..Self::default()
         }
@@ -307,7 +306,7 @@ mod tests {
                 &BodyField {
                     name: "body".to_owned(),
                     points: nodes.map(|node| points[node]).to_vec(),
-                    cell: CellKind::Tetra,
+                    cell: CellKind { dimension: 3, order: 1 },
                     connectivity: vec![0, 1, 2, 3],
                     displacement: vec![[0.0, 0.0, 0.01]; 4],
                     stress: vec![[0.0; 6]; 4],

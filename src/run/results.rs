@@ -13,10 +13,9 @@ use crate::linalg::{around, bounds};
 use crate::model::{Body, BodySlot, Field};
 use crate::output::report::readable;
 use crate::output::{
-    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, PairColumns, ReactionReport,
+    BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, ReactionReport, ResultNames,
     StepPairReport, StepReport, sci,
 };
-use crate::problem::ContactSpec;
 use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
@@ -214,20 +213,21 @@ pub fn pair_names(built: &Built) -> Vec<String> {
     numbered(names)
 }
 
-/// Return the measure of the contact points: `"length"`, or `"area"` in space and for bodies of revolution.
-pub fn of_points(built: &Built) -> &'static str {
-    built.discrete.model.pairs.first().map_or("length", |pair| pair.measure)
-}
-
-/// Return the names of the supports, springs and rigid surfaces, body by body, made unique.
-pub fn reaction_names(built: &Built) -> Vec<String> {
-    numbered(built.discrete.bodies.iter().flat_map(|body| {
+/// Return the names of the pairs and of the supports, springs and rigid surfaces, body by body, made unique.
+pub fn names_of_results(built: &Built) -> ResultNames {
+    let reactions = built.discrete.bodies.iter().flat_map(|body| {
         let all = body.supports.iter().chain(&body.springs).chain(&body.rigid);
         all.map(|on| format!("{}:{on}", body.name))
-    }))
+    });
+    ResultNames {
+        pairs: pair_names(built),
+        reactions: numbered(reactions),
+        dimension: built.scene.dimension.value,
+        measure: built.discrete.model.pairs.first().map_or("length", |pair| pair.measure),
+    }
 }
 
-/// Return the reactions of bodies with these names and balances, in the order of [`reaction_names`].
+/// Return the reactions of bodies with these names and balances, in the order of [`names_of_results`].
 fn reactions<'a>(bodies: impl Iterator<Item = (&'a String, BalanceReport)>) -> Vec<ReactionReport> {
     let of_body = |(name, balance): (&String, BalanceReport)| {
         let BalanceReport { supports, springs, rigid, .. } = balance;
@@ -237,7 +237,7 @@ fn reactions<'a>(bodies: impl Iterator<Item = (&'a String, BalanceReport)>) -> V
     bodies.flat_map(of_body).collect()
 }
 
-/// Return the reactions from the reports of bodies, in the order of [`reaction_names`].
+/// Return the reactions from the reports of bodies, in the order of [`names_of_results`].
 pub fn reported(bodies: &[BodyReport]) -> Vec<ReactionReport> {
     reactions(bodies.iter().map(|body| (&body.name, body.balance.clone())))
 }
@@ -292,15 +292,6 @@ fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
         closed: c.iter().filter(|c| **c > 0.0).count(),
         obstacle: obstacle(done, i),
         offset: offset(done, i),
-    }
-}
-
-/// Return what the table of load steps has of a pair beside the columns of all pairs.
-pub fn columns(spec: &ContactSpec) -> PairColumns {
-    match spec.force.is_some() || spec.preload.is_some() {
-        _ if spec.obstacle => PairColumns::Obstacle,
-        true => PairColumns::Offset,
-        false => PairColumns::None,
     }
 }
 

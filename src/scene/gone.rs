@@ -1,9 +1,9 @@
-//! Keys and values of scenes that earlier versions knew, each with what to use instead.
+//! Keys and values of scenes, commands and options that earlier versions knew, each with what to use instead.
 
 use crate::error::Error;
 
 /// Names that are gone: a key, or a word that was the value of a key.
-pub const GONE: &[(&str, &str)] = &[
+pub const KEYS: &[(&str, &str)] = &[
     ("anderson", SWEEPS),
     ("asperities", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
     ("balanced", "runs with an adapted mesh stop at a tenth of `adapt.error`"),
@@ -25,6 +25,28 @@ pub const GONE: &[(&str, &str)] = &[
     ("spectral", "gamma = \"aitken\" or \"line-search\""),
 ];
 
+/// Options with their dashes, and commands that are gone.
+pub const OPTIONS: &[(&str, &str)] = &[
+    ("--adapted", "a run that adapts its mesh writes adapted.msh into the folder of results"),
+    ("--budget", "--timeout bounds each run"),
+    ("--checkpoint", "states are saved at the end of each load step, and when a signal ends the run"),
+    ("--color", "messages have colours on a terminal, and none where NO_COLOR is set"),
+    ("--linear", "`winkler solve --method robin --set method.stop.iterations=1` factors and solves each body"),
+    ("--resume", "every benchmark makes all of its runs"),
+    ("--tolerance", "`winkler solve --tolerance E` adapts meshes and writes the last one as adapted.msh"),
+    (
+        "--trust-geo",
+        "a script is a program, as a Makefile is: scripts are run without a question, so read those of others before",
+    ),
+    ("-o", "`check` draws nothing any more; `solve`, `sweep`, `bench` and `mesh` write to what -o names"),
+    ("man", "`winkler COMMAND --help` has all that the man pages had"),
+    (
+        "plot",
+        "`winkler solve` draws its plots as SVG, --report shows the bodies, and ParaView opens bodies.pvd of --vtu",
+    ),
+    ("report", "`winkler solve --report` writes the page of a run"),
+];
+
 /// Advice for methods over the sweep.
 const SWEEPS: &str = "name = \"auto\", or \"robin\" with gamma = \"aitken\"";
 
@@ -40,8 +62,13 @@ pub fn explain(error: Error) -> Error {
         [start, .., name, ""] if start.starts_with("unknown ") => name,
         _ => return error,
     };
-    match GONE.iter().find(|(gone, _)| *gone == name) {
-        Some((_, advice)) => error.help(*advice),
+    match advice(KEYS, name) {
+        Some(advice) => error.help(advice),
         None => error,
     }
+}
+
+/// Return the advice for a name of a list, if it is gone.
+pub fn advice(gone: &[(&str, &'static str)], name: &str) -> Option<&'static str> {
+    gone.iter().find(|(known, _)| *known == name).map(|(_, advice)| *advice)
 }

@@ -3,7 +3,7 @@
 //! [`load`] parses the file into a table with spans, puts the options of the command line into it (`overrides`), and lets serde read the [`Scene`]
 //! from it. What serde refuses is put into words by `refuse`. The scene, whether it is read or built in Rust, is checked by [`Scene::verify`].
 
-mod gone;
+pub mod gone;
 mod overrides;
 mod refuse;
 mod spec;

@@ -168,36 +168,28 @@ impl Typed {
     /// Return the index of the item that a step names by its number, or by the name of its table.
     fn index(&self, items: &[Value<'_>], step: &Step<'_>) -> Result<usize> {
         let Step { name, span, parent, .. } = step;
-        let count = match items.len() {
-            1 => "1 item".to_owned(),
-            count => format!("{count} items"),
+        let name_of = |item| -> Option<&str> { Value::get_ref(item).get("name")?.get_ref().as_str() };
+        let found = match is_number(name) {
+            true => name.parse().ok().filter(|index| *index < items.len()),
+            false => items.iter().position(|item| name_of(item) == Some(name)),
         };
-        let numbers = match items.len() {
-            0 => None,
-            1 => Some("the only item is number 0".to_owned()),
-            count => Some(format!("they are numbered 0 to {}", count - 1)),
-        };
-        let refuse = |message: String, help: Option<String>| {
-            let error = Error::scene(&self.place(span.clone()), message);
-            Err(match help {
-                Some(help) => error.help(help),
-                None => error,
-            })
-        };
-        if is_number(name) {
-            return match name.parse::<usize>() {
-                Ok(index) if index < items.len() => Ok(index),
-                _ => refuse(format!("`{parent}` has {count}, there is no number {name}"), numbers),
+        found.ok_or_else(|| {
+            let count = format!("{} item{}", items.len(), if items.len() == 1 { "" } else { "s" });
+            let message = match is_number(name) {
+                true => format!("`{parent}` has {count}, there is no number {name}"),
+                false => format!("`{parent}` is a list of {count}; `{name}` is no number"),
             };
-        }
-        let names: Vec<Option<&str>> =
-            items.iter().map(|item| item.get_ref().get("name").and_then(|name| name.get_ref().as_str())).collect();
-        if let Some(index) = names.iter().position(|known| *known == Some(*name)) {
-            return Ok(index);
-        }
-        let known: Vec<&str> = names.into_iter().flatten().collect();
-        let help = if known.is_empty() { numbers } else { Some(format!("their names: {}", few(known).join(", "))) };
-        refuse(format!("`{parent}` is a list of {count}; `{name}` is no number"), help)
+            let error = Error::scene(&self.place(span.clone()), message);
+            let known: Vec<&str> = items.iter().filter_map(name_of).collect();
+            match items.len() {
+                _ if !is_number(name) && !known.is_empty() => {
+                    error.help(format!("their names: {}", few(known).join(", ")))
+                }
+                0 => error,
+                1 => error.help("the only item is number 0"),
+                count => error.help(format!("they are numbered 0 to {}", count - 1)),
+            }
+        })
     }
 }
 

@@ -113,8 +113,8 @@ fn overrides_replace_and_add() {
     assert_eq!([4, 5].map(|k| zone.is_true_at([2.0, 0.0, 0.0], k).unwrap()), [true, false]);
     assert_eq!(scene.method.stop.residual, Some(1e-6));
     assert_eq!(scene.method.stop.increment, Some(1e-3));
-    let MeshSource::Geo { set, .. } = &scene.mesh else { panic!() };
-    assert_eq!(set, &[("m".to_owned(), 2.0), ("n".to_owned(), 64.0)]);
+    let MeshSource::Geo(source) = &scene.mesh else { panic!() };
+    assert_eq!(source.set, [("m".to_owned().into(), 2.0), ("n".to_owned().into(), 64.0)]);
     assert_eq!(scene.solver.preset, Some(Preset::Hypre));
     assert_eq!((scene.title.as_str(), scene.plane), ("Ein anderer Titel", Plane::Stress));
     assert!(scene.output.vtu && scene.output.plots);

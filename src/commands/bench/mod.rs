@@ -35,8 +35,7 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     let reference = bench.reference(request)?;
     let folder = Folder::claim(bench.folder(request))?;
     let runner = Runner::new(interrupt, request.timeout, request.repeat, folder.path())?;
-    let header = [bench.plan.columns.clone(), Row::columns()].concat();
-    let mut file = RowFile::create(&folder, "bench.csv", &header)?;
+    let mut file = RowFile::create(&folder, "bench.csv")?;
     let bar = terminal::runs(bench.plan.cases.len(), !request.quiet);
     let (mut rows, mut meshed) = (Vec::new(), BTreeSet::new());
     for case in &bench.plan.cases {
@@ -52,15 +51,16 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
             bar.suspend(|| say(row.line(&case.label)))?;
         }
         // written at once, so that it is kept whatever comes next
-        file.push(&[case.key.clone(), row.fields()].concat());
+        file.push(&bench.plan.fields(case).chain(row.fields()).collect::<Vec<_>>());
         rows.push(Measured { case: case.clone(), row });
         bar.inc(1);
     }
     bar.finish_and_clear();
     file.finish()?;
     bench.compare_with_finest(&mut rows, &runner);
-    let mut file = RowFile::create(&folder, "bench.csv", &header)?;
-    rows.iter().for_each(|Measured { case, row }| file.push(&[case.key.clone(), row.fields()].concat()));
+    let mut file = RowFile::create(&folder, "bench.csv")?;
+    rows.iter()
+        .for_each(|Measured { case, row }| file.push(&bench.plan.fields(case).chain(row.fields()).collect::<Vec<_>>()));
     file.finish()?;
     for (name, plot) in plots::plots(&rows, &bench) {
         folder.write(&name, |out| plot.write(out))?;
@@ -118,7 +118,7 @@ impl Benchmark {
         let mut row = runner.repeat(case, ranks)?;
         let tables = compare::tables(&runner.folder(case)).unwrap_or_default();
         if row.is_good() {
-            let against = reference.and_then(|reference| difference(scene.dimension.value, &tables, reference));
+            let against = reference.and_then(|reference| difference(&tables, reference));
             if let Some(error) = against {
                 row.set_error(error, "pressure, --against");
             } else if row.error.is_none()
@@ -147,7 +147,7 @@ impl Benchmark {
             let Some(finest) = finest.filter(|finest| fineness(finest) != fineness(own)) else { continue };
             let [run, reference] =
                 [own, finest].map(|measured| compare::tables(&runner.folder(&measured.case)).unwrap_or_default());
-            let error = difference(self.scene(&own.case).dimension.value, &run, &reference);
+            let error = difference(&run, &reference);
             let of = format!("pressure, mesh of {} dofs", finest.row.dofs.unwrap_or_default());
             found.extend(error.map(|error| (index, error, of)));
         }

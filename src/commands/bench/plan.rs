@@ -116,16 +116,10 @@ impl Benchmark {
             (None, _) => PathBuf::from("results/bench"),
         }
     }
-
-    /// Return the scene of a case.
-    pub fn scene(&self, case: &Case) -> &Scene {
-        let place = self.names.iter().position(|name| *name == case.key[0]);
-        &self.scenes[place.unwrap_or(0)]
-    }
 }
 
 /// Return the axes of a scene behind those of `--over`, from the slowest to the fastest, in the order of [`COLUMNS`].
-fn own_axes(scene: &Scene, request: &BenchArgs, solvers: &[AxisValue]) -> [Axis; 4] {
+fn own_axes(scene: &Scene, request: &BenchArgs, solvers: &[AxisValue]) -> impl Iterator<Item = Axis> {
     let of_order = |order: &usize| {
         let bodies = 0..scene.bodies.len();
         AxisValue::new(order.to_string(), bodies.map(|body| format!("body.{body}.order={order}")).collect())
@@ -142,8 +136,7 @@ fn own_axes(scene: &Scene, request: &BenchArgs, solvers: &[AxisValue]) -> [Axis;
     }
     let ranks = request.ranks.iter().map(|ranks| AxisValue::new(ranks.to_string(), Vec::new())).collect();
     let values = [orders, methods, solvers.to_vec(), ranks];
-    let mut axes = COLUMNS.iter().zip(values).map(|(name, values)| Axis::new(name, values));
-    std::array::from_fn(|_| axes.next().unwrap_or_else(|| unreachable!("four of each")))
+    COLUMNS.into_iter().zip(values).map(|(name, values)| Axis::new(name, values))
 }
 
 /// Return whether a column is a key of the mesh.

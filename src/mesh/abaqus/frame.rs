@@ -16,28 +16,22 @@ impl Coordinates {
     pub fn rectangular(self, [a, b, c]: [f64; 3]) -> [f64; 3] {
         match self {
             Coordinates::Rectangular => [a, b, c],
-            Coordinates::Cylindrical => [a * cos(b), a * sin(b), c],
+            Coordinates::Cylindrical => {
+                let (sine, cosine) = sine_cosine(b);
+                [a * cosine, a * sine, c]
+            }
         }
     }
 }
 
-/// Return the cosine of an angle in degrees. It is exact at multiples of 90 degrees, where planes of symmetry are.
-fn cos(degrees: f64) -> f64 {
+/// Return sine and cosine of an angle in degrees. They are exact at multiples of 90 degrees, where planes of symmetry are.
+fn sine_cosine(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
-        0.0 => 1.0,
-        90.0 | 270.0 => 0.0,
-        180.0 => -1.0,
-        angle => angle.to_radians().cos(),
-    }
-}
-
-/// Return the sine of an angle in degrees, exact at multiples of 90 degrees.
-fn sin(degrees: f64) -> f64 {
-    match degrees.rem_euclid(360.0) {
-        0.0 | 180.0 => 0.0,
-        90.0 => 1.0,
-        270.0 => -1.0,
-        angle => angle.to_radians().sin(),
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        angle => angle.to_radians().sin_cos(),
     }
 }
 

@@ -33,6 +33,7 @@ pub enum InputLine {
 }
 
 /// The lines of a file, and of those that it includes, in turn.
+#[derive(Default)]
 pub struct LineReader {
     files: Vec<PathBuf>,
     open: Vec<Open>,
@@ -45,7 +46,7 @@ pub struct LineReader {
 impl LineReader {
     /// Start with the first line of a file.
     pub fn new(path: &Path, bytes: &[u8]) -> Self {
-        let mut lines = Self { files: Vec::new(), open: Vec::new(), early: None, bytes: 0 };
+        let mut lines = Self::default();
         lines.push(path.to_owned(), bytes);
         lines
     }

@@ -3,7 +3,6 @@
 use super::lines::SourceLine;
 use crate::mesh::simplex::{HEXAHEDRON, LINE, PRISM, PYRAMID, QUADRANGLE, Shape, TETRAHEDRON, TRIANGLE};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::RangeInclusive;
 use std::rc::Rc;
 
 /// A node.
@@ -105,18 +104,12 @@ pub fn members<'a, T>(
         }
         found.extend(&set.members);
         for &[first, last, step] in &set.ranges {
-            found.extend(range(known, first..=last).filter(|tag| (tag - first).is_multiple_of(step)));
+            let tags = known.range(first..).map(|(tag, _)| *tag).take_while(|tag| *tag <= last);
+            found.extend(tags.filter(|tag| (tag - first).is_multiple_of(step)));
         }
         rest.extend(set.sets.iter().map(String::as_str));
     }
     Ok(found)
-}
-
-/// Return the keys of a map in a range, which is empty if it ends before it begins.
-fn range<T>(known: &BTreeMap<u64, T>, range: RangeInclusive<u64>) -> impl Iterator<Item = u64> + '_ {
-    let is_empty = range.is_empty();
-    let range = if is_empty { 0..=0 } else { range };
-    known.range(range).map(|(tag, _)| *tag).filter(move |_| !is_empty)
 }
 
 impl AbaqusModel {

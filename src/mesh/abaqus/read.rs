@@ -15,33 +15,30 @@ use std::rc::Rc;
 
 /// The kind of data lines that follow a keyword.
 enum DataLines {
-    Nodes {
-        set: Option<String>,
-        coordinates: Coordinates,
-    },
-    /// `open` is an element whose line does not have all its nodes, and `comma` tells whether that line ends with a comma.
-    Elements {
-        name: Rc<str>,
-        role: Role,
-        set: Option<String>,
-        open: Vec<u64>,
-        comma: bool,
-    },
-    Set {
-        name: String,
-        nodes: bool,
-        generate: bool,
-        shift: u64,
-    },
+    Nodes { set: Option<String>, coordinates: Coordinates },
+    Elements(ElementLines),
+    Set { name: String, nodes: bool, generate: bool, shift: u64 },
     Surface(String),
     NodeSurface(String),
     Union(String),
     System(Vec<[f64; 3]>),
-    Instance(Vec<Vec<f64>>),
+    Instance,
     Other,
 }
 
+/// Lines of elements of a type.
+struct ElementLines {
+    name: Rc<str>,
+    role: Role,
+    set: Option<String>,
+    /// An element whose line does not have all its nodes.
+    open: Vec<u64>,
+    /// Whether that line ends with a comma.
+    comma: bool,
+}
+
 /// A part or instance that is being read, and what surrounds it.
+#[derive(Default)]
 struct PartScope {
     /// Beginning of the names of its sets.
     prefix: String,
@@ -58,6 +55,7 @@ pub struct Twice {
 }
 
 /// A reader of a file, with what it has read so far.
+#[derive(Default)]
 pub struct Reader {
     pub lines: LineReader,
     pub model: AbaqusModel,
@@ -104,28 +102,16 @@ impl Reader {
     /// A line is not one of Abaqus or CalculiX, or it is one that the program does not know and that changes the mesh. The
     /// error names the file and the line.
     pub fn read(path: &Path, bytes: &[u8]) -> Result<Reader> {
-        let scope = PartScope { prefix: String::new(), shift: 0, frame: LocalAxes::default() };
-        let mut reader = Reader {
-            lines: LineReader::new(path, bytes),
-            model: AbaqusModel::default(),
-            twice: Vec::new(),
-            transforms: 0,
-            longer: 0,
-            scope,
-            outer: None,
-            parts: BTreeMap::new(),
-            instances: BTreeMap::new(),
-            moves: Vec::new(),
-        };
+        let mut reader = Reader { lines: LineReader::new(path, bytes), ..Reader::default() };
         let (mut data, mut last) = (DataLines::Other, SourceLine::default());
         while let Some((at, line)) = reader.lines.next() {
             last = at;
-            data = match line {
+            match line {
                 InputLine::Data(line) => {
-                    reader.data(data, &line, at).map_err(|message| reader.lines.refuse(at, message))?
+                    reader.data(&mut data, &line, at).map_err(|message| reader.lines.refuse(at, message))?;
                 }
-                InputLine::Keyword(line) => reader.keyword(data, &line, at)?,
-            };
+                InputLine::Keyword(line) => data = reader.keyword(data, &line, at)?,
+            }
         }
         reader.end(data).map_err(|message| reader.lines.refuse(last, message))?;
         match (reader.outer.is_some(), reader.scope.prefix.is_empty()) {
@@ -166,7 +152,7 @@ impl Reader {
                          hexahedra of order 1 or 2 can, of the families CPS, CPE, CAX and C3D"
                     ));
                 }
-                DataLines::Elements { name, role, set: spelling("ELSET"), open: Vec::new(), comma: false }
+                DataLines::Elements(ElementLines { name, role, set: spelling("ELSET"), open: Vec::new(), comma: false })
             }
             "NSET" | "ELSET" => self.set(keyword, named(&keyword.name)?)?,
             "SURFACE" => self.surface(keyword, named("NAME")?)?,
@@ -257,7 +243,7 @@ impl Reader {
                     return Err("this instance stands twice".into());
                 }
                 self.moves.clear();
-                return Ok(DataLines::Instance(Vec::new()));
+                return Ok(DataLines::Instance);
             }
             "END INSTANCE" => self.end_instance(keyword.at)?,
             _ => {}
@@ -288,43 +274,35 @@ impl Reader {
         let elements: Vec<u64> = self.model.elements.range(shift.saturating_add(1)..).map(|(tag, _)| *tag).collect();
         let set = entry(&mut self.model.element_sets, &name, at)?;
         set.members.extend(elements);
-        self.scope = PartScope { prefix: String::new(), shift: self.model.largest(), frame: LocalAxes::default() };
+        self.scope = PartScope { shift: self.model.largest(), ..PartScope::default() };
         Ok(())
     }
 
     /// End the data lines of a keyword.
     fn end(&mut self, data: DataLines) -> TextResult<()> {
         match data {
-            DataLines::Elements { role: Role::Mesh(kind), open, .. } if !open.is_empty() => check_count(kind, &open),
-            DataLines::Instance(moves) => {
-                self.moves = moves;
-                Ok(())
+            DataLines::Elements(ElementLines { role: Role::Mesh(kind), open, .. }) if !open.is_empty() => {
+                check_count(kind, &open)
             }
             _ => Ok(()),
         }
     }
 
-    fn data(&mut self, data: DataLines, line: &str, at: SourceLine) -> TextResult<DataLines> {
+    fn data(&mut self, data: &mut DataLines, line: &str, at: SourceLine) -> TextResult<()> {
         let words: Vec<&str> = line.trim_end_matches(',').split(',').map(str::trim).collect();
         match data {
-            DataLines::Nodes { ref set, coordinates } => {
-                self.node(&words, set.as_deref(), coordinates, at).map(|()| data)
-            }
-            DataLines::Elements { .. } => self.element(data, &words, !line.ends_with(','), at),
-            DataLines::Set { ref name, nodes, generate, shift } => {
-                self.members(name, nodes, generate, shift, &words).map(|()| data)
-            }
-            DataLines::Surface(ref name) => self.face(name, &words, line).map(|()| data),
-            DataLines::NodeSurface(ref name) => {
-                self.members(name, true, false, self.scope.shift, &words[..1]).map(|()| data)
-            }
-            DataLines::Union(ref name) => self.unite(name, &words).map(|()| data),
+            DataLines::Nodes { set, coordinates } => self.node(&words, set.as_deref(), *coordinates, at),
+            DataLines::Elements(lines) => self.element(lines, &words, !line.ends_with(','), at),
+            DataLines::Set { name, nodes, generate, shift } => self.members(name, *nodes, *generate, *shift, &words),
+            DataLines::Surface(name) => self.face(name, &words, line),
+            DataLines::NodeSurface(name) => self.members(name, true, false, self.scope.shift, &words[..1]),
+            DataLines::Union(name) => self.unite(name, &words),
             DataLines::System(points) => self.system(points, &reals(&words)?),
-            DataLines::Instance(mut moves) => {
-                moves.push(reals(&words)?);
-                Ok(DataLines::Instance(moves))
+            DataLines::Instance => {
+                self.moves.push(reals(&words)?);
+                Ok(())
             }
-            DataLines::Other => Ok(data),
+            DataLines::Other => Ok(()),
         }
     }
 
@@ -346,10 +324,10 @@ impl Reader {
     ///
     /// A line goes on in the next one after a comma. Where the number of nodes is known, it also goes on without a comma until all nodes are there, as
     /// CalculiX reads it; then the lines must have exactly these nodes.
-    fn element(&mut self, data: DataLines, words: &[&str], ends: bool, at: SourceLine) -> TextResult<DataLines> {
-        let DataLines::Elements { name, role, set, mut open, comma } = data else { return Ok(data) };
+    fn element(&mut self, lines: &mut ElementLines, words: &[&str], ends: bool, at: SourceLine) -> TextResult<()> {
+        let ElementLines { name, role, set, open, comma } = lines;
         let before = open.len();
-        let kind = if let Role::Mesh(kind) = role { Some(kind) } else { None };
+        let kind = if let Role::Mesh(kind) = *role { Some(kind) } else { None };
         if kind.is_none() {
             // The number of nodes is unknown, so that the element ends where its line does not go on.
             open.extend(count(words[0]).ok().filter(|_| open.is_empty()));
@@ -357,10 +335,12 @@ impl Reader {
             open.extend(words.iter().map(|word| count(word)).collect::<TextResult<Vec<u64>>>()?);
         }
         if kind.map_or(!ends, |kind| open.len() <= kind.nodes()) {
-            return Ok(DataLines::Elements { name, role, set, open, comma: !ends });
+            *comma = !ends;
+            return Ok(());
         }
+        let mut open = std::mem::take(open);
         if let Some(kind) = kind {
-            if before > 0 && !comma && open.len() > kind.nodes() + 1 {
+            if before > 0 && !*comma && open.len() > kind.nodes() + 1 {
                 check_count(kind, &open[..before])?;
             }
             // A beam may have a node more, for its direction.
@@ -371,14 +351,15 @@ impl Reader {
         let [tag, nodes @ ..] = open.as_slice() else { return Err("an element has no number".into()) };
         let shifted = |tag: &u64| tag.saturating_add(self.scope.shift);
         let (tag, nodes) = (shifted(tag), nodes.iter().map(shifted).collect());
-        if let Some(set) = &set {
+        *comma = false;
+        if let Some(set) = set {
             entry(&mut self.model.element_sets, set, at)?.members.insert(tag);
         }
         let element = AbaqusElement { name: name.clone(), kind, nodes, at };
         if let Some(old) = self.model.elements.insert(tag, element) {
             return Err(format!("the element {tag} stands twice, also in {}", self.lines.show(old.at)));
         }
-        Ok(DataLines::Elements { name, role, set, open: Vec::new(), comma: false })
+        Ok(())
     }
 
     fn members(&mut self, name: &str, nodes: bool, generate: bool, shift: u64, words: &[&str]) -> TextResult<()> {
@@ -436,7 +417,7 @@ impl Reader {
     }
 
     /// Read a line of `*SYSTEM`: the origin and a point on the first axis; then a point in the plane of the first two axes.
-    fn system(&mut self, mut points: Vec<[f64; 3]>, numbers: &[f64]) -> TextResult<DataLines> {
+    fn system(&mut self, points: &mut Vec<[f64; 3]>, numbers: &[f64]) -> TextResult<()> {
         if !matches!(numbers.len(), 3 | 6) {
             return Err("*SYSTEM has three numbers of each point: origin, first axis; then the second axis".into());
         }
@@ -448,7 +429,7 @@ impl Reader {
             _ => return Err("*SYSTEM has three points at most".into()),
         };
         self.scope.frame = frame.ok_or("the points of *SYSTEM lie on a line")?;
-        Ok(DataLines::System(points))
+        Ok(())
     }
 }
 

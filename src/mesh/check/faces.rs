@@ -49,7 +49,7 @@ impl<'a, const D: usize> Cells<'a, D> {
 
     /// Return all faces.
     pub fn faces(&self) -> Faces<D> {
-        Faces::new(self.simplices(), self.node_count())
+        Faces::new(self.simplices())
     }
 
     /// Return the number of cells.
@@ -100,10 +100,10 @@ pub fn check<const D: usize>(faces: &Faces<D>, cells: &Cells<D>) -> Result<()> {
     let simplices = cells.simplices();
     for alike in faces.alike() {
         let refuse = |what: &str| {
-            let cells_of = alike.iter().map(|face| face.cell()).collect::<Vec<_>>();
-            cells.refuse(what, &cells_of, centre(cells, alike[0])).help(AGAIN)
+            let cells_of = alike.iter().map(|(_, face)| face.cell()).collect::<Vec<_>>();
+            cells.refuse(what, &cells_of, centre(cells, alike[0].1)).help(AGAIN)
         };
-        let [a, b] = alike else {
+        let [(_, a), (_, b)] = alike else {
             if alike.len() > 2 {
                 return Err(refuse(&format!("{} cells share the facet", alike.len())));
             }

@@ -62,7 +62,7 @@ impl<'a> InUse<'a> {
                 (_, duty) => {
                     let has_all =
                         |face: &Face<D>| face.nodes(cells.simplices()).skip(D).all(|node| own.contains(&node));
-                    let cells = faces.at(own).iter().filter(|face| has_all(face)).count();
+                    let cells = faces.at(own).filter(has_all).count();
                     cells == 1 || duty == Duty::Holds && cells > 0
                 }
             };

@@ -30,7 +30,7 @@ pub fn of<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> Result<Componen
 fn classes<const D: usize>(cells: &Cells<D>, faces: &Faces<D>) -> (usize, Vec<u32>) {
     let mut joined = DisjointSets::new(cells.count());
     for two in faces.alike().flat_map(|alike| alike.windows(2)) {
-        joined.join(two[0].cell() as u32, two[1].cell() as u32);
+        joined.join(two[0].1.cell() as u32, two[1].1.cell() as u32);
     }
     joined.classes()
 }
