@@ -98,8 +98,8 @@ pub struct AdaptiveRun {
     previous: Option<EstimatedSolution>,
     /// The error at sharp ends on the mesh before.
     last_end: Option<MeshError>,
-    /// Sizes that the mesh of the round before follows.
-    last_sizes: Option<Arc<AdaptedMesh>>,
+    /// What was asked of the mesh of the round before.
+    last_mesh: Option<Arc<AdaptedMesh>>,
     /// Number of cells that was predicted for this round from its sizes.
     predicted_cells: Option<f64>,
     /// The load steps that follow on the last mesh, while meshes are adapted under the largest of them.
@@ -172,7 +172,7 @@ impl AdaptiveRun {
             start_from: Vec::new(),
             seconds: 0.0,
             previous: None,
-            last_sizes: None,
+            last_mesh: None,
             predicted_cells: None,
             later_steps: None,
         }
@@ -240,10 +240,10 @@ impl AdaptiveRun {
     /// What [`run::build`] refuses, but not the mesh of a later round.
     pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
         match run::build(session, self.scene.clone(), interrupt, clock) {
-            Err(error) if error.kind() == Kind::Mesh && self.last_sizes.is_some() && self.limit.is_none() => {
+            Err(error) if error.kind() == Kind::Mesh && self.last_mesh.is_some() && self.limit.is_none() => {
                 let round = self.rounds.len();
                 self.limit = Some(format!("no mesh comes of the sizes after mesh {round}: {}", error.message()));
-                follow(Rc::make_mut(&mut self.scene), self.last_sizes.take());
+                follow(Rc::make_mut(&mut self.scene), self.last_mesh.take());
                 self.end_meshes();
                 run::build(session, self.scene.clone(), interrupt, clock)
             }
@@ -263,7 +263,7 @@ impl AdaptiveRun {
     pub fn head(&self) -> CheckpointHeader {
         CheckpointHeader {
             rounds: self.rounds.clone(),
-            adapted: self.sizes().map(|adapted| (*adapted).clone()),
+            adapted: self.adapted().map(|adapted| (*adapted).clone()),
             on_last_mesh: self.is_stepping(),
             limit: self.limit.clone(),
             ..CheckpointHeader::default()
@@ -311,7 +311,7 @@ impl AdaptiveRun {
         };
         self.start_from = contact_tables(done);
         self.predicted_cells = Some(next.cells);
-        self.last_sizes = self.sizes();
+        self.last_mesh = self.adapted();
         follow(Rc::make_mut(&mut self.scene), Some(mesh_of(&next).into()));
         true
     }
@@ -405,7 +405,7 @@ impl AdaptiveRun {
     }
 
     /// Return what was asked of the mesh of this round.
-    fn sizes(&self) -> Option<Arc<AdaptedMesh>> {
+    fn adapted(&self) -> Option<Arc<AdaptedMesh>> {
         match &self.scene.mesh {
             MeshSource::Geo(source) => source.adapted.clone(),
             _ => None,
@@ -419,8 +419,8 @@ impl AdaptiveRun {
         }
         let tables = contact_tables(done);
         let Some(meshes) = &done.built.discrete.meshes else { return };
-        let orders: Vec<Order> = (0..done.model().pairs.len()).map(|pair| meshes.points(pair).order).collect();
-        self.previous.iter().for_each(|previous| previous.correct(&tables, &orders, estimate));
+        let edges: Vec<_> = (0..done.model().pairs.len()).map(|pair| meshes.points(pair).edges()).collect();
+        self.previous.iter().for_each(|previous| previous.correct(&tables, &edges, estimate));
         self.previous = Some(EstimatedSolution::new(estimate, tables));
     }
 }

@@ -1,11 +1,10 @@
 //! Solutions on two meshes: the start of an iteration from the solution on another mesh, and the error of the later one, checked by the earlier one.
 
-use super::interpolate::{DAMPED, L2Norms, PointTree, Squares, Weights, clamped_mean, mean};
+use super::interpolate::{DAMPED, L2Norms, PointTree, Squares, Weights, clamped_mean, mean, on_edge};
 use crate::contact::ContactPair;
 use crate::discretize::Discrete;
 use crate::estimate::Estimate;
 use crate::output::ContactTable;
-use crate::problem::Order;
 
 /// Return the trace on a new mesh (layout of a trace vector) of a solution that is given by its contact tables, one for each pair.
 pub fn trace(tables: &[ContactTable], discrete: &Discrete) -> Vec<f64> {
@@ -42,6 +41,9 @@ fn neighbours<'a>(pair: &'a ContactPair, table: &ContactTable) -> impl Iterator<
     pair.position.iter().map(move |x| scattered.inverse_distances(x, count))
 }
 
+/// The contact points of each edge of a pair, if these have an order above two in the plane; otherwise empty.
+pub type Edges = Vec<Vec<usize>>;
+
 /// The estimated errors of a solution on one mesh, to be compared with those on the next mesh.
 pub struct EstimatedSolution {
     /// Relative errors of the pressures, one for each pair.
@@ -71,12 +73,12 @@ impl EstimatedSolution {
     /// at least one of them is too small, and e is multiplied by the ratio. Pairs that are found automatically may differ between meshes; then
     /// nothing is compared.
     ///
-    /// `orders` are those of the bodies that carry the points, one for each pair.
-    pub fn correct(&self, tables: &[ContactTable], orders: &[Order], estimate: &mut Estimate) {
+    /// `edges` are those of the next mesh, one entry for each pair.
+    pub fn correct(&self, tables: &[ContactTable], edges: &[Edges], estimate: &mut Estimate) {
         if !self.tables.iter().map(bodies).eq(tables.iter().map(bodies)) {
             return;
         }
-        let norms = norms(&self.tables, tables, orders);
+        let norms = norms(&self.tables, tables, edges);
         let of_displacement = excess(&norms.displacement, estimate.displacement, self.displacement);
         for (i, error) in estimate.pressure.iter_mut().enumerate() {
             let excess = excess(&norms.pressure[i], *error, self.pressure[i]);
@@ -118,13 +120,13 @@ struct SolutionNorms {
 }
 
 /// Return the norms of two solutions at the points of the coarser mesh, which is that of `old`.
-fn norms(old: &[ContactTable], new: &[ContactTable], orders: &[Order]) -> SolutionNorms {
+fn norms(old: &[ContactTable], new: &[ContactTable], edges: &[Edges]) -> SolutionNorms {
     let (mut pressure, mut displacement) = (Vec::new(), Squares::default());
-    for ((old, new), &order) in old.iter().zip(new).zip(orders) {
+    for ((old, new), edges) in old.iter().zip(new).zip(edges) {
         let scattered = PointTree::new(&new.points);
         let mut of_pair = Squares::default();
         for (q, (point, area)) in old.points.iter().zip(&old.weight).enumerate() {
-            let at_point = Interpolation::new(&scattered, point, order);
+            let at_point = Interpolation::new(&scattered, &new.points, edges, point);
             of_pair.add(*area, old.pressure[q], at_point.nearest(&new.pressure, old.pressure[q]));
             for (new, old) in new.displacement.iter().zip(&old.displacement) {
                 displacement.add(*area, old[q], at_point.nearest(new, old[q]));
@@ -144,11 +146,8 @@ enum Interpolation {
 }
 
 impl Interpolation {
-    fn new(scattered: &PointTree, point: &[f64; 3], order: Order) -> Self {
-        match order {
-            Order::P1 | Order::P2 => Self::Plane(scattered.plane(point, DAMPED)),
-            _ => Self::Edge(scattered.polynomials(point, order)),
-        }
+    fn new(scattered: &PointTree, points: &[[f64; 3]], edges: &Edges, at: &[f64; 3]) -> Self {
+        if edges.is_empty() { Self::Plane(scattered.plane(at, DAMPED)) } else { Self::Edge(on_edge(points, edges, at)) }
     }
 
     /// Return the value in the column that is nearest to `old` within its uncertainty.
@@ -191,7 +190,7 @@ mod tests {
             let mut later = estimate(0.05);
             EstimatedSolution::new(&estimate(of_earlier), vec![table(5, 1.0)]).correct(
                 &[table(5, 1.1)],
-                &[Order::P1],
+                &[Edges::new()],
                 &mut later,
             );
             assert_eq!(later.pressure, [0.1]);
@@ -213,15 +212,15 @@ mod tests {
 
     #[test]
     fn linear_functions_do_not_differ_and_others_by_what_they_do() {
-        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)], &[Order::P1]);
+        let same = norms(&[table(5, 1.0)], &[table(8, 1.0)], &[Edges::new()]);
         // but for the weight of the slopes
         assert!(same.pressure[0].difference < 2e-3 * same.pressure[0].new, "{:?}", same.pressure);
-        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)], &[Order::P1]);
+        let off = norms(&[table(5, 1.1)], &[table(8, 1.0)], &[Edges::new()]);
         let L2Norms { difference, old, new } = off.pressure[0];
         assert!((difference / new - 0.1).abs() < 2e-3 && (old / new - 1.1).abs() < 2e-3, "{:?}", off.pressure);
         assert!((off.displacement.difference / off.displacement.new - 0.1).abs() < 2e-3);
         // fewer points than a plane through the nearest ones takes
-        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)], &[Order::P1]).pressure[0];
+        let few = norms(&[table(2, 1.0)], &[table(2, 1.25)], &[Edges::new()]).pressure[0];
         assert!((few.difference / few.new - 0.2).abs() < 1e-12, "{few:?}");
     }
 }

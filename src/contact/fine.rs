@@ -13,7 +13,7 @@ use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// An integration point that both surfaces of a pair share.
 #[derive(Serialize, Deserialize)]
@@ -146,6 +146,21 @@ impl<const D: usize> Fine<D> {
 }
 
 impl FinePoints {
+    /// Return the contact points of each edge of order three or more; none of facets in space and of lower orders.
+    pub fn edges(&self) -> Vec<Vec<usize>> {
+        if self.order <= Order::P2 {
+            return Vec::new();
+        }
+        let mut first = 0;
+        let of_facet = |chunk: &[FinePoint]| {
+            let on_facet = first..first + chunk.len();
+            first = on_facet.end;
+            let points: BTreeSet<usize> = on_facet.flat_map(|g| self.interpolation.row(g)).map(|(q, _)| q).collect();
+            points.into_iter().collect()
+        };
+        self.each.chunk_by(|p, q| p.facet == q.facet).map(of_facet).collect()
+    }
+
     /// Append the rows of the points, facet by facet of side a, and find the contact point nearest to each.
     fn push_rows<const D: usize>(
         &mut self,
@@ -225,7 +240,7 @@ fn kink(order: Order, function: &dyn Fn(f64) -> f64) -> Option<f64> {
     let rounding = 1e3 * f64::EPSILON * tests.iter().map(|(along, _)| function(*along).abs()).fold(0.0, f64::max);
     let (mut from, mut size) = (-0.06, 1.11);
     let mut least = missed(from, size);
-    for halving in 1.. {
+    for halving in 1..=HALVINGS[0] {
         size *= 0.5;
         least *= 0.5f64.powf(0.5 * (order.degree() as f64 + 2.0));
         let [left, right] = [from, from + size].map(|from| missed(from, size));

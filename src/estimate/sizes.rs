@@ -14,8 +14,9 @@ use super::Estimate;
 use crate::contact::ContactPair;
 use crate::discretize::meshes::{BodyCells, Meshes};
 use crate::fem::{cross, length, minus, unit};
-use crate::linalg::dot;
+use crate::linalg::{dot, interpolation_weights};
 use crate::model::{Layer, Model};
+use rstar::RTree;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -150,11 +151,8 @@ fn singular_places(meshes: &dyn Meshes, model: &Model, layer: &Layer) -> Vec<[f6
 
 /// Return where on \[0, 1\] the polynomial through values at some points changes its sign, if it does, by bisection.
 fn zero_between(at: &[f64], values: &[f64]) -> Option<f64> {
-    let polynomial = |x: f64| -> f64 {
-        let weight =
-            |i: usize| -> f64 { (0..at.len()).filter(|&j| j != i).map(|j| (x - at[j]) / (at[i] - at[j])).product() };
-        values.iter().enumerate().map(|(i, value)| weight(i) * value).sum()
-    };
+    let polynomial =
+        |x: f64| -> f64 { interpolation_weights(at, x).zip(values).map(|(weight, value)| weight * value).sum() };
     let mut sorted: Vec<f64> = at.iter().copied().chain([0.0, 1.0]).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let is_open = |x: f64| polynomial(x) <= 0.0;
@@ -178,12 +176,12 @@ fn distances(meshes: &dyn Meshes, model: &Model) -> Vec<f64> {
             continue;
         }
         let pairs = model.pairs.iter().filter(|pair| pair.bodies.contains(&body));
-        let points: Vec<[f64; 3]> = pairs.flat_map(|pair| &pair.position).copied().collect();
+        let points = RTree::bulk_load(pairs.flat_map(|pair| &pair.position).copied().collect());
         for (corners, size) in cells.corners.chunks_exact(cells.stride).zip(&cells.sizes) {
             let mean = |c: usize| corners.iter().map(|&node| cells.nodes[node as usize][c]).sum::<f64>();
             let centre: [f64; 3] = std::array::from_fn(|c| mean(c) / cells.stride as f64);
-            let least = points.iter().map(|point| length(minus(*point, centre))).fold(f64::INFINITY, f64::min);
-            all.push(least / size);
+            let nearest = points.nearest_neighbor(centre);
+            all.push(nearest.map_or(f64::INFINITY, |point| length(minus(*point, centre)) / size));
         }
     }
     all

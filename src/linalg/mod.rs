@@ -204,6 +204,14 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
+/// Return the weights of the values at some points of a line in the value at `x` of the polynomial through them (Lagrange). The points are distinct.
+pub fn interpolation_weights(at: &[f64], x: f64) -> impl Iterator<Item = f64> + '_ {
+    let weight = move |(i, own): (usize, &f64)| {
+        at.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, other)| (x - other) / (own - other)).product()
+    };
+    at.iter().enumerate().map(weight)
+}
+
 /// Add a x to y.
 pub fn axpy(a: f64, x: &[f64], y: &mut [f64]) {
     for (y, x) in y.iter_mut().zip(x) {

@@ -4,10 +4,11 @@
 //! not in a cell that holds the place. A mesher knows only sizes, so that its mesh is changed afterwards.
 
 use super::Mesh;
-use crate::linalg::{dot, length, minus};
+use crate::linalg::{axpy, dot, interpolation_weights, length, minus};
 use std::collections::{HashMap, HashSet};
 
-/// Least ratio of the area of a cell after a move to that before it. A vertex that moves by half of an edge along a boundary halves that of a regular cell.
+/// Least ratio of the area of a cell after a move to that before it. A vertex that moves by half of an edge along a boundary
+/// halves that of a regular cell; an irregular one may have a half of what is left.
 const AREA: f64 = 0.25;
 
 /// Largest angle in radians between the two edges of a smooth boundary at their vertex. On a circle quadratic edges that turn by t each differ there by t^3/16,
@@ -95,12 +96,11 @@ impl Mesh<2> {
         (1..5).for_each(|i| at[i] = at[i - 1] + length(minus(points[i], points[i - 1])));
         // differences from the first point keep a straight boundary straight to the last digit
         let curve = |s: f64| -> [f64; 2] {
-            let weight =
-                |i: usize| -> f64 { (0..5).filter(|&j| j != i).map(|j| (s - at[j]) / (at[i] - at[j])).product() };
-            let weights: [f64; 5] = std::array::from_fn(weight);
-            std::array::from_fn(|c| {
-                points[0][c] + (1..5).map(|i| weights[i] * (points[i][c] - points[0][c])).sum::<f64>()
-            })
+            let mut x = points[0];
+            for (weight, point) in interpolation_weights(&at, s).zip(points) {
+                axpy(weight, &minus(point, points[0]), &mut x);
+            }
+            x
         };
         let along = minus(points[4], points[0]).map(|x| x / length(minus(points[4], points[0])));
         let mut s = at[2];
