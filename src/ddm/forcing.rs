@@ -106,7 +106,8 @@ pub fn respond(
 }
 
 /// Stiffness, as a share of the springs of whole surfaces, that resists motions which no closed contact resists: such motions then go far, but not
-/// without end. How far is not what this share decides: where these springs carry a force, a descent chooses the length of the step.
+/// without end. How far is not what this share decides: where these springs carry a force, a descent chooses the length of the step. With 1e-2 and 1e-4, 120
+/// random scenes, usual, wide and slender, take the same steps.
 const STAND_IN: f64 = 1e-3;
 
 /// The springs of a linear step.

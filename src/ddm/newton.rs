@@ -26,7 +26,7 @@ use crate::model::field::{Field, LineEnergy, residual, unbalanced};
 use crate::model::layer::Layer;
 use crate::model::linear::{LinearResult, LinearSolution, LinearStep, System, Trial};
 
-/// Relative error of the linear system that shows what is left of equilibrium: only its size is wanted.
+/// Relative error of the linear system that shows what is left of equilibrium: its size is wanted, which is then known to a factor of two.
 const LOOK: f64 = 0.5;
 
 /// Relative error above which the first linear step from the states of another solution does not end. Displacements are zero before it, and the
