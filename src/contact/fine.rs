@@ -21,7 +21,7 @@ pub struct FinePoint {
     /// Length (area) of the point.
     pub weight: f64,
     /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
-    /// less by the heights of both curved surfaces above their straight facets (`rise`).
+    /// less by the heights of both curved surfaces above their straight facets (`rise`), or above their edges of order three or more.
     pub gap: f64,
     /// Facet of side a under the point. Points on one facet follow each other.
     pub facet: usize,
@@ -301,11 +301,13 @@ impl<const D: usize> Projections<D> {
         let rounding = a.rounding_along_normals();
         let position = |q: usize| -> [f64; D] { std::array::from_fn(|c| pair.position[q][c] - a.space.datum[c]) };
         let mut projections = Self::default();
-        for (q, facet) in nearest_facets(a, common, pair, position).into_iter().enumerate() {
+        for (q, [facet_a, facet]) in nearest_facets(a, common, pair, position).into_iter().enumerate() {
             let (from, normal) = (position(q), std::array::from_fn(|c| pair.normal[q][c]));
             let at = project(b, facet, from, normal);
+            let [on_a, on_b] = &common.heights;
+            let height = || on_a.at(facet_a, &project(a, facet_a, from, normal)) + on_b.at(facet, &at);
             let difference = |gap: &dyn Fn([f64; 3]) -> f64| {
-                pair.gap[q] - gap(pair.position[q]) - distance(b, facet, &at, from, normal)
+                pair.gap[q] - gap(pair.position[q]) - (distance(b, facet, &at, from, normal) - height())
             };
             // Between planes the difference is no more than the rounding of the coordinates.
             let rounding = rounding.max(1e-12 * length(b.area(facet)).powf(1.0 / (D - 1) as f64));
@@ -319,26 +321,25 @@ impl<const D: usize> Projections<D> {
     }
 }
 
-/// Return the facet of side b for each contact point: the partner of the nearest integration point on a facet of side a at
-/// its node. `position` gives the place of a contact point, measured from the datum of the mesh.
+/// Return the facets of both sides for each contact point: that of side a at its node with the nearest integration point, and the partner of this point. `position` gives the place of a contact point, measured from the datum of the mesh.
 fn nearest_facets<const D: usize>(
     a: &Side<D>,
     common: &Intersection<D>,
     pair: &ContactPair,
     position: impl Fn(usize) -> [f64; D],
-) -> Vec<usize> {
+) -> Vec<[usize; 2]> {
     let point_of = pair.point_of(a.nodes.len());
-    let mut nearest = vec![(f64::INFINITY, 0); pair.len()];
+    let mut nearest = vec![(f64::INFINITY, [0, 0]); pair.len()];
     for point in &common.points {
         let from = a.facets.point(point.facet_a, a.space, &point.at_a);
         for q in a.on_facet(point.facet_a).iter().filter_map(|&node| point_of[node as usize]) {
             let distance = length(minus(position(q), from));
             if distance < nearest[q].0 {
-                nearest[q] = (distance, point.facet_b);
+                nearest[q] = (distance, [point.facet_a, point.facet_b]);
             }
         }
     }
-    nearest.into_iter().map(|(_, facet)| facet).collect()
+    nearest.into_iter().map(|(_, facets)| facets).collect()
 }
 
 /// Return where the line from a point along a normal meets the plane of a facet's corners, in barycentric coordinates.

@@ -169,7 +169,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         }
         let is_touching = spec.is_touching() || is_through;
         if is_touching {
-            common.points.iter_mut().for_each(|point| point.gap = 0.0);
+            common.close();
         }
         (common, is_touching)
     }

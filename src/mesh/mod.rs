@@ -37,6 +37,7 @@ pub use msh::parse;
 pub use script::unstructured;
 pub use script::view;
 pub use simplex::EDGES;
+pub use vertices::is_smooth;
 
 use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;

@@ -74,18 +74,13 @@ impl Mesh<2> {
             let is_free = groups_of[&first] == groups_of[&second] && !fixed.contains(&vertex);
             is_free.then(|| [other(first), first[2], vertex, second[2], other(second)])
         };
-        let mut passages: Vec<Passage> =
-            edges_at.iter().filter_map(passage).filter(|passage| self.is_smooth(passage)).collect();
+        let mut passages: Vec<Passage> = edges_at
+            .iter()
+            .filter_map(passage)
+            .filter(|passage| is_smooth(passage.map(|point| self.points[point as usize])))
+            .collect();
         passages.sort_unstable_by_key(|passage| passage[2]);
         passages
-    }
-
-    /// Return whether the two quadratic edges of a passage have one tangent at their vertex.
-    fn is_smooth(&self, passage: &Passage) -> bool {
-        let x = passage.map(|point| self.points[point as usize]);
-        let before: [f64; 2] = std::array::from_fn(|c| 3.0 * x[2][c] - 4.0 * x[1][c] + x[0][c]);
-        let after: [f64; 2] = std::array::from_fn(|c| 4.0 * x[3][c] - 3.0 * x[2][c] - x[4][c]);
-        (before[0] * after[1] - before[1] * after[0]).atan2(dot(&before, &after)).abs() < SMOOTH
     }
 
     /// Return the points of a passage with its vertex at `place`, or at the point of the curve that is nearest to it; none unless this vertex is the nearest
@@ -144,6 +139,13 @@ impl Mesh<2> {
         passage.iter().zip(points).for_each(|(&point, x)| self.points[point as usize] = x);
         true
     }
+}
+
+/// Return whether the quadratic edges through points 0 to 2 and 2 to 4 have one tangent where they meet.
+pub fn is_smooth(x: [[f64; 2]; 5]) -> bool {
+    let before: [f64; 2] = std::array::from_fn(|c| 3.0 * x[2][c] - 4.0 * x[1][c] + x[0][c]);
+    let after: [f64; 2] = std::array::from_fn(|c| 4.0 * x[3][c] - 3.0 * x[2][c] - x[4][c]);
+    (before[0] * after[1] - before[1] * after[0]).atan2(dot(&before, &after)).abs() < SMOOTH
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ pub fn in_space(a: &Side<3>, b: &Side<3>, reach: &Reach) -> Intersection<3> {
     let facets_b: Vec<Facet<3>> = (0..b.facets.count()).map(|i| Facet::of(b, i)).collect();
     let quadratic = a.facets.order == Order::P2 || b.facets.order == Order::P2;
     let rule = element::rule(3, if quadratic { 5 } else { 2 });
-    let mut common = Intersection { points: Vec::new(), refused: vec![Refused::default(); a.facets.count()] };
+    let mut common = Intersection { refused: vec![Refused::default(); a.facets.count()], ..Intersection::default() };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
         let refused = &mut common.refused[i];
