@@ -2,7 +2,7 @@
 
 use crate::common::here::solve_here;
 use crate::common::vtu::Grid;
-use crate::common::{Report, Scene, root, solve, winkler};
+use crate::common::{Report, Scene, case, root, solve, winkler};
 use std::fs;
 
 const PUNCH: usize = 1;
@@ -205,5 +205,26 @@ fn facets_before_a_hole_lose_nothing() {
             assert_eq!(run.count("pairs/0/pieces_lost"), 0, "order {order}, {contact}: {}", run.warnings());
             assert!((run.forces(0)[0][2].abs() - 100.0).abs() < 1e-6, "order {order}, {contact}: {}", run.said());
         }
+    }
+}
+
+/// A wave of the mesh and one of the gap before a flat mesh give the same pressures with elements of high order, whose edges have the order two.
+#[test]
+fn a_wave_of_the_mesh_is_one_of_the_gap() {
+    let pressures = |order: usize, sets: &[&str]| {
+        let orders = [0, 1].map(|body| format!("body.{body}.order={order}"));
+        let all: Vec<&str> =
+            orders.iter().map(String::as_str).chain(["mesh.set.n=4"]).chain(sets.iter().copied()).collect();
+        let table = solve_here(case("westergaard"), &all).converged().contact();
+        ["x", "weight", "pressure"].map(|column| table[column].to_vec())
+    };
+    for order in [3, 4, 6] {
+        let [x, weight, wavy] = pressures(order, &[]);
+        let [at, _, flat] = pressures(order, &["mesh.set.D=0", "contact.0.gap=\"1e-4 * (1 - cos(pi * x))\""]);
+        let mean =
+            |value: &dyn Fn(usize) -> f64| (0..x.len()).map(|q| weight[q] * value(q).powi(2)).sum::<f64>().sqrt();
+        let error = mean(&|q| wavy[q] - flat[q]) / mean(&|q| flat[q]);
+        assert!(x.len() == at.len() && x.iter().zip(&at).all(|(x, at)| (x - at).abs() < 1e-3), "{x:?} {at:?}");
+        assert!(error < 5e-4, "order {order}: {error}");
     }
 }
