@@ -9,18 +9,13 @@ use std::path::Path;
 /// Name in messages, where meshes from files have their path.
 const NAME: &str = "mesh arrays";
 
-/// Return the mesh of these arrays, with cells turned to positive volume. Points keep their numbers.
+/// Return the mesh of these arrays, with cells turned to positive volume. Points keep their numbers. A mesh of order 1 gets straight edges with middles if `order` is above.
 ///
 /// # Errors
 /// A coordinate is not finite, or a point is off the plane if `D` is 2. A group has no name or no simplices, or two groups have
-/// the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension above `D`. `order`
-/// is above that of the arrays.
+/// the same name. A group has numbers of points that do not exist, simplices without extent, or a dimension above `D`.
 pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>> {
     let MeshArrays { points, order: own, groups } = arrays;
-    if *own < order {
-        return Err(refuse_arrays("the mesh is of order 1, the scene asks for order 2 or more")
-            .help("give mid-edge points, too"));
-    }
     let largest = points.iter().flatten().fold(0.0_f64, |size, x| size.max(x.abs()));
     if let Some(number) = points.iter().position(|x| x.iter().any(|x| !x.is_finite())) {
         return Err(refuse_arrays(format!("point {number} has the coordinates {:?}", points[number])));
@@ -34,7 +29,8 @@ pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>
         return Err(refuse_arrays(format!("two groups are called `{twice}`")));
     }
     let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
-    Ok(Mesh::new(NAME.into(), points, *own, groups.into()))
+    let mesh = Mesh::new(NAME.into(), points, *own, groups.into());
+    Ok(if *own < order { mesh.higher_order() } else { mesh })
 }
 
 fn group_of<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order) -> Result<Group> {
@@ -106,7 +102,6 @@ mod tests {
         bad(|a| a.groups[0].connectivity.truncate(5), Order::P1, "5 numbers of points, its simplices have 3");
         bad(|a| a.groups[0].connectivity[4] = 7, Order::P1, "has point 7");
         bad(|a| a.groups[0].connectivity[1] = 0, Order::P1, "simplex 0, of the points [0, 0, 2]");
-        bad(|_| {}, Order::P2, "the scene asks for order 2");
         bad(|a| a.order = Order::P2, Order::P2, "simplices have 3 each");
     }
 }

@@ -95,14 +95,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     };
     loaded.mesh = match (loaded.mesh.order, order) {
         (Order::P2, Order::P1) => loaded.mesh.lower_order(),
-        (Order::P1, order) if order > Order::P1 => {
-            let help = format!(
-                "set `order = 1`, or save it anew: gmsh {} -order 2 -{D} -format msh41 -o new.msh",
-                path.display()
-            );
-            let error = Error::mesh(path, None, "the mesh is of order 1, the scene asks for order 2 or more");
-            return Err(error.at(&file.place).help(help));
-        }
+        (Order::P1, order) if order > Order::P1 => loaded.mesh.higher_order(),
         _ => loaded.mesh,
     };
     Ok(loaded)
