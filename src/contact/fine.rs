@@ -6,6 +6,7 @@
 use super::basis::{Carriers, PressureBasis};
 use super::pair::{ContactPair, Coverage};
 use super::pieces::{IntegrationPoint, Intersection};
+use super::review::{products, rises};
 use super::side::{FaceNode, Side};
 use crate::exchange::Plain;
 use crate::fem::{Facets, element, lagrange, length, minus, unit};
@@ -359,12 +360,12 @@ fn distance<const D: usize>(b: &Side<D>, facet: usize, at: &[f64; D], from: [f64
 
 /// Return the height of the surface of a side above a facet at barycentric coordinates.
 ///
-/// A quadratic facet is the surface itself. Over a straight facet the surface is taken to rise by
+/// A curved facet is the surface itself. So is a straight one of order two or more, unless it is a chord ([`rises`]). Over a linear facet the surface is taken to rise by
 /// l_i l_j (n_j - n_i).(x_j - x_i)/2 for each edge ij, since a curve between two normals is a parabola. Here l_i is the
 /// barycentric coordinate, n_i the normal and x_i the place of corner i.
 fn rise<const D: usize>(side: &Side<D>, facet: usize, at: &[f64; D]) -> f64 {
     if side.facets.order != Order::P1 {
-        return 0.0;
+        return rises(side, facet).iter().zip(products(at)).map(|(rise, l)| rise * l).sum();
     }
     let x = side.facets.coordinates(facet, side.space);
     let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();

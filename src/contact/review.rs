@@ -6,6 +6,7 @@ use super::pieces::Intersection;
 use super::side::Side;
 use crate::fem::{element, minus};
 use crate::linalg::dot;
+use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap};
 
@@ -16,6 +17,8 @@ pub struct Chords {
     pub sagitta: f64,
     /// Mean height of both surfaces above their facets around each contact point, by which the gap is too large, n.
     pub height: Vec<f64>,
+    /// Length of a wave of pressures that the corners between facets make: that of a facet. It is zero for linear elements, which do not show such waves.
+    pub wave: f64,
 }
 
 impl Chords {
@@ -36,7 +39,8 @@ impl Chords {
             }
         }
         let mean = |at: &u32| sums.get(at).map_or(0.0, |[height, weight]| height / weight);
-        (sagitta > 0.0).then(|| Self { sagitta, height: pair.on_side.iter().map(mean).collect() })
+        let wave = if a.facets.order == Order::P1 { 0.0 } else { a.mean_measure().powf(1.0 / (D - 1) as f64) };
+        (sagitta > 0.0).then(|| Self { sagitta, height: pair.on_side.iter().map(mean).collect(), wave })
     }
 }
 
@@ -45,7 +49,7 @@ impl Chords {
 ///
 /// The edge from x_i to x_j is a chord if the normals at both ends turn away from the facet to opposite sides. Beside an edge of a part only one
 /// of them does. The smaller turn counts.
-fn rises<const D: usize>(side: &Side<D>, facet: usize) -> Vec<f64> {
+pub(super) fn rises<const D: usize>(side: &Side<D>, facet: usize) -> Vec<f64> {
     let x = side.facets.coordinates(facet, side.space);
     let is_straight = element::is_straight(side.facets.order, &x, D);
     let normals: Vec<[f64; D]> = side.facet_nodes(facet).map(|at| at.normal).collect();
@@ -58,7 +62,7 @@ fn rises<const D: usize>(side: &Side<D>, facet: usize) -> Vec<f64> {
 }
 
 /// Return l_i l_j for each edge of a facet.
-fn products<const D: usize>(l: &[f64; D]) -> impl Iterator<Item = f64> {
+pub(super) fn products<const D: usize>(l: &[f64; D]) -> impl Iterator<Item = f64> {
     edges::<D>().map(|(i, j)| l[i] * l[j])
 }
 

@@ -164,15 +164,15 @@ const BY_CHORDS: f64 = 0.1;
 ///
 /// The heights h of the surfaces above their facets close the gap, be it drawn as a clearance, as an overlap or as nothing. A point with the
 /// compression c and the pressure p then has the pressure where the law meets the line c + h + s p, with the compliance s of the bodies to a wave as
-/// long as the contact. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
+/// long as the contact, or as a facet of elements of order two or more. A contact of Hertz with n facets in its radius changes by about 1/(4 n^2).
 pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     let (pair, layer, range) = (&done.model().pairs[i], &done.outcome.layer, done.model().range(i));
-    let Chords { sagitta, height } =
+    let Chords { sagitta, height, wave } =
         done.built.discrete.contacts[i].chords.as_ref().filter(|_| done.outcome.status.is_solved())?;
     let (compression, pressure) = (&layer.compression[range.clone()], &layer.pressure[range]);
     let closed: f64 = (0..pair.len()).filter(|&q| pressure[q] > 0.0).map(|q| pair.area[q]).sum();
     let extent = if pair.measure == "length" { closed } else { closed.sqrt() };
-    let give = softness(done.model(), i) * extent / PI;
+    let give = softness(done.model(), i) * if *wave > 0.0 { *wave } else { extent } / PI;
     let (mut changed, mut whole) = (0.0, 0.0);
     for q in 0..pair.len() {
         let state = compression[q] + height[q] + give * pressure[q];
@@ -195,7 +195,7 @@ pub fn by_chords(done: &Done, i: usize) -> Option<String> {
     let [a, b] = names(&done.built.discrete.specs[i]);
     Some(format!(
         "{a} - {b}: straight facets leave their curved surfaces by up to {}, and {drawn}: pressures are those of facets, and {change}; take order = 2 \
-         or a finer mesh; if the true surfaces have one distance everywhere, write touching = true, with that distance as `gap` (negative for an overlap)",
+         on a mesh of that order, or a finer mesh; if the true surfaces have one distance everywhere, write touching = true, with that distance as `gap` (negative for an overlap)",
         sci(*sagitta, 2),
     ))
 }
