@@ -22,7 +22,7 @@ pub struct FinePoint {
     /// Length (area) of the point.
     pub weight: f64,
     /// Distance of the surfaces along the normal plus the gap that the scene adds. Between surfaces that do not touch as wholes, it is
-    /// less by the heights of both curved surfaces above their straight facets (`rise`), or above their edges of order three or more.
+    /// less by the heights of both curved surfaces above their straight facets (`rise`), and by what is unsure of a curve ([`Heights`](super::curve::Heights)).
     pub gap: f64,
     /// Facet of side a under the point. Points on one facet follow each other.
     pub facet: usize,
@@ -109,7 +109,11 @@ impl<const D: usize> Fine<D> {
         let rounding = a.rounding_along_normals();
         let rise_of_both = |point: &IntegrationPoint<D>| match touching {
             true => 0.0,
-            false => rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b),
+            false => {
+                let [on_a, on_b] = &common.heights;
+                let unsure = on_a.unsure(point.facet_a, &point.at_a) + on_b.unsure(point.facet_b, &point.at_b);
+                rise(a, point.facet_a, &point.at_a) + rise(b, point.facet_b, &point.at_b) + unsure
+            }
         };
         let at_rim = facets_at_rim(a, b, common, &pair.cover, jumps);
         let normal_a = |point: &IntegrationPoint<D>| vector_at(a, point.facet_a, &point.at_a, |at| at.normal);

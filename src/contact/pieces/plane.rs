@@ -19,7 +19,7 @@ pub fn in_plane(a: &Side<2>, b: &Side<2>, reach: &Reach) -> Intersection<2> {
     let mut common = Intersection {
         points: Vec::new(),
         refused: vec![Refused::default(); a.facets.count()],
-        heights: [a, b].map(Heights::new),
+        heights: Heights::of_both(a, b),
     };
     for i in 0..a.facets.count() {
         let facet = Facet::of(a, i);
