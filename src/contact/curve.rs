@@ -59,15 +59,20 @@ impl Heights<2> {
     fn new(side: &Side<2>) -> Self {
         let shape = |i: usize| <[[f64; 2]; 3]>::try_from(side.facets.shape(i, side.space)).unwrap_or_default();
         let edges = (0..side.facets.count()).map(|i| ([side.on_facet(i)[0], side.on_facet(i)[1]], shape(i)));
-        Self::of_edges(&edges.collect::<Vec<_>>(), side.rounding())
+        let mirror = |vertex: u32| {
+            let at = &side.nodes[vertex as usize];
+            side.mirrors.plane_at(side.space, at.node, at.normal)
+        };
+        Self::of_edges(&edges.collect::<Vec<_>>(), side.rounding(), &mirror)
     }
 
-    /// Return the heights above edges that are given as the numbers of their vertices, and the places of these and of the middle. Straight edges
+    /// Return the heights above edges that are given as the numbers of their vertices, and the places of these and of the middle. `mirror` gives the unit
+    /// normal of the plane at a vertex beyond which the boundary goes on as its mirror image. Straight edges
     /// are lines, and no part of a curve, but one between curved edges may hold a point of inflection.
     ///
     /// The two curves of an edge differ by the size of their errors where the boundary is smooth, and by far more where its curvature jumps. While they differ by less
     /// than their mean height, the mean is nearer to the boundary than the edge. At an end of the boundary that must hold for the neighbour.
-    fn of_edges(all: &[([u32; 2], [[f64; 2]; 3])], rounding: f64) -> Self {
+    fn of_edges(all: &[([u32; 2], [[f64; 2]; 3])], rounding: f64, mirror: &dyn Fn(u32) -> Option<[f64; 2]>) -> Self {
         let mut at_vertex: HashMap<u32, Vec<usize>> = HashMap::new();
         for (i, (vertices, _)) in all.iter().enumerate() {
             vertices.iter().for_each(|&vertex| at_vertex.entry(vertex).or_default().push(i));
@@ -77,7 +82,11 @@ impl Heights<2> {
         let is_part = |i: usize| !straight[i] || beside(i).count() == 2 && beside(i).all(|&other| !straight[other]);
         let curve = |i: usize, end: usize| {
             let (vertices, own) = all[i];
-            let neighbour = at_vertex[&vertices[end]].iter().copied().find(|&other| other != i)?;
+            let Some(neighbour) = at_vertex[&vertices[end]].iter().copied().find(|&other| other != i) else {
+                let plane = mirror(vertices[end]).filter(|_| is_part(i))?;
+                let [middle, far] = [own[2], own[1 - end]].map(|x| image(x, own[end], plane));
+                return Curve::through([own[1 - end], own[2], own[end], middle, far], end == 1, i);
+            };
             if !is_part(i) || !is_part(neighbour) {
                 return None;
             }
@@ -114,6 +123,12 @@ impl Curve<2> {
         let is_graph = steps.zip(points.windows(2)).all(|(step, ends)| step > STEEP * length(minus(ends[1], ends[0])));
         (is_smooth(points) && is_graph).then_some(Self { neighbour, origin: from, axes, points: local })
     }
+}
+
+/// Return the mirror image of a point beyond the plane through `at` with this unit normal.
+fn image(x: [f64; 2], at: [f64; 2], plane: [f64; 2]) -> [f64; 2] {
+    let away = dot(&minus(x, at), &plane);
+    std::array::from_fn(|c| x[c] - 2.0 * away * plane[c])
 }
 
 /// Return the distance of the middle point of an edge from the middle of its chord, beyond the rounding of a straight one.
@@ -185,7 +200,7 @@ mod tests {
 
     /// Return the largest distance of the points of an edge from a curve y(x), without and with the heights.
     fn distances(edges: &[([u32; 2], [[f64; 2]; 3])], edge: usize, curve: impl Fn(f64) -> f64) -> [f64; 2] {
-        let (heights, own) = (Heights::of_edges(edges, 0.0), edges[edge].1);
+        let (heights, own) = (Heights::of_edges(edges, 0.0, &|_| None), edges[edge].1);
         let along = unit(minus(own[1], own[0]));
         let distance = |s: f64, height: f64| {
             let x = element::interpolate(&own, &element::values(Order::P2, &[1.0 - s, s]));
@@ -235,7 +250,7 @@ mod tests {
         let fillet = row(&[-0.3, 0.0, turn, turn + 0.25, turn + 0.5, turn + 0.75], fillet);
         let parabola = row(&[-1.0, 0.0, 1.0], |x| [x, x * x]);
         let fine = row(&[0.0, 0.2, 0.4, 0.6], |t| [t.sin(), t.cos()]);
-        assert!(Heights::of_edges(&fine, 0.0).at(1, &[0.3, 0.7]).abs() > 1e-8);
+        assert!(Heights::of_edges(&fine, 0.0, &|_| None).at(1, &[0.3, 0.7]).abs() > 1e-8);
         for (edges, edge, rounding) in [
             (arc, 1, 0.0),
             (polygon.collect(), 1, 0.0),
@@ -244,7 +259,20 @@ mod tests {
             (parabola, 0, 0.0),
             (fine, 1, 1e-6),
         ] {
-            assert!(Heights::of_edges(&edges, rounding).at(edge, &[0.3, 0.7]).abs() < 1e-15, "{edges:?}");
+            assert!(Heights::of_edges(&edges, rounding, &|_| None).at(edge, &[0.3, 0.7]).abs() < 1e-15, "{edges:?}");
+        }
+    }
+
+    /// Beyond a plane of symmetry the mirror image of an edge is its neighbour.
+    #[test]
+    fn heights_go_on_beyond_planes_of_symmetry() {
+        let curve = |t: f64| [t.sin(), t.cos()];
+        let [half, whole] = [&[0.0, 0.3, 0.6, 0.9][..], &[-0.6, -0.3, 0.0, 0.3, 0.6, 0.9]].map(|at| row(at, curve));
+        let half = Heights::of_edges(&half, 0.0, &|vertex| (vertex == 0).then_some([1.0, 0.0]));
+        let whole = Heights::of_edges(&whole, 0.0, &|_| None);
+        for l in [[0.2, 0.8], [0.7, 0.3]] {
+            assert!((half.at(0, &l) / whole.at(2, &l) - 1.0).abs() < 1e-9);
+            assert!((half.unsure(0, &l) / whole.unsure(2, &l) - 1.0).abs() < 1e-6);
         }
     }
 
@@ -253,7 +281,7 @@ mod tests {
     fn heights_of_matching_edges_cancel() {
         let edges = row(&[0.2, 0.4, 0.54, 0.78, 0.92], |x| [x, x.sin()]);
         let turned: Vec<_> = edges.iter().map(|&([i, j], [x, y, middle])| ([j, i], [y, x, middle])).collect();
-        let [one, other] = [&edges, &turned].map(|edges| Heights::of_edges(edges, 0.0));
+        let [one, other] = [&edges, &turned].map(|edges| Heights::of_edges(edges, 0.0, &|_| None));
         let mut largest = 0.0f64;
         for l in [[0.2, 0.8], [0.7, 0.3], [0.9, 0.1]] {
             let turned = [l[1], l[0]];

@@ -63,6 +63,14 @@ impl<const D: usize> Mirrors<D> {
         mean
     }
 
+    /// Return the unit normal of the plane beyond which a surface goes on smoothly as its mirror image from a node, where it has this unit normal.
+    pub fn plane_at(&self, space: &Space<D>, node: u32, normal: [f64; D]) -> Option<[f64; D]> {
+        let axis = std::array::from_fn(|c| f64::from(u8::from(c == 0)));
+        let of_axis = space.on_axis(node).then_some(axis);
+        let mut planes = self.planes.get(&node).into_iter().flatten().copied().chain(of_axis);
+        planes.find(|plane| dot(&normal, plane).abs() <= HELD)
+    }
+
     /// Return whether a surface goes on as its mirror image beyond an edge with these `(node, normal)` at its ends.
     pub fn continue_beyond(&self, edge: &[(u32, [f64; D])]) -> bool {
         let is_in = |plane: &[f64; D]| {
