@@ -28,7 +28,9 @@ pub fn with_session<T: Send + 'static>(work: impl FnOnce(&Session) -> T + Send +
 fn start() -> Sender<Job> {
     let (sender, receiver) = channel::<Job>();
     std::thread::spawn(move || {
+        let environment = super::ENVIRONMENT.write();
         let session = Session::start(&[]).expect("one session in this process");
+        drop(environment);
         receiver.iter().for_each(|job| job(&session));
     });
     sender

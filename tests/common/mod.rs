@@ -12,6 +12,7 @@ use std::fs::{self, File};
 use std::ops::{Deref, Index};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::RwLock;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use winkler::petsc::launcher;
@@ -219,8 +220,12 @@ fn program(ranks: usize) -> Command {
     command
 }
 
+/// Held for writing while MPI starts in this process and changes the environment, and for reading where tests read it: the C library has no lock of its own.
+pub static ENVIRONMENT: RwLock<()> = RwLock::new(());
+
 /// Removes what MPI sets where this process has a session, and a launcher would take for its own.
 pub fn without_session(command: &mut Command) -> &mut Command {
+    let _environment = ENVIRONMENT.read();
     let is_of_mpi = |name: &str| ["OMPI_", "ORTE_", "PMIX_", "PRTE_"].iter().any(|start| name.starts_with(start));
     for (name, _) in std::env::vars().filter(|(name, _)| is_of_mpi(name)) {
         command.env_remove(name);
@@ -231,6 +236,10 @@ pub fn without_session(command: &mut Command) -> &mut Command {
 /// Sets what tests need: Open MPI as root, ranks that share cores, one thread a rank unless the environment asks for more, a cache of meshes for all tests, no
 /// options from outside.
 pub fn environment(command: &mut Command) {
+    let threads = || {
+        let _environment = ENVIRONMENT.read();
+        std::env::var("OPENBLAS_NUM_THREADS").unwrap_or_else(|_| "1".to_owned())
+    };
     without_session(command)
         .env("OMPI_MCA_rmaps_base_oversubscribe", "1")
         // bound to one core a rank would have one thread of OpenBLAS, whatever the environment asks for
@@ -239,7 +248,7 @@ pub fn environment(command: &mut Command) {
         .env("OMPI_MCA_mpi_yield_when_idle", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT", "1")
         .env("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1")
-        .env("OPENBLAS_NUM_THREADS", std::env::var("OPENBLAS_NUM_THREADS").as_deref().unwrap_or("1"))
+        .env("OPENBLAS_NUM_THREADS", threads())
         .env("WINKLER_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("meshes"))
         .env_remove("PETSC_OPTIONS");
 }
@@ -263,6 +272,7 @@ fn finish(mut command: Command, scratch: TempDir, folder: PathBuf) -> Run {
 
 /// Runs a command to its end, which must come before `patience` is over; gives its exit status, output and complaints.
 pub fn output(mut command: Command, patience: Duration) -> (ExitStatus, String, String) {
+    let environment = ENVIRONMENT.read();
     // Files, unlike pipes, take all output without anybody reading.
     let texts = TempDir::new().expect("a temporary folder");
     let [out, err] = ["out", "err"].map(|name| texts.path().join(name));
@@ -270,6 +280,7 @@ pub fn output(mut command: Command, patience: Duration) -> (ExitStatus, String, 
     command.stdin(Stdio::null()).stdout(file(&out)).stderr(file(&err));
     let began = Instant::now();
     let mut child = command.spawn().unwrap_or_else(|cause| panic!("{command:?}: {cause}"));
+    drop(environment);
     let read = |path: &Path| String::from_utf8_lossy(&fs::read(path).unwrap_or_default()).into_owned();
     loop {
         if let Some(status) = child.try_wait().expect("a child can be waited for") {
