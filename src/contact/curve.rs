@@ -5,7 +5,7 @@
 //! 2.7e-4 from those of the same gap before a flat mesh, and by 3.9e-3 without these heights.
 
 use super::side::Side;
-use crate::fem::{element, length, minus, unit};
+use crate::fem::{element, minus, unit};
 use crate::linalg::{dot, interpolation_weights};
 use crate::mesh::is_smooth;
 use crate::problem::order::Order;
@@ -39,9 +39,6 @@ struct Curve<const D: usize> {
     /// Coordinates of the points along these axes.
     points: [[f64; 2]; 5],
 }
-
-/// Least cosine of the angle between a part of two edges and their chord: 60 degrees.
-const STEEP: f64 = 0.5;
 
 /// Points of an edge at which heights are compared.
 const COMPARED: [f64; 4] = [0.125, 0.375, 0.625, 0.875];
@@ -77,7 +74,7 @@ impl Heights<2> {
         for (i, (vertices, _)) in all.iter().enumerate() {
             vertices.iter().for_each(|&vertex| at_vertex.entry(vertex).or_default().push(i));
         }
-        let straight: Vec<bool> = all.iter().map(|(_, own)| off_middle(own) <= 2.0 * rounding).collect();
+        let straight: Vec<bool> = all.iter().map(|(_, own)| element::is_straight(Order::P2, own, 2)).collect();
         let beside = |i: usize| all[i].0.iter().flat_map(|vertex| &at_vertex[vertex]).filter(move |&&other| other != i);
         let is_part = |i: usize| !straight[i] || beside(i).count() == 2 && beside(i).all(|&other| !straight[other]);
         let curve = |i: usize, end: usize| {
@@ -119,8 +116,7 @@ impl Curve<2> {
         let along = unit(minus(to, from));
         let axes = [along, [along[1], -along[0]]];
         let local = points.map(|x| axes.map(|axis| dot(&axis, &minus(x, from))));
-        let steps = local.windows(2).map(|ends| (ends[1][0] - ends[0][0]) * if forward { 1.0 } else { -1.0 });
-        let is_graph = steps.zip(points.windows(2)).all(|(step, ends)| step > STEEP * length(minus(ends[1], ends[0])));
+        let is_graph = local.is_sorted_by(|p, q| if forward { p[0] < q[0] } else { p[0] > q[0] });
         (is_smooth(points) && is_graph).then_some(Self { neighbour, origin: from, axes, points: local })
     }
 }
@@ -129,12 +125,6 @@ impl Curve<2> {
 fn image(x: [f64; 2], at: [f64; 2], plane: [f64; 2]) -> [f64; 2] {
     let away = dot(&minus(x, at), &plane);
     std::array::from_fn(|c| x[c] - 2.0 * away * plane[c])
-}
-
-/// Return the distance of the middle point of an edge from the middle of its chord, beyond the rounding of a straight one.
-fn off_middle([first, last, middle]: &[[f64; 2]; 3]) -> f64 {
-    let off: [f64; 2] = std::array::from_fn(|c| middle[c] - 0.5 * (first[c] + last[c]));
-    length(off) - 1e-9 * length(minus(*last, *first))
 }
 
 impl<const D: usize> Curve<D> {

@@ -145,7 +145,6 @@ impl InterfaceDofs {
         let d = self.dimension;
         let mut lower = Vec::with_capacity(matrix.values.len() / 2 + matrix.rows());
         let mut block = vec![vec![0.0; d]; d];
-        let is_turned = |node: usize| !self.axes.is_empty() && self.axes.contains_key(&node);
         for node in 0..matrix.rows() / d {
             let starts: Vec<usize> = (node * d..node * d + d).map(|row| matrix.range(row).start).collect();
             let others = matrix.col[matrix.range(node * d)].iter().step_by(d).map(|&dof| dof as usize / d);
@@ -153,9 +152,7 @@ impl InterfaceDofs {
                 for (row, start) in block.iter_mut().zip(&starts) {
                     row.copy_from_slice(&matrix.values[start + k * d..][..d]);
                 }
-                if is_turned(node) || is_turned(other) {
-                    self.turn_block(node, other, &mut block);
-                }
+                self.turn_block(node, other, &mut block);
                 for (r, row) in block.iter().enumerate() {
                     for (c, &value) in row.iter().enumerate() {
                         let (i, j) = (node * d + r, other * d + c);
