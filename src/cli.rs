@@ -14,7 +14,7 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 
-/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
+/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Newton's method or Robin-Robin domain decomposition on PETSc.
 ///
 /// PETSc options are typed as in every PETSc program, for all bodies (-ksp_type cg -pc_type hypre) or for one
 /// (-upper_ksp_type cg); -help lists them.
