@@ -43,6 +43,16 @@ pub struct FaceNode<const D: usize> {
     pub tilt: f64,
     /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
     pub curvature: f64,
+    /// Mean of (n_f - n)(n_f - n)' over the unit normals n_f of the facets around, where n is `direction`.
+    pub spread: Spread<D>,
+}
+
+/// The mean of products of differences of normals: a symmetric matrix.
+pub type Spread<const D: usize> = [[f64; D]; D];
+
+/// Add `weight * v v'` to a spread.
+pub fn add_square<const D: usize>(spread: &mut Spread<D>, weight: f64, v: [f64; D]) {
+    (0..D).for_each(|i| (0..D).for_each(|j| spread[i][j] += weight * v[i] * v[j]));
 }
 
 impl<'a, const D: usize> Side<'a, D> {
@@ -66,7 +76,12 @@ impl<'a, const D: usize> Side<'a, D> {
                     (0..D).for_each(|c| normal[c] += area[c]);
                 }
                 let normal = unit(mirrors.mean(space, node, normal, least));
-                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0 });
+                let whole: f64 = face.iter().map(|(_, area)| length(*area)).sum();
+                let mut spread = [[0.0; D]; D];
+                for (_, area) in face {
+                    add_square(&mut spread, length(area) / whole, minus(unit(area), normal));
+                }
+                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0, spread });
             }
         }
         let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };

@@ -14,21 +14,25 @@ use crate::contact::ContactPair;
 use crate::error::{few, joined};
 use crate::fem::{PointExtent, RigidMotion, rigid};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
-use crate::model::{Mechanism, Motions};
-use nalgebra::{DMatrix, DVector};
+use crate::model::Mechanism;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
+/// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for: forces in equilibrium that
+/// people write have three digits or more, and straight chords and quadrature take as much from them.
 const LACKING: f64 = 1e-3;
 
-/// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
-pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
+/// Find the motions that nothing resists. Fix those on which no load works.
+pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair]) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
-    let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
+    let mut search = MechanismSearch { bodies, pairs, tilt, found: Vec::new() };
     for group in search.groups() {
-        search.settle(search.as_one(&group));
+        search.settle(search.as_one(&group), |_| false);
     }
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
-        search.settle(search.kernel());
+        let squares = search.squares();
+        let least = search.tolerance();
+        let is_resisted = |motion: &DVector<f64>| squares[0].energy(motion) > least * motion.norm_squared();
+        search.settle(search.kernel(&squares), is_resisted);
     }
     search.found
 }
@@ -48,8 +52,6 @@ struct MechanismSearch<'p, 's, const D: usize> {
     pairs: &'p [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
-    /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
-    lack: f64,
     found: Vec<Mechanism>,
 }
 
@@ -121,19 +123,67 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         (0..body).map(|body| self.unconstrained(body).len()).sum()
     }
 
-    /// Return the motions that contact does not resist.
+    /// Return the motions that contact does not resist, and those that facets alone resist, from [`Self::squares`].
     ///
-    /// Each pair counts by the mean square of its closings. Motions are of size one. So a motion that closes less than the error of the
-    /// normals is free, and so is one that closes less than the root of [`TOLERANCE`], the error of coordinates on curves.
-    fn kernel(&self) -> Vec<DVector<f64>> {
-        let points: Vec<usize> = self.pairs.iter().map(ContactPair::len).collect();
-        let share = |pair: &ContactPair| {
-            let all: f64 = pair.area.iter().sum();
-            pair.area.iter().map(|area| area / all).collect::<Vec<_>>()
-        };
-        let shares: Vec<f64> = self.pairs.iter().flat_map(share).collect();
-        let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..]));
-        Motions::new(motions, &points).springs(&shares).kernel(TOLERANCE.max(self.tilt * self.tilt))
+    /// Motions are of size one. So a motion that closes less than the error of the normals is free, and so is one that closes less than the root of
+    /// [`TOLERANCE`], the error of coordinates on curves.
+    fn kernel(&self, [closing, leaning]: &[Blocks; 2]) -> Vec<DVector<f64>> {
+        let mut held = closing.clone();
+        leaning.stored().for_each(|(i, j, block)| held.add(i, j, &(-DOUBT * block)));
+        let leans = |motion: &DVector<f64>| leaning.energy(motion) > self.tolerance() * motion.norm_squared();
+        let (doubtful, mut free): (Vec<_>, Vec<_>) = held.kernel(self.tolerance()).into_iter().partition(leans);
+        if !doubtful.is_empty() {
+            let all = DMatrix::from_columns(&doubtful);
+            let products = |matrix: &Blocks| {
+                let columns: Vec<_> = doubtful.iter().map(|motion| matrix.multiply(motion)).collect();
+                all.tr_mul(&DMatrix::from_columns(&columns))
+            };
+            let doubt = DOUBT * products(leaning) + self.tolerance() * all.tr_mul(&all);
+            let of_all = |weights: DVector<f64>| &all * weights;
+            free.extend(less(&products(closing), doubt).map_or(doubtful, |few| few.into_iter().map(of_all).collect()));
+        }
+        free
+    }
+
+    /// Return the share of e'e up to which the mean square of the closings of a motion e is rounding.
+    fn tolerance(&self) -> f64 {
+        TOLERANCE.max(self.tilt * self.tilt)
+    }
+
+    /// Return the mean squares of the closings n.u of all pairs, and those of (n_f - n).u with the normals n_f of the facets around: quadratic forms of the
+    /// motions of all bodies.
+    ///
+    /// The displacement u between the two sides is that of both motions at the position of the point. So bodies that move as one close nothing, whatever
+    /// the rows of a mesh say where curved surfaces are apart.
+    fn squares(&self) -> [Blocks; 2] {
+        let sizes: Vec<usize> = (0..self.bodies.len()).map(|body| self.unconstrained(body).len()).collect();
+        let mut sums = [Blocks::new(&sizes), Blocks::new(&sizes)];
+        for pair in self.pairs.iter().filter(|pair| pair.bodies[0] != pair.bodies[1]) {
+            let sides: Vec<usize> = pair.bodies.into_iter().filter(|body| *body < self.bodies.len()).collect();
+            let moves: Vec<DMatrix<f64>> = sides.iter().zip([1.0, -1.0]).map(|(&body, sign)| sign * self.at_points(body, pair)).collect();
+            let closings: Vec<DMatrix<f64>> = moves.iter().map(|u| closings::<D>(u, &pair.normal)).collect();
+            let turned: Vec<DMatrix<f64>> = moves.iter().map(|u| turned::<D>(u, &pair.spread)).collect();
+            for s in 0..sides.len() {
+                for t in s..sides.len() {
+                    sums[0].add(sides[s], sides[t], &closings[s].tr_mul(&closings[t]));
+                    if !pair.spread.is_empty() {
+                        sums[1].add(sides[s], sides[t], &moves[s].tr_mul(&turned[t]));
+                    }
+                }
+            }
+        }
+        sums
+    }
+
+    /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of the share of each point in the area.
+    fn at_points(&self, body: usize, pair: &ContactPair) -> DMatrix<f64> {
+        let (motions, datum) = (self.unconstrained(body), &self.bodies[body].part.mesh.space.datum);
+        let area: f64 = pair.area.iter().sum();
+        let roots: Vec<f64> = pair.area.iter().map(|own| (own / area).sqrt()).collect();
+        let points = || pair.position.iter().map(|x| std::array::from_fn(|c| x[c] - datum[c]));
+        let columns = motions.iter().map(|motion| motion.nodal(points()));
+        let scaled = columns.flat_map(|u| u.into_iter().enumerate().map(|(i, u)| roots[i / D] * u).collect::<Vec<_>>());
+        DMatrix::from_iterator(D * pair.len(), motions.len(), scaled)
     }
 
     /// Return the motion with these amounts.
@@ -153,7 +203,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Fix motions that nothing resists if no load works on them, and record them.
-    fn settle(&mut self, all: Vec<DVector<f64>>) {
+    fn settle(&mut self, all: Vec<DVector<f64>>, is_resisted: impl Fn(&DVector<f64>) -> bool) {
         let mut sets: Vec<Vec<GroupMotion<D>>> = Vec::new();
         for moving in all.into_iter().map(|amounts| self.moving(amounts)) {
             match sets.iter_mut().find(|set| set[0].bodies == moving.bodies) {
@@ -165,15 +215,16 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let works: Vec<Vec<f64>> =
             named.iter().map(|set| set.iter().map(|(_, moving)| self.work(moving).abs()).collect()).collect();
         let worst = works.iter().flatten().copied().fold(0.0, f64::max);
-        if worst <= self.lack {
+        if worst <= LACKING {
             self.balance(named.iter().flatten().map(|(_, moving)| moving).collect());
         }
         let mut pins = Vec::new();
         for (set, works) in named.into_iter().zip(works) {
             let most = works.iter().copied().fold(0.0, f64::max);
+            let by_facets = set.iter().any(|(_, moving)| is_resisted(&moving.amounts));
             let mechanism =
-                |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, ..Default::default() };
-            if worst > self.lack {
+                |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, by_facets, ..Default::default() };
+            if worst > LACKING {
                 // The motion on which loads work most is the reason, and the others of its bodies are not of interest.
                 let reason = works.iter().position(|work| *work == worst);
                 self.found.extend(reason.map(|i| Mechanism {
@@ -300,6 +351,32 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         Some(body)
     }
 }
+
+/// Return n.u at each point for the displacements u in each column.
+fn closings<const D: usize>(u: &DMatrix<f64>, normal: &[[f64; 3]]) -> DMatrix<f64> {
+    DMatrix::from_fn(normal.len(), u.ncols(), |q, k| (0..D).map(|c| normal[q][c] * u[(D * q + c, k)]).sum())
+}
+
+/// Return L u at each point for the displacements u in each column.
+fn turned<const D: usize>(u: &DMatrix<f64>, spread: &[[[f64; 3]; 3]]) -> DMatrix<f64> {
+    let of = |i: usize, k: usize| (0..D).map(|c| spread[i / D][i % D][c] * u[(i - i % D + c, k)]).sum();
+    DMatrix::from_fn(D * spread.len(), u.ncols(), of)
+}
+
+/// Return a basis of the weights x with x'Ax <= x'Bx, for a positive semidefinite A and a positive definite B; `None` if these are all, or B is not definite.
+fn less(a: &DMatrix<f64>, b: DMatrix<f64>) -> Option<Vec<DVector<f64>>> {
+    let root = b.cholesky()?.unpack();
+    let half = root.solve_lower_triangular(a)?;
+    let eigen = SymmetricEigen::new(root.solve_lower_triangular(&half.transpose())?);
+    let least: Vec<usize> = (0..a.nrows()).filter(|&i| eigen.eigenvalues[i] <= 1.0).collect();
+    let vector = |i: usize| root.tr_solve_lower_triangular(&eigen.eigenvectors.column(i));
+    (least.len() < a.nrows()).then(|| least.into_iter().filter_map(vector).collect())
+}
+
+/// Share of the mean square by which the normals of facets lean along a motion, below which the mean square of its closings may be their error: the
+/// motion then closes less than half of what single facets would. A pin in a hub has up to 0.12 of it (turns 0.05), a plug in a taper of 1:20 twice as
+/// much as all of it with 24 facets around.
+const DOUBT: f64 = 0.25;
 
 /// Share of the largest displacement from which a node can fix a motion; two of its digits are lost there.
 const NEAR: f64 = 1e-2;

@@ -462,6 +462,11 @@ impl Blocks {
         }
         y
     }
+
+    /// Return x'Ax.
+    pub fn energy(&self, x: &DVector<f64>) -> f64 {
+        self.multiply(x).dot(x)
+    }
 }
 
 /// The vertices in the order of their elimination, each with its neighbours at that time.
