@@ -8,16 +8,12 @@
 //!
 //! so that the less curved surface counts; two flats, and surfaces of equal curvature, give the plain mean (docs/theory.md, "The normals").
 //!
-//! The normals n_f of the facets around differ from n. Their spread, the mean of (n_f - n)(n_f - n)', is that of both sides with the same weights. With
-//! the spreads L_a and L_b of facets around n_a and n_b, and w_a + w_b = 1, it is
-//!
-//! ```text
-//! L = w_a L_a + w_b L_b + w_a w_b (n_a + n_b)(n_a + n_b)'
-//! ```
+//! The spread of n is that of both sides with the same weights: the mean of (n_f - n_a)(n_f - n_a)' over the unit normals n_f of the facets around n_a, and
+//! the like for n_b. Surfaces that turn away from each other add nothing to it.
 
 use super::basis::PressureBasis;
 use super::pieces::Intersection;
-use super::side::{ROUNDING, Side, Spread, add_square};
+use super::side::{ROUNDING, Side, Spread};
 use crate::fem::{element, length, unit};
 use crate::linalg::{axpy, dot};
 use crate::problem::order::Order;
@@ -54,7 +50,6 @@ impl<const D: usize> Side<'_, D> {
             if length(tilt) <= ROUNDING {
                 continue;
             }
-            add_square(&mut own.spread, weight * (1.0 - weight), tilt);
             let sum = std::array::from_fn(|c| weight * own.normal[c] - (1.0 - weight) * normal[c]);
             own.direction = unit(self.mirrors.mean(self.space, own.node, sum, -1.0));
             own.tilt = length(tilt);

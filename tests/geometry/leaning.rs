@@ -105,7 +105,11 @@ fn a_fit_carries_neither_torque_nor_axial_force() {
     refused(&at(&fit(3, FIT, "force = [\"-y*1e-3\", \"x*1e-3\", 0]", -0.01), 1, &numbers), "rotation about z");
     let free = at(&fit(3, FIT, "", -0.01), 1, &numbers).converged();
     assert!((peak(&free) / 81.0 - 1.0).abs() < 0.15, "{}\n{}", peak(&free), free.warnings());
-    assert!(free.warnings().contains("nothing holds its translation along z and rotation about z"), "{}", free.warnings());
+    assert!(
+        free.warnings().contains("nothing holds its translation along z and rotation about z"),
+        "{}",
+        free.warnings()
+    );
 }
 
 /// A pin with clearance is pressed to one side of its hole: the peak is that of matching circles.
