@@ -42,15 +42,18 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);
     let digits = report.error_bound.or(report.error_estimate).unwrap_or(f64::INFINITY);
-    let fixed = discrete.mechanisms.iter().filter_map(|mechanism| mechanism.fixed);
-    let reactions = discrete.bodies.iter().zip(&balances).enumerate();
-    let reactions = reactions.filter(|(body, _)| fixed.clone().any(|of| of == *body));
-    report
-        .warnings
-        .extend(reactions.filter_map(|(_, (info, balance))| warnings::of_fixed(&info.name, balance, digits)));
+    for (body, (info, balance)) in discrete.bodies.iter().zip(&balances).enumerate() {
+        let fixed = || discrete.mechanisms.iter().filter(|mechanism| mechanism.fixed == Some(body));
+        let error = if fixed().any(|mechanism| mechanism.by_facets) { digits.max(OF_FACETS) } else { digits };
+        report.warnings.extend(fixed().next().and_then(|_| warnings::of_fixed(&info.name, balance, error)));
+    }
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     report
 }
+
+/// Share of all forces on a body, fixed against a motion that facets resist, that its node may carry without a warning: the forces of facets along that motion.
+/// Loads may lack balance by as much.
+const OF_FACETS: f64 = 1e-3;
 
 /// Add the status and the results of the iteration.
 fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {

@@ -98,15 +98,21 @@ fn not_finite(body: &str, k: usize, other: &str) -> String {
 }
 
 /// Return the message on a motion that nothing resists, and on which loads work.
-fn unbalanced_mechanism(Mechanism { bodies, motion, work, support, .. }: &Mechanism, model: &Model) -> String {
+fn unbalanced_mechanism(found: &Mechanism, model: &Model) -> String {
+    let Mechanism { bodies, motion, work, support, by_facets, .. } = found;
     let names = in_words(bodies.iter().map(|body| &model.bodies[*body].name));
     let (who, whose) = if bodies.len() == 1 { ("body", "its") } else { ("bodies", "them together in their") };
     format!(
         "{who} {names}: neither a support nor a spring nor contact holds {whose} {motion}, and loads work on it ({} % of what \
-         forces of their sizes could do): add a support {support}, or balance the loads",
-        readable(100.0 * work, 1)
+         forces of their sizes could do): add a support {support} or a weak spring, or balance the loads{}",
+        readable(100.0 * work, 1),
+        if *by_facets { CANNOT_TELL } else { "" }
     )
 }
+
+/// The advice where facets resist a motion by no more than their errors.
+const CANNOT_TELL: &str = ". Facets of this order and size cannot tell whether contact holds this motion: if it does, as in a slender taper, take a higher \
+     order or a finer mesh";
 
 /// Return the message on unresisted motions of bodies.
 fn unbounded(moving: &[NamedMotion], model: &Model) -> String {

@@ -32,7 +32,7 @@ pub fn of_problem(session: &Session, discrete: &Discrete) -> Vec<String> {
             session.size()
         ));
     }
-    warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
+    warnings.extend(of_mechanisms(discrete));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.specs));
     warnings
@@ -50,13 +50,30 @@ pub fn made_straight(cells: usize) -> Option<String> {
     (cells > 0).then(|| format!("{cells} quadratic cells {why}"))
 }
 
-/// Return the warning of motions that nothing resists.
-fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
-    let Mechanism { bodies, motion, work, balanced, fixed, .. } = mechanism;
+/// Return the warnings of motions that nothing resists: one for all bodies that have the same one, each for itself.
+fn of_mechanisms(discrete: &Discrete) -> Vec<String> {
+    let mut found: Vec<(Mechanism, Vec<usize>)> = Vec::new();
+    for mechanism in &discrete.mechanisms {
+        let mut kind = mechanism.clone();
+        let bodies = std::mem::take(&mut kind.bodies);
+        kind.fixed = kind.fixed.map(|body| if bodies.len() == 1 { 0 } else { body });
+        match found.iter_mut().find(|(other, _)| bodies.len() == 1 && kind == *other) {
+            Some((_, alike)) => alike.extend(bodies),
+            None => found.push((if bodies.len() == 1 { kind } else { mechanism.clone() }, bodies)),
+        }
+    }
+    found.iter().map(|(mechanism, bodies)| mechanism_in_words(discrete, mechanism, bodies)).collect()
+}
+
+/// Return the warning of a motion that nothing resists. It is one of these bodies together if it names them, and one that each of them has if not.
+fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism, bodies: &[usize]) -> String {
+    let Mechanism { motion, work, balanced, fixed, .. } = mechanism;
     let name = |body: usize| &discrete.bodies[body].name;
-    let (who, together) = match bodies[..] {
-        [body] => (format!("body {}", name(body)), "its"),
-        _ => (format!("bodies {}", in_words(bodies.iter().map(|&body| name(body)))), "them together in their"),
+    let names = || in_words(bodies.iter().map(|&body| name(body)));
+    let (who, whose) = match bodies {
+        [body] => (format!("body {}", name(*body)), "its"),
+        _ if mechanism.bodies.is_empty() => (format!("bodies {}", names()), "each of them in its"),
+        _ => (format!("bodies {}", names()), "them together in their"),
     };
     let loads = match *work {
         0.0 if *balanced > 0.0 => format!(
@@ -68,12 +85,13 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     };
     let end = match fixed {
         Some(_) if bodies.len() == 1 => "it is fixed at one node".to_owned(),
+        Some(_) if mechanism.bodies.is_empty() => "each is fixed at one node".to_owned(),
         Some(body) => format!("they are fixed at nodes of `{}`", name(*body)),
         None if *work == 0.0 => "displacements are free up to it".to_owned(),
         None => "there is no solution".to_owned(),
     };
     let then = if *balanced > 0.0 { ";" } else { ":" };
-    format!("{who}: nothing holds {together} {motion}, and {loads}{then} {end}")
+    format!("{who}: nothing holds {whose} {motion}, and {loads}{then} {end}")
 }
 
 /// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error of the result.
