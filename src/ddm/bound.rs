@@ -117,6 +117,7 @@ impl Reached {
         let change = closing.iter().zip(&before.tangent).map(|(s, tangent)| (s * tangent).abs()).fold(0.0, f64::max);
         let change = if change == 0.0 { 0.0 } else { change / scale.peak(&layer.pressure, strain) };
         self.error += 2.0 * missed;
+        self.verify(missed);
         self.pressure += 2.0 * change;
     }
 
