@@ -134,7 +134,8 @@ impl Reached {
 ///
 /// Unconstrained bodies that only an initial overlap presses together move apart until no pressure is left. Then everything that a relative
 /// tolerance could refer to vanishes with the error, and rest or the automatic start is the reference. Its layers may answer an overlap with any
-/// pressure, so the surfaces deflect first ([`start::at`]). A contact may also vanish while bodies carry other loads. Then the reference is the energy
+/// pressure, so the surfaces deflect first ([`start::at`]). Under loads the start alone is the reference: an overlap says nothing of the pressures that
+/// carry them. A contact may also vanish while bodies carry other loads. Then the reference is the energy
 /// of their strains, as a pressure on all surfaces.
 ///
 /// A solution below [`PART`] of a reference is measured by that share of it. With a tolerance of 1e-8 this is 1e-14 of what the bodies carry, which

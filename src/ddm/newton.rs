@@ -256,12 +256,6 @@ impl<'n, 'r> Newton<'n, 'r> {
             }
         }
         let end = self.position();
-        if std::env::var("NW").is_ok() {
-            eprintln!(
-                "descent here {:e} lowest {:e} begin {f1:e} end {:e} steps {}",
-                here.f1, self.lowest.f1, end.f1, self.descents
-            );
-        }
         let falls = falls(f1, end.f1);
         if falls {
             (self.lowest, self.stagnation) = (end, Stagnation::default());
