@@ -333,6 +333,7 @@ mod tests {
         exact.add_unbalanced((&scale, 5.0), &more, &layer, &layer);
         close(exact.error, ((2.0 * gap).sqrt() + 2.0 * 0.06f64.sqrt()) / all.sqrt());
         close(exact.pressure, 0.1 + 2.0 * 0.04 / 4.0);
+        assert!(!exact.is_bound, "a step that lacks so much of equilibrium is not exact");
     }
 
     /// The law p = 4 c, and an open point, whose law has zero pressure at any c < 0.

@@ -51,7 +51,11 @@ pub(super) fn iterate(
     states: Layer,
     is_near: bool,
 ) -> Result<Outcome> {
-    let mut newton = Newton::new(run, linear, u, states, is_near)?;
+    let (progress, tolerance, foreign) = (Progress::new(run.model), run.stop.tolerance(), linear.sweeps());
+    let (stagnation, added, descents, lowest) = (Stagnation::default(), Vec::new(), 0, Position::default());
+    let mut newton =
+        Newton { run, linear, progress, stagnation, tolerance, foreign, u, lowest, descents, states, added, is_near };
+    newton.lowest = newton.position();
     loop {
         let step = match newton.linear_step()? {
             Ok(step) => step,
@@ -145,32 +149,7 @@ struct Measured {
     reached: Reached,
 }
 
-impl<'n, 'r> Newton<'n, 'r> {
-    fn new(
-        run: &'n mut Run<'r>,
-        linear: &'n mut dyn LinearStep,
-        u: Field,
-        states: Layer,
-        is_near: bool,
-    ) -> Result<Self> {
-        let mut newton = Self {
-            progress: Progress::new(run.model),
-            tolerance: run.stop.tolerance(),
-            foreign: linear.sweeps(),
-            run,
-            linear,
-            stagnation: Stagnation::default(),
-            u,
-            lowest: Position::default(),
-            descents: 0,
-            states,
-            added: Vec::new(),
-            is_near,
-        };
-        newton.lowest = newton.position();
-        Ok(newton)
-    }
-
+impl Newton<'_, '_> {
     /// Return where the iterate is. Collective.
     fn position(&mut self) -> Position {
         let model = &mut *self.run.model;

@@ -135,6 +135,13 @@ fn no_method_claims_what_it_has_not(bench: &Bench) {
     let case = wide::scene(2170544, 290, Path::new(env!("CARGO_MANIFEST_DIR")));
     let answer = &bench.solve(case, &["auto"]).0[0].1;
     assert!(answer.claims && answer.iterations <= 30, "{} {}", answer.iterations, answer.message);
+    // contact peels off leaves whose overlap stores far more energy than bending
+    let case = slender::scene(777123, 57, Path::new(env!("CARGO_MANIFEST_DIR")));
+    let answer = &bench.solve(case, &["auto"]).0[0].1;
+    assert_eq!(answer.status, "converged", "{}", answer.message);
+    // a soft bond lets nothing resist the rise of both blocks from an obstacle
+    let case = mixed::scene(777123, 45, Path::new(env!("CARGO_MANIFEST_DIR")));
+    assert_eq!(bench.solve(case, &["auto"]).0[0].1.status, "unbounded");
     // the residual is met, but a body is not in balance yet: that is neither converged nor rounding
     let answer = &bench.run(1, 123, &["0.6"]).0[0].1;
     assert_eq!(answer.status, "iteration-limit");

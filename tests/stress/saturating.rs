@@ -18,10 +18,15 @@ pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
 /// Return a scene with two blocks of width one and meshes that do not match, in the plane or of revolution.
 fn pressed(index: usize, random: &mut Random, root: &Path) -> Case {
     let plane = random.pick(&["strain", "stress", "axisymmetric"]);
-    let layer = format!("table = [{}]", table(random));
-    let [n1, n2] = [random.pick(&[2, 3, 5, 8]), random.pick(&[2, 3, 5, 8])];
+    let steep = format!(
+        "[{:e}, {PLATEAU}], [10, {:e}]",
+        random.power_of_ten(-8.0, -3.0),
+        PLATEAU + random.power_of_ten(-5.0, -1.0)
+    );
+    let layer = format!("table = [{}]", if random.chance(0.5) { steep } else { table(random) });
+    let [n1, n2] = [random.pick(&[3, 6, 12]), random.pick(&[3, 6, 12])];
     let mean = PLATEAU * random.uniform(0.1, 0.95);
-    let gap = format!("{:e}*sin({:e}*x)", random.power_of_ten(-5.0, -2.0), random.uniform(2.0, 18.0));
+    let gap = format!("{:e}*sin({:e}*x)", random.power_of_ten(-4.5, -2.0), random.uniform(2.0, 18.0));
     let (taper, is_round) = (random.uniform(-0.03, 0.03), plane == "axisymmetric");
     let has_obstacle = !is_round && random.chance(0.4);
     let mut body = |name: &str, more: &str| {
