@@ -50,7 +50,6 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     if let Some(method) = table.get_mut().get_mut("method") {
         method::complete(method);
     }
-    let has_stop = table.get_ref().get("method").is_some_and(|method| method.get_ref().get("stop").is_some());
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let reader = Reader { table, sources };
     reader.refuse_lists()?;
@@ -63,10 +62,6 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     for (table, contact) in scene.contacts.iter_mut().enumerate() {
         contact.table = table;
         contact.complete();
-    }
-    // meshes that are adapted need no more digits than they are worth, unless the scene says how many
-    if let (Some(adapt), false) = (&scene.adapt, has_stop) {
-        scene.method.stop.residual = Some(0.1 * adapt.error.value);
     }
     scene.method.steps.join(&scene.bodies, &scene.contacts)?;
     scene.verify()?;

@@ -1,7 +1,7 @@
 //! Where rounding or a bad start spoiled the answer: columns of two blocks whose pressure a line of algebra gives.
 
 use crate::common::shapes::SHAPES;
-use crate::common::{Run, Scene, distance, solve, solve_on};
+use crate::common::{Run, Scene, case, distance, solve, solve_on};
 
 /// Two unit blocks of modulus `young` on each other, the lower one on a roller; Poisson's ratio is zero, so that each is a
 /// spring. `upper` is what holds and loads the upper one.
@@ -329,6 +329,19 @@ fn a_run_that_rounding_ends_is_soon_over() {
     );
     assert_eq!((run.code, run.text("status")), (0, "roundoff-limited"), "{}", run.said());
     assert!(run.number("residual") < 1e-12 && run.count("iterations") <= 12, "{}", run.said());
+}
+
+/// A support that draws blocks together over a far overlap, or a far gap, leaves no more digits than `rounding` says.
+#[test]
+fn far_overlaps_have_their_error() {
+    for gap in ["-1e4", "-1e8", "1e8", "-1e10", "-1e12"] {
+        let args = ["mesh.set.n=4", "method={}", &format!("contact.0.gap={gap}")];
+        let args: Vec<&str> = args.iter().flat_map(|set| ["--set", set]).collect();
+        let run = solve(case("groove-held"), &args);
+        let off = (run.number("pairs/0/peak_pressure") / 10.0 - 1.0).abs();
+        assert!(run.code != 0 || off <= run.number("rounding") + 1e-6, "{gap}: {off:e}, {}", run.said());
+        assert_eq!(run.code == 0 && run.text("status") == "converged", gap == "-1e4", "{gap}: {}", run.said());
+    }
 }
 
 /// Solvers have thresholds: MUMPS takes pivots below 1e-20 for zeros, and residuals below 1e-50 were none. Units change nothing but the last digits.
