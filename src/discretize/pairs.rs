@@ -60,13 +60,15 @@ pub struct Facing {
 }
 
 impl Facing {
-    /// Return the facets of both sides with a common piece, sorted. `on_mesh` are the points of the mesh of the nodes of both bodies.
+    /// Return the facets of both sides with a common piece, sorted.
     fn all<const D: usize>(
+        parts: &[SceneBody<D>],
         sides: [&Side<D>; 2],
-        on_mesh: [&[u32]; 2],
         common: &Intersection<D>,
         pair: &ContactPair,
     ) -> Vec<Self> {
+        // an obstacle has the facets of the body before it
+        let on_mesh = pair.bodies.map(|body| &parts.get(body).unwrap_or(&parts[pair.bodies[0]]).mesh.points);
         let point_of = pair.point_of(sides[0].nodes.len());
         let met: BTreeSet<[usize; 2]> = common.points.iter().map(|point| [point.facet_a, point.facet_b]).collect();
         let facing = |met: [usize; 2]| {
@@ -293,9 +295,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         };
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
-        let on_mesh =
-            [bodies[0], if spec.obstacle { bodies[0] } else { bodies[1] }].map(|body| &*parts[body].mesh.points);
-        let facing = Facing::all([&a, &b], on_mesh, &common, &pair);
+        let facing = Facing::all(parts, [&a, &b], &common, &pair);
         Ok(Some(Contact {
             pair,
             fine,

@@ -397,10 +397,15 @@ impl ContactSpec {
                 return Err(Flaw::new(*key, format!("a negative `{key}`"), "", help));
             }
         }
-        match self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
-            true => Err(Flaw::new("path", "`path` without a force or motion of this contact", "", "")),
-            false => Ok(()),
+        let is_scaled = |field: &Field| field.is_constant() && !field.is_zero();
+        if self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
+            return Err(Flaw::new("path", "`path` without a force or motion of this contact", "", ""));
         }
+        if self.path.is_some() && self.given().any(|field| !field.is_constant()) && !self.given().any(is_scaled) {
+            let help = "remove it: an expression has the columns of the table as variables, force = \"100*press\"";
+            return Err(Flaw::new("path", "`path` of an expression", "", help));
+        }
+        Ok(())
     }
 
     /// Check a pair of surfaces: two plain names.
