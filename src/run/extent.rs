@@ -16,7 +16,8 @@ pub fn of(done: &Done, i: usize) -> (Extent, Vec<[f64; 3]>) {
     let (c, p) = (&layer.compression[range.clone()], &layer.pressure[range]);
     let neighbours = done.built.discrete.contacts[i].surface.neighbours();
     if !pair.along_curve || neighbours.is_empty() {
-        let sum = |counts: fn(f64) -> bool| pair.area.iter().zip(c).filter(|(_, c)| counts(**c)).map(|(w, _)| w).sum();
+        let areas = || pair.area.iter().zip(c);
+        let sum = |counts: fn(f64) -> bool| areas().filter(|(_, c)| counts(**c)).fold(0.0, |sum, (area, _)| sum + area);
         return (Extent::new(pair.measure, sum(|c| c > 0.0), sum(|c| c < 0.0)), Vec::new());
     }
     let soft = if pair.law.is_bonded() { 0.0 } else { softness(model, i) };

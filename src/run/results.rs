@@ -286,7 +286,7 @@ pub fn largest_pressure(pressure: &[f64]) -> (usize, f64) {
 
 /// Return the mean pressure of the part in contact, from the forces of the points; zero without contact.
 pub fn mean_pressure(force: &[f64], extent: &Extent) -> f64 {
-    let pressed: f64 = force.iter().filter(|force| **force > 0.0).sum();
+    let pressed = force.iter().fold(0.0, |sum, force| sum + force.max(0.0));
     if extent.contact() > 0.0 { pressed / extent.contact() } else { 0.0 }
 }
 
@@ -295,7 +295,7 @@ pub fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Opt
     let least =
         (0..pair.len()).min_by(|&q, &r| pressure[q].total_cmp(&pressure[r])).filter(|_| pair.law.is_bonded())?;
     Some(TensionReport {
-        peak_tension: (-pressure[least]).max(0.0),
+        peak_tension: (0.0 - pressure[least]).max(0.0),
         peak_tension_at: pair.position[least],
         peak_stretch: compression.iter().fold(0.0, |most, c| most.max(-c)),
     })
