@@ -374,7 +374,6 @@ fn obstacles_that_cannot_be() {
         ("approach = 1\nforce = 1", "both `approach` and `force`"),
         ("path = \"a\"", "`path` without a force"),
         ("force = 1\npath = \"a\"", "`path` without a table"),
-        ("force = \"factor\"\npath = \"a\"", "`path` of an expression"),
         ("distance = 1", "`distance` of an obstacle"),
         ("angle = 30", "`angle` of an obstacle"),
         ("touching = true", "`touching` of an obstacle"),
@@ -414,7 +413,7 @@ fn a_ring_on_springs() {
         load = [{ on = \"outer\", traction = [\"-0.15*x/5.2\", \"-0.3*y/5.2\"] }]\n\
         [[contact]]\non = \"outer\"\nobstacle = true\nlayer = { linear = { stiffness = 10 } }\n";
     let scene = scene(RING, text);
-    for (order, tolerance) in [(1, 1e-2), (2, 1e-3), (3, 1e-3), (6, 1e-3)] {
+    for (order, tolerance) in [(1, 5e-2), (2, 1e-3), (3, 1e-3), (6, 1e-3)] {
         let run = solve_here(&scene.path, &[&format!("body.0.order={order}")]).converged();
         close(&format!("order {order}"), run.number("pairs/0/contact_length"), 4.0 * 5.2 * 0.78496, tolerance);
         let length = run.number("pairs/0/contact_length") + run.number("pairs/0/open_length");

@@ -308,11 +308,11 @@ fn a_history_is_as_good_as_its_worst_step() {
     assert!(run.text("message").starts_with("1 of 2 load steps found no solution; load step 1: "), "{}", run.said());
     let kept = Scene::edited("bolt", "[method]", "[method]\nstop = { iterations = 1 }");
     fs::copy(case("bolt").with_file_name("tighten.csv"), kept.path.with_file_name("tighten.csv")).expect("a table");
-    let run = solve(&kept, &[]);
+    let run = solve(&kept, &["--method", "robin", "--set", "method.gamma=0.3"]);
     assert!(run.warnings().contains("keep the offset of `top1` and `cut`"), "{}", run.said());
 }
 
-/// Names of columns that `steps.csv` has itself.
+/// Names of columns that `steps.csv` has itself, and a path of an expression, which has the columns as variables.
 #[test]
 fn columns_of_the_table_of_steps() {
     for name in ["step", "status", "iterations", "residual"] {
@@ -320,4 +320,7 @@ fn columns_of_the_table_of_steps() {
         assert_eq!(run.code, 3, "{}", run.said());
         assert!(run.stderr.contains(&format!("a column is called `{name}`")), "{}", run.said());
     }
+    let sets = ["--set", "contact.0.force=10*press", "--set", "contact.0.path=press"];
+    let run = solve(with_table(PATH), &sets);
+    assert!(run.code == 3 && run.stderr.contains("`path` of an expression"), "{}", run.said());
 }
