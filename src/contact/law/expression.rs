@@ -148,7 +148,7 @@ const HUGE: f64 = 1e60;
 /// Number of checked compressions in a factor of ten.
 const STEPS: i32 = 24;
 /// Number of factors of ten that are checked below the largest compression.
-pub const DECADES: i32 = 9;
+const DECADES: i32 = 9;
 
 /// Where a function is no law of a layer.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! The law that a scene asks for, at the points of a pair.
 
-use super::expression::{Breach, DECADES, ExpressionLaw, increases};
+use super::expression::{Breach, ExpressionLaw, increases};
 use super::forms;
 use super::table::Table;
 use super::{Bonded, LayerLaw, PerPoint, Response};
@@ -83,6 +83,10 @@ fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<R
 /// so the bounds of the energy differ by that times the exponent of the law.
 const FINE_STEPS: i32 = 100;
 
+/// Number of factors of ten below the largest compression in which they are compared. A formula such as p0 (c0 (exp(c/c0) - 1) - c) loses all digits
+/// at smaller ones, without harm: the energy counts relative to that of the solution.
+const ENERGY_DECADES: i32 = 4;
+
 /// Rounding of an energy that a program sums over many pieces, relative to it.
 const SUMMED: f64 = 1e-9;
 
@@ -90,11 +94,11 @@ const SUMMED: f64 = 1e-9;
 /// neighbouring compressions P grows by their distance times a pressure between both of theirs.
 fn wrong_energy(law: &dyn LayerLaw, last: f64) -> Option<f64> {
     let at = |step: i32| {
-        let c = last * 10f64.powf(f64::from(step) / f64::from(FINE_STEPS) - f64::from(DECADES));
+        let c = last * 10f64.powf(f64::from(step) / f64::from(FINE_STEPS) - f64::from(ENERGY_DECADES));
         (c, law.response(0, c))
     };
     let mut before = (0.0, Response::default());
-    for step in 0..=DECADES * FINE_STEPS {
+    for step in 0..=ENERGY_DECADES * FINE_STEPS {
         let (c, now) = at(step);
         let (grown, distance) = (now.energy - before.1.energy, c - before.0);
         let slack = SUMMED * now.energy.abs();
