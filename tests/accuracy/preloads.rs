@@ -169,7 +169,7 @@ fn a_preload_is_kept_over_a_restart() {
                 close(path, of(&rest), of(&whole), 1e-9);
             }
         }
-        close("peak", rest.number("pairs/0/peak_pressure"), whole.number("pairs/0/peak_pressure"), 1e-9);
+        close("peak", rest.number("pairs/0/peak_tension"), whole.number("pairs/0/peak_tension"), 1e-9);
     }
 }
 

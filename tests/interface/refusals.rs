@@ -474,7 +474,8 @@ fn a_reader_that_goes_away() {
 /// Two layers between the same facets are refused by the facets, whatever the groups are called. A surface may face two others.
 #[test]
 fn two_layers_on_the_same_facets() {
-    const BLOCKS: &str = "For k In {0:1} p=10*k;
+    const BLOCKS: &str = "For k In {0:1}
+        p=10*k;
         Point(p+1)={0,k,0};Point(p+2)={2,k,0};Point(p+3)={2,k+1,0};Point(p+4)={1,k+1,0};Point(p+5)={0,k+1,0};Point(p+6)={1,k,0};
         Line(p+1)={p+1,p+6};Line(p+2)={p+6,p+2};Line(p+3)={p+2,p+3};Line(p+4)={p+3,p+4};Line(p+5)={p+4,p+5};Line(p+6)={p+5,p+1};
         Curve Loop(k+1)={p+1:p+6};Plane Surface(k+1)={k+1};
