@@ -1,10 +1,9 @@
 //! The files of the results of a run: tables, plots, fields, those of each load step included, the page, and the report, which lists all files.
 
 use super::adapt::AdaptiveRun;
-use super::interpolate::PointTree;
 use super::plots::{self, Plots};
 use crate::contact::ContactPair;
-use crate::discretize::BodyInfo;
+use crate::discretize::{BodyInfo, corners};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::exchange::{all_gather, gather};
@@ -18,6 +17,7 @@ use crate::run::results::{self, pair_names};
 use crate::run::{All, Clock, Done, Recovered, report};
 use crate::scene::Precision;
 use serde::Serialize;
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -157,12 +157,22 @@ impl ResultFiles<'_> {
 /// Mark supports, loads, springs and contact surfaces of the bodies.
 fn mark(bodies: &mut [Surface], done: &Done) {
     let (model, layer) = (done.model(), &done.outcome.layer);
+    // how many contact points of each facet there are, and how many of them carry pressure
+    let mut points: HashMap<[u32; 3], [usize; 2]> = HashMap::new();
+    for (i, contact) in done.built.discrete.contacts.iter().enumerate() {
+        let pressure = &layer.pressure[model.range(i)];
+        for facing in &contact.facing {
+            let closed = facing.points.iter().filter(|&&q| pressure[q] != 0.0).count();
+            for facet in facing.facets {
+                let [all, under_pressure] = points.entry(facet).or_default();
+                (*all, *under_pressure) = (*all + facing.points.len(), *under_pressure + closed);
+            }
+        }
+    }
+    let is_closed = |facet: &[u32]| {
+        points.get(&corners(facet.iter().copied())).is_some_and(|[all, closed]| *closed > 0 && 2 * closed >= *all)
+    };
     for (index, body) in bodies.iter_mut().enumerate() {
-        let own: Vec<usize> = (0..model.pairs.len()).filter(|&i| model.pairs[i].bodies.contains(&index)).collect();
-        let points: Vec<[f64; 3]> = own.iter().flat_map(|&i| &model.pairs[i].position).copied().collect();
-        let pressure: Vec<f64> = own.iter().flat_map(|&i| &layer.pressure[model.range(i)]).copied().collect();
-        let tree = PointTree::new(&points);
-        let is_closed = |x| tree.inverse_distances(&x, 1).iter().any(|&(q, _)| pressure[q] != 0.0);
         body.mark(done.built.marks.iter().filter(|mark| mark.body == index), &is_closed);
     }
 }

@@ -405,6 +405,8 @@ pub struct Coverage {
     pub lost: usize,
     /// Which of its nodes carry points; `None` where it has no partner.
     pub carriers: Option<Carriers>,
+    /// Whether facets of side b lie before it that are too far away or inclined by too much.
+    pub is_cut_short: bool,
 }
 
 impl Coverage {
@@ -414,8 +416,14 @@ impl Coverage {
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = element::rule(D, if a.facets.order == Order::P1 { 2 } else { 2 * a.facets.order.degree() + 1 });
         let of_facet = |i: usize| {
-            let found = Self { share: covered[i] / facet_measure(a, i, &rule), lost: 0, carriers: carriers[i] };
-            Self { lost: if found.is_whole() { 0 } else { common.refused[i].lost }, ..found }
+            let refused = &common.refused[i];
+            let found = Self {
+                share: covered[i] / facet_measure(a, i, &rule),
+                lost: 0,
+                carriers: carriers[i],
+                is_cut_short: refused.is_inclined || !refused.far.is_empty(),
+            };
+            Self { lost: if found.is_whole() { 0 } else { refused.lost }, ..found }
         };
         (0..covered.len()).map(of_facet).collect()
     }

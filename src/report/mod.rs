@@ -209,13 +209,18 @@ impl Page<'_> {
             "layer".to_owned(),
             "#points".to_owned(),
             self.label("force on the first", |units| &units.force),
+            self.label("#normal force", |units| &units.force),
+            self.label("#mean pressure", |units| &units.stress),
             self.label("#peak pressure", |units| &units.stress),
             self.label("at", |units| &units.length),
             label(if is_area { "#area in contact" } else { "#length in contact" }, unit.as_deref()),
             label("#open", unit.as_deref()),
         ];
         let moves = pairs.iter().any(|pair| pair.obstacle.is_some() || pair.offset.is_some());
-        let columns: Vec<String> = columns.into_iter().chain(moves.then(|| "obstacle or offset".to_owned())).collect();
+        let pulls = pairs.iter().any(|pair| pair.tension.is_some());
+        let tension = [self.label("#largest tension", |units| &units.stress), self.label("at", |units| &units.length)];
+        let columns = columns.into_iter().chain(tension.into_iter().filter(|_| pulls));
+        let columns: Vec<String> = columns.chain(moves.then(|| "obstacle or offset".to_owned())).collect();
         let row = |pair: &PairReport| {
             let obstacle = pair.obstacle.as_ref().map(|obstacle| {
                 let ObstacleReport { approach, tilt, force, moment, .. } = obstacle;
@@ -230,12 +235,17 @@ impl Page<'_> {
                 escape(&words(&self.report.settings["contact"][pair.contact]["layer"])),
                 pair.points.to_string(),
                 vector(&pair.force[0]),
+                digits(pair.normal_force),
+                digits(pair.mean_pressure),
                 digits(pair.peak_pressure),
                 if pair.peak_pressure > 0.0 { vector(&pair.peak_at) } else { String::new() },
                 digits(pair.extent.contact()),
                 digits(pair.extent.open()),
             ];
-            cells.into_iter().chain(moved).collect()
+            let tension = pair.tension.filter(|tension| tension.peak_tension > 0.0);
+            let tension = tension.map(|tension| [digits(tension.peak_tension), vector(&tension.peak_tension_at)]);
+            let tension = tension.unwrap_or_default().into_iter().filter(|_| pulls);
+            cells.into_iter().chain(tension).chain(moved).collect()
         };
         let rest = match pairs.len() {
             ..=ROWS => String::new(),
