@@ -50,7 +50,10 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         crate::scene::parse(&case.scene, text.clone(), &overrides).map(Rc::new)
     };
     let scenes = collectively(session, plan.cases.iter().map(load).collect::<Result<Vec<Rc<Scene>>>>())?;
-    let folder = collectively(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
+    let folder = collectively(
+        session,
+        claim(session, folder_of(&scenes[0], request.output.as_ref()), &scenes, planned(&scenes[0])),
+    )?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = terminal::runs(plan.cases.len(), terminal.is_loud());
     let mut sweep = Sweep {
@@ -89,6 +92,12 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         sweep.finish(scenes[0].output.plots)?;
     }
     Ok(exit)
+}
+
+/// Return the names of the files that a sweep writes, but for plots beyond the first.
+fn planned(scene: &Scene) -> Vec<String> {
+    let plots = ["convergence.svg", "pressure.svg"].into_iter().filter(|_| scene.output.plots);
+    plots.chain(["sweep.csv"]).map(str::to_owned).collect()
 }
 
 /// Return the cases of a request.
