@@ -164,7 +164,9 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
             return refuse(message, "type it in UTF-8, or rename the file".to_owned());
         }
     };
-    let (program, petsc) = options::split(words);
+    let parser = Cli::command();
+    let commands = parser.get_subcommands().map(clap::Command::get_name).chain(["help"]).collect::<Vec<_>>();
+    let (program, petsc) = options::split(words, &commands);
     if let Some(flag) = option_with_one_dash(&petsc) {
         return refuse(format!("PETSc knows no option -{flag}"), format!("did you mean --{flag}?"));
     }

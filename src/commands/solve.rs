@@ -3,8 +3,8 @@
 use super::adapt::AdaptiveRun;
 use super::checkpoint::{self, Checkpoint};
 use super::plots::unit_words;
-use super::write::{ResultFiles, to_json, write_fields};
-use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
+use super::write::{ResultFiles, planned, planned_on_mesh, to_json, write_fields};
+use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, inputs, load};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
@@ -16,7 +16,9 @@ use crate::output::{
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::run::{self, All, Clock, Done, Prepared, Recorder, report, results, verdict};
+use crate::scene::Scene;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// The command line of `winkler solve`.
 #[derive(clap::Args)]
@@ -60,7 +62,10 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
-    let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
+    let folder = collectively(
+        session,
+        claim(session, folder_of(&scene, request.output.as_ref()), &[scene.clone()], planned(&scene)),
+    )?;
     let plan = AdaptiveRun::new(session, scene, checkpoint, interrupt, &mut clock)?;
     let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
@@ -130,7 +135,7 @@ impl Solver<'_> {
         let typed = session.options().typed();
         let is_monitored = typed.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         self.terminal.decisions(session, &ready)?.iter().for_each(|line| eprintln!("{line}"));
-        self.open_tables(&ready)?;
+        collectively(session, self.open_tables(&ready))?;
         let scene = &self.plan.scene;
         let is_shown = self.terminal.is_loud() && !is_monitored;
         self.table = IterationTable::new(is_shown, &run::targets(scene), scene.method.stop.residual);
@@ -155,6 +160,7 @@ impl Solver<'_> {
             return Ok(());
         }
         if !std::mem::replace(&mut self.has_tables, true) {
+            self.folder.check(&planned_on_mesh(&ready.built), &inputs(&ready.built.scene))?;
             prepare_folder(&self.folder, self.has_checkpoint)?;
         }
         self.tables = Tables::open(&self.folder, ready)?;
@@ -253,9 +259,14 @@ fn brief_summary(report: &Report, code: i32, results: &str) -> String {
     ended.into_iter().chain(warnings).chain([results.to_owned()]).collect::<Vec<_>>().join("\n")
 }
 
-/// Take the folder of results for this run. The first rank, which writes its tables, locks it.
-pub(super) fn claim(session: &Session, path: PathBuf) -> Result<Folder> {
-    if session.rank() == 0 { Folder::claim(path) } else { Folder::create(path) }
+/// Take the folder of results for a run of these scenes, which writes files of these names. The first rank, which writes its tables, locks it.
+pub(super) fn claim(session: &Session, path: PathBuf, scenes: &[Rc<Scene>], names: Vec<String>) -> Result<Folder> {
+    if session.rank() > 0 {
+        return Folder::create(path);
+    }
+    let folder = Folder::claim(path)?;
+    folder.check(&names, &scenes.iter().flat_map(|scene| inputs(scene)).collect::<Vec<_>>())?;
+    Ok(folder)
 }
 
 /// Remove the results of other runs from the folder.

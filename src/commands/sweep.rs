@@ -51,7 +51,10 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
     };
     let scenes = plan.cases.iter().map(load).collect::<Result<Vec<Rc<Scene>>>>();
     let scenes = collectively(session, scenes.and_then(without_adaptation))?;
-    let folder = collectively(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
+    let folder = collectively(
+        session,
+        claim(session, folder_of(&scenes[0], request.output.as_ref()), &scenes, planned(&scenes[0])),
+    )?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = terminal::runs(plan.cases.len(), terminal.is_loud());
     let mut sweep = Sweep {
@@ -103,6 +106,12 @@ fn without_adaptation(scenes: Vec<Rc<Scene>>) -> Result<Vec<Rc<Scene>>> {
     Err(error.help(
         "leave --tolerance and [adapt] away, and take --estimate for the errors; `solve` adapts the mesh of one scene",
     ))
+}
+
+/// Return the names of the files that a sweep writes, but for plots beyond the first.
+fn planned(scene: &Scene) -> Vec<String> {
+    let plots = ["convergence.svg", "pressure.svg"].into_iter().filter(|_| scene.output.plots);
+    plots.chain(["sweep.csv"]).map(str::to_owned).collect()
 }
 
 /// Return the cases of a request.

@@ -7,7 +7,7 @@ use super::report::{Extent, PairReport, ReactionReport, StepReport, TensionRepor
 use crate::ddm::{Observer, Row};
 use crate::error::Result;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::path::PathBuf;
 
 /// A field of a table: the name of its column and its text.
@@ -55,6 +55,9 @@ impl RowFile {
     /// Write the header, which is that of this row.
     pub fn begin(&mut self, row: &[Cell]) {
         self.columns = row.iter().map(|(column, _)| column.clone()).collect();
+        // the header takes the place of the mark of a file without rows
+        let mut file = self.csv.get_ref();
+        self.written = file.set_len(0).and_then(|()| file.rewind()).map_err(csv::Error::from);
         self.record(&self.columns.clone());
     }
 

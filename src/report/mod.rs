@@ -5,7 +5,8 @@ mod surface;
 pub use surface::Surface;
 
 use crate::output::{
-    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, trimmed,
+    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, escape,
+    trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -49,11 +50,6 @@ fn table<T: AsRef<str>>(headings: &[T], rows: impl Iterator<Item = Vec<String>>)
     };
     let heads: String = headings.iter().map(head).collect();
     format!("<div class=\"wide\"><table>\n<tr>{heads}</tr>\n{}</table></div>", rows.map(line).collect::<String>())
-}
-
-/// Return a text for HTML.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Format a number with five digits; one that is unknown becomes a dash.
@@ -181,8 +177,9 @@ impl Page<'_> {
                 digits(error.energy)
             );
         }
-        let units =
-            self.units.as_ref().map(|units| format!(" Units: {}, {}, {}.", units.length, units.stress, units.force));
+        let units = self.units.as_ref().map(|Units { length, stress, force }| {
+            format!(" Units: {}.", escape(&[length.as_str(), stress, force].join(", ")))
+        });
         text + &units.unwrap_or_default()
     }
 

@@ -322,6 +322,7 @@ const CASES: &[Case] = &[
     ("geo = \"groove.geo\"", "geo = \".\"", "\".\"", " is not a file", ""),
     ("n = 32 }", "n = 32 }, timeout = 0", "0", "the timeout is 0", ""),
     ("n = 32 }", "n = 32 }, threads = 0", "0", "`threads` is 0", ""),
+    ("[method]", "points = 3\n[method]", "points", "unknown key `points` in [[contact]]", "its keys are"),
     ("n = 32 }", "n = 32 }, memory = 8", "memory", "unknown key `memory`", "`timeout` alone"),
     ("geo = \"groove.geo\", set = { n = 32 }", "msh = \"groove.msh\", timeout = 1", "1", "`timeout` for a finished mesh", ""),
     ("n = 32", "n = \"many\"", "\"many\"", "expected a number, found a string", ""),

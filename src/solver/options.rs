@@ -243,8 +243,9 @@ impl Drop for OptionGroup {
 /// Split the arguments (without the program's name) into words of the program and words of PETSc, each in order.
 ///
 /// A PETSc option has one dash and two or more letters. It takes the next word as its value unless that looks like an
-/// option. A scene file (`*.toml`) or a command is never a value, except of `-options_file`. All words after `--` belong to the program.
-pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<String>) {
+/// option. A scene file (`*.toml`) or one of the `commands` is never a value, except of `-options_file`. All words after `--` belong to the
+/// program.
+pub fn split(words: impl IntoIterator<Item = String>, commands: &[&str]) -> (Vec<String>, Vec<String>) {
     let (mut program, mut petsc) = (Vec::new(), Vec::new());
     let mut words = words.into_iter().peekable();
     while let Some(word) = words.next() {
@@ -259,15 +260,12 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
         }
         let takes_file = word == "-options_file";
         petsc.push(word);
-        let is_value = |next: &String| !is_option(next) && (takes_file || !is_scene_or_command(next));
+        let is_value = |next: &String| {
+            !is_option(next) && (takes_file || !(next.ends_with(".toml") || commands.contains(&next.as_str())))
+        };
         petsc.extend(words.next_if(is_value));
     }
     (program, petsc)
-}
-
-/// Return whether a word is a scene file or a command, which is never meant as the value of an option.
-fn is_scene_or_command(word: &str) -> bool {
-    word.ends_with(".toml") || ["solve", "check", "sweep", "bench", "mesh", "new", "completions"].contains(&word)
 }
 
 /// Return whether a word is one dash and two or more characters, the first of them a letter. A whole string of options (for `bench --solver`) is
@@ -382,7 +380,7 @@ mod tests {
     }
 
     fn check(words: &str, program: &str, petsc: &str) {
-        let (p, q) = split(words.split_whitespace().map(String::from));
+        let (p, q) = split(words.split_whitespace().map(String::from), &["solve", "bench", "schema"]);
         assert_eq!((p.join(" "), q.join(" ")), (program.to_owned(), petsc.to_owned()), "{words}");
     }
 
@@ -397,7 +395,8 @@ mod tests {
         check("-ksp_type cg -- -ksp_type x", "-- -ksp_type x", "-ksp_type cg");
         check("-ksp_monitor", "", "-ksp_monitor");
         check("-ksp_monitor bench", "bench", "-ksp_monitor");
+        check("-ksp_monitor schema", "schema", "-ksp_monitor");
         let string = ["--solver", "-ksp_type cg -pc_type icc"].map(String::from);
-        assert_eq!(split(string.clone()), (string.to_vec(), Vec::new()));
+        assert_eq!(split(string.clone(), &[]), (string.to_vec(), Vec::new()));
     }
 }
