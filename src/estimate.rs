@@ -44,6 +44,8 @@ pub struct Estimate {
     pub pressure: Vec<f64>,
     /// The part of it on the facets at sharp ends of the contact, where the pressure may be singular.
     pub ends: Vec<f64>,
+    /// Place in the scene of the largest part of it.
+    pub worst: Vec<[f64; 3]>,
     /// Why the error of the pressures of each pair is a guess, if it is one.
     pub guesses: Vec<Option<Guess>>,
     /// Relative error of the normal displacements of all contact surfaces, prescribed ones included, measured likewise.
@@ -71,12 +73,6 @@ impl Estimate {
             Quantity::Displacements => self.displacement,
             Quantity::Forces => self.force.iter().copied().fold(0.0, f64::max),
         }
-    }
-
-    /// Return the pair with the largest error at its sharp ends, and the error.
-    pub fn largest_end(&self) -> Option<(usize, f64)> {
-        let ends = self.ends.iter().copied().enumerate();
-        ends.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Return whether the errors are a guess: of pressures at the edge of the contact, or because the energy error is as large as the solution.
@@ -141,6 +137,7 @@ pub fn estimate(
         pressure: pressures.relative,
         force,
         ends: pressures.ends,
+        worst: pressures.worst,
         guesses: pressures.guesses,
         pressure_error: pressures.error,
         displacement: if error == 0.0 { 0.0 } else { SAFETY * f64::sqrt(error / whole) },

@@ -22,9 +22,9 @@ use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
 /// Uncertainty of each part of the sum above, as a share of it. Parts of both signs cancel, and their sum is known no better than to this share of their
-/// magnitudes. Without it, 66 forces of blocks, brackets, press fits and rollers of orders 1 to 4 have estimates down to a thousandth of the error; with 0.2 to 0.5 one
-/// or none is below a third.
-const UNCERTAIN: f64 = 0.3;
+/// magnitudes. For 66 forces of blocks, brackets, press fits and rollers of orders 1 to 4, one estimate is below a third of the error with 0.4,
+/// and three are with 0.3.
+const UNCERTAIN: f64 = 0.4;
 
 /// Number of pairs up to which each has its influence computed, by one more linear system. The error of a force among more pairs is bounded by the sum
 /// of the magnitudes of the errors of its pressures, which is of first order.

@@ -20,8 +20,8 @@ pub use mark::{Mark, Role};
 pub use plot::{Color, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
-    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, busiest,
-    warning_lines,
+    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, UnmetReport,
+    busiest, warning_lines,
 };
 pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;
