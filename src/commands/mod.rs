@@ -11,6 +11,7 @@ pub(crate) mod mesh;
 pub(crate) mod new;
 mod plots;
 mod rows;
+mod shortfall;
 pub(crate) mod solve;
 pub(crate) mod sweep;
 mod transfer;

@@ -3,6 +3,7 @@
 use super::adapt::AdaptiveRun;
 use super::checkpoint::{self, Checkpoint};
 use super::plots::unit_words;
+use super::shortfall::Shortfall;
 use super::write::{ResultFiles, planned, planned_on_mesh, to_json, write_fields};
 use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, inputs, load};
 use crate::ddm::{Observer, Row, Status};
@@ -206,18 +207,16 @@ impl Solver<'_> {
     /// Write all results of the last mesh, and return the exit code.
     fn finish(self, Round { done, estimate }: Round) -> Result<i32> {
         let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
+        let shortfall = plan.shortfall.as_ref().filter(|_| verdict::exit_code(&done) == 0);
         let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
         let (report, written) = self.files(&done, estimate.as_ref(), true).write(&mut self.clock.clone(), |report| {
-            report.warnings.extend(plan.costly_end.clone());
-            if let Some(limit) = &plan.limit {
-                report.status = "mesh-limit".to_owned();
-                report.message = format!("the error asked for is not reached: {limit}");
-            }
+            report.unmet.clone_from(&plan.unmet);
+            shortfall.iter().for_each(|shortfall| shortfall.put_into(report));
         });
         drop(line);
-        let code = if plan.limit.is_some() { 1 } else { verdict::exit_code(&done) };
+        let code = shortfall.map_or(verdict::exit_code(&done), Shortfall::exit_code);
         if first {
-            if self.has_checkpoint && code == 0 {
+            if self.has_checkpoint && verdict::exit_code(&done) == 0 {
                 // nothing is left to go on with; it is no failure if the file is gone already
                 let _ = std::fs::remove_file(path.join(checkpoint::FILE));
             }

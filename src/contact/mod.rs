@@ -15,7 +15,7 @@ mod review;
 mod side;
 
 pub use basis::Carriers;
-pub use fine::{Fine, FinePoints};
+pub use fine::{Fine, FinePoint, FinePoints};
 pub use law::LayerLaw;
 #[cfg(test)]
 pub use law::Response;

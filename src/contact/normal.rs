@@ -67,7 +67,7 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
         let on = a.on_facet(chunk[0].facet_a);
         // The vertices, between which directions are interpolated, need not carry points; the nodes between them do so by their own functions.
         let [vertices, all] = [(Order::P1, D), (a.facets.order, on.len())]
-            .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets));
+            .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets, a.axis_of(chunk[0].facet_a)));
         for point in chunk {
             let phi = element::values(a.facets.order, &point.at_a);
             let before = surface_at(b, point.facet_b, &point.at_b);

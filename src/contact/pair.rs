@@ -145,7 +145,7 @@ fn integrate<const D: usize>(
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let facet = chunk[0].facet_a;
         let nodes = a.on_facet(facet);
-        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets);
+        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets, a.axis_of(facet));
         carriers[facet] = Some(basis.carriers());
         for point in chunk {
             let (phi, shapes) =

@@ -159,6 +159,11 @@ impl<'a, const D: usize> Side<'a, D> {
         &self.corners[i * self.facets.stride..(i + 1) * self.facets.stride]
     }
 
+    /// Return the vertex of facet `i` on the axis of revolution.
+    pub fn axis_of(&self, i: usize) -> Option<usize> {
+        self.facets.facet(i)[..D].iter().position(|&node| self.space.on_axis(node))
+    }
+
     /// Return the nodes of facet `i`.
     pub fn facet_nodes(&self, i: usize) -> impl Iterator<Item = &FaceNode<D>> {
         self.on_facet(i).iter().map(|&corner| &self.nodes[corner as usize])

@@ -21,7 +21,7 @@ pub use plot::{Color, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
     PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, TensionReport, UNSETTLED, UnitWords,
-    busiest, warning_lines,
+    UnmetReport, busiest, warning_lines,
 };
 pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;

@@ -19,7 +19,7 @@ pub struct Report {
     /// Title of the scene.
     pub title: String,
     /// Status at the end of the run: `converged`, `roundoff-limited`, `stagnated`, `iteration-limit`, `not-finite`, `out-of-range`,
-    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`.
+    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`, `mesh-limit`, `tolerance-unmet`.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -72,6 +72,8 @@ pub struct Report {
     pub unbalanced: Option<f64>,
     /// Estimated errors of the discretisation, if requested.
     pub discretization_error: Option<EstimateReport>,
+    /// Errors of pairs above the tolerance, if an adapted run has ended with any.
+    pub unmet: Vec<UnmetReport>,
     /// Adapted meshes, one after another.
     pub rounds: Vec<RoundReport>,
     /// Interval (33) of gamma, if requested.
@@ -150,6 +152,32 @@ pub struct EstimateReport {
     pub force: Vec<f64>,
     /// Fraction of the squared energy error in each body, in the order of the scene.
     pub bodies: Vec<f64>,
+}
+
+/// An estimated error above the tolerance at the end of an adapted run.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct UnmetReport {
+    /// Names of the surfaces of the pair, in the order of the scene.
+    pub surfaces: [String; 2],
+    /// What has the error: `pressure` or `force`.
+    pub of: String,
+    /// Relative error.
+    pub error: f64,
+    /// Place of the largest part of the error of the pressures (x, y, z).
+    pub place: [f64; 3],
+}
+
+impl UnmetReport {
+    /// Return the error in words.
+    pub fn in_words(&self) -> String {
+        let [a, b] = &self.surfaces;
+        format!(
+            "{} of the {} between `{a}` and `{b}`, most of it near {}",
+            sci(self.error, 1),
+            self.of,
+            place(self.place)
+        )
+    }
 }
 
 /// The result on one mesh of an adaptation. Errors are relative estimates.
