@@ -142,14 +142,11 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Ok(parsed) => parsed,
         Err(refusal) => return refusal.print(),
     };
-    let interrupt = match Interrupt::watch() {
-        Ok(interrupt) => interrupt,
-        Err(error) => return complain(&error),
+    let work = move |interrupt: &Interrupt| match cli.command {
+        Command::Solving(command) => with_session(&petsc, interrupt, command),
+        command => without_session(interrupt, command, petsc),
     };
-    match cli.command {
-        Command::Solving(command) => with_session(&petsc, &interrupt, command),
-        command => without_session(&interrupt, command, petsc),
-    }
+    Interrupt::watch(work).unwrap_or_else(|error| complain(&error))
 }
 
 /// Parse the words of a command line into a command and the options of PETSc.

@@ -1,12 +1,16 @@
 //! Signals that request the program to end.
 //!
 //! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
-//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once. Handlers set
-//! flags and do nothing else.
+//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once.
+//!
+//! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the work goes on for ever cannot
+//! hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM, cannot take it.
 
 use crate::error::{Error, Kind, Result};
+use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
-use signal_hook::flag;
+use signal_hook::{flag, low_level};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -22,28 +26,41 @@ pub struct Interrupt {
     asked: Arc<AtomicUsize>,
 }
 
+/// Bytes of the stack of the second thread, as many as Linux gives the first one.
+const STACK: usize = 8 << 20;
+
 impl Interrupt {
-    /// Install the handlers. Signals end the program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`. With a
-    /// limit on the size of files, writing fails with an error that has a message.
+    /// Do the work of the program in a second thread, and exit with the code that it returns. This thread waits for signals. They end the
+    /// program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`. With a limit on the size of files, writing fails
+    /// with an error that has a message.
     ///
     /// # Errors
-    /// The system refuses a handler.
-    pub fn watch() -> Result<Self> {
+    /// The system refuses a thread or a handler.
+    pub fn watch(work: impl FnOnce(&Interrupt) -> i32 + Send + 'static) -> Result<i32> {
+        let refused = |cause: String| Error::new(Kind::File, "signals cannot be watched").because(cause);
+        flag::register(SIGXFSZ, Arc::default()).map_err(|cause| refused(cause.to_string()))?;
+        let ending = ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal));
+        let ending: SigSet = ending.filter_map(|signal| Signal::try_from(signal).ok()).collect();
         let interrupt = Self::default();
         interrupt.at_once.store(true, Ordering::SeqCst);
-        let installed = interrupt.install();
-        installed.map_err(|cause| Error::new(Kind::File, "signals cannot be watched").because(cause.to_string()))?;
-        Ok(interrupt)
+        let asked = interrupt.clone();
+        // The hook for panics has printed a message. The second thread and its children take signals as usual. The system gives the signals to this
+        // thread, as it prefers the first one where that wants them.
+        let work = move || std::process::exit(catch_unwind(AssertUnwindSafe(|| work(&asked))).unwrap_or(101));
+        let second = std::thread::Builder::new().name("main".to_owned()).stack_size(STACK).spawn(work);
+        second.map_err(|cause| refused(cause.to_string()))?;
+        ending.thread_block().map_err(|cause| refused(cause.to_string()))?;
+        loop {
+            interrupt.note(ending.wait().map_err(|cause| refused(cause.to_string()))? as i32);
+        }
     }
 
-    fn install(&self) -> std::io::Result<()> {
-        for signal in ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal)) {
-            // handlers run in this order: the shutdown is tested before the flag is set, so that only the second signal ends the program
-            flag::register_conditional_shutdown(signal, Kind::Stopped(signal).exit_code(), self.at_once.clone())?;
-            flag::register(signal, self.at_once.clone())?;
-            flag::register_usize(signal, self.asked.clone(), signal as usize)?;
+    /// Set the flags for a signal, or end the program.
+    fn note(&self, signal: i32) {
+        if self.at_once.swap(true, Ordering::SeqCst) {
+            low_level::exit(Kind::Stopped(signal).exit_code());
         }
-        flag::register(SIGXFSZ, Arc::default()).map(|_| ())
+        self.asked.store(signal as usize, Ordering::SeqCst);
     }
 
     /// From now on, let the first signal set the flag only.
@@ -77,7 +94,7 @@ pub fn ended(signal: i32) -> Error {
 
 /// Return the name of a signal that ends a run.
 pub fn name(signal: i32) -> &'static str {
-    signal_hook::low_level::signal_name(signal).unwrap_or("a signal")
+    low_level::signal_name(signal).unwrap_or("a signal")
 }
 
 /// Whether the program was started with a signal ignored, as by `nohup`.

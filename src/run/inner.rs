@@ -18,7 +18,7 @@ use crate::solver::preset::{self, Smoother};
 use crate::solver::{InterfaceDofs, Krylov, MakeSolver};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A factory that makes the inner solvers of a scene's bodies by its plan.
 pub struct SolverFactory<'a> {
@@ -28,6 +28,8 @@ pub struct SolverFactory<'a> {
     typed: UserOptions,
     /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and multigrid.
     pub interpolation: Option<Prolongation>,
+    /// Rigid motions of all bodies, on the rows of this rank in the matrix of all bodies, if its multigrid is GAMG.
+    pub near_null_space: Vec<Vec<f64>>,
     /// The plan, once it is made.
     pub plan: Plan,
     /// Condensed bodies that an earlier scene has left. `local` exists on the rank that owns the body.
@@ -56,6 +58,7 @@ impl<'a> SolverFactory<'a> {
             asked,
             typed,
             interpolation: None,
+            near_null_space: Vec::new(),
             plan: Plan { linear: Linear::Sweeps, bodies: Vec::new(), seconds: None },
             kept: kept.into_iter().map(|slot| (slot.name.clone(), slot)).collect(),
         })
@@ -126,6 +129,44 @@ impl<'a> SolverFactory<'a> {
         kinds.into_iter().map(warning).collect()
     }
 
+    /// Return the warnings of options that PETSc reads and that change or show nothing.
+    pub fn idle_options(&self) -> Vec<String> {
+        let chosen: Vec<&Chosen> = match self.plan.linear {
+            Linear::Dense => Vec::new(),
+            Linear::Sweeps => {
+                let solved = self.plan.bodies.iter().filter(|body| body.preset != Preset::Condensed);
+                solved.map(|body| &body.facts.options).collect()
+            }
+            _ => vec![&self.asked.whole],
+        };
+        let is_swept = self.plan.linear == Linear::Sweeps && self.asked.method != MethodName::Robin;
+        let (mut direct, mut applied) = (BTreeSet::new(), BTreeSet::new());
+        for chosen in chosen {
+            let typed = |names: &[&'static str]| {
+                let is_typed = |name: &&str| chosen.typed(name).is_some();
+                names.iter().copied().filter(is_typed).map(|name| chosen.as_typed(name)).collect::<Vec<_>>()
+            };
+            if chosen.get("ksp_type") == Some("preonly") {
+                direct.extend(typed(&["ksp_rtol", "ksp_atol", "ksp_divtol", "ksp_max_it", "ksp_monitor"]));
+            } else if is_swept && chosen.is_applied_once() {
+                applied.extend(typed(&["ksp_view", "ksp_monitor", "ksp_converged_reason"]));
+            }
+        }
+        let listed = |options: BTreeSet<String>| options.into_iter().collect::<Vec<_>>().join(" ");
+        let mut warnings = Vec::new();
+        if !direct.is_empty() {
+            let options = listed(direct);
+            warnings.push(format!("no effect of {options}: the solver `preonly` does not iterate; -ksp_type cg does"));
+        }
+        if !applied.is_empty() {
+            let options = listed(applied);
+            warnings.push(format!(
+                "nothing to show for {options}: each sweep applies multigrid once instead of solving; -ksp_rtol 1e-2 lets it solve"
+            ));
+        }
+        warnings
+    }
+
     /// Return the names of the condensed bodies.
     pub fn condensed(&self) -> Vec<String> {
         let condensed = self.plan.bodies.iter().filter(|body| body.preset == Preset::Condensed);
@@ -148,7 +189,11 @@ impl<'a> SolverFactory<'a> {
         let is_quadratic = self.is_quadratic();
         match self.plan.linear {
             Linear::Dense => {}
-            Linear::Direct => preset::apply(&mut self.asked.whole, Preset::Mumps, None),
+            Linear::Direct => {
+                let is_iterative = |preset: &Preset| matches!(preset, Preset::Gamg | Preset::Icc);
+                let preset = self.asked.preset.filter(is_iterative).unwrap_or(Preset::Mumps);
+                preset::apply(&mut self.asked.whole, preset, None);
+            }
             Linear::Multigrid => {
                 preset::made_often(&mut self.asked.whole);
                 preset::apply(&mut self.asked.whole, Preset::Hypre, smoother(is_parallel, is_quadratic));
@@ -241,9 +286,15 @@ impl Factory for SolverFactory<'_> {
             let first = if distribution.is_some() { 0 } else { whole.rows.columns };
             whole.append(&next, first);
         }
-        let mut modes: Vec<Vec<f64>> = if is_swept { near_null_space() } else { Vec::new() };
+        let is_gamg = self.asked.whole.get("pc_type") == Some("gamg");
+        let mut modes: Vec<Vec<f64>> = if is_swept || is_gamg { near_null_space() } else { Vec::new() };
         if let Some(distribution) = &distribution {
             modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
+        }
+        if !is_swept {
+            // each motion moves all bodies at once: few cells do not see the difference
+            self.near_null_space.resize(modes.len(), Vec::new());
+            self.near_null_space.iter_mut().zip(modes.drain(..)).for_each(|(whole, mode)| whole.extend(mode));
         }
         let make: MakeSolver = Box::new(move |stiffness: Rows| {
             Ok(Box::new(Krylov::new(&session, chosen, dimension, stiffness, &modes, levels)?))

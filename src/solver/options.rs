@@ -133,6 +133,12 @@ impl Chosen {
         typed.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
+    /// Return an option that the user wrote, with its dash and prefix.
+    pub fn as_typed(&self, name: &str) -> String {
+        let is_own = self.choices.get(name).is_some_and(|choice| choice.origin == OptionOrigin::Own);
+        if is_own { format!("-{}_{name}", self.prefix) } else { format!("-{name}") }
+    }
+
     /// Return the controls of MUMPS that the user wrote, and mark them as read.
     pub fn controls_of_mumps(&self, session: &Session) -> Vec<(&str, &str)> {
         let controls: Vec<_> = self.all_typed().filter(|(name, _)| is_control_of_mumps(name)).collect();
@@ -155,6 +161,29 @@ impl Chosen {
     /// MUMPS and options that only [look](looks) at a solver do not count.
     pub fn asks_for_ksp(&self) -> bool {
         self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control_of_mumps(name))
+    }
+
+    /// Return whether the user wrote an option that steers the iteration of the solver. Then a solve is one, also where one application of the
+    /// preconditioner would do.
+    pub fn steers_iteration(&self) -> bool {
+        let steers = |name: &str| name.starts_with("ksp_") && name != "ksp_reuse_preconditioner" && !looks(name);
+        self.all_typed().any(|(name, _)| steers(name))
+    }
+
+    /// Return whether a solve that only preconditions is one application of a multigrid.
+    pub fn is_applied_once(&self) -> bool {
+        matches!(self.get("pc_type"), Some("hypre" | "gamg" | "ml" | "mg")) && !self.steers_iteration()
+    }
+
+    /// Refuse limits of no iteration that the user wrote for the solver, or for the estimates of eigenvalues that multigrid needs for its smoothers.
+    /// A smoother itself may have none.
+    pub fn refuse_idle(&self) -> Result<()> {
+        let iterates = self.get("ksp_type") != Some("preonly");
+        let is_limit = |name: &str| (iterates && name == "ksp_max_it") || name.ends_with("esteig_ksp_max_it");
+        let is_idle =
+            |(name, value): &(&str, &str)| is_limit(name) && value.parse::<i64>().is_ok_and(|limit| limit < 1);
+        let idle = self.all_typed().find(is_idle);
+        idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&format!("-{}_{name}", self.prefix), value)))
     }
 
     /// Return whether the user wrote an option for this solver alone.
@@ -290,7 +319,7 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     let is_read = |name: &&String| {
         let mut copies = groups.iter().flat_map(|group| &group.copies);
         let is_copy_read = copies.any(|(copy, plain)| plain.eq_ignore_ascii_case(name) && options.used(copy));
-        is_copy_read || is_global(&name[1..]) || options.used(name)
+        is_copy_read || is_global(&name[1..]) || options.used(name) || is_read_by_solves(name, &groups)
     };
     let mine: Vec<String> = typed.iter().filter(is_read).cloned().collect();
     let (read, has_solvers): (Vec<_>, Vec<_>) =
@@ -301,9 +330,7 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     let (mut warnings, mut watching) = (Vec::new(), Vec::new());
     for option in &typed {
         let bare = names::bare(option, bodies);
-        // a solve reads this one
-        let is_read =
-            read.contains(option) || (has_solvers && is_of_family(bare) && bare.ends_with("ksp_converged_reason"));
+        let is_read = read.contains(option);
         if is_read || !is_listed {
             options.has(option);
         }
@@ -327,6 +354,18 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
         ));
     }
     Ok(warnings)
+}
+
+/// Return whether an option is one that solvers read in each solve, and not in their set-up.
+fn is_read_by_solves(option: &str, groups: &[Rc<OptionGroup>]) -> bool {
+    let option = option[1..].to_ascii_lowercase();
+    let is_of = |group: &Rc<OptionGroup>| {
+        group.options.all_typed().any(|(name, _)| {
+            name.ends_with("ksp_converged_reason")
+                && (name == option || option.strip_suffix(name) == Some(&format!("{}_", group.options.prefix)))
+        })
+    };
+    groups.iter().any(is_of)
 }
 
 /// Print the options of a solver as `-help` does, for a run that makes no solver of PETSc.
