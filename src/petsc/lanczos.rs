@@ -128,3 +128,28 @@ impl Tridiagonal {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{ACCURACY, Tridiagonal};
+
+    /// The matrix with 2 on its diagonal and 1 beside it has the least eigenvalue 2 - 2 cos(pi/(n+1)). A step that is none changes nothing.
+    #[test]
+    fn the_least_eigenvalue_comes_from_steps() {
+        let (mut matrix, mut before) = (Tridiagonal::default(), 0.0);
+        assert_eq!(matrix.least(), None);
+        for n in 1..50 {
+            let length = f64::recip(2.0 - before);
+            matrix.push(length, length * length);
+            before = length;
+            let exact = 2.0 - 2.0 * (std::f64::consts::PI / f64::from(n + 1)).cos();
+            let least = matrix.least().expect("an eigenvalue");
+            assert!(least <= exact * (1.0 + 1e-12) && least > exact * (1.0 - 2.0 * ACCURACY), "{n}: {least} {exact}");
+        }
+        let least = matrix.least();
+        for (length, growth) in [(f64::NAN, 1.0), (1.0, f64::INFINITY), (1.0, 1.0)] {
+            matrix.push(length, growth);
+            assert_eq!(matrix.least(), least);
+        }
+    }
+}

@@ -129,42 +129,19 @@ impl<'a> SolverFactory<'a> {
         kinds.into_iter().map(warning).collect()
     }
 
-    /// Return the warnings of options that PETSc reads and that change or show nothing.
-    pub fn idle_options(&self) -> Vec<String> {
-        let chosen: Vec<&Chosen> = match self.plan.linear {
-            Linear::Dense => Vec::new(),
-            Linear::Sweeps => {
-                let solved = self.plan.bodies.iter().filter(|body| body.preset != Preset::Condensed);
-                solved.map(|body| &body.facts.options).collect()
-            }
-            _ => vec![&self.asked.whole],
-        };
-        let is_swept = self.plan.linear == Linear::Sweeps && self.asked.method != MethodName::Robin;
-        let (mut direct, mut applied) = (BTreeSet::new(), BTreeSet::new());
-        for chosen in chosen {
-            let typed = |names: &[&'static str]| {
-                let is_typed = |name: &&str| chosen.typed(name).is_some();
-                names.iter().copied().filter(is_typed).map(|name| chosen.as_typed(name)).collect::<Vec<_>>()
-            };
-            if chosen.get("ksp_type") == Some("preonly") {
-                direct.extend(typed(&["ksp_rtol", "ksp_atol", "ksp_divtol", "ksp_max_it", "ksp_monitor"]));
-            } else if is_swept && chosen.is_applied_once() {
-                applied.extend(typed(&["ksp_view", "ksp_monitor", "ksp_converged_reason"]));
-            }
+    /// Return the warning of options that would show the solves of bodies, where sweeps apply multigrid instead.
+    pub fn idle_options(&self) -> Option<String> {
+        if self.plan.linear != Linear::Sweeps || self.asked.method == MethodName::Robin {
+            return None;
         }
-        let listed = |options: BTreeSet<String>| options.into_iter().collect::<Vec<_>>().join(" ");
-        let mut warnings = Vec::new();
-        if !direct.is_empty() {
-            let options = listed(direct);
-            warnings.push(format!("no effect of {options}: the solver `preonly` does not iterate; -ksp_type cg does"));
-        }
-        if !applied.is_empty() {
-            let options = listed(applied);
-            warnings.push(format!(
-                "nothing to show for {options}: each sweep applies multigrid once instead of solving; -ksp_rtol 1e-2 lets it solve"
-            ));
-        }
-        warnings
+        let solved = self.plan.bodies.iter().filter(|body| body.preset != Preset::Condensed);
+        let applied = solved.map(|body| &body.facts.options).filter(|chosen| chosen.is_applied_once());
+        let shown = |chosen: &'_ Chosen| chosen.all_looking("ksp_").collect::<Vec<String>>();
+        let options: BTreeSet<String> = applied.flat_map(shown).collect();
+        let options = options.into_iter().collect::<Vec<_>>().join(" ");
+        (!options.is_empty()).then(|| {
+            format!("nothing to show for {options}: each sweep applies multigrid once instead of solving; with -ksp_rtol 1e-2 it solves")
+        })
     }
 
     /// Return the names of the condensed bodies.

@@ -133,10 +133,13 @@ impl Chosen {
         typed.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
-    /// Return an option that the user wrote, with its dash and prefix.
-    pub fn as_typed(&self, name: &str) -> String {
-        let is_own = self.choices.get(name).is_some_and(|choice| choice.origin == OptionOrigin::Own);
-        if is_own { format!("-{}_{name}", self.prefix) } else { format!("-{name}") }
+    /// Return the options of a family that the user wrote and that only [look](looks), as they were typed.
+    pub fn all_looking(&self, family: &str) -> impl Iterator<Item = String> {
+        let looking = self.choices.iter().filter(move |(name, _)| name.starts_with(family) && looks(name));
+        looking.map(|(name, choice)| match choice.origin {
+            OptionOrigin::Own => format!("-{}_{name}", self.prefix),
+            _ => format!("-{name}"),
+        })
     }
 
     /// Return the controls of MUMPS that the user wrote, and mark them as read.

@@ -292,6 +292,29 @@ fn petsc_options() {
     refused(&solve(&scene, &[]), SCENE, &["options", "command line"]);
 }
 
+/// Keys that the method does not read are refused, unless an option has replaced the method that reads them.
+#[test]
+fn keys_of_other_methods() {
+    let typed = |options: &[&str], words: &[&str]| refused(&solve(case("groove"), options), SCENE, words);
+    for key in ["psi=full", "gamma=0.5", "robin=frozen"] {
+        let name = key.split('=').next().unwrap_or_default();
+        let said = format!("the method `newton` does not read `{name}`");
+        typed(&["--method", "newton", "--set", &format!("method.{key}")], &[&said, "--set method.", "`robin`"]);
+    }
+    typed(&["--set", "method={name='auto',gamma='aitken'}"], &["the method `auto` does not read `gamma`"]);
+    typed(&["--method", "newton-robin", "--set", "method.gamma=1"], &["`newton-robin` does not read `gamma`"]);
+    typed(&["--set", "method={name='auto',linear='direct',psi='full'}"], &["does not read `psi`", "`newton-robin`"]);
+    groove_refused(
+        "gamma = 0.6",
+        "gamma = 0.6\nname = \"newton\"",
+        "gamma = 0.6",
+        &["the method `newton` does not read"],
+    );
+    for options in ["method.name=newton", "method={name='newton-robin',psi='full',robin='tangent'}"] {
+        solve(case("groove"), &["--set", "mesh.set.n=4", "--set", options]).converged();
+    }
+}
+
 #[test]
 fn a_folder_that_cannot_be_made() {
     let folder = tempfile::tempdir().expect("a temporary folder");
