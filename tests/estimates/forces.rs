@@ -11,10 +11,12 @@ fn script(bodies: &[Outline]) -> String {
     let mut text = String::from("DefineConstant[ h = {1, Name \"h\"} ];\n");
     for (name, corners, first) in bodies {
         let numbers: Vec<String> = (1..=corners.len()).map(|k| (first + k).to_string()).collect();
-        for (k, [x, y]) in corners.iter().enumerate() {
-            let (here, next) = (first + k + 1, first + (k + 1) % corners.len() + 1);
-            text += &format!("Point({here}) = {{{x}, {y}, 0, h}}; Line({here}) = {{{here}, {next}}};\n");
-            text += &format!("Physical Curve(\"{name}_{k}\") = {{{here}}};\n");
+        for (number, [x, y]) in (first + 1..).zip(*corners) {
+            text += &format!("Point({number}) = {{{x}, {y}, 0, h}};\n");
+        }
+        for (k, number) in numbers.iter().enumerate() {
+            let next = &numbers[(k + 1) % numbers.len()];
+            text += &format!("Line({number}) = {{{number}, {next}}}; Physical Curve(\"{name}_{k}\") = {{{number}}};\n");
         }
         let at = first + 1;
         text += &format!("Curve Loop({at}) = {{{}}}; Plane Surface({at}) = {{{at}}};\n", numbers.join(", "));
