@@ -65,7 +65,7 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
     let folder = collectively(
         session,
-        claim(session, folder_of(&scene, request.output.as_ref()), &[scene.clone()], planned(&scene)),
+        claim(session, folder_of(&scene, request.output.as_ref()), std::slice::from_ref(&scene), planned(&scene)),
     )?;
     let plan = AdaptiveRun::new(session, scene, checkpoint, interrupt, &mut clock)?;
     let has_checkpoint =

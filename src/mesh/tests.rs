@@ -245,7 +245,7 @@ fn the_cache_removes_only_its_own_work() {
     let day_before = std::time::SystemTime::now() - std::time::Duration::from_secs(3 * 86_400);
     std::fs::File::open(&old).unwrap().set_modified(day_before).unwrap();
     let cache = Cache::at(folder.path().to_owned());
-    let write = |text: &str, to: &Path| Ok(std::fs::write(to, text).unwrap());
+    let write = |text: &str, to: &Path| crate::file::write(to, text);
     cache
         .make("a", |own, made| {
             cache.make("b", |other, made| {

@@ -502,7 +502,7 @@ fn local_coordinates_of_points_are_refused() {
     for (turn, is_local) in [(" 1.D+00 0. 0.\n 0. 1. 0.\n", false), (" 0. 1. 0.\n -1. 0. 0.\n", true)] {
         fs::write(&file, unv(turn)).expect("a file");
         let run = winkler(&["mesh", file.to_str().expect("a path")]);
-        assert_eq!(run.stderr.contains("a.unv:12: this node is in a local system"), is_local, "{}", run.said());
+        assert_eq!(run.stderr.contains("a.unv:14: this node is in a local system"), is_local, "{}", run.said());
         assert_eq!(run.code, if is_local { 4 } else { 0 }, "{}", run.said());
     }
 }
