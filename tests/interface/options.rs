@@ -355,10 +355,10 @@ fn options_of_the_iteration_are_never_ignored() {
     let swept = |options: &str| held(&format!("--method newton-robin --set solver=hypre {options}")).converged();
     let once = swept("");
     assert_eq!(once.count("inner_iterations") % once.count("sweeps"), 0);
-    let exact = swept("-ksp_rtol 1e-12 -ksp_view");
+    let exact = swept("-ksp_rtol 1e-12 -ksp_converged_reason");
     assert_eq!(exact.warnings(), "");
-    assert!(exact.stdout.contains("tolerances:  relative=1e-12"), "{}", exact.stdout);
-    assert!(2 * exact.count("sweeps") < once.count("sweeps"), "{} {}", exact.count("sweeps"), once.count("sweeps"));
+    assert!(exact.stdout.matches("solve converged due to CONVERGED_RTOL").count() >= exact.count("sweeps"));
+    assert!(exact.count("sweeps") < once.count("sweeps"), "{} {}", exact.count("sweeps"), once.count("sweeps"));
     assert!(exact.count("inner_iterations") > 4 * exact.count("sweeps"));
     assert!(swept("-upper_ksp_type gmres").count("sweeps") < once.count("sweeps"));
     let looking = swept("-ksp_monitor -upper_ksp_view");
@@ -371,7 +371,7 @@ fn options_of_the_iteration_are_never_ignored() {
         assert!(run.warnings().contains(option), "{options}: {}", run.warnings());
     }
     // the preset of the scene is that of the matrix of all bodies, too
-    for (solver, name) in [("icc", "cg + icc by petsc"), ("gamg", "cg + gamg")] {
+    for (solver, name) in [("icc", "cg + icc"), ("gamg", "cg + gamg")] {
         assert_eq!(held(&format!("--method newton --set solver={solver}")).converged().solvers(), [name; 2]);
     }
 }
