@@ -6,6 +6,7 @@ mod auto;
 mod bodies;
 mod body;
 mod carrier;
+mod chords;
 mod facts;
 mod groups;
 mod marks;

@@ -1,9 +1,11 @@
 //! Rigid motions of bodies, alone or together, that neither supports nor springs nor contact resist.
 //!
 //! A body may slide on a plane, halves of a ring of blocks may slide on each other, and a group of bodies without supports may move as
-//! one. These motions are the kernel of one matrix over all bodies, (B E)'(B E), where E are the motions that supports and springs leave
-//! to each body, and B are the contact rows. Motions of a whole group come first: contact within the group cannot resist them, whatever
-//! the rows of a mesh say where curved surfaces are apart.
+//! one. These motions close no point of contact ([`Squares`]), among the motions that supports and springs leave to each body. Motions of a whole group come
+//! first, so that they are found and named as such.
+//!
+//! Facets resist motions that smooth surfaces do not, such as the turn of a pin in a hub, because their normals lean (docs/theory.md, "Motions that nothing
+//! holds"). Such motions count as free.
 //!
 //! If the loads do no work on a motion, the solution is unique only up to it. One dof is then fixed, without reaction. If the loads do
 //! work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces may lack balance on facets, and by
@@ -17,14 +19,13 @@ use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::Mechanism;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-/// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for: forces in equilibrium that
-/// people write have three digits or more, and straight chords and quadrature take as much from them.
+/// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
 const LACKING: f64 = 1e-3;
 
-/// Find the motions that nothing resists. Fix those on which no load works.
-pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair]) -> Vec<Mechanism> {
+/// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
+pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
-    let mut search = MechanismSearch { bodies, pairs, tilt, found: Vec::new() };
+    let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
     for group in search.groups() {
         search.settle(search.as_one(&group), |_| false);
     }
@@ -52,6 +53,8 @@ struct MechanismSearch<'p, 's, const D: usize> {
     pairs: &'p [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
+    /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
+    lack: f64,
     found: Vec<Mechanism>,
 }
 
@@ -226,7 +229,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let works: Vec<Vec<f64>> =
             named.iter().map(|set| set.iter().map(|(_, moving)| self.work(moving).abs()).collect()).collect();
         let worst = works.iter().flatten().copied().fold(0.0, f64::max);
-        if worst <= LACKING {
+        if worst <= self.lack {
             self.balance(named.iter().flatten().map(|(_, moving)| moving).collect());
         }
         let mut pins = Vec::new();
@@ -235,7 +238,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let by_facets = set.iter().any(|(_, moving)| is_resisted(&moving.amounts));
             let mechanism =
                 |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, by_facets, ..Default::default() };
-            if worst > LACKING {
+            if worst > self.lack {
                 // The motion on which loads work most is the reason, and the others of its bodies are not of interest.
                 let reason = works.iter().position(|work| *work == worst);
                 self.found.extend(reason.map(|i| Mechanism {

@@ -6,11 +6,11 @@ use super::assembly::Factory;
 use super::bodies::parts;
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
-use super::mechanism;
 use super::pairs::{self, ContactFacts};
 use super::partition::Partition;
 use super::verify::Verified;
 use super::whole::WholeBody;
+use super::{chords, mechanism};
 use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
@@ -96,8 +96,9 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         contacts.push(found.facts);
         fine.extend(found.fine);
     }
+    let lack = chords::lack(&parts, mesh)?;
     let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
-    let mechanisms = mechanism::fix(&mut bodies, &pairs);
+    let mechanisms = mechanism::fix(&mut bodies, &pairs, lack);
     for body in &mut bodies {
         body.part.mesh.prescribed = body.part.mesh.prescribed_sorted();
     }

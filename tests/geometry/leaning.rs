@@ -78,7 +78,7 @@ fn refused(run: &Report, motion: &str) {
 #[test]
 fn press_fits_have_the_pressure_of_lame() {
     let scene = fit(2, FIT, "", -0.01);
-    let (counts, orders) = (12u32..28, prop::sample::select(vec![1usize, 2, 3, 4, 6]));
+    let (counts, orders) = (20u32..36, prop::sample::select(vec![1usize, 2, 3, 4, 6]));
     let fits = (counts.clone(), counts, any::<bool>(), 0.0..0.4, orders);
     let config = Config { cases: 12, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..Config::default() };
     TestRunner::new(config)
