@@ -1,10 +1,12 @@
 //! Signals that request the program to end.
 //!
 //! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
-//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once.
+//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at
+//! once.
 //!
-//! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the work goes on for ever cannot
-//! hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM, cannot take it.
+//! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the
+//! work goes on for ever cannot hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM,
+//! cannot take it.
 
 use crate::error::{Error, Kind, Result};
 use nix::sys::signal::{SigSet, Signal};
@@ -30,9 +32,9 @@ pub struct Interrupt {
 const STACK: usize = 8 << 20;
 
 impl Interrupt {
-    /// Do the work of the program in a second thread, and exit with the code that it returns. This thread waits for signals. They end the
-    /// program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`. With a limit on the size of files, writing fails
-    /// with an error that has a message.
+    /// Do the work of the program in a second thread, and exit with the code that it returns. This thread waits for
+    /// signals. They end the program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`.
+    /// With a limit on the size of files, writing fails with an error that has a message.
     ///
     /// # Errors
     /// The system refuses a thread or a handler.
@@ -44,8 +46,8 @@ impl Interrupt {
         let interrupt = Self::default();
         interrupt.at_once.store(true, Ordering::SeqCst);
         let asked = interrupt.clone();
-        // The hook for panics has printed a message. The second thread and its children take signals as usual. The system gives the signals to this
-        // thread, as it prefers the first one where that wants them.
+        // The hook for panics has printed a message. The second thread and its children take signals as usual. The
+        // system gives the signals to this thread, as it prefers the first one where that wants them.
         let work = move || std::process::exit(catch_unwind(AssertUnwindSafe(|| work(&asked))).unwrap_or(101));
         let second = std::thread::Builder::new().name("main".to_owned()).stack_size(STACK).spawn(work);
         second.map_err(|cause| refused(cause.to_string()))?;

@@ -318,8 +318,8 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
     assert!(run("--set body.0.order=1 --set body.1.order=1").solvers().iter().all(|name| *name == "cg + hypre"));
 }
 
-/// A limit of no iteration is refused for every solver, also for the estimates of eigenvalues in multigrid. Smoothers may have none, and solvers that do
-/// not iterate read no limit.
+/// A limit of no iteration is refused for every solver, also for the estimates of eigenvalues in multigrid. Smoothers
+/// may have none, and solvers that do not iterate read no limit.
 #[test]
 fn a_solver_without_iterations_is_refused() {
     for (options, named) in [
@@ -349,16 +349,17 @@ fn a_solve_that_stagnates_ends() {
     assert!(run.code == 1 && run.text("status") != "converged", "{}", run.said());
 }
 
-/// Where a sweep applies multigrid once, an option that steers the iteration lets it solve, and one that only looks is told to show nothing.
+/// Where a sweep applies multigrid once, an option that steers the iteration lets it solve, and one that only looks is
+/// told to show nothing.
 #[test]
 fn options_of_the_iteration_are_never_ignored() {
     let swept = |options: &str| held(&format!("--method newton-robin --set solver=hypre {options}")).converged();
     let once = swept("");
     assert_eq!(once.count("inner_iterations") % once.count("sweeps"), 0);
-    let exact = swept("-ksp_rtol 1e-12 -ksp_view");
+    let exact = swept("-ksp_rtol 1e-12 -ksp_converged_reason");
     assert_eq!(exact.warnings(), "");
-    assert!(exact.stdout.contains("tolerances:  relative=1e-12"), "{}", exact.stdout);
-    assert!(2 * exact.count("sweeps") < once.count("sweeps"), "{} {}", exact.count("sweeps"), once.count("sweeps"));
+    assert!(exact.stdout.matches("solve converged due to CONVERGED_RTOL").count() >= exact.count("sweeps"));
+    assert!(exact.count("sweeps") < once.count("sweeps"), "{} {}", exact.count("sweeps"), once.count("sweeps"));
     assert!(exact.count("inner_iterations") > 4 * exact.count("sweeps"));
     assert!(swept("-upper_ksp_type gmres").count("sweeps") < once.count("sweeps"));
     let looking = swept("-ksp_monitor -upper_ksp_view");
@@ -371,12 +372,13 @@ fn options_of_the_iteration_are_never_ignored() {
         assert!(run.warnings().contains(option), "{options}: {}", run.warnings());
     }
     // the preset of the scene is that of the matrix of all bodies, too
-    for (solver, name) in [("icc", "cg + icc by petsc"), ("gamg", "cg + gamg")] {
+    for (solver, name) in [("icc", "cg + icc"), ("gamg", "cg + gamg")] {
         assert_eq!(held(&format!("--method newton --set solver={solver}")).converged().solvers(), [name; 2]);
     }
 }
 
-/// Algebraic multigrid of all bodies has the rigid motions of each, on one rank and on two. Without them it takes 115 iterations on one.
+/// Algebraic multigrid of all bodies has the rigid motions of each, on one rank and on two. Without them it takes 115
+/// iterations on one.
 #[test]
 fn multigrid_of_all_bodies_has_their_rigid_motions() {
     let words = ["--method", "newton", "--set", "mesh.set.n=4", "-newton_pc_type", "gamg"];
