@@ -1,10 +1,12 @@
 //! Signals that request the program to end.
 //!
 //! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
-//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once.
+//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at
+//! once.
 //!
-//! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the work goes on for ever cannot
-//! hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM, cannot take it.
+//! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the
+//! work goes on for ever cannot hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM,
+//! cannot take it.
 
 use crate::error::{Error, Kind, Result};
 use nix::sys::signal::{SigSet, Signal};
@@ -30,32 +32,55 @@ pub struct Interrupt {
 const STACK: usize = 8 << 20;
 
 impl Interrupt {
-    /// Do the work of the program in a second thread, and exit with the code that it returns. This thread waits for signals. They end the
-    /// program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`. With a limit on the size of files, writing fails
-    /// with an error that has a message.
+    /// Do the work of the program in a second thread, and exit with the code that it returns. This thread waits for
+    /// signals. They end the program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`.
+    /// With a limit on the size of files, writing fails with an error that has a message.
     ///
     /// # Errors
     /// The system refuses a thread or a handler.
     pub fn watch(work: impl FnOnce(&Interrupt) -> i32 + Send + 'static) -> Result<i32> {
-        let refused = |cause: String| Error::new(Kind::File, "signals cannot be watched").because(cause);
-        flag::register(SIGXFSZ, Arc::default()).map_err(|cause| refused(cause.to_string()))?;
-        let ending = ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal));
-        let ending: SigSet = ending.filter_map(|signal| Signal::try_from(signal).ok()).collect();
         let interrupt = Self::default();
         interrupt.at_once.store(true, Ordering::SeqCst);
-        let asked = interrupt.clone();
-        // The hook for panics has printed a message. The second thread and its children take signals as usual. The system gives the signals to this
-        // thread, as it prefers the first one where that wants them.
-        let work = move || std::process::exit(catch_unwind(AssertUnwindSafe(|| work(&asked))).unwrap_or(101));
-        let second = std::thread::Builder::new().name("main".to_owned()).stack_size(STACK).spawn(work);
-        second.map_err(|cause| refused(cause.to_string()))?;
-        ending.thread_block().map_err(|cause| refused(cause.to_string()))?;
-        loop {
-            interrupt.note(ending.wait().map_err(|cause| refused(cause.to_string()))? as i32);
+        let ended = interrupt.begin(work);
+        Err(Error::new(Kind::File, "signals cannot be watched").because(ended.to_string()))
+    }
+
+    /// Begin the work, and wait for signals. Return why that is not possible.
+    fn begin(&self, work: impl FnOnce(&Interrupt) -> i32 + Send + 'static) -> std::io::Error {
+        let interrupt = self.clone();
+        // the hook for panics has printed a message
+        let work = move || std::process::exit(catch_unwind(AssertUnwindSafe(|| work(&interrupt))).unwrap_or(101));
+        let wait = || -> std::io::Result<std::convert::Infallible> {
+            let ending = self.install()?;
+            std::thread::Builder::new().name("main".to_owned()).stack_size(STACK).spawn(work)?;
+            // the system prefers the first thread for a signal, if that waits for it
+            ending.thread_block()?;
+            loop {
+                self.note(ending.wait()? as i32);
+            }
+        };
+        match wait() {
+            Err(cause) => cause,
         }
     }
 
-    /// Set the flags for a signal, or end the program.
+    /// Install handlers for a signal that another thread takes all the same, as it may where it starts a process. Return
+    /// the signals that end the program.
+    fn install(&self) -> std::io::Result<SigSet> {
+        let mut ending = SigSet::empty();
+        for signal in ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal)) {
+            // handlers run in this order: the shutdown is tested before the flag is set, so that only the second signal
+            // ends the program
+            flag::register_conditional_shutdown(signal, Kind::Stopped(signal).exit_code(), self.at_once.clone())?;
+            flag::register(signal, self.at_once.clone())?;
+            flag::register_usize(signal, self.asked.clone(), signal as usize)?;
+            ending.add(Signal::try_from(signal)?);
+        }
+        flag::register(SIGXFSZ, Arc::default())?;
+        Ok(ending)
+    }
+
+    /// Do for a signal what the handlers do.
     fn note(&self, signal: i32) {
         if self.at_once.swap(true, Ordering::SeqCst) {
             low_level::exit(Kind::Stopped(signal).exit_code());

@@ -107,7 +107,7 @@ impl Ksp {
     ///
     /// [`failure`](Self::failure) reports whether the factorisation succeeded.
     pub(super) fn factored(session: &Session, scope: Scope, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
-        let mut solver = Self::of(session, scope, "")?;
+        let mut solver = Self::of(session, scope, "patch_")?;
         let new = || Vector::new(session, scope, rows, 1);
         solver.vectors = Some([new()?, new()?]);
         let pc = solver.pc()?;
@@ -159,7 +159,8 @@ impl Ksp {
         let (mut limit, none) = (0, null_mut());
         // SAFETY: the solver of this wrapper; PETSc writes to no null pointer.
         unsafe { petsc!(KSPGetTolerances(self.ksp, none, none, none, &mut limit)) }?;
-        // PETSc's conjugate gradients go through one iteration all the same, and may write where they have allocated nothing
+        // PETSc's conjugate gradients go through one iteration all the same, and may write where they have allocated
+        // nothing
         if limit < 1 { Err(Self::idle(&format!("{}ksp_max_it", self.own_options()), limit)) } else { Ok(()) }
     }
 

@@ -1,7 +1,7 @@
 //! The least eigenvalue of a preconditioned matrix, from the iterates of conjugate gradients (Lanczos).
 //!
-//! PETSc estimates it, too, but stores coefficients for as many iterations as the limit allows, and computes all eigenvalues each time. Its QL
-//! iteration does not end where rounding makes a number that is none.
+//! PETSc estimates it, too, but stores coefficients for as many iterations as the limit allows, and computes all
+//! eigenvalues each time. Its QL iteration does not end where rounding makes a number that is none.
 
 use super::call::petsc;
 use super::ffi;
@@ -19,7 +19,8 @@ pub(super) struct Lanczos {
 }
 
 impl Lanczos {
-    /// Note the iterate x of a solver, with r'z of its residual. A step is s = alpha p, where p'r = r'z of the residual r before. Collective.
+    /// Note the iterate x of a solver, with r'z of its residual. A step is s = alpha p, where p'r = r'z of the residual
+    /// r before. Collective.
     pub fn follow(&mut self, ksp: ffi::KSP, x: ffi::Vec, squared: f64) -> Result<()> {
         let [last, residual] = match self.last {
             Some([last, residual]) => {
@@ -99,7 +100,8 @@ impl Tridiagonal {
         }
     }
 
-    /// Return the least eigenvalue from below. Parts of T have no less one than T has, so it falls from step to step, and is soon known.
+    /// Return the least eigenvalue from below. Parts of T have no less one than T has, so it falls from step to step,
+    /// and is soon known.
     fn least(&mut self) -> Option<f64> {
         let mut high = self.low;
         while !self.is_below(self.low) {
@@ -133,7 +135,8 @@ impl Tridiagonal {
 mod tests {
     use super::{ACCURACY, Tridiagonal};
 
-    /// The matrix with 2 on its diagonal and 1 beside it has the least eigenvalue 2 - 2 cos(pi/(n+1)). A step that is none changes nothing.
+    /// The matrix with 2 on its diagonal and 1 beside it has the least eigenvalue 2 - 2 cos(pi/(n+1)). A step that is
+    /// none changes nothing.
     #[test]
     fn the_least_eigenvalue_comes_from_steps() {
         let (mut matrix, mut before) = (Tridiagonal::default(), 0.0);

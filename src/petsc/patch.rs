@@ -83,8 +83,8 @@ impl PatchSpace {
         let (session, scope, owned) = (matrix.session(), matrix.scope(), matrix.own());
         let header = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
         let mut dofs = of_whole_nodes(Indices::around(matrix, dofs, layers)?, matrix.block_size());
-        // The factor of all rows costs little more than that of most of them. With it nothing is left to the iteration, whose digits the soft motions
-        // of a small stiff rest would take.
+        // The factor of all rows costs little more than that of most of them. With it nothing is left to the iteration,
+        // whose digits the soft motions of a small stiff rest would take.
         if 2 * dofs.len() > matrix.total() {
             dofs = (0..matrix.total()).collect();
         }

@@ -19,7 +19,8 @@ pub struct KspIterate<'a> {
     pub residual: f64,
     /// The norm of the residual of the first guess, which is zero or the exact solution in a [`Subspace`](super::Subspace).
     pub first: f64,
-    /// The least eigenvalue of the preconditioned matrix that conjugate gradients in the natural norm have found so far.
+    /// The least eigenvalue of the preconditioned matrix that conjugate gradients in the natural norm have found so
+    /// far.
     pub least: Option<f64>,
 }
 

@@ -90,8 +90,8 @@ pub struct IdleKey {
     pub readers: &'static str,
 }
 
-/// Return a key of the [`complete`] table `[method]` that its method does not read. A key of the file may stand there if an option of the command line
-/// has replaced the method. `is_option` tells whether a place is in such an option.
+/// Return a key of the [`complete`] table `[method]` that its method does not read. A key of the file may stand there
+/// if an option of the command line has replaced the method. `is_option` tells whether a place is in such an option.
 pub fn idle_key(method: &Spanned<DeValue<'_>>, is_option: impl Fn(&Range<usize>) -> bool) -> Option<IdleKey> {
     let DeValue::Table(table) = method.get_ref() else { return None };
     let word = |key: &str| table.get(key).and_then(|value| value.get_ref().as_str());

@@ -140,7 +140,10 @@ impl<'a> SolverFactory<'a> {
         let options: BTreeSet<String> = applied.flat_map(shown).collect();
         let options = options.into_iter().collect::<Vec<_>>().join(" ");
         (!options.is_empty()).then(|| {
-            format!("nothing to show for {options}: each sweep applies multigrid once instead of solving; with -ksp_rtol 1e-2 it solves")
+            format!(
+                "nothing to show for {options}: each sweep applies multigrid once instead of solving; with \
+                 -ksp_rtol 1e-2 it solves"
+            )
         })
     }
 

@@ -346,7 +346,8 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         crate::robin::prepare(model)?;
         return Ok(Box::new(SweepCg::new(coefficient_of(scene))));
     }
-    // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are not distributed
+    // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
+    // not distributed
     let is_dense = linear == Linear::Dense;
     let factors = is_dense || matches!(options[0].get("pc_type"), Some("cholesky" | "lu"));
     let of_nodes = !factors || model.is_distributed();

@@ -69,7 +69,8 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Refuse a key of `[method]` that the method does not read. `length` is that of the file, after which the options begin.
+/// Refuse a key of `[method]` that the method does not read. `length` is that of the file, after which the options
+/// begin.
 fn refuse_idle(method: &Spanned<DeValue<'_>>, sources: &Sources, length: usize) -> Result<()> {
     let Some(idle) = method::idle_key(method, |span| span.start > length) else { return Ok(()) };
     let message = format!("the method `{}` does not read `{}`", idle.method, idle.name);

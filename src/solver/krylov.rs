@@ -24,7 +24,8 @@ pub struct Krylov {
     changed: bool,
     /// Number of factorisations or preconditioner set-ups.
     set_ups: usize,
-    /// Whether the preconditioner is a multigrid, which takes about as many iterations for any size, and whose set-up costs more than its use.
+    /// Whether the preconditioner is a multigrid, which takes about as many iterations for any size, and whose set-up
+    /// costs more than its use.
     multigrid: bool,
     /// Whether one application of it preconditions all bodies together, unless the user wants a whole solve.
     is_applied_once: bool,

@@ -166,8 +166,8 @@ impl Chosen {
         self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control_of_mumps(name))
     }
 
-    /// Return whether the user wrote an option that steers the iteration of the solver. Then a solve is one, also where one application of the
-    /// preconditioner would do.
+    /// Return whether the user wrote an option that steers the iteration of the solver. Then a solve is one, also where
+    /// one application of the preconditioner would do.
     pub fn steers_iteration(&self) -> bool {
         let steers = |name: &str| name.starts_with("ksp_") && name != "ksp_reuse_preconditioner" && !looks(name);
         self.all_typed().any(|(name, _)| steers(name))
@@ -178,8 +178,8 @@ impl Chosen {
         matches!(self.get("pc_type"), Some("hypre" | "gamg" | "ml" | "mg")) && !self.steers_iteration()
     }
 
-    /// Refuse limits of no iteration that the user wrote for the solver, or for the estimates of eigenvalues that multigrid needs for its smoothers.
-    /// A smoother itself may have none.
+    /// Refuse limits of no iteration that the user wrote for the solver, or for the estimates of eigenvalues that
+    /// multigrid needs for its smoothers. A smoother itself may have none.
     pub fn refuse_idle(&self) -> Result<()> {
         let iterates = self.get("ksp_type") != Some("preonly");
         let is_limit = |name: &str| (iterates && name == "ksp_max_it") || name.ends_with("esteig_ksp_max_it");

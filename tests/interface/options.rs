@@ -318,8 +318,8 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
     assert!(run("--set body.0.order=1 --set body.1.order=1").solvers().iter().all(|name| *name == "cg + hypre"));
 }
 
-/// A limit of no iteration is refused for every solver, also for the estimates of eigenvalues in multigrid. Smoothers may have none, and solvers that do
-/// not iterate read no limit.
+/// A limit of no iteration is refused for every solver, also for the estimates of eigenvalues in multigrid. Smoothers
+/// may have none, and solvers that do not iterate read no limit.
 #[test]
 fn a_solver_without_iterations_is_refused() {
     for (options, named) in [
@@ -349,7 +349,8 @@ fn a_solve_that_stagnates_ends() {
     assert!(run.code == 1 && run.text("status") != "converged", "{}", run.said());
 }
 
-/// Where a sweep applies multigrid once, an option that steers the iteration lets it solve, and one that only looks is told to show nothing.
+/// Where a sweep applies multigrid once, an option that steers the iteration lets it solve, and one that only looks is
+/// told to show nothing.
 #[test]
 fn options_of_the_iteration_are_never_ignored() {
     let swept = |options: &str| held(&format!("--method newton-robin --set solver=hypre {options}")).converged();
@@ -376,7 +377,8 @@ fn options_of_the_iteration_are_never_ignored() {
     }
 }
 
-/// Algebraic multigrid of all bodies has the rigid motions of each, on one rank and on two. Without them it takes 115 iterations on one.
+/// Algebraic multigrid of all bodies has the rigid motions of each, on one rank and on two. Without them it takes 115
+/// iterations on one.
 #[test]
 fn multigrid_of_all_bodies_has_their_rigid_motions() {
     let words = ["--method", "newton", "--set", "mesh.set.n=4", "-newton_pc_type", "gamg"];

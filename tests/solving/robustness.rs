@@ -424,8 +424,8 @@ fn stiff_layers_have_their_error() {
     }
 }
 
-/// Multigrid of two small blocks on a stiff layer, the upper one held sideways by soft springs: rows near the contact are most of all rows. It takes at
-/// most as many iterations as there are dofs, for the pressures of a factorisation.
+/// Multigrid of two small blocks on a stiff layer, the upper one held sideways by soft springs: rows near the contact
+/// are most of all rows. It takes at most as many iterations as there are dofs, for the pressures of a factorisation.
 #[test]
 fn multigrid_of_a_small_mesh_on_a_stiff_layer() {
     let mut mesh = Blocks::default();
