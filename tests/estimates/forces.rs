@@ -80,13 +80,16 @@ fn force(run: &Report, pair: usize) -> f64 {
     x.hypot(y)
 }
 
-/// The forces of orders 6 on meshes of size 0.12 to 0.15 are exact to a tenth of these errors. Sums of signed errors of pressures gave 0.05 to 0.4 of them.
+/// Bodies, the rest of the scene, the order, the size of elements, and the exact forces of pairs.
+type Row<'a> = (&'a [Outline<'a>], &'a str, usize, f64, &'a [(usize, f64)]);
+
+/// The forces of order 6 on meshes of size 0.12 to 0.15 are exact to a tenth of these errors. Sums of signed errors of pressures gave 0.05 to 0.4 of them.
 #[test]
 fn estimates_of_forces_are_of_the_size_of_errors() {
     let punch = before_obstacle("max(0, abs(x) - 1.13)", 0.01, 2);
     let bracket = before_obstacle("0.01*(x - 4.6)^2", 0.02, 4);
     let (bridge, posts) = (bridge(), [8.581391, 7.742099, 3.176510]);
-    let rows: [(&[Outline], &str, usize, f64, &[(usize, f64)]); 7] = [
+    let rows: [Row; 7] = [
         (&[BLOCK], &punch, 1, 1.0, &[(0, 1.056213)]),
         (&[BLOCK], &punch, 2, 0.7, &[(0, 1.056213)]),
         (&[BRACKET], &bracket, 1, 0.7, &[(0, 0.0220344)]),
@@ -97,7 +100,7 @@ fn estimates_of_forces_are_of_the_size_of_errors() {
     ];
     for (bodies, text, order, h, pairs) in rows {
         let sets = [&format!("mesh.set.h={h}"), "method.stop.residual=1e-10"];
-        let run = solve_here(&scene(bodies, text, order, false), &sets).converged();
+        let run = solve_here(scene(bodies, text, order, false), &sets).converged();
         for &(pair, exact) in pairs {
             let (error, name) = ((force(&run, pair) / exact - 1.0).abs(), bodies[0].0);
             let ratio = run.number(&format!("discretization_error/force/{pair}")) / error;
@@ -114,7 +117,7 @@ fn forces_that_loads_determine_have_no_error() {
     let held = text
         .replace("x = 0, y = 0", "x = 0")
         .replace("[[contact]]", "load = [{ on = \"blk_0\", pressure = 1 }]\n[[contact]]");
-    let run = solve_here(&scene(&[BLOCK], &held, 2, false), &["mesh.set.h=2"]).converged();
+    let run = solve_here(scene(&[BLOCK], &held, 2, false), &["mesh.set.h=2"]).converged();
     assert!((force(&run, 0) / 8.0 - 1.0).abs() < 1e-9 && run.number("discretization_error/force/0") < 1e-6);
 }
 
