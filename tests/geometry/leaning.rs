@@ -10,7 +10,7 @@ const FIT: &str = "SetFactory(\"OpenCASCADE\");
 DefineConstant[ n = 16, m = 16, t = 0.1, layers = 0 ];
 Disk(1) = {0, 0, 0, 20}; Disk(2) = {0, 0, 0, 10}; BooleanDifference(3) = { Surface{1}; Delete; }{ Surface{2}; Delete; };
 Disk(4) = {0, 0, 0, 10}; Rotate {{0, 0, 1}, {0, 0, 0}, t} { Surface{4}; }
-MeshSize {:} = 6;
+MeshSize {:} = 4;
 c() = Abs(Boundary{ Surface{3}; }); d() = Abs(Boundary{ Surface{4}; });
 b() = BoundingBox Curve{c(0)}; k = (b(3) > 15) ? 0 : 1;
 MeshSize { PointsOf { Curve{c(1-k)}; } } = 2*Pi*10/n; MeshSize { PointsOf { Curve{d(0)}; } } = 2*Pi*10/m;
