@@ -245,12 +245,11 @@ pub fn write_whole(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<
 /// Write a whole file as [`write_whole`] does, and return it, positioned at its end.
 fn replace(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<File> {
     refuse_foreign(path)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
     let folder = path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
     let write = || {
         // a temporary file that cannot be finished is removed
         let part = tempfile::Builder::new()
-            .prefix(&format!(".{name:.100}."))
+            .prefix(".winkler-")
             .suffix(".part")
             .permissions(Permissions::from_mode(0o666))
             .tempfile_in(folder)?;
