@@ -1,25 +1,27 @@
 //! Relaxation rules of the paper's iteration u <- u + gamma z: gamma of (42), from the sweeps so far.
 
 use crate::error::Result;
+use crate::expression::Field;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::field::{LineEnergy, Unbounded};
 use crate::model::layer::Layer;
+use crate::model::linear::LinearStep;
 use crate::problem::Own;
 use crate::problem::method::Gamma;
 use crate::robin::Sweep;
 
 /// The present iterate.
 pub struct Iterate<'a> {
-    /// The problem. Its bodies carry the Robin term of this iterate.
+    /// The problem. For sweeps its bodies carry the Robin term of this iterate.
     pub model: &'a mut Model,
+    /// The solver of all bodies, which can multiply by K.
+    pub linear: &'a mut dyn LinearStep,
     /// Number of the iterate.
     pub k: usize,
     /// The layers at the iterate.
     pub layer: &'a Layer,
-    /// The Robin term, omega psi kappa of each contact row (2n).
-    pub weight: &'a [f64],
-    /// The sweep at the iterate: r and z = G^-1 r.
+    /// r and z = G^-1 r at the iterate, by a sweep or with one matrix of all bodies.
     pub sweep: &'a Sweep,
     /// Relative residual.
     pub residual: f64,
@@ -45,6 +47,7 @@ pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
     Ok(match gamma {
         Gamma::Stationary(gamma) => Box::new(Schedule(vec![*gamma])),
         Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
+        Gamma::Expression(gamma) => Box::new(OfIteration(gamma.clone())),
         Gamma::LineSearch => Box::new(LineSearch),
         Gamma::Aitken => Box::new(Aitken::default()),
         Gamma::Own(name) => own.get("rule for gamma", name)?(),
@@ -61,6 +64,16 @@ impl GammaRule for Schedule {
     }
 }
 
+/// gamma^k from an expression in k.
+#[derive(Debug, Clone)]
+pub struct OfIteration(pub Field);
+
+impl GammaRule for OfIteration {
+    fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
+        Ok(self.0.in_iteration(here.k))
+    }
+}
+
 /// gamma^k minimises F1 along the correction, to six digits of its slope. F1 is convex, so it falls in every step.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct LineSearch;
@@ -68,7 +81,7 @@ pub struct LineSearch;
 impl GammaRule for LineSearch {
     fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
         let z = &here.sweep.correction;
-        let products = here.model.multiply(&z.displacements);
+        let products = here.linear.multiply(here.model, &z.displacements);
         LineEnergy::new(here.model, here.layer, &here.sweep.residual, z, &products).minimize(1e-6)
     }
 }

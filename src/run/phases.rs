@@ -8,7 +8,7 @@ use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, Verified};
+use crate::discretize::{self, Discrete, Verified};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
@@ -20,7 +20,7 @@ use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
-use crate::robin::{Coefficient, SweepCg};
+use crate::robin::{Coefficient, SweepCg, stiff_joint_springs};
 use crate::scene::Scene;
 use crate::scene::remove;
 use crate::solver::{Dense, Krylov, MakeSolver, options};
@@ -304,7 +304,7 @@ fn serves(last: &Built, scene: &Scene) -> bool {
     // how linear steps are solved was chosen for the method
     let [old_joint, new_joint] = both.map(|scene| {
         let MethodSpec { name, linear, .. } = &scene.method;
-        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
+        matches!(name, MethodName::Auto | MethodName::Newton | MethodName::Semismooth).then_some((*name, *linear))
     });
     last.condensed.len() == last.discrete.bodies.len()
         && old_meshes == new_meshes
@@ -324,26 +324,36 @@ fn settings(scene: &Scene) -> Value {
 /// automatic start, it is stored in `start`.
 fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
     let scene = built.scene.clone();
-    if scene.method.name != MethodName::Robin {
-        return linear_step(session, built, start).map(Method::Newton);
+    let rule = || gamma::rule(&scene.method.gamma, &scene.own_rules);
+    match scene.method.name {
+        MethodName::Robin => {
+            let (rule, coefficient) = (rule()?, Some(coefficient_of(&scene, &built.discrete)));
+            crate::robin::prepare(&mut built.discrete.model)?;
+            Ok(Method::Robin { rule, coefficient, linear: Box::new(SweepCg::with_robin_term()) })
+        }
+        MethodName::Semismooth => {
+            Ok(Method::Robin { rule: rule()?, coefficient: None, linear: linear_step(session, built, start)? })
+        }
+        _ => linear_step(session, built, start).map(Method::Newton),
     }
-    let rule = gamma::rule(&scene.method.gamma, &scene.own_rules)?;
-    crate::robin::prepare(&mut built.discrete.model)?;
-    Ok(Method::Robin { rule, coefficient: coefficient_of(&scene), linear: Box::new(SweepCg::with_robin_term()) })
 }
 
-fn coefficient_of(scene: &Scene) -> Coefficient {
-    Coefficient::new(scene.method.psi.clone(), scene.method.robin)
+/// Return the Robin term of a scene.
+fn coefficient_of(scene: &Scene, discrete: &Discrete) -> Coefficient {
+    let MethodSpec { psi, robin, .. } = &scene.method;
+    let sides = (0..discrete.model.pairs.len()).map(|i| discrete.sides(i)).collect();
+    Coefficient::new(psi.clone(), sides, *robin)
 }
 
-/// Return the solver of the linear steps of Newton's method.
+/// Return the solver of linear steps of all bodies.
 fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Box<dyn LinearStep>> {
     let Built { scene, discrete, linear, options, interpolation, .. } = built;
-    let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
+    let (linear, interpolation) = (*linear, interpolation.take());
     if linear == Linear::Sweeps {
-        crate::robin::prepare(model)?;
-        return Ok(Box::new(SweepCg::new(coefficient_of(scene))));
+        crate::robin::prepare(&mut discrete.model)?;
+        return Ok(Box::new(SweepCg::new(coefficient_of(scene, discrete))));
     }
+    let model = &mut discrete.model;
     // multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows
     let of_nodes = linear == Linear::Multigrid || model.is_distributed();
     let is_dense = linear == Linear::Dense;
@@ -355,8 +365,9 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &[], interpolation)?)))
     };
     let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
-    if let Some(springs) = first_springs(model, start) {
-        step.set_up(&springs)?;
-    }
+    // the first system of the paper's iteration is the extension of its start
+    let extends = scene.method.name == MethodName::Semismooth;
+    let springs = if extends { Some(stiff_joint_springs(model)) } else { first_springs(model, start) };
+    springs.map_or(Ok(()), |springs| step.set_up(&springs))?;
     Ok(step)
 }
