@@ -10,6 +10,7 @@ use crate::expression::Field;
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -79,10 +80,45 @@ pub fn complete(method: &mut Spanned<DeValue<'_>>) {
     }
 }
 
+/// A key of `[method]` that the method of the scene does not read.
+pub struct IdleKey {
+    /// The key.
+    pub name: &'static str,
+    /// The place of its value.
+    pub span: Range<usize>,
+    /// The method.
+    pub method: String,
+    /// The methods that read it.
+    pub readers: &'static str,
+}
+
+/// Return a key of the [`complete`] table `[method]` that its method does not read. A key of the file may stand there
+/// if an option of the command line has replaced the method. `is_option` tells whether a place is in such an option.
+pub fn idle_key(method: &Spanned<DeValue<'_>>, is_option: impl Fn(&Range<usize>) -> bool) -> Option<IdleKey> {
+    let DeValue::Table(table) = method.get_ref() else { return None };
+    let word = |key: &str| table.get(key).and_then(|value| value.get_ref().as_str());
+    let (name, linear) = (word("name").unwrap_or("auto"), word("linear"));
+    if !["auto", "newton", "newton-robin", "semismooth"].contains(&name) {
+        return None;
+    }
+    let is_replaced = table.get("name").is_some_and(|name| is_option(&name.span()));
+    let has_sweeps = match name {
+        "auto" => linear.is_none_or(|linear| linear == "sweeps"),
+        "newton" | "semismooth" => linear == Some("sweeps"),
+        _ => true,
+    };
+    let gamma = ("gamma", name == "semismooth", "`robin` and `semismooth`");
+    let zone = ["psi", "robin"].map(|key| (key, has_sweeps, "`robin` and `newton-robin`"));
+    [gamma].into_iter().chain(zone).filter(|(_, is_read, _)| !is_read).find_map(|(key, _, readers)| {
+        let span = table.get(key)?.span();
+        let is_idle = is_option(&span) || !is_replaced;
+        is_idle.then(|| IdleKey { name: key, span, method: name.to_owned(), readers })
+    })
+}
+
 impl Check for MethodSpec {
     /// Check all but steps and stop rule, which are checked by themselves.
     fn check(&self, _: Geometry) -> Result<(), Flaw> {
-        self.refuse_unread()?;
         match &self.gamma {
             Gamma::Stationary(gamma) => positive("gamma", "gamma", *gamma)?,
             Gamma::Schedule(list) if list.is_empty() => {
@@ -105,32 +141,20 @@ impl Check for MethodSpec {
         if let RobinRule::Floor(floor) = self.robin {
             positive("robin.floor", "the floor", floor)?;
         }
+        if self.linear.is_some() && matches!(self.name, MethodName::Robin | MethodName::NewtonRobin) {
+            let help = "name = \"newton\", or leave `linear` away";
+            return Err(Flaw::new("linear", "only Newton's method has linear steps of all bodies", "", help));
+        }
+        if self.interval && self.name != MethodName::Robin {
+            let help = "name = \"robin\", or leave `interval` away";
+            return Err(Flaw::new("interval", "only the method `robin` has an interval of gamma", "", help));
+        }
         Ok(())
     }
 }
 
 /// Most iterations for which an expression for gamma is checked beforehand: more than a run makes, checked in less than a second.
 const MOST: usize = 1_000_000;
-
-impl MethodSpec {
-    /// Refuse a key that is given, but that the method does not read.
-    fn refuse_unread(&self) -> Result<(), Flaw> {
-        use MethodName::{Auto, Newton, NewtonRobin, Robin, Semismooth};
-        let table: [(&str, bool, &[MethodName]); 4] = [
-            ("linear", self.linear.is_some(), &[Auto, Newton, Semismooth]),
-            ("interval", self.interval, &[Robin]),
-            ("psi", !matches!(self.psi, Zone::Active), &[Auto, Newton, NewtonRobin, Robin]),
-            ("robin", self.robin != RobinRule::Auto, &[Auto, Newton, NewtonRobin, Robin]),
-        ];
-        if let Some((key, _, readers)) = table.into_iter().find(|row| row.1 && !row.2.contains(&self.name)) {
-            let message = format!("the method `{}` does not read `{key}`", self.name.name());
-            let names: Vec<String> = readers.iter().map(|name| name.name()).collect();
-            let help = format!("take {}, or leave `{key}` away", names.join(" or "));
-            return Err(Flaw::new(key, message, "", &help));
-        }
-        Ok(())
-    }
-}
 
 /// The methods.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]

@@ -6,6 +6,7 @@ mod library;
 mod lines;
 mod manners;
 mod options;
+mod origins;
 mod paper;
 mod pictures;
 mod refusals;

@@ -10,5 +10,6 @@ mod mechanisms;
 mod methods;
 mod paper;
 mod robustness;
+mod saturating;
 mod steps;
 mod stopping;
