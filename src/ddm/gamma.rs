@@ -1,7 +1,6 @@
 //! Relaxation rules of the paper's iteration u <- u + gamma z: gamma of (42), from the sweeps so far.
 
 use crate::error::Result;
-use crate::expression::Field;
 use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::field::{LineEnergy, Unbounded};
@@ -44,33 +43,22 @@ pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 /// # Errors
 /// A name that no rule of the program has.
 pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
-    Ok(match gamma {
-        Gamma::Stationary(gamma) => Box::new(Schedule(vec![*gamma])),
-        Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
-        Gamma::Expression(gamma) => Box::new(OfIteration(gamma.clone())),
+    Ok(match gamma.clone() {
+        Gamma::Stationary(gamma) => Box::new(OfIteration(move |_| gamma)),
+        Gamma::Schedule(list) => Box::new(OfIteration(move |k: usize| list[k.min(list.len() - 1)])),
+        Gamma::Expression(gamma) => Box::new(OfIteration(move |k| gamma.in_iteration(k))),
         Gamma::LineSearch => Box::new(LineSearch),
         Gamma::Aitken => Box::new(Aitken::default()),
-        Gamma::Own(name) => own.get("rule for gamma", name)?(),
+        Gamma::Own(name) => own.get("rule for gamma", &name)?(),
     })
 }
 
-/// gamma^k from a list; the last value stays. With one value it is gamma^k = gamma, as in the paper.
-#[derive(Debug, Clone)]
-pub struct Schedule(pub Vec<f64>);
+/// gamma^k that depends on k alone: always the same, as in the paper, from a list whose last value stays, or from an expression.
+struct OfIteration<F>(F);
 
-impl GammaRule for Schedule {
+impl<F: Fn(usize) -> f64> GammaRule for OfIteration<F> {
     fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
-        Ok(self.0[here.k.min(self.0.len() - 1)])
-    }
-}
-
-/// gamma^k from an expression in k.
-#[derive(Debug, Clone)]
-pub struct OfIteration(pub Field);
-
-impl GammaRule for OfIteration {
-    fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
-        Ok(self.0.in_iteration(here.k))
+        Ok((self.0)(here.k))
     }
 }
 

@@ -56,7 +56,7 @@ const GROOVE: [Way; 32] = [
     // S is factored once a body, besides the start
     by("gamma=\"line-search\", psi=\"none\"", "", &[("dense_factorizations", 4)]),
     by("gamma=\"line-search\", psi=\"x > 2\"", "", &[]),
-    by("gamma=0.3, psi=[\"full\", \"x > 2\"]", "", &[]),
+    by("gamma=\"aitken\", psi=[\"full\", \"x > 2\"]", "", &[]),
     by("gamma=\"0.6 + 0.3*exp(-k)\"", "", &[]),
     by(SEMISMOOTH, "", CONDENSED),
     by(SEMISMOOTH, "mumps", JOINED),
