@@ -39,6 +39,8 @@ pub struct Report {
     pub patches: usize,
     /// Symbolic factorisations, all bodies.
     pub symbolic_factorizations: usize,
+    /// Meshes in space that HXT could not make, or would not make the same in every run.
+    pub meshes_without_hxt: usize,
     /// Stiffness matrices assembled.
     pub assemblies: usize,
     /// Stiffness matrices reused from an earlier run of a sweep.

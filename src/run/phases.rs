@@ -3,7 +3,7 @@
 
 use super::inner::SolverFactory;
 use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
+use super::stages::{Begin, Built, Clock, Done, Legs, MeshFile, Prepared};
 use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
-use crate::mesh;
+use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, JointStep, LinearStep};
 use crate::output;
 use crate::parallel::{Ranks, collectively};
@@ -25,7 +25,6 @@ use crate::scene::Scene;
 use crate::scene::remove;
 use crate::solver::{Dense, Krylov, MakeSolver, options};
 use serde_json::Value;
-use std::path::PathBuf;
 use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
@@ -110,8 +109,8 @@ struct MeshedScene<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
-    /// SHA-256 and path of the file of the mesh, on the rank that has read it.
-    file: Option<(String, PathBuf)>,
+    /// The file of the mesh, on the rank that has read it.
+    file: Option<MeshFile>,
     cut: Cut<D>,
 }
 
@@ -154,8 +153,7 @@ where
             },
             discrete,
             splits: verified.splits(),
-            mesh: file.as_ref().map(|(digest, _)| digest.clone()),
-            mesh_file: file.as_ref().map(|(_, path)| path.clone()),
+            mesh: file.clone(),
             linear: inner.plan.linear,
             interpolation: inner.interpolation.take(),
             near_null_space: std::mem::take(&mut inner.near_null_space),
@@ -192,19 +190,20 @@ where
     }
 }
 
-/// Return the bodies of a scene and their mesh, with SHA-256 and path of its file. The first rank runs Gmsh, reads the mesh and checks it. Collective.
+/// Return the bodies of a scene and their mesh, with its file. The first rank runs Gmsh, reads the mesh and checks it. Collective.
 fn verified<const D: usize>(
     session: &Session,
     scene: &Scene,
     interrupt: &Interrupt,
-) -> Result<(Verified<D>, Option<(String, PathBuf)>)> {
+) -> Result<(Verified<D>, Option<MeshFile>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     let (mut file, mut notes) = (None, Vec::new());
     let read = || {
         interrupt.release()?;
-        let loaded = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        (file, notes) = (Some((loaded.digest, loaded.file)), loaded.notes);
-        Ok(loaded.mesh)
+        let Loaded { mesh, file: path, digest, without_hxt, notes: said, .. } =
+            mesh::load(&scene.mesh, order, interrupt)?;
+        (file, notes) = (Some(MeshFile { digest, path, without_hxt }), said);
+        Ok(mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);
     let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
