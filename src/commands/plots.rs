@@ -99,7 +99,8 @@ fn of_one(run: &History) -> Vec<Series> {
     all.into_iter().flatten().collect()
 }
 
-/// Return a curve of each run. Runs that are not solved do not stretch the axes: they are cut where those of solved runs end.
+/// Return a curve of each run. Runs that are not solved do not stretch the axes: they are cut where those of solved
+/// runs end.
 fn of_several(runs: &[History], value: fn(&Row) -> f64) -> Vec<Series> {
     let solved = || runs.iter().filter(|run| run.is_solved).flat_map(|run| &run.rows);
     let last = solved().map(|row| row.iteration).max().unwrap_or(usize::MAX);

@@ -35,7 +35,8 @@ pub struct SweepArgs {
     verbosity: VerbosityArgs,
 }
 
-/// Solve a scene for every combination of values, and write `sweep.csv`, `history.csv`, `convergence.svg` and `pressure.svg`.
+/// Solve a scene for every combination of values, and write `sweep.csv`, `history.csv`, `convergence.svg` and
+/// `pressure.svg`.
 ///
 /// Return the exit code: that of a run that did not converge, if there is one. A signal ends the sweep with the run under way.
 ///

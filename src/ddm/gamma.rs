@@ -53,7 +53,8 @@ pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
     })
 }
 
-/// gamma^k that depends on k alone: always the same, as in the paper, from a list whose last value stays, or from an expression.
+/// gamma^k that depends on k alone: always the same, as in the paper, from a list whose last value stays, or from an
+/// expression.
 struct OfIteration<F>(F);
 
 impl<F: Fn(usize) -> f64> GammaRule for OfIteration<F> {

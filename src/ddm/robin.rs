@@ -43,7 +43,8 @@ pub(super) struct Corrector<'a> {
 }
 
 impl Corrector<'_> {
-    /// Return r and z at an iterate with this layer, or the status that ends the run because G is singular or its solver fails.
+    /// Return r and z at an iterate with this layer, or the status that ends the run because G is singular or its
+    /// solver fails.
     fn correct(
         &mut self,
         run: &mut Run,
@@ -60,8 +61,8 @@ impl Corrector<'_> {
         self.sweeper.sweep(run.model, u, layer, run.observer.asked()).map(Ok)
     }
 
-    /// Do the work of [`Self::correct`] with the matrix of all bodies. Where no closed contact resists a motion, a spring stands in for it, as in the linear
-    /// steps of Newton's method.
+    /// Do the work of [`Self::correct`] with the matrix of all bodies. Where no closed contact resists a motion, a
+    /// spring stands in for it, as in the linear steps of Newton's method.
     fn correct_jointly(
         &mut self,
         run: &mut Run,
@@ -88,8 +89,8 @@ impl Corrector<'_> {
         }))
     }
 
-    /// Move the bodies from the motions of a start to displacements of least energy with its trace (2n). With the matrix of all bodies these
-    /// have its closings B u; no iterate's closings depend on another part of a start.
+    /// Move the bodies from the motions of a start to displacements of least energy with its trace (2n). With the
+    /// matrix of all bodies these have its closings B u; no iterate's closings depend on another part of a start.
     pub fn extend(
         &mut self,
         model: &mut Model,
@@ -111,8 +112,8 @@ impl Corrector<'_> {
         }))
     }
 
-    /// Solve (K + B' diag(`springs`) B) z = r = f - K u - B' `force` for all bodies together, as accurately as sweeps solve for each. Return r, the energies
-    /// of u, and z.
+    /// Solve (K + B' diag(`springs`) B) z = r = f - K u - B' `force` for all bodies together, as accurately as sweeps
+    /// solve for each. Return r, the energies of u, and z.
     fn solve_jointly(
         &mut self,
         model: &mut Model,

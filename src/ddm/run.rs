@@ -83,8 +83,8 @@ impl Outcome {
 }
 
 impl Run<'_> {
-    /// Sum the numbers of an iterate over the ranks: u'Ku, u'Ku/2 - f'u, `more`, factorisations and inner iterations of the bodies' solvers, and requests
-    /// from outside.
+    /// Sum the numbers of an iterate over the ranks: u'Ku, u'Ku/2 - f'u, `more`, factorisations and inner iterations of
+    /// the bodies' solvers, and requests from outside.
     pub fn sum(&self, energy: Energy, more: f64) -> Vec<f64> {
         let mut sums = vec![energy.strain, energy.potential, more, 0.0, 0.0];
         for (_, body) in self.model.locals().filter(|(_, body)| body.dofs().leads()) {

@@ -1,4 +1,5 @@
-//! The cache of meshes that Gmsh made: one file for each combination of script, numbers, order, dimension, algorithm and Gmsh. Its name is a digest of these.
+//! The cache of meshes that Gmsh made: one file for each combination of script, numbers, order, dimension, algorithm
+//! and Gmsh. Its name is a digest of these.
 //!
 //! Where there is no Gmsh, the newest mesh of the other inputs serves: the login node of a cluster meshes, and its other nodes solve.
 

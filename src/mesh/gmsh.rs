@@ -95,8 +95,8 @@ impl Gmsh {
         format!("{} {size} {}", self.program.display(), time.unwrap_or_default().as_nanos())
     }
 
-    /// Return whether HXT makes the same mesh in every run, on one thread. Before version 4.12 it depends on addresses in memory
-    /// ([issue 2255](https://gitlab.onelab.info/gmsh/gmsh/-/issues/2255)).
+    /// Return whether HXT makes the same mesh in every run, on one thread. Before version 4.12 it depends on addresses
+    /// in memory ([issue 2255](https://gitlab.onelab.info/gmsh/gmsh/-/issues/2255)).
     pub fn has_steady_hxt(&self) -> bool {
         let said = Command::new(&self.program).arg("--version").stdin(Stdio::null()).output();
         // versions 4.8 to 4.15 say it in either stream

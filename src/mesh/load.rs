@@ -210,7 +210,8 @@ impl Wanted<'_> {
         Ok(Loaded { file: cache.file(&name), ..loaded })
     }
 
-    /// Return the mesh from the cache, if it is there. A file of the cache that cannot be read or is damaged counts as absent.
+    /// Return the mesh from the cache, if it is there. A file of the cache that cannot be read or is damaged counts as
+    /// absent.
     fn find<const D: usize>(&self, cache: &Cache) -> Option<Loaded<D>> {
         let known = match Gmsh::find() {
             Some(gmsh) => vec![cache.file(&self.made_by(&gmsh))],
@@ -256,8 +257,8 @@ pub(super) struct Meshing<'a> {
 }
 
 impl Meshing<'_> {
-    /// Return the mesh from a cache, or by Gmsh. Tetrahedra are by HXT if it makes the same mesh in every run or the scene gives it threads, and if it
-    /// does not fail.
+    /// Return the mesh from a cache, or by Gmsh. Tetrahedra are by HXT if it makes the same mesh in every run or the
+    /// scene gives it threads, and if it does not fail.
     pub fn mesh<const D: usize>(&self, cache: &Cache) -> Result<Loaded<D>> {
         let GmshSource { file, set, guard, .. } = self.source;
         let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;

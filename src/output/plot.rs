@@ -51,7 +51,8 @@ pub enum Style {
     Dashed,
     /// A solid line with marks at the points.
     LineMarkers,
-    /// A line with a number at its end, dashed after each turn of the palette, so that more curves than colours can be told apart.
+    /// A line with a number at its end, dashed after each turn of the palette, so that more curves than colours can be
+    /// told apart.
     Numbered(usize),
 }
 

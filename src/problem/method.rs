@@ -153,7 +153,8 @@ impl Check for MethodSpec {
     }
 }
 
-/// Most iterations for which an expression for gamma is checked beforehand: more than a run makes, checked in less than a second.
+/// Most iterations for which an expression for gamma is checked beforehand: more than a run makes, checked in less than
+/// a second.
 const MOST: usize = 1_000_000;
 
 /// The methods.
@@ -169,7 +170,8 @@ pub enum MethodName {
     NewtonRobin,
     /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
     Newton,
-    /// The paper's iteration (34) with the form (35), one matrix of all bodies with the tangents at the iterate: for gamma = 1 the semismooth Newton method.
+    /// The paper's iteration (34) with the form (35), one matrix of all bodies with the tangents at the iterate: for
+    /// gamma = 1 the semismooth Newton method.
     Semismooth,
 }
 

@@ -200,7 +200,8 @@ impl Coefficient {
     }
 }
 
-/// Return whether a point at x with this tangent of the layer is in the zone of a surface, 0 or 1 of `between`, in iteration `k`.
+/// Return whether a point at x with this tangent of the layer is in the zone of a surface, 0 or 1 of `between`, in
+/// iteration `k`.
 fn is_inside(zone: &Zone, surface: usize, tangent: f64, x: [f64; 3], k: usize) -> Result<bool> {
     match zone {
         Zone::None => Ok(false),

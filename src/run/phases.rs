@@ -190,7 +190,8 @@ where
     }
 }
 
-/// Return the bodies of a scene and their mesh, with its file. The first rank runs Gmsh, reads the mesh and checks it. Collective.
+/// Return the bodies of a scene and their mesh, with its file. The first rank runs Gmsh, reads the mesh and checks it.
+/// Collective.
 fn verified<const D: usize>(
     session: &Session,
     scene: &Scene,

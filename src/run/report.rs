@@ -54,8 +54,8 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     report
 }
 
-/// Share of all forces on a body, fixed against a motion that facets resist, that its node may carry without a warning: the forces of facets along that motion.
-/// Loads may lack balance by as much.
+/// Share of all forces on a body, fixed against a motion that facets resist, that its node may carry without a warning:
+/// the forces of facets along that motion. Loads may lack balance by as much.
 const OF_FACETS: f64 = 1e-3;
 
 /// Add the status and the results of the iteration.

@@ -82,8 +82,8 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
     }
 }
 
-/// Return what to try instead. Only `robin` and `semismooth` have a step length that a user can make shorter; other methods choose it
-/// themselves.
+/// Return what to try instead. Only `robin` and `semismooth` have a step length that a user can make shorter; other
+/// methods choose it themselves.
 fn alternative(outcome: &Outcome) -> &'static str {
     match outcome.method {
         "robin" | "semismooth" => "a smaller method.gamma, or --method auto",

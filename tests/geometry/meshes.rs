@@ -480,7 +480,8 @@ fn parts_of_a_group_are_bodies() {
     assert!(run.code == 3 && run.stderr.contains("`all_blocks_1` is a connected part"), "{}", run.said());
 }
 
-/// A unit cube under pressure, meshed by a Gmsh of a version that is said to be this one: the counter of meshes without HXT, and the calls.
+/// A unit cube under pressure, meshed by a Gmsh of a version that is said to be this one: the counter of meshes without
+/// HXT, and the calls.
 fn by_version(folder: &Path, version: &str, geo: &str, threads: &str) -> (u64, Vec<String>) {
     let bin = folder.join(version);
     std::fs::create_dir_all(&bin).expect("a folder");
@@ -514,7 +515,8 @@ fn by_version(folder: &Path, version: &str, geo: &str, threads: &str) -> (u64, V
     (report["meshes_without_hxt"].as_u64().expect("a counter"), calls.lines().map(str::to_owned).collect())
 }
 
-/// HXT is the default from the version on that makes one mesh in all runs, gives way where it fails, and is what threads are for.
+/// HXT is the default from the version on that makes one mesh in all runs, gives way where it fails, and is what
+/// threads are for.
 #[test]
 fn tetrahedra_are_by_hxt_where_it_is_steady() {
     let folder = tempfile::tempdir().expect("a folder");

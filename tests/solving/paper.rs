@@ -3,7 +3,8 @@
 use crate::common::here::solve_here;
 use crate::common::{Scene, case, solve};
 
-/// Two unit blocks that can only be compressed, with these moduli, the upper one pressed down by 0.01, and a layer p = (c/B)^2.
+/// Two unit blocks that can only be compressed, with these moduli, the upper one pressed down by 0.01, and a layer p =
+/// (c/B)^2.
 fn blocks([lower, upper]: [f64; 2], method: &str) -> Scene {
     let geo = concat!(env!("CARGO_MANIFEST_DIR"), "/meshes/stack/stack.geo");
     let block = |name: &str, young: f64, fix: &str| {
@@ -21,9 +22,9 @@ fn blocks([lower, upper]: [f64; 2], method: &str) -> Scene {
 
 const B: f64 = 2e-3;
 
-/// Increments of both blocks in the first steps of (34), (42), from displacements u of the contact along the outer normals: the form G of a step has
-/// the stiffness of the blocks on the diagonal, psi kappa of each side beside it, and `coupled` psi kappa between them. The paper's law is odd,
-/// so that kappa is positive where the layer is open, too.
+/// Increments of both blocks in the first steps of (34), (42), from displacements u of the contact along the outer
+/// normals: the form G of a step has the stiffness of the blocks on the diagonal, psi kappa of each side beside it, and
+/// `coupled` psi kappa between them. The paper's law is odd, so that kappa is positive where the layer is open, too.
 fn increments(
     k: [f64; 2],
     mut u: [f64; 2],
@@ -45,7 +46,8 @@ fn increments(
     (0..6).map(step).collect()
 }
 
-/// Whether increments are the expected ones. A start has its trace to about 1e-3; where u is small, its error counts as often as the step is longer than u.
+/// Whether increments are the expected ones. A start has its trace to about 1e-3; where u is small, its error counts as
+/// often as the step is longer than u.
 fn are_alike(ours: [f64; 2], expected: [f64; 2]) -> bool {
     (0..2).all(|side| (ours[side] / expected[side] - 1.0).abs() < 0.01 * (1.0 + expected[side]))
 }
