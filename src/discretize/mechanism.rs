@@ -14,7 +14,7 @@
 use super::whole::{NO_WORK, WholeBody};
 use crate::contact::ContactPair;
 use crate::error::{few, joined};
-use crate::fem::{PointExtent, RigidMotion, rigid};
+use crate::fem::{PointExtent, RigidMotion, length, minus, rigid, unit};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
 use crate::model::Mechanism;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -23,9 +23,12 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 const LACKING: f64 = 1e-3;
 
 /// Find the motions that nothing resists. Fix those on which no load works. `lack` is the share that chords may take from the balance of loads.
-pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], lack: f64) -> Vec<Mechanism> {
+///
+/// Both sides of a pair slide along each other in such a motion: the normals of the pair are turned across it.
+pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &mut [ContactPair], lack: f64) -> Vec<Mechanism> {
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
-    let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
+    let mut search =
+        MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new(), fixed: Vec::new() };
     for group in search.groups() {
         search.settle(search.as_one(&group), |_| false);
     }
@@ -34,11 +37,13 @@ pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], l
         let least = search.tolerance();
         let is_resisted = |motion: &DVector<f64>| squares.closing.energy(motion) > least * motion.norm_squared();
         search.settle(search.kernel(&squares), is_resisted);
+        search.turn_normals();
     }
     search.found
 }
 
 /// A motion of some bodies, each of which is rigid.
+#[derive(Clone)]
 struct GroupMotion<const D: usize> {
     /// Indices of the bodies that it moves.
     bodies: Vec<usize>,
@@ -50,12 +55,14 @@ struct GroupMotion<const D: usize> {
 
 struct MechanismSearch<'p, 's, const D: usize> {
     bodies: &'p mut [WholeBody<'s, D>],
-    pairs: &'p [ContactPair],
+    pairs: &'p mut [ContactPair],
     /// Angle by which errors of coordinates turn normals.
     tilt: f64,
     /// Largest work of the loads on a motion, as a share of what forces of their sizes could do, that the mesh may be blamed for.
     lack: f64,
     found: Vec<Mechanism>,
+    /// The motions that contact does not resist and that are fixed.
+    fixed: Vec<GroupMotion<D>>,
 }
 
 impl<const D: usize> MechanismSearch<'_, '_, D> {
@@ -149,9 +156,10 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let works = self.bodies.iter().flat_map(|body| body.motions.iter().map(|motion| motion.work));
             let loads = DVector::from_vec(works.collect());
             let yielding = held.solve(&loads);
-            free.extend(found.unwrap_or(doubtful).into_iter().map(|motion| {
+            let found = squares.rounded(found.unwrap_or(doubtful));
+            free.extend(found.into_iter().map(|motion| {
                 let is_exact = closing.energy(&motion) <= self.tolerance() * motion.norm_squared();
-                if is_exact { motion } else { squares.plain(motion, &loads, &yielding) }
+                if is_exact { motion } else { squares.unloaded(motion, &loads, &yielding) }
             }));
         }
         free
@@ -187,6 +195,67 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             }
         }
         Squares { closing, leaning, error }
+    }
+
+    /// Turn the normals of all pairs across the motions that are fixed, so that contact does not resist them to the last digit.
+    ///
+    /// Let V hold the relative displacements v_j of both sides at a point, averaged as its rows do. The new normal is the direction of
+    /// (I + V V' / s)^-1 n with s = [`TOLERANCE`]: the part of n along V vanishes. If two motions span all directions, as those of two discs
+    /// that turn for themselves nearly do, the direction is that of least displacement.
+    fn turn_normals(&mut self) {
+        if self.fixed.is_empty() {
+            return;
+        }
+        for number in 0..self.pairs.len() {
+            let pair = &self.pairs[number];
+            let motions: Vec<&GroupMotion<D>> = self.fixed.iter().filter(|moving| self.slides(moving, pair)).collect();
+            if motions.is_empty() || pair.spread.is_empty() {
+                continue;
+            }
+            let normal: Vec<[f64; D]> = (0..pair.len()).map(|q| self.across(&motions, pair, q)).collect();
+            // an obstacle has the rows of the surface before it until it is a rigid part
+            let [a, b] = pair.bodies;
+            let dofs =
+                [a, if b < self.bodies.len() { b } else { a }].map(|body| self.bodies[body].part.mesh.node_dofs());
+            self.pairs[number].turn(&normal, dofs);
+        }
+        for body in self.bodies.iter_mut() {
+            body.collect_rows(self.pairs);
+            body.find_motions();
+        }
+    }
+
+    /// Return whether the two sides of a pair slide along each other in a motion. Bodies that move as one do not.
+    fn slides(&self, moving: &GroupMotion<D>, pair: &ContactPair) -> bool {
+        let at = |body: usize, x: &[f64; 3]| {
+            let motion = moving.of(body).map(|motion| (motion, self.bodies[body].part.mesh.space.datum));
+            motion.map_or([0.0; D], |(motion, datum)| motion.at(&std::array::from_fn(|c| x[c] - datum[c])))
+        };
+        let [a, b] = pair.bodies;
+        a != b && pair.position.iter().any(|x| length(minus(at(a, x), at(b, x))) > PART * moving.amounts.norm())
+    }
+
+    /// Return the normal of a point of a pair, turned across motions.
+    fn across(&self, motions: &[&GroupMotion<D>], pair: &ContactPair, q: usize) -> [f64; D] {
+        let displacement = |moving: &&GroupMotion<D>| {
+            let mut v = DVector::<f64>::zeros(D);
+            for (side, (&body, sign)) in pair.bodies.iter().zip([1.0, -1.0]).enumerate() {
+                let Some(motion) = moving.of(body) else { continue };
+                for (node, share) in pair.shares::<D>(side, q) {
+                    let u = self.bodies[body].part.mesh.at(motion, node);
+                    v.axpy(sign * share, &DVector::from_row_slice(&u), 1.0);
+                }
+            }
+            v / moving.amounts.norm()
+        };
+        let all = DMatrix::from_columns(&motions.iter().map(displacement).collect::<Vec<_>>());
+        let svd = all.svd(true, false);
+        let normal = DVector::from_row_slice(&pair.normal[q][..D]);
+        let mut turned = normal.clone();
+        for (u, sigma) in svd.u.iter().flat_map(|u| u.column_iter()).zip(&svd.singular_values) {
+            turned.axpy(-u.dot(&normal) * sigma * sigma / (sigma * sigma + TOLERANCE), &u, 1.0);
+        }
+        unit(std::array::from_fn(|c| turned[c]))
     }
 
     /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of the share of each point in the area.
@@ -252,6 +321,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             let balanced = if most > self.tilt.max(NO_WORK) { most } else { 0.0 };
             let mut mechanism = Mechanism { balanced, ..mechanism(joined(names)) };
             for (_, moving) in set {
+                self.fixed.push(moving.clone());
                 mechanism.fixed = self.pin(moving, &mut pins).or(mechanism.fixed);
             }
             self.found.push(mechanism);
@@ -277,7 +347,30 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
             }
             spans.push((rigid::sum(&whole, &DVector::from_vec(amounts)), moving.amounts.clone()));
         }
-        rigid::apart(spans).into_iter().map(|(motion, amounts)| (motion.in_words(), self.moving(amounts))).collect()
+        let bodies = &set[0].bodies;
+        let spans = rigid::apart(spans);
+        let shifts = rigid::to_common_point(&spans.iter().map(|(motion, _)| motion).collect::<Vec<_>>());
+        let shifted = |((motion, amounts), shift): ((RigidMotion<D>, DVector<f64>), [f64; D])| {
+            let parts = (0..D).filter(|&c| shift[c] != 0.0).map(|c| shift[c] * self.as_group(bodies, &whole[c]));
+            (motion, parts.fold(amounts, |sum, part| sum + part))
+        };
+        spans
+            .into_iter()
+            .zip(shifts)
+            .map(shifted)
+            .map(|(motion, amounts)| (motion.in_words(), self.moving(amounts)))
+            .collect()
+    }
+
+    /// Return the amounts of one motion of several bodies, as near as the motions that supports leave come to it.
+    fn as_group(&self, bodies: &[usize], motion: &RigidMotion<D>) -> DVector<f64> {
+        let mut amounts = DVector::zeros(self.count());
+        for &body in bodies {
+            let left: Vec<Vec<f64>> = self.unconstrained(body).iter().map(|own| self.at_corners(body, own)).collect();
+            let own = fit(&left, &self.at_corners(body, motion));
+            amounts.as_mut_slice()[self.first(body)..][..own.len()].copy_from_slice(&own);
+        }
+        amounts
     }
 
     /// Return the name of a motion of several bodies, each of which has its own.
@@ -377,19 +470,26 @@ struct Squares {
 }
 
 impl Squares {
-    /// Return the plainest motion that differs from a motion by no more than its error: without small parts, and such that loads do no work on it.
-    /// `yielding` are the motions by which contact yields to the loads.
-    fn plain(&self, motion: DVector<f64>, loads: &DVector<f64>, yielding: &DVector<f64>) -> DVector<f64> {
-        let most = self.closing.energy(&motion) + self.error.energy(&motion);
-        let is_near = |other: &DVector<f64>| self.closing.energy(other) <= most;
-        let least = SLIGHT * motion.amax();
-        let mut found = motion;
-        let rounded = found.map(|part| if part.abs() < least { 0.0 } else { part });
-        if is_near(&rounded) {
-            found = rounded;
-        }
-        let unloaded = &found - loads.dot(&found) / loads.dot(yielding) * yielding;
-        if is_near(&unloaded) { unloaded } else { found }
+    /// Return whether a motion differs from another by no more than the error of that one.
+    fn is_near(&self, motion: &DVector<f64>, other: &DVector<f64>) -> bool {
+        self.closing.energy(motion) <= self.closing.energy(other) + self.error.energy(other)
+    }
+
+    /// Return motions without their small parts, if these may be errors in all of them.
+    fn rounded(&self, motions: Vec<DVector<f64>>) -> Vec<DVector<f64>> {
+        let round = |motion: &DVector<f64>| {
+            let least = SLIGHT * motion.amax();
+            motion.map(|part| if part.abs() < least { 0.0 } else { part })
+        };
+        let rounded: Vec<DVector<f64>> = motions.iter().map(round).collect();
+        let all_near = rounded.iter().zip(&motions).all(|(rounded, motion)| self.is_near(rounded, motion));
+        if all_near { rounded } else { motions }
+    }
+
+    /// Return a motion without the part on which loads work, if that may be an error. `yielding` are the motions by which contact yields to the loads.
+    fn unloaded(&self, motion: DVector<f64>, loads: &DVector<f64>, yielding: &DVector<f64>) -> DVector<f64> {
+        let unloaded = &motion - loads.dot(&motion) / loads.dot(yielding) * yielding;
+        if self.is_near(&unloaded, &motion) { unloaded } else { motion }
     }
 }
 
