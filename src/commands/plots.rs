@@ -107,7 +107,7 @@ fn of_several(runs: &[History], value: fn(&Row) -> f64) -> Vec<Series> {
     let largest = solved().map(value).reduce(f64::max).unwrap_or(f64::INFINITY);
     let curve = |(index, run): (usize, &History)| {
         let shown = run.rows.iter().filter(|row| row.iteration <= last);
-        let points = shown.map(|row| (row.iteration as f64, value(row))).filter(|point| !(point.1 > largest)).collect();
+        let points = shown.map(|row| (row.iteration as f64, value(row))).filter(|point| point.1 <= largest).collect();
         Series::new(&run.label[..], points, Style::Numbered(index + 1)).color(Color::Palette(index))
     };
     runs.iter().enumerate().map(curve).collect()
