@@ -262,6 +262,11 @@ impl Error {
         &self.0.message
     }
 
+    /// Return the causes.
+    pub fn causes(&self) -> &[String] {
+        &self.0.causes
+    }
+
     /// Return the advice, if there is one.
     pub fn advice(&self) -> Option<&str> {
         self.0.help.as_deref()

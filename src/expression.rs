@@ -175,6 +175,11 @@ impl Field {
         }
     }
 
+    /// Return the value in iteration `k`, for an expression that depends on nothing else.
+    pub fn in_iteration(&self, k: usize) -> f64 {
+        self.eval_at([f64::NAN; 3], k as f64)
+    }
+
     /// Return the field of a load step with these factors.
     pub fn in_step(&self, factors: &[f64]) -> Self {
         match self {

@@ -143,9 +143,10 @@ fn problem_digest(scene: &Scene, Built { mesh, discrete, .. }: &Built) -> String
     let mut problem = scene.problem();
     problem["method"] = problem["method"]["steps"].take();
     remove(&mut problem, "", &["solver", "estimate"]);
-    remove(&mut problem, "/mesh", &["timeout"]);
+    remove(&mut problem, "/mesh", &["timeout", "threads"]);
     let bodies = discrete.bodies.iter().map(|body| (&body.name, body.nodes, body.cells, body.dofs));
     // gaps follow from these and the scene, and may change from step to step
     let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.area));
-    digest(&(problem.to_string(), mesh, bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
+    let file = mesh.as_ref().map(|mesh| &mesh.digest);
+    digest(&(problem.to_string(), file, bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
 }

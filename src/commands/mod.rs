@@ -78,8 +78,8 @@ impl Terminal {
         let solvers = GatheredCounters::gather(discrete).solvers;
         let mut lines = vec![format!("{}: decided", scene.title)];
         let name = scene.method.name.name();
-        let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
-        let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
+        let has_steps = scene.method.name != MethodName::Robin;
+        let linear = if has_steps { format!("; linear steps: {}", built.linear.name()) } else { String::new() };
         lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));
         lines.push(format!("  inner solver: {} ({})", solvers_in_words(&solvers), built.choice));
         lines.push(format!("  {} ranks, {}", session.size(), session.blas_name()));
@@ -110,7 +110,7 @@ pub struct SceneArgs {
     /// Replace a key of the scene, for example method.gamma=0.3 or contact.0.layer.power.a=0.3; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Method: auto, robin, newton-robin or newton (short for --set method.name=NAME)
+    /// Method: auto, robin, newton-robin, newton or semismooth (short for --set method.name=NAME)
     #[arg(long, value_name = "NAME")]
     method: Option<String>,
     /// Estimate the error of the discretisation (short for --set estimate=true)

@@ -12,13 +12,22 @@ use crate::run::{Done, numbered, results};
 use crate::scene::Scene;
 use std::collections::BTreeMap;
 
+/// The iterations of a run.
+struct History {
+    label: String,
+    rows: Vec<Row>,
+    /// Whether the run ends by the increment alone.
+    by_increment: bool,
+    is_solved: bool,
+}
+
 /// The plots of runs on the same pairs of surfaces.
 #[derive(Default)]
 pub struct Plots {
     /// Title of the first run.
     title: String,
-    /// Label and iterations of each run.
-    histories: Vec<(String, Vec<Row>)>,
+    /// The iterations of each run.
+    histories: Vec<History>,
     /// The pressures of all runs along each pair, and last the reference.
     pressures: BTreeMap<usize, Plot>,
 }
@@ -30,7 +39,13 @@ impl Plots {
         if self.histories.is_empty() {
             self.title.clone_from(&done.built.scene.title);
         }
-        self.histories.push((label.to_owned(), history(done)));
+        let stop = &done.built.scene.method.stop;
+        self.histories.push(History {
+            label: label.to_owned(),
+            rows: history(done),
+            by_increment: stop.increment.is_some() && stop.residual.is_none(),
+            is_solved: done.outcome.status.is_solved(),
+        });
         for &i in shown.iter().filter(|&&i| pairs.get(i).is_some_and(|pair| pair.along_curve)) {
             let Plot { series, .. } = self.pressures.entry(i).or_insert_with(|| pressure_plot(done, i));
             let pressure = &done.outcome.layer.pressure[done.model().range(i)];
@@ -51,37 +66,51 @@ impl Plots {
         self.files().zip(self.pressures()).try_for_each(|((_, file), plot)| folder.write(&file, |out| plot.write(out)))
     }
 
-    /// Return the plot of residual (solid) and increment (dashed) of the runs over the iteration, and of the error of a single one.
+    /// Return the plot of the iterations of one run, or of several.
     pub fn convergence(&self) -> Plot {
-        let runs = &self.histories;
-        let is_one = runs.len() == 1;
-        let has_increments = runs.iter().flat_map(|(_, rows)| rows).any(|row| row.increment > 0.0);
-        let mut series = Vec::new();
-        for (index, (label, rows)) in runs.iter().enumerate() {
-            let curve = |label: &str, style, value: fn(&Row) -> f64| {
-                let points = rows.iter().map(|row| (row.iteration as f64, value(row))).collect();
-                Series::new(label, points, style).color(Color::Palette(index))
-            };
-            series.push(curve(if is_one { "residual" } else { label }, Style::Line, |row| row.residual));
-            if has_increments {
-                series.push(curve(if is_one { "increment" } else { "" }, Style::Dashed, |row| row.increment));
+        let (name, series) = match &self.histories[..] {
+            [run] => ("relative size", of_one(run)),
+            runs if runs.iter().all(|run| run.by_increment) => {
+                ("relative increment", of_several(runs, |row| row.increment))
             }
-            if is_one && rows.iter().any(|row| row.error > 0.0) {
-                series.push(curve("error", Style::LineMarkers, |row| row.error).color(Color::Palette(1)));
-            }
-        }
-        if !is_one && has_increments {
-            for (label, style) in [("residual", Style::Line), ("increment", Style::Dashed)] {
-                series.push(Series::new(label, Vec::new(), style).color(Color::Grey));
-            }
-        }
-        Plot { title: self.title.clone(), x: PlotAxis::linear("iteration"), y: PlotAxis::log("relative size"), series }
+            runs => ("relative residual", of_several(runs, |row| row.residual)),
+        };
+        Plot { title: self.title.clone(), x: PlotAxis::linear("iteration"), y: PlotAxis::log(name), series }
     }
 
     /// Return the plots of pressures, in the order of [`Self::files`].
     pub fn pressures(&self) -> impl Iterator<Item = &Plot> {
         self.pressures.values()
     }
+}
+
+/// Return the curves of residual (solid), increment (dashed) and error of a run.
+fn of_one(run: &History) -> Vec<Series> {
+    let curve = |label: &str, style, color, value: fn(&Row) -> f64| {
+        let points: Vec<_> = run.rows.iter().map(|row| (row.iteration as f64, value(row))).collect();
+        let has_points = label == "residual" || points.iter().any(|point| point.1 > 0.0);
+        has_points.then(|| Series::new(label, points, style).color(Color::Palette(color)))
+    };
+    let all = [
+        curve("residual", Style::Line, 0, |row| row.residual),
+        curve("increment", Style::Dashed, 0, |row| row.increment),
+        curve("error", Style::LineMarkers, 1, |row| row.error),
+    ];
+    all.into_iter().flatten().collect()
+}
+
+/// Return a curve of each run. Runs that are not solved do not stretch the axes: they are cut where those of solved
+/// runs end.
+fn of_several(runs: &[History], value: fn(&Row) -> f64) -> Vec<Series> {
+    let solved = || runs.iter().filter(|run| run.is_solved).flat_map(|run| &run.rows);
+    let last = solved().map(|row| row.iteration).max().unwrap_or(usize::MAX);
+    let largest = solved().map(value).reduce(f64::max).unwrap_or(f64::INFINITY);
+    let curve = |(index, run): (usize, &History)| {
+        let shown = run.rows.iter().filter(|row| row.iteration <= last);
+        let points = shown.map(|row| (row.iteration as f64, value(row))).filter(|point| point.1 <= largest).collect();
+        Series::new(&run.label[..], points, Style::Numbered(index + 1)).color(Color::Palette(index))
+    };
+    runs.iter().enumerate().map(curve).collect()
 }
 
 /// Return the iterations of a run, those of several load steps numbered through.

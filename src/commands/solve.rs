@@ -300,7 +300,8 @@ impl Tables {
         let (built, history) = (&ready.built, &ready.built.scene.method.steps);
         let rows = RowFile::create(folder, "history.csv")?;
         let bodies = built.discrete.bodies.iter().map(|body| body.name.clone()).collect();
-        let mut tables = Self { history: Some(HistoryWriter::new(rows, bodies, !history.is_empty())), steps: None };
+        let mut tables =
+            Self { history: Some(HistoryWriter::new(rows, Vec::new(), bodies, !history.is_empty())), steps: None };
         if !history.is_empty() {
             let (rows, names) = (RowFile::create(folder, "steps.csv")?, results::names_of_results(built));
             let mut steps = StepTable { rows, count: 0, factors: history.names.clone(), names };

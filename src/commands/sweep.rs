@@ -7,10 +7,10 @@ use super::rows::Row;
 use super::solve::claim;
 use super::write::to_json;
 use super::{SceneArgs, Terminal, VerbosityArgs, folder_of};
-use crate::ddm::Status;
+use crate::ddm::{Observer, Status};
 use crate::error::{Error, Kind, Result};
 use crate::interrupt::Interrupt;
-use crate::output::tables::{self, Cell};
+use crate::output::tables::{self, Cell, HistoryWriter};
 use crate::output::{Folder, LISTED, Report, ResultNames, RowFile, busiest, say, terminal};
 use crate::parallel::collectively;
 use crate::petsc::Session;
@@ -35,7 +35,8 @@ pub struct SweepArgs {
     verbosity: VerbosityArgs,
 }
 
-/// Solve a scene for every combination of values, and write `sweep.csv`, `convergence.svg` and `pressure.svg`.
+/// Solve a scene for every combination of values, and write `sweep.csv`, `history.csv`, `convergence.svg` and
+/// `pressure.svg`.
 ///
 /// Return the exit code: that of a run that did not converge, if there is one. A signal ends the sweep with the run under way.
 ///
@@ -57,6 +58,7 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
     )?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = terminal::runs(plan.cases.len(), terminal.is_loud());
+    let has_steps = scenes.iter().any(|scene| !scene.method.steps.is_empty());
     let mut sweep = Sweep {
         session,
         interrupt,
@@ -65,7 +67,9 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         bar,
         plan: &plan,
         names: None,
+        has_steps,
         table: None,
+        history: None,
         shown: None,
         plots: Plots::default(),
         reports: Vec::new(),
@@ -133,8 +137,11 @@ struct Sweep<'a> {
     plan: &'a Plan,
     /// Names of pairs and reactions, the same for all runs.
     names: Option<ResultNames>,
-    /// `sweep.csv`, on the first rank and from the first run on.
+    /// Whether some run has load steps.
+    has_steps: bool,
+    /// `sweep.csv` and `history.csv`, on the first rank and from the first run on.
     table: Option<RowFile>,
+    history: Option<HistoryWriter>,
     /// Pairs whose pressures are drawn, the same for all runs.
     shown: Option<Vec<usize>>,
     plots: Plots,
@@ -154,6 +161,9 @@ impl Sweep<'_> {
             // before anything is computed that could be lost
             self.folder.clear()?;
             self.table = Some(RowFile::create(&self.folder, "sweep.csv")?);
+            let rows = RowFile::create(&self.folder, "history.csv")?;
+            let bodies = ready.built.discrete.bodies.iter().map(|body| body.name.clone()).collect();
+            self.history = Some(HistoryWriter::new(rows, self.plan.fields(case).collect(), bodies, self.has_steps));
         }
         let decisions = self.terminal.decisions(session, &ready)?;
         self.bar.suspend(|| decisions.iter().for_each(|line| eprintln!("{line}")));
@@ -167,6 +177,10 @@ impl Sweep<'_> {
         if let (Some(table), Some(names)) = (&mut self.table, &self.names) {
             let fields = self.plan.fields(case).chain(row.fields()).chain(result_fields(&report, names));
             table.push(&fields.collect::<Vec<_>>());
+        }
+        if let Some(history) = &mut self.history {
+            history.first = self.plan.fields(case).collect();
+            done.earlier.iter().chain(&done.outcome.rows).for_each(|row| history.row(row));
         }
         self.bar.inc(1);
         // with `-q` only runs that are not solved are printed
@@ -182,7 +196,8 @@ impl Sweep<'_> {
 
     /// End the table, draw the plots if they are wanted, and print the reports or the folder.
     fn finish(self, has_plots: bool) -> Result<()> {
-        let mut written = self.table.map_or(Ok(()), RowFile::finish);
+        let tables = [self.table, self.history.map(|history| history.rows)];
+        let mut written = tables.into_iter().flatten().map(RowFile::finish).fold(Ok(()), Result::and);
         if has_plots {
             written = written.and(self.plots.write(&self.folder));
         }

@@ -5,21 +5,22 @@ use crate::linalg::dot;
 use crate::model::Model;
 use crate::model::field::{LineEnergy, Unbounded};
 use crate::model::layer::Layer;
+use crate::model::linear::LinearStep;
 use crate::problem::Own;
 use crate::problem::method::Gamma;
 use crate::robin::Sweep;
 
 /// The present iterate.
 pub struct Iterate<'a> {
-    /// The problem. Its bodies carry the Robin term of this iterate.
+    /// The problem. For sweeps its bodies carry the Robin term of this iterate.
     pub model: &'a mut Model,
+    /// The solver of all bodies, which can multiply by K.
+    pub linear: &'a mut dyn LinearStep,
     /// Number of the iterate.
     pub k: usize,
     /// The layers at the iterate.
     pub layer: &'a Layer,
-    /// The Robin term, omega psi kappa of each contact row (2n).
-    pub weight: &'a [f64],
-    /// The sweep at the iterate: r and z = G^-1 r.
+    /// r and z = G^-1 r at the iterate, by a sweep or with one matrix of all bodies.
     pub sweep: &'a Sweep,
     /// Relative residual.
     pub residual: f64,
@@ -42,22 +43,23 @@ pub type OwnRules = Own<dyn Fn() -> Box<dyn GammaRule>>;
 /// # Errors
 /// A name that no rule of the program has.
 pub fn rule(gamma: &Gamma, own: &OwnRules) -> Result<Box<dyn GammaRule>> {
-    Ok(match gamma {
-        Gamma::Stationary(gamma) => Box::new(Schedule(vec![*gamma])),
-        Gamma::Schedule(list) => Box::new(Schedule(list.clone())),
+    Ok(match gamma.clone() {
+        Gamma::Stationary(gamma) => Box::new(OfIteration(move |_| gamma)),
+        Gamma::Schedule(list) => Box::new(OfIteration(move |k: usize| list[k.min(list.len() - 1)])),
+        Gamma::Expression(gamma) => Box::new(OfIteration(move |k| gamma.in_iteration(k))),
         Gamma::LineSearch => Box::new(LineSearch),
         Gamma::Aitken => Box::new(Aitken::default()),
-        Gamma::Own(name) => own.get("rule for gamma", name)?(),
+        Gamma::Own(name) => own.get("rule for gamma", &name)?(),
     })
 }
 
-/// gamma^k from a list; the last value stays. With one value it is gamma^k = gamma, as in the paper.
-#[derive(Debug, Clone)]
-pub struct Schedule(pub Vec<f64>);
+/// gamma^k that depends on k alone: always the same, as in the paper, from a list whose last value stays, or from an
+/// expression.
+struct OfIteration<F>(F);
 
-impl GammaRule for Schedule {
+impl<F: Fn(usize) -> f64> GammaRule for OfIteration<F> {
     fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
-        Ok(self.0[here.k.min(self.0.len() - 1)])
+        Ok((self.0)(here.k))
     }
 }
 
@@ -68,7 +70,7 @@ pub struct LineSearch;
 impl GammaRule for LineSearch {
     fn gamma(&mut self, here: &mut Iterate) -> Result<f64, Unbounded> {
         let z = &here.sweep.correction;
-        let products = here.model.multiply(&z.displacements);
+        let products = here.linear.multiply(here.model, &z.displacements);
         LineEnergy::new(here.model, here.layer, &here.sweep.residual, z, &products).minimize(1e-6)
     }
 }

@@ -326,20 +326,11 @@ impl Newton<'_, '_> {
         })
     }
 
-    /// Sum the numbers of an iterate over the ranks: u'Ku, u'Ku/2 - f'u, the squared energy norm of the unbalanced forces `rest` of each node, the work of the
-    /// bodies' solvers, and requests from outside.
+    /// Return the sums of [`Run::sum`] with the squared energy norm of the unbalanced forces `rest` of each node.
     fn sum(&self, rest: &[Vec<f64>], energy: Energy) -> Vec<f64> {
         let model = &*self.run.model;
         let unbalanced = unbalanced(model, rest, &self.states.springs(model));
-        let mut sums = vec![energy.strain, energy.potential, unbalanced, 0.0, 0.0];
-        for (_, body) in model.locals().filter(|(_, body)| body.dofs().leads()) {
-            let counts = body.counts();
-            sums[3] += counts.factorizations as f64;
-            sums[4] += counts.inner_iterations as f64;
-        }
-        sums.extend(asks(self.run.observer.asked()));
-        model.exchange.sum(&mut sums);
-        sums
+        self.run.sum(energy, unbalanced)
     }
 
     /// Look at the equilibrium of an iterate once more: one linear system, with the matrix of the step, for the forces that are left. Add twice the size of

@@ -1,22 +1,28 @@
-//! The paper's loop (41)-(42).
+//! The paper's loop (34), (42), with one of its two forms G.
 //!
 //! ```text
 //! layers      c = B u - d,   p = p(c)
-//! Robin term  G_s = K_s + B_s' omega psi kappa B_s                            (37)-(38)
-//! sweep       G_s z_s = r_s = f_s - K_s u_s - B_s' omega p                    (41)  every body by itself
+//! correction  G z = r = f - K u - B' omega p                                  (34)
+//!   sweep     G_s = K_s + B_s' omega psi kappa B_s    every body by itself    (37)-(38), (41)
+//!   joint     G = K + B' omega kappa B                all bodies together     (35)-(36)
 //! update      u <- u + gamma z                                                (42)
 //! ```
 
+use super::forcing::resisting;
 use super::gamma::{GammaRule, Iterate};
 use super::run::{Outcome, Row, Run};
 use super::stop::Status;
 use crate::error::Result;
+use crate::exchange::{self, ASKS};
 use crate::linalg::DIGIT;
-use crate::model::field::{Field, unbalanced};
+use crate::model::body::Energy;
+use crate::model::field::{Field, residual, unbalanced};
 use crate::model::layer::Layer;
+use crate::model::linear::{Failure, LinearResult, LinearStep, System, Trial};
+use crate::model::{INNER_TOLERANCE, Model, closing};
 use crate::robin::Sweep;
 use crate::robin::spectrum::{Interval, interval};
-use crate::robin::sweep::{Coefficient, Sweeper, underconstrained};
+use crate::robin::sweep::{Coefficient, Sweeper, extend, stiff_joint_springs, underconstrained};
 
 /// The step that led to an iterate.
 struct LastStep {
@@ -27,32 +33,136 @@ struct LastStep {
     moved: Vec<f64>,
 }
 
+/// Solves G z = r at an iterate.
+pub(super) struct Corrector<'a> {
+    /// The Robin term of sweeps; without one, G is the matrix of all bodies.
+    pub coefficient: Option<&'a mut Coefficient>,
+    pub sweeper: Sweeper,
+    /// The solver of all bodies.
+    pub linear: &'a mut dyn LinearStep,
+}
+
+impl Corrector<'_> {
+    /// Return r and z at an iterate with this layer, or the status that ends the run because G is singular or its
+    /// solver fails.
+    fn correct(
+        &mut self,
+        run: &mut Run,
+        u: &Field,
+        layer: &Layer,
+        k: usize,
+    ) -> Result<std::result::Result<Sweep, Status>> {
+        let Some(coefficient) = &mut self.coefficient else { return self.correct_jointly(run, u, layer) };
+        let weight = coefficient.weight(run.model, layer, k)?;
+        if let Some(moved) = underconstrained(run.model, &weight) {
+            return Ok(Err(Status::Underconstrained(moved)));
+        }
+        run.model.robin(&weight)?;
+        self.sweeper.sweep(run.model, u, layer, run.observer.asked()).map(Ok)
+    }
+
+    /// Do the work of [`Self::correct`] with the matrix of all bodies. Where no closed contact resists a motion, a
+    /// spring stands in for it, as in the linear steps of Newton's method.
+    fn correct_jointly(
+        &mut self,
+        run: &mut Run,
+        u: &Field,
+        layer: &Layer,
+    ) -> Result<std::result::Result<Sweep, Status>> {
+        let springs = resisting(run.model, layer).all;
+        let (residual, energy, z) = self.solve_jointly(run.model, u, layer, &springs, &layer.force)?;
+        let z = match z {
+            Ok(z) => z,
+            Err(failure) => return Ok(Err(Status::InnerSolver(failure))),
+        };
+        let (sums, joint) = (run.sum(energy, 0.0), self.linear.counts());
+        Ok(Ok(Sweep {
+            residual,
+            correction: z.field,
+            decrement: z.energy,
+            strain: sums[0],
+            potential: sums[1],
+            factorizations: sums[3] as usize + joint.factorizations,
+            inner_iterations: sums[4] as usize + joint.inner_iterations,
+            asked: exchange::asked(&sums[sums.len() - ASKS..]),
+            ..Sweep::default()
+        }))
+    }
+
+    /// Move the bodies from the motions of a start to displacements of least energy with its trace (2n). With the
+    /// matrix of all bodies these have its closings B u; no iterate's closings depend on another part of a start.
+    pub fn extend(
+        &mut self,
+        model: &mut Model,
+        u: &mut Field,
+        trace: &[f64],
+    ) -> Result<std::result::Result<(), Failure>> {
+        if self.coefficient.is_some() {
+            return Ok(extend(model, trace)?.map(|bent| *u = Field { rigid: sums(&u.rigid, &bent.rigid), ..bent }));
+        }
+        u.retrace(model);
+        let springs = stiff_joint_springs(model);
+        let missing = closing(trace).zip(closing(&u.trace)).map(|(wanted, now)| wanted - now);
+        let pull: Vec<f64> = springs.iter().zip(missing).map(|(spring, missing)| -spring * missing).collect();
+        let layer = Layer::at(model, &u.trace);
+        let (.., step) = self.solve_jointly(model, u, &layer, &springs, &pull)?;
+        Ok(step.map(|step| {
+            u.advance(model, 1.0, &step.field);
+            u.retrace(model);
+        }))
+    }
+
+    /// Solve (K + B' diag(`springs`) B) z = r = f - K u - B' `force` for all bodies together, as accurately as sweeps
+    /// solve for each. Return r, the energies of u, and z.
+    fn solve_jointly(
+        &mut self,
+        model: &mut Model,
+        u: &Field,
+        layer: &Layer,
+        springs: &[f64],
+        force: &[f64],
+    ) -> Result<(Vec<Vec<f64>>, Energy, LinearResult)> {
+        let products = self.linear.multiply(model, &u.displacements);
+        let (residual, energy) = residual(model, products, u, force);
+        let mut enough = |_: &Model, trial: &Trial| trial.is_within(INNER_TOLERANCE);
+        let z = self.linear.solve(System { model, layer, springs, residual: &residual, enough: &mut enough })?;
+        Ok((residual, energy, z))
+    }
+}
+
+/// Return the sums of two lists of amounts.
+fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
+}
+
 /// Iterate from a displacement until a rule ends the run. With `wants_interval` the interval (33) of gamma is found at the end.
 pub(super) fn iterate(
     run: &mut Run,
     rule: &mut dyn GammaRule,
-    coefficient: &mut Coefficient,
+    mut corrector: Corrector,
     mut u: Field,
     wants_interval: bool,
 ) -> Result<Outcome> {
-    let (mut sweeper, mut settling) = (Sweeper::default(), Settling::default());
+    let mut settling = Settling::default();
     let mut last: Option<LastStep> = None;
     for k in 0.. {
         let layer = Layer::at(run.model, &u.trace);
-        let weight = coefficient.weight(run.model, &layer, k)?;
-        if let Some(moved) = underconstrained(run.model, &weight) {
-            u.retrace(run.model);
-            return Ok(Outcome::at_start(Status::Underconstrained(moved), u, layer));
-        }
-        run.model.robin(&weight)?;
-        let sweep = sweeper.sweep(run.model, &u, &layer, run.observer.asked())?;
+        let sweep = match corrector.correct(run, &u, &layer, k)? {
+            Ok(sweep) => sweep,
+            Err(status) => {
+                u.retrace(run.model);
+                return Ok(Outcome::at_start(status, u, layer));
+            }
+        };
+        let sweeps = corrector.sweeper.sweeps;
         let residual = run.scale.relative(sweep.decrement, sweep.strain + layer.work);
-        let broken = record(run, &u, &layer, &sweep, last.as_ref(), &sweeper);
+        let broken = record(run, &u, &layer, &sweep, last.as_ref(), sweeps);
         let mut ended = status(run, &layer, &sweep, &settling, broken);
         settling.note(residual, &layer.pressure);
         let mut gamma = 0.0;
         if ended.is_none() {
-            let mut here = Iterate { model: run.model, k, layer: &layer, weight: &weight, sweep: &sweep, residual };
+            let (model, linear) = (&mut *run.model, &mut *corrector.linear);
+            let mut here = Iterate { model, linear, k, layer: &layer, sweep: &sweep, residual };
             match rule.gamma(&mut here) {
                 Ok(value) => gamma = value,
                 Err(_) => ended = Some(Status::Unbounded { moving: Vec::new() }),
@@ -67,7 +177,7 @@ pub(super) fn iterate(
             return Ok(Outcome {
                 strain: sweep.strain,
                 unbalanced: run.scale.relative(left[0], sweep.strain + layer.work),
-                sweeps: sweeper.sweeps,
+                sweeps,
                 interval,
                 ..Outcome::at_start(status, u, layer)
             });
@@ -88,7 +198,7 @@ fn record(
     layer: &Layer,
     sweep: &Sweep,
     last: Option<&LastStep>,
-    sweeper: &Sweeper,
+    sweeps: usize,
 ) -> Option<usize> {
     let residual = run.scale.relative(sweep.decrement, sweep.strain + layer.work);
     let amplification = last.map_or(f64::NAN, |last| {
@@ -102,7 +212,7 @@ fn record(
         gamma: last.map_or(f64::NAN, |last| last.gamma),
         energy: sweep.potential + layer.energy.iter().sum::<f64>(),
         closed: layer.closed,
-        sweeps: sweeper.sweeps,
+        sweeps,
         factorizations: sweep.factorizations,
         inner_iterations: sweep.inner_iterations,
         ..Row::default()

@@ -2,7 +2,9 @@
 
 use super::bound::Scale;
 use super::stop::{Status, relative_increment};
+use crate::exchange::asks;
 use crate::linalg::axpy;
+use crate::model::body::Energy;
 use crate::model::field::Field;
 use crate::model::layer::Layer;
 use crate::model::rigid;
@@ -81,6 +83,20 @@ impl Outcome {
 }
 
 impl Run<'_> {
+    /// Sum the numbers of an iterate over the ranks: u'Ku, u'Ku/2 - f'u, `more`, factorisations and inner iterations of
+    /// the bodies' solvers, and requests from outside.
+    pub fn sum(&self, energy: Energy, more: f64) -> Vec<f64> {
+        let mut sums = vec![energy.strain, energy.potential, more, 0.0, 0.0];
+        for (_, body) in self.model.locals().filter(|(_, body)| body.dofs().leads()) {
+            let counts = body.counts();
+            sums[3] += counts.factorizations as f64;
+            sums[4] += counts.inner_iterations as f64;
+        }
+        sums.extend(asks(self.observer.asked()));
+        self.model.exchange.sum(&mut sums);
+        sums
+    }
+
     /// Complete the row of an iterate u, show it and keep it. `moved` is the step of the traces that led to u (2n), none for a start. Return the first body
     /// with a trace that is not finite.
     pub fn record(&mut self, u: &Field, moved: Option<&[f64]>, row: Row) -> Option<usize> {

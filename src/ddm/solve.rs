@@ -3,6 +3,7 @@
 use super::bound::{EXACT, Scale, pressure_roundoff};
 use super::forcing::resisting;
 use super::gamma::GammaRule;
+use super::robin::Corrector;
 use super::run::{Observer, Outcome, Run};
 use super::start::{self, RigidStart};
 use super::stop::Status;
@@ -15,7 +16,7 @@ use crate::model::linear::LinearStep;
 use crate::model::rigid::{self, Motions, NamedMotion};
 use crate::model::{INNER_TOLERANCE, Model};
 use crate::problem::method::StopRule;
-use crate::robin::sweep::{Coefficient, extend, underconstrained};
+use crate::robin::sweep::{Coefficient, Sweeper, underconstrained};
 use nalgebra::DVector;
 use std::time::Instant;
 
@@ -27,9 +28,9 @@ pub enum Method {
     Robin {
         /// The rule for gamma.
         rule: Box<dyn GammaRule>,
-        /// The Robin term.
-        coefficient: Coefficient,
-        /// The solver for the response of the bodies, which estimates of the mesh's error need.
+        /// The Robin term of sweeps; without one, `linear` solves for all bodies together.
+        coefficient: Option<Coefficient>,
+        /// The solver of all bodies, which estimates of the mesh's error need, too.
         linear: Box<dyn LinearStep>,
     },
 }
@@ -39,7 +40,8 @@ impl Method {
     pub fn name(&self) -> &'static str {
         match self {
             Method::Newton(linear) => linear.name(),
-            Method::Robin { .. } => "robin",
+            Method::Robin { coefficient: Some(_), .. } => "robin",
+            Method::Robin { coefficient: None, .. } => "semismooth",
         }
     }
 
@@ -110,17 +112,18 @@ impl Run<'_> {
                 u.retrace(self.model);
                 newton::iterate(self, &mut **linear, u, states, is_near)
             }
-            Method::Robin { rule, coefficient, .. } => {
+            Method::Robin { rule, coefficient, linear } => {
+                let (coefficient, sweeper) = (coefficient.as_mut(), Sweeper::default());
+                let mut corrector = Corrector { coefficient, sweeper, linear: &mut **linear };
                 if has_displacements {
                     u.retrace(self.model);
                 } else {
                     axpy(-1.0, &fallen, &mut trace);
-                    match extend(self.model, &trace)? {
-                        Ok(bent) => u = Field { rigid: sums(&u.rigid, &bent.rigid), ..bent },
-                        Err(failure) => return Ok(Outcome::at_start(Status::InnerSolver(failure), u, states)),
+                    if let Err(failure) = corrector.extend(self.model, &mut u, &trace)? {
+                        return Ok(Outcome::at_start(Status::InnerSolver(failure), u, states));
                     }
                 }
-                robin::iterate(self, &mut **rule, coefficient, u, wants_interval)
+                robin::iterate(self, &mut **rule, corrector, u, wants_interval)
             }
         }
     }
@@ -185,11 +188,6 @@ impl Run<'_> {
         let tolerance = self.stop.increment.map_or(tolerance, |increment| increment.max(tolerance));
         if rounding > TIMES * tolerance.max(INNER_TOLERANCE) { Status::RoundoffLimited } else { end.status.clone() }
     }
-}
-
-/// Return the sums of two lists of amounts.
-fn sums(a: &[Vec<f64>], b: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
 }
 
 /// A run reports unbalanced forces, or the roundoff of pressures, if they are larger than this number of tolerances. The norms in which the two are measured

@@ -1,4 +1,5 @@
-//! The cache of meshes that Gmsh made: one file for each combination of script, numbers, order, dimension and Gmsh. Its name is a digest of these.
+//! The cache of meshes that Gmsh made: one file for each combination of script, numbers, order, dimension, algorithm
+//! and Gmsh. Its name is a digest of these.
 //!
 //! Where there is no Gmsh, the newest mesh of the other inputs serves: the login node of a cluster meshes, and its other nodes solve.
 
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 pub fn name(made_from: impl Serialize, path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     // a prefix of 128 bits is long enough
-    format!("{stem}-{:.32}-", digest(&("winkler mesh 5", made_from)))
+    format!("{stem}-{:.32}-", digest(&("winkler mesh 6", made_from)))
 }
 
 /// The folder with the files of the cache.

@@ -3,6 +3,7 @@
 use crate::error::{Error, Located, Result};
 use crate::interrupt::{self, Interrupt};
 use crate::problem::{Guard, Order};
+use serde::Serialize;
 use signal_hook::consts::SIGXFSZ;
 use std::io::Read;
 use std::os::unix::fs::PermissionsExt;
@@ -15,6 +16,18 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 pub struct Gmsh {
     program: PathBuf,
 }
+
+/// The algorithm of Gmsh for tetrahedra, unless the script sets one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Algorithm {
+    /// The fastest one. It cannot mesh beside facets with four corners.
+    Hxt,
+    /// That of a Gmsh without settings.
+    Default,
+}
+
+/// What Gmsh says if HXT has made no mesh, or if this Gmsh does not have it.
+const NO_HXT: &str = "HXT 3D mesh failed";
 
 /// A script for Gmsh to mesh, with the settings of the run.
 pub struct MeshingTask<'a> {
@@ -30,6 +43,8 @@ pub struct MeshingTask<'a> {
     pub dimension: usize,
     /// Order of the elements.
     pub order: Order,
+    /// Algorithm for tetrahedra.
+    pub algorithm: Algorithm,
     /// Limit of time and settings.
     pub guard: &'a Guard,
     /// Signals that may end the run.
@@ -57,12 +72,18 @@ impl Gmsh {
         find("gmsh").map(|program| Gmsh { program })
     }
 
-    /// Return the error of a script or file that cannot be meshed or converted, because there is no Gmsh.
-    pub fn missing(path: &Path) -> Error {
-        Error::mesh(path, None, "the cache has no mesh of it, and there is no `gmsh` in $PATH to make one").help(
-            "put Gmsh 4.8 or newer into $PATH (Debian: gmsh), or make the mesh where there is one: \
-             `winkler mesh SCENE` there keeps it in the cache, and WINKLER_CACHE names a folder that both see",
-        )
+    /// Find `gmsh` in $PATH for a script or file to mesh or convert.
+    ///
+    /// # Errors
+    /// There is no Gmsh.
+    pub fn found(path: &Path) -> Result<Gmsh> {
+        let missing = || {
+            Error::mesh(path, None, "the cache has no mesh of it, and there is no `gmsh` in $PATH to make one").help(
+                "put Gmsh 4.8 or newer into $PATH (Debian: gmsh), or make the mesh where there is one: \
+                 `winkler mesh SCENE` there keeps it in the cache, and WINKLER_CACHE names a folder that both see",
+            )
+        };
+        Gmsh::find().ok_or_else(missing)
     }
 
     /// Return a text that distinguishes this Gmsh from others: its path, size and time of change. To ask for its version would
@@ -72,6 +93,14 @@ impl Gmsh {
         let time = data.as_ref().and_then(|data| data.modified().ok()?.duration_since(UNIX_EPOCH).ok());
         let size = data.map_or(0, |data| data.len());
         format!("{} {size} {}", self.program.display(), time.unwrap_or_default().as_nanos())
+    }
+
+    /// Return whether HXT makes the same mesh in every run, on one thread. Before version 4.12 it depends on addresses
+    /// in memory ([issue 2255](https://gitlab.onelab.info/gmsh/gmsh/-/issues/2255)).
+    pub fn has_steady_hxt(&self) -> bool {
+        let said = Command::new(&self.program).arg("--version").stdin(Stdio::null()).output();
+        // versions 4.8 to 4.15 say it in either stream
+        said.is_ok_and(|said| is_steady(&String::from_utf8_lossy(&[said.stdout, said.stderr].concat())))
     }
 
     /// Mesh a script into the file `output`. A signal ends Gmsh and gives an error.
@@ -106,8 +135,13 @@ impl Gmsh {
                 return Err(Error::file(output, "write", &std::io::ErrorKind::FileTooLarge.into())
                     .help("there is a limit on the size of files (ulimit -f)"));
             }
-            ProcessEnd::Itself(status) if status.success() && output.is_file() => {}
-            ProcessEnd::Itself(status) => return Err(failure(task, status, &reader.join().unwrap_or_default())),
+            ProcessEnd::Itself(status) => {
+                let said = reader.join().unwrap_or_default();
+                // the Gmsh of Python ends with success even so
+                if !(status.success() && output.is_file()) || said.contains(NO_HXT) {
+                    return Err(failure(task, status, &said));
+                }
+            }
         }
         task.interrupt.release()
     }
@@ -128,9 +162,11 @@ impl Gmsh {
             false => command.arg(format!("-{}", task.dimension)).args(["-order", order]),
         };
         command.args(["-format", "msh41", "-bin", "-v", "2"]);
-        if let Some(threads) = task.guard.threads {
-            command.args(["-algo", "hxt", "-nt", &threads.to_string()]);
+        if task.algorithm == Algorithm::Hxt {
+            // read before the script, which may choose another one
+            command.args(["-algo", "hxt"]);
         }
+        command.args(["-nt", &task.guard.threads.unwrap_or(1).to_string()]);
         for (name, value) in task.set {
             command.args(["-setnumber", &name.value, &value.to_string()]);
         }
@@ -166,6 +202,17 @@ fn wait(child: &mut Child, task: &MeshingTask) -> std::io::Result<ProcessEnd> {
         // At most a twentieth of the time so far is lost.
         std::thread::sleep((elapsed / 20).clamp(Duration::from_millis(1), PAUSE));
     }
+}
+
+/// Return whether the HXT of a version is steady.
+fn is_steady(version: &str) -> bool {
+    let mut numbers = version.trim().split('.').map(|number| number.parse::<usize>().ok());
+    numbers.next().flatten().zip(numbers.next().flatten()) >= Some((4, 12))
+}
+
+/// Return whether HXT is what has failed.
+pub fn is_of_hxt(error: &Error) -> bool {
+    error.causes().iter().any(|cause| cause.contains(NO_HXT))
 }
 
 /// Return the error of a Gmsh that ended by itself without a mesh. `said` has its errors.
@@ -220,5 +267,11 @@ mod tests {
     fn complaints_are_errors_once_without_the_summary() {
         let said = "Warning : odd\nError   : 'a.geo', line 3: no\nError   : 'a.geo', line 3: no\nError   : -----\nError   : sum\n";
         assert_eq!(complaints(said), ["'a.geo', line 3: no"]);
+    }
+
+    #[test]
+    fn versions_are_compared_by_their_numbers() {
+        let verdicts = ["4.8.4\n", "4.11.1", "4.12.0-git-abc", "4.15.2", "5.0", "", "no"].map(is_steady);
+        assert_eq!(verdicts, [false, false, true, true, true, false, false]);
     }
 }

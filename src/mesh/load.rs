@@ -2,7 +2,7 @@
 
 use super::builder::MeshProducer;
 use super::cache::{self, Cache};
-use super::gmsh::{Gmsh, MeshingTask};
+use super::gmsh::{Algorithm, Gmsh, MeshingTask, is_of_hxt};
 use super::msh;
 use super::msh2::Contents;
 use super::script::{self, Script, quoted};
@@ -26,6 +26,8 @@ pub struct Loaded<const D: usize> {
     pub file: PathBuf,
     /// SHA-256 of the contents of the file; empty for arrays.
     pub digest: String,
+    /// Whether Gmsh was to take its default algorithm for tetrahedra instead of HXT.
+    pub without_hxt: bool,
     /// What of the file was left out, or is not as the user may think.
     pub notes: Vec<String>,
 }
@@ -65,6 +67,7 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
             origin: MeshOrigin::File,
             file: PathBuf::new(),
             digest: String::new(),
+            without_hxt: false,
             notes: Vec::new(),
         }),
     }?;
@@ -99,7 +102,8 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
             let abaqus::Converted { mesh: bytes, notes } =
                 abaqus::convert(path, &whole()?, D).map_err(|error| error.at(&file.place))?;
             let mesh = msh::parse(path, &bytes, MeshProducer::Other)?;
-            Loaded { mesh, origin: MeshOrigin::File, file: path.clone(), digest: digest_of_bytes(&bytes), notes }
+            let digest = digest_of_bytes(&bytes);
+            Loaded { mesh, origin: MeshOrigin::File, file: path.clone(), digest, without_hxt: false, notes }
         }
         true => converted(file, &whole()?, interrupt)?,
         false => read_file(path, path, MeshProducer::User, MeshOrigin::File)?,
@@ -123,7 +127,8 @@ fn move_vertices(shown: &Path, file: &Path, places: &[[f64; 3]]) -> Result<()> {
 fn read_file<const D: usize>(shown: &Path, file: &Path, maker: MeshProducer, origin: MeshOrigin) -> Result<Loaded<D>> {
     let mut source = Digested::new(File::open(file).map_err(|cause| Error::file(file, "read", &cause))?);
     let mesh = msh::read(shown, &mut BufReader::with_capacity(WINDOW, &mut source), maker)?;
-    Ok(Loaded { mesh, origin, file: file.to_owned(), digest: source.digest(), notes: Vec::new() })
+    let digest = source.digest();
+    Ok(Loaded { mesh, origin, file: file.to_owned(), digest, without_hxt: false, notes: Vec::new() })
 }
 
 /// Bytes that are read at a time.
@@ -159,6 +164,7 @@ fn converted<const D: usize>(file: &Located<PathBuf>, bytes: &[u8], interrupt: &
             is_mesh: true,
             dimension: D,
             order: Order::P1,
+            algorithm: Algorithm::Default,
             guard,
             interrupt,
         };
@@ -186,24 +192,37 @@ impl Wanted<'_> {
         cache: &Cache,
         make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
     ) -> Result<Loaded<D>> {
-        let gmsh = Gmsh::find();
-        let full_name = gmsh.as_ref().map(|gmsh| format!("{}{:.16}.msh", self.name, digest(&gmsh.identity())));
-        let known = match &full_name {
-            Some(name) => vec![cache.file(name)],
-            None => cache.all(&self.name),
-        };
-        // A file of the cache that cannot be read or is damaged counts as absent.
-        if let Some(loaded) =
-            known.iter().filter(|_| self.is_kept).find_map(|file| self.read(file, MeshOrigin::Cache).ok())
-        {
-            return Ok(loaded);
-        }
-        let (Some(gmsh), Some(name)) = (gmsh, full_name) else { return Err(Gmsh::missing(self.path)) };
+        self.find(cache).map_or_else(|| self.make(&Gmsh::found(self.path)?, cache, make), Ok)
+    }
+
+    /// Make the mesh.
+    fn make<const D: usize>(
+        &self,
+        gmsh: &Gmsh,
+        cache: &Cache,
+        make: impl FnOnce(&Gmsh, &Path, &Path) -> Result<()>,
+    ) -> Result<Loaded<D>> {
+        let name = self.made_by(gmsh);
         let loaded = cache.make(&name, |work, made| {
-            make(&gmsh, work, made)?;
+            make(gmsh, work, made)?;
             self.read(made, MeshOrigin::Gmsh)
         })?;
         Ok(Loaded { file: cache.file(&name), ..loaded })
+    }
+
+    /// Return the mesh from the cache, if it is there. A file of the cache that cannot be read or is damaged counts as
+    /// absent.
+    fn find<const D: usize>(&self, cache: &Cache) -> Option<Loaded<D>> {
+        let known = match Gmsh::find() {
+            Some(gmsh) => vec![cache.file(&self.made_by(&gmsh))],
+            None => cache.all(&self.name),
+        };
+        known.iter().filter(|_| self.is_kept).find_map(|file| self.read(file, MeshOrigin::Cache).ok())
+    }
+
+    /// Return the name in the cache of the mesh that this Gmsh makes.
+    fn made_by(&self, gmsh: &Gmsh) -> String {
+        format!("{}{:.16}.msh", self.name, digest(&gmsh.identity()))
     }
 
     /// Read a file that was made.
@@ -238,26 +257,59 @@ pub(super) struct Meshing<'a> {
 }
 
 impl Meshing<'_> {
-    /// Return the mesh from a cache, or by Gmsh.
+    /// Return the mesh from a cache, or by Gmsh. Tetrahedra are by HXT if it makes the same mesh in every run or the
+    /// scene gives it threads, and if it does not fail.
     pub fn mesh<const D: usize>(&self, cache: &Cache) -> Result<Loaded<D>> {
-        let Self { source: GmshSource { file, set, adapted, guard }, order, interrupt } = *self;
-        let (path, adapted) = (&file.value, adapted.as_deref());
-        let script = Script::read(path).map_err(|error| error.at(&file.place))?;
-        set.iter().try_for_each(|(name, _)| script.check(name, path))?;
-        // the algorithm depends on whether a number of threads is given, not on the number
-        let asked = (D, order.degree(), guard.threads.is_some(), guard.size, set, adapted);
-        let files: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
-        let name = cache::name((asked, files, script.is_ended()), path);
-        let wanted = Wanted { path, name, order: Some(order), is_kept: !script.may_change };
-        wanted.find_or_make(cache, |gmsh, work, made| {
-            let script = &self.written::<D>(&script, work)?;
-            let task = MeshingTask { script, shown: path, set, is_mesh: false, dimension: D, order, guard, interrupt };
-            gmsh.run(&task, made, work)?;
-            match adapted {
-                Some(AdaptedMesh { vertices, .. }) if !vertices.is_empty() => move_vertices(path, made, vertices),
-                _ => Ok(()),
+        let GmshSource { file, set, guard, .. } = self.source;
+        let script = Script::read(&file.value).map_err(|error| error.at(&file.place))?;
+        set.iter().try_for_each(|(name, _)| script.check(name, &file.value))?;
+        let digests: Vec<String> = script.files.iter().map(|bytes| digest_of_bytes(bytes)).collect();
+        let wanted = |algorithm| self.wanted::<D>(algorithm, &script, &digests);
+        let [hxt, default] = [Algorithm::Hxt, Algorithm::Default].map(wanted);
+        let is_in_space = D == 3;
+        if let Some(loaded) = default.find(cache) {
+            return Ok(Loaded { without_hxt: is_in_space, ..loaded });
+        }
+        if let Some(loaded) = hxt.find(cache).filter(|_| is_in_space) {
+            return Ok(loaded);
+        }
+        let gmsh = Gmsh::found(&file.value)?;
+        if is_in_space && (guard.threads.is_some() || gmsh.has_steady_hxt()) {
+            match hxt.make(&gmsh, cache, |gmsh, work, made| self.run::<D>(gmsh, Algorithm::Hxt, &script, work, made)) {
+                Err(error) if is_of_hxt(&error) => {}
+                made => return made,
             }
-        })
+        }
+        let loaded = default
+            .make(&gmsh, cache, |gmsh, work, made| self.run::<D>(gmsh, Algorithm::Default, &script, work, made))?;
+        Ok(Loaded { without_hxt: is_in_space, ..loaded })
+    }
+
+    /// Return what to look for in the cache. `digests` are those of the files of the script.
+    fn wanted<const D: usize>(&self, algorithm: Algorithm, script: &Script, digests: &[String]) -> Wanted<'_> {
+        let GmshSource { file, set, adapted, guard } = self.source;
+        let asked = (D, self.order.degree(), (algorithm, guard.threads), guard.size, set, adapted.as_deref());
+        let name = cache::name((asked, digests, script.is_ended()), &file.value);
+        Wanted { path: &file.value, name, order: Some(self.order), is_kept: !script.may_change }
+    }
+
+    /// Mesh the script into the file `made`, with the folder `work` to work in.
+    fn run<const D: usize>(
+        &self,
+        gmsh: &Gmsh,
+        algorithm: Algorithm,
+        script: &Script,
+        work: &Path,
+        made: &Path,
+    ) -> Result<()> {
+        let Self { source: GmshSource { file, set, adapted, guard }, order, interrupt } = *self;
+        let (script, shown) = (&self.written::<D>(script, work)?, &file.value);
+        let task = MeshingTask { script, shown, set, is_mesh: false, dimension: D, order, algorithm, guard, interrupt };
+        gmsh.run(&task, made, work)?;
+        match adapted.as_deref() {
+            Some(AdaptedMesh { vertices, .. }) if !vertices.is_empty() => move_vertices(shown, made, vertices),
+            _ => Ok(()),
+        }
     }
 
     /// Return the path of the script for Gmsh: the user's own, or one in the folder `work` that loads a shape, follows sizes, or includes a script whose

@@ -404,25 +404,33 @@ fn loads_at_the_same_time_do_not_meet() {
     assert_eq!(load().origin, MeshOrigin::Cache);
 }
 
-/// Gmsh's parallel algorithm makes another mesh of the same cube. This mesh has its own file in the cache, and it does not
-/// depend on the number of threads.
+/// A mesh by HXT has its own file in the cache for each number of threads. A script may choose another algorithm.
 #[test]
-fn free_meshes_in_space_by_threads() {
+fn tetrahedra_by_hxt() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("cache");
-    let geo = folder.path().join("cube.geo");
-    let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nMeshSize{:} = 0.2;\n\
-                Physical Volume(\"all\") = {1};\nPhysical Surface(\"bottom\") = {5};\n";
-    std::fs::write(&geo, cube).unwrap();
-    let run = |threads: Option<usize>| {
+    let run = |script: &str, threads: Option<usize>| {
+        let geo = folder.path().join("cube.geo");
+        std::fs::write(&geo, script).unwrap();
         let guard = Guard { threads, ..Guard::default() };
         let loaded = meshed_with::<3>(&geo, &[], Order::P1, (None, &guard), &cache).unwrap();
-        (loaded.origin, loaded.mesh.points)
+        (loaded.origin, loaded.without_hxt, loaded.mesh.points)
     };
-    let ((_, usual), (origin, parallel)) = (run(None), run(Some(1)));
-    assert_eq!(origin, MeshOrigin::Gmsh);
-    // The numbers of points may be equal, but the points differ.
-    let counts = [&usual, &parallel].map(Vec::len);
-    assert!(usual != parallel && counts[0].abs_diff(counts[1]) < counts[0] / 4, "{counts:?}");
-    assert_eq!((run(Some(2)), run(None)), ((MeshOrigin::Cache, parallel), (MeshOrigin::Cache, usual)));
+    let cube = CUBE.replace("1/2;\nPhysical", "1/5;\nPhysical");
+    let default = parse::<3>(&gmsh(&cube, &["-3", "-bin"])).unwrap().points;
+    let (origin, without_hxt, ours) = run(&cube, Some(1));
+    assert_eq!((origin, without_hxt), (MeshOrigin::Gmsh, false));
+    assert!(ours != default && ours.len().abs_diff(default.len()) < default.len() / 4, "{}", ours.len());
+    assert_eq!(run(&cube, Some(1)), (MeshOrigin::Cache, false, ours));
+    assert_eq!(run(&cube, Some(2)).0, MeshOrigin::Gmsh);
+    let chosen = run(&format!("Mesh.Algorithm3D = 1;\n{cube}"), Some(1));
+    assert_eq!(chosen, (MeshOrigin::Gmsh, false, default));
+    // a structured block of cells with quadrangular facets
+    let beside = cube.replace(
+        "MeshSize",
+        "Transfinite Curve{:} = 3;\nTransfinite Surface{:};\nRecombine Surface{:};\nTransfinite Volume{1};\nMeshSize",
+    );
+    let (origin, without_hxt, structured) = run(&beside, Some(1));
+    assert_eq!((origin, without_hxt), (MeshOrigin::Gmsh, true));
+    assert_eq!(run(&beside, Some(1)), (MeshOrigin::Cache, true, structured));
 }

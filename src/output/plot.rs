@@ -51,6 +51,9 @@ pub enum Style {
     Dashed,
     /// A solid line with marks at the points.
     LineMarkers,
+    /// A line with a number at its end, dashed after each turn of the palette, so that more curves than colours can be
+    /// told apart.
+    Numbered(usize),
 }
 
 /// Colour of a series.
@@ -97,6 +100,8 @@ const NAMES: usize = 24;
 /// Colours of Okabe and Ito that stand out on white: colour-blind readers can tell them apart.
 const PALETTE: [&str; 7] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
 const GREY: &str = "#5A5A5A";
+/// Dash patterns.
+const DASHES: [&str; 3] = ["", " stroke-dasharray=\"6.4 4.2\"", " stroke-dasharray=\"1.6 3\""];
 /// Marks around their middle, as SVG paths: a disc, a square, a triangle, a diamond.
 const MARKS: [&str; 4] = [
     "m-3.9,0a3.9,3.9 0 1 0 7.8,0a3.9,3.9 0 1 0 -7.8,0z",
@@ -227,8 +232,9 @@ impl Pen {
     fn draw(&self, places: &[[f64; 2]], svg: &mut String) {
         let Self { style, color, mark } = self;
         let (width, dashes) = match style {
-            Style::Dashed => (1.6, " stroke-dasharray=\"6.4 4.2\""),
+            Style::Dashed => (1.6, DASHES[1]),
             Style::Line | Style::LineMarkers => (1.9, ""),
+            Style::Numbered(number) => (1.9, DASHES[(number - 1) / PALETTE.len() % DASHES.len()]),
         };
         let points: Vec<String> = places.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
         // writing to a String does not fail
@@ -241,6 +247,9 @@ impl Pen {
             let marks: String = points.iter().map(|place| format!("M{place}{mark}")).collect();
             let _ = writeln!(svg, "<path d=\"{marks}\" fill=\"{color}\"/>");
         }
+        if let (Style::Numbered(number), Some([x, y])) = (style, places.last()) {
+            text(svg, [x + 3.0, y + 4.0], &format!("fill=\"{color}\" font-weight=\"bold\""), &number.to_string());
+        }
     }
 }
 
@@ -249,11 +258,11 @@ fn draw_legend(entries: &[(String, Pen)], left: f64, svg: &mut String) {
     let row = |k: usize| 36.0 + 19.0 * k as f64;
     for (k, (label, pen)) in entries.iter().take(NAMES).enumerate() {
         let line = [[left, row(k)], [left + 30.0, row(k)]];
-        Pen { style: if pen.style == Style::Dashed { Style::Dashed } else { Style::Line }, ..*pen }.draw(&line, svg);
+        Pen { style: if pen.style == Style::LineMarkers { Style::Line } else { pen.style }, ..*pen }.draw(&line, svg);
         if pen.style == Style::LineMarkers {
             pen.draw(&[[left + 15.0, row(k)]], svg);
         }
-        text(svg, [left + 36.0, row(k) + 4.0], "", label);
+        text(svg, [left + 36.0 + if let Style::Numbered(_) = pen.style { 18.0 } else { 0.0 }, row(k) + 4.0], "", label);
     }
     if entries.len() > NAMES {
         text(svg, [left + 36.0, row(NAMES) + 4.0], "", &format!("and {} more", entries.len() - NAMES));

@@ -39,6 +39,8 @@ pub struct Report {
     pub patches: usize,
     /// Symbolic factorisations, all bodies.
     pub symbolic_factorizations: usize,
+    /// Meshes in space that HXT could not make, or would not make the same in every run.
+    pub meshes_without_hxt: usize,
     /// Stiffness matrices assembled.
     pub assemblies: usize,
     /// Stiffness matrices reused from an earlier run of a sweep.
@@ -544,6 +546,7 @@ impl Report {
     pub fn summary(&self, units: &UnitWords) -> String {
         let mut lines = vec![format!("{}: {}", self.title, self.message), self.counts()];
         lines.extend(self.discretization_line());
+        lines.extend(self.interval_line());
         if self.steps.len() <= LISTED {
             lines.extend(self.steps.iter().enumerate().map(|(index, step)| self.step_line(index + 1, step, units)));
         }
@@ -599,6 +602,21 @@ impl Report {
             words(&error.force),
             sci(error.energy, 1)
         ))
+    }
+
+    /// Return the line on the interval of gamma, if it was asked for.
+    fn interval_line(&self) -> Option<String> {
+        let is_solved = matches!(self.status.as_str(), "converged" | "roundoff-limited");
+        let words = match &self.gamma_interval {
+            Some(IntervalReport { theorem, descent, .. }) => format!(
+                "F1 falls in every step below {}, theorem 3 promises convergence {}, with the last form G in all steps",
+                sci(*descent, 2),
+                theorem.map_or("nowhere".to_owned(), |end| format!("below {}", sci(end, 2)))
+            ),
+            None if is_solved => "unknown, as no step was made or the eigenvalues did not settle".to_owned(),
+            None => "unknown, as its bounds are those at a solution, and the run found none".to_owned(),
+        };
+        (self.settings["method"]["interval"] == true).then(|| format!("  interval of gamma: {words}"))
     }
 
     /// Return the line of a load step; `number` counts from 1.

@@ -88,6 +88,8 @@ impl RowFile {
 pub struct HistoryWriter {
     /// The file.
     pub rows: RowFile,
+    /// Fields with which each line begins; the same columns in all lines.
+    pub first: Vec<Cell>,
     /// Names of the bodies in the order of [`Row::increments`].
     bodies: Vec<String>,
     /// Whether rows begin with their load step.
@@ -95,15 +97,16 @@ pub struct HistoryWriter {
 }
 
 impl HistoryWriter {
-    /// Begin the file, which has its header whether or not there is an iterate.
-    pub fn new(rows: RowFile, bodies: Vec<String>, steps: bool) -> Self {
-        let mut history = Self { rows, bodies, steps };
+    /// Begin the file, which has its header whether or not there is an iterate. Lines begin with the fields `first`.
+    pub fn new(rows: RowFile, first: Vec<Cell>, bodies: Vec<String>, steps: bool) -> Self {
+        let mut history = Self { rows, first, bodies, steps };
         history.rows.begin(&history.fields(&Row::default()));
         history
     }
 
     fn fields(&self, row: &Row) -> Vec<Cell> {
-        let mut fields: Vec<Cell> = self.steps.then(|| count("step", row.step)).into_iter().collect();
+        let mut fields = self.first.clone();
+        fields.extend(self.steps.then(|| count("step", row.step)));
         fields.push(count("iteration", row.iteration));
         let sizes = [("residual", row.residual), ("error", row.error), ("increment", row.increment)];
         fields.extend(sizes.map(|(name, size)| number(name, size)));
@@ -345,7 +348,7 @@ mod tests {
         let base = tempfile::tempdir().unwrap();
         let folder = Folder::create(base.path()).unwrap();
         let rows = RowFile::create(&folder, "history.csv").unwrap();
-        let mut history = HistoryWriter::new(rows, ["upper", "lower"].map(str::to_owned).to_vec(), true);
+        let mut history = HistoryWriter::new(rows, Vec::new(), ["upper", "lower"].map(str::to_owned).to_vec(), true);
         let first =
             Row { residual: 1.0, error: f64::NAN, increment: f64::NAN, gamma: f64::NAN, points: 9, ..Row::default() };
         history.row(&first);

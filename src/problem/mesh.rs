@@ -19,7 +19,7 @@ use toml::Spanned;
 pub struct Guard {
     /// Largest size of elements in a shape.
     pub size: Option<f64>,
-    /// Threads of Gmsh for free meshes in space. Gmsh then uses its parallel algorithm (HXT), and that of the script otherwise.
+    /// Threads of Gmsh for free meshes in space, by HXT even where it makes another mesh in each run.
     pub threads: Option<usize>,
     /// Seconds after which Gmsh is ended.
     pub seconds: f64,
@@ -45,7 +45,7 @@ struct MeshKeys {
     set: Option<Located<BTreeMap<Spanned<String>, f64>>>,
     /// largest size of elements in a shape
     size: Option<Located<f64>>,
-    /// threads of Gmsh for free meshes in space
+    /// threads of Gmsh for free meshes in space, by HXT
     #[schemars(range(min = 1))]
     threads: Option<Located<usize>>,
     /// seconds after which Gmsh is ended; 1000

@@ -2,8 +2,10 @@
 
 use super::geometry::Geometry;
 use super::history::History;
-use super::read::{Check, Either, Flaw, Form, at_least_one, checked, condition, kept, of_word, positive, word};
-use crate::error::{Error, Located};
+use super::read::{
+    Check, Either, Flaw, Form, at_least_one, checked, condition, kept, of_iteration, of_word, positive, word,
+};
+use crate::error::{Error, Located, shown};
 use crate::expression::Field;
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
@@ -20,9 +22,9 @@ pub struct MethodSpec {
     ///
     /// A scene file without a name means [`MethodName::Robin`] if psi, gamma, robin or the increment rule is given ([`complete`]).
     pub name: MethodName,
-    /// Robin zone: "none", "full", "active" or a condition
+    /// Robin zone: "none", "full", "active", a condition, or a list of one for each side
     pub psi: Zone,
-    /// relaxation of `robin`: a number, a list, a rule
+    /// relaxation of `robin` and `semismooth`: a number, an expression in k, a list, a rule
     pub gamma: Gamma,
     /// Robin coefficient on the zone, "tangent" if the method is `robin`
     pub robin: RobinRule,
@@ -96,18 +98,18 @@ pub fn idle_key(method: &Spanned<DeValue<'_>>, is_option: impl Fn(&Range<usize>)
     let DeValue::Table(table) = method.get_ref() else { return None };
     let word = |key: &str| table.get(key).and_then(|value| value.get_ref().as_str());
     let (name, linear) = (word("name").unwrap_or("auto"), word("linear"));
-    if !["auto", "newton", "newton-robin"].contains(&name) {
+    if !["auto", "newton", "newton-robin", "semismooth"].contains(&name) {
         return None;
     }
     let is_replaced = table.get("name").is_some_and(|name| is_option(&name.span()));
     let has_sweeps = match name {
         "auto" => linear.is_none_or(|linear| linear == "sweeps"),
-        "newton" => linear == Some("sweeps"),
+        "newton" | "semismooth" => linear == Some("sweeps"),
         _ => true,
     };
-    let robin = ("gamma", false, "`robin`");
+    let gamma = ("gamma", name == "semismooth", "`robin` and `semismooth`");
     let zone = ["psi", "robin"].map(|key| (key, has_sweeps, "`robin` and `newton-robin`"));
-    [robin].into_iter().chain(zone).filter(|(_, is_read, _)| !is_read).find_map(|(key, _, readers)| {
+    [gamma].into_iter().chain(zone).filter(|(_, is_read, _)| !is_read).find_map(|(key, _, readers)| {
         let span = table.get(key)?.span();
         let is_idle = is_option(&span) || !is_replaced;
         is_idle.then(|| IdleKey { name: key, span, method: name.to_owned(), readers })
@@ -127,12 +129,19 @@ impl Check for MethodSpec {
                 let one = |(k, gamma): (usize, &f64)| positive(&format!("gamma.{k}"), "gamma", *gamma);
                 list.iter().enumerate().try_for_each(one)?;
             }
+            Gamma::Expression(gamma) => {
+                let of = |k: usize| gamma.in_iteration(k);
+                if let Some(k) = (0..self.stop.iterations.min(MOST)).find(|k| !(of(*k) > 0.0 && of(*k).is_finite())) {
+                    let message = format!("gamma is {} in iteration k = {k}", shown(of(k)));
+                    return Err(Flaw::new("gamma", message, "must be greater than 0", ""));
+                }
+            }
             Gamma::LineSearch | Gamma::Aitken | Gamma::Own(_) => {}
         }
         if let RobinRule::Floor(floor) = self.robin {
             positive("robin.floor", "the floor", floor)?;
         }
-        if self.linear.is_some() && !matches!(self.name, MethodName::Auto | MethodName::Newton) {
+        if self.linear.is_some() && matches!(self.name, MethodName::Robin | MethodName::NewtonRobin) {
             let help = "name = \"newton\", or leave `linear` away";
             return Err(Flaw::new("linear", "only Newton's method has linear steps of all bodies", "", help));
         }
@@ -143,6 +152,10 @@ impl Check for MethodSpec {
         Ok(())
     }
 }
+
+/// Most iterations for which an expression for gamma is checked beforehand: more than a run makes, checked in less than
+/// a second.
+const MOST: usize = 1_000_000;
 
 /// The methods.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
@@ -157,6 +170,9 @@ pub enum MethodName {
     NewtonRobin,
     /// Newton's method with one matrix of all bodies: dense, factorised, or solved by multigrid.
     Newton,
+    /// The paper's iteration (34) with the form (35), one matrix of all bodies with the tangents at the iterate: for
+    /// gamma = 1 the semismooth Newton method.
+    Semismooth,
 }
 
 impl MethodName {
@@ -188,8 +204,8 @@ impl Linear {
 }
 
 /// The relaxation gamma^k of iteration k.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
-#[schemars(with = "Either<f64, Either<Vec<f64>, Rule>>")]
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+#[schemars(with = "Either<Field, Either<Vec<f64>, Rule>>")]
 #[serde(rename_all = "kebab-case")]
 pub enum Gamma {
     /// Exact line search on the functional F1.
@@ -204,6 +220,9 @@ pub enum Gamma {
     /// Numbers > 0 for k = 0, 1, ...; the last one is kept.
     #[serde(untagged)]
     Schedule(Vec<f64>),
+    /// An expression in k = 0, 1, ... with values > 0.
+    #[serde(untagged)]
+    Expression(Field),
 }
 
 impl Default for Gamma {
@@ -248,7 +267,7 @@ pub enum RobinRule {
 
 /// The Robin zone: psi of (38), a characteristic function of a part of the contact surfaces. c is the compression of the layer.
 #[derive(Debug, Clone, Default, Serialize, JsonSchema)]
-#[schemars(with = "String")]
+#[schemars(with = "Either<String, Vec<String>>")]
 #[serde(rename_all = "lowercase")]
 pub enum Zone {
     /// psi = 0: Neumann-Neumann.
@@ -261,6 +280,9 @@ pub enum Zone {
     /// psi = 1 where the expression in x, y, z and the iteration k = 0, 1, ... is > 0 (true is 1).
     #[serde(untagged, serialize_with = "as_text")]
     Subset(Field),
+    /// psi_ab and psi_ba: a zone for each side of a pair, in the order of `between`.
+    #[serde(untagged)]
+    Sides(Box<[Zone; 2]>),
 }
 
 /// The rules that stop a run. At least one of `residual` and `increment` is given. The first rule that is met ends the run.
@@ -383,31 +405,52 @@ enum Rule {
 
 impl<'de> Deserialize<'de> for Gamma {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        match Form::<f64>::deserialize(deserializer)? {
+        let Located { value, place } = Located::<Form<f64>>::deserialize(deserializer)?;
+        match value {
             Form::Integer(gamma) => Ok(Self::Stationary(gamma as f64)),
             Form::Number(gamma) => Ok(Self::Stationary(gamma)),
             Form::List(list) => Ok(Self::Schedule(list)),
-            Form::Text(rule) => of_word(&rule).map(|rule| match rule {
+            Form::Text(text) if is_word(&text) => of_word(&text).map(|rule| match rule {
                 Rule::LineSearch => Self::LineSearch,
                 Rule::Aitken => Self::Aitken,
             }),
+            Form::Text(text) => of_iteration(&text, &place).map(Self::Expression).map_err(kept),
             other => Err(other.unexpected()),
         }
     }
 }
 
-/// A word, or a condition as a text.
+/// Return whether a text is meant as one of some words: a word of more than two letters is no variable.
+fn is_word(text: &str) -> bool {
+    text.len() > 2 && text.chars().all(|c| c.is_alphabetic() || c == '-')
+}
+
+/// A word, a condition as a text, or a list of these for both sides.
 impl<'de> Deserialize<'de> for Zone {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let Located { value: text, place } = Located::<String>::deserialize(deserializer)?;
+        let Located { value, place } = Located::<Form<Zone>>::deserialize(deserializer)?;
+        let text = match value {
+            Form::Text(text) => text,
+            Form::List(zones) => match <[Zone; 2]>::try_from(zones) {
+                Ok(zones) if !zones.iter().any(|zone| matches!(zone, Self::Sides(_))) => {
+                    return Ok(Self::Sides(Box::new(zones)));
+                }
+                _ => {
+                    let error = Error::scene(&place, "a list of zones has one for each of the two sides");
+                    return Err(kept(
+                        error.help("psi = [\"active\", \"none\"]: the first is that of the first surface of `between`"),
+                    ));
+                }
+            },
+            other => return Err(other.unexpected()),
+        };
         match text.as_str() {
             "none" => return Ok(Self::None),
             "full" => return Ok(Self::Full),
             "active" => return Ok(Self::Active),
             _ => {}
         }
-        // a single word of more than two letters is a slip of one of the three, not of a variable
-        if text.len() > 2 && text.chars().all(char::is_alphabetic) {
+        if is_word(&text) {
             let otherwise = || "psi is none, full, active, or a condition such as \"x > 1 && k < 5\"".to_owned();
             let error = Error::scene(&place, format!("unknown zone `{text}`"));
             return Err(kept(error.suggest(&text, ["none", "full", "active"], otherwise)));

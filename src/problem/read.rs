@@ -457,6 +457,14 @@ pub fn condition(text: &str, place: &Place, iteration: bool) -> Checked<Field> {
     })
 }
 
+/// Compile an expression in the iteration k alone.
+///
+/// # Errors
+/// A text that is no expression.
+pub fn of_iteration(text: &str, place: &Place) -> Checked<Field> {
+    Field::parse(text, place, KnownNames { variables: &["k"], factors: &[], data: &data() })
+}
+
 /// Compile an expression in the coordinates, behind `first`.
 ///
 /// # Errors

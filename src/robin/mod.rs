@@ -8,4 +8,4 @@ pub mod spectrum;
 pub mod sweep;
 
 pub use cg::SweepCg;
-pub use sweep::{Coefficient, Sweep, prepare};
+pub use sweep::{Coefficient, Sweep, prepare, stiff_joint_springs};

@@ -5,12 +5,12 @@ use super::obstacle::{self, Obstacles, is_obstacle};
 use crate::error::{Error, Result};
 use crate::exchange::{self, ASKS, asks};
 use crate::linalg::{Blocks, axpy, dot};
-use crate::model::Model;
 use crate::model::body::Energy;
 use crate::model::field::{Field, residual};
 use crate::model::layer::Layer;
 use crate::model::linear::Failure;
 use crate::model::rigid::{self, NamedMotion, TOLERANCE, combined};
+use crate::model::{Model, closing};
 use crate::problem::method::{RobinRule, Zone};
 use nalgebra::DMatrix;
 
@@ -143,6 +143,8 @@ impl Sweeper {
 /// of a trace vector, because the two bodies of a pair may need different weights.
 pub struct Coefficient {
     zone: Zone,
+    /// The surfaces of `between` at sides a and b of each pair.
+    sides: Vec<[usize; 2]>,
     rule: RobinRule,
     /// Weights of the first call under the rule `frozen`.
     frozen: Option<Vec<f64>>,
@@ -150,20 +152,19 @@ pub struct Coefficient {
 
 impl Coefficient {
     /// Return a coefficient that has kept no weights yet.
-    pub fn new(zone: Zone, rule: RobinRule) -> Self {
-        Self { zone, rule, frozen: None }
+    pub fn new(zone: Zone, sides: Vec<[usize; 2]>, rule: RobinRule) -> Self {
+        Self { zone, sides, rule, frozen: None }
     }
 
     /// Return omega psi kappa of every contact row (2n, layout of a trace vector) for layers in these states in iteration `k`.
     ///
     /// # Errors
-    /// A condition of the zone has no value at a contact point; all ranks find this.
+    /// A condition of a zone has no value at a contact point; all ranks find this.
     pub fn weight(&mut self, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
         if let Some(frozen) = &self.frozen {
             return Ok(frozen.clone());
         }
-        let points = tangents(&self.zone, model, layer, k).map_err(Error::common)?;
-        let tangent = [&points[..], &points[..]].concat();
+        let tangent = self.tangents(model, layer, k).map_err(Error::common)?;
         let mut weight = match &self.rule {
             RobinRule::Tangent => tangent,
             RobinRule::Floor(floor) => {
@@ -178,28 +179,37 @@ impl Coefficient {
         }
         Ok(weight)
     }
+
+    /// Return omega psi kappa of every contact row, 2n, in iteration `k`.
+    fn tangents(&self, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
+        let mut weight = vec![0.0; 2 * model.points()];
+        for (i, side) in (0..model.pairs.len()).flat_map(|i| [(i, 0), (i, 1)]) {
+            let (pair, surface) = (&model.pairs[i], self.sides[i][side]);
+            for (point, q) in model.range(i).enumerate() {
+                if is_inside(&self.zone, surface, layer.tangent[q], pair.position[point], k)? {
+                    // a smoothed law has a tangent where the law itself has none
+                    let tangent = match layer.tangent[q] {
+                        0.0 => pair.law.robin_tangent(point, layer.compression[q]),
+                        tangent => tangent,
+                    };
+                    weight[side * model.points() + q] = model.area[q] * tangent;
+                }
+            }
+        }
+        Ok(weight)
+    }
 }
 
-/// Return omega psi kappa at every point, n, in iteration `k`.
-fn tangents(zone: &Zone, model: &Model, layer: &Layer, k: usize) -> Result<Vec<f64>> {
-    let mut weight = vec![0.0; model.points()];
-    for (q, pair, point) in model.each_point() {
-        let inside = match zone {
-            Zone::None => false,
-            Zone::Full => true,
-            Zone::Active => layer.tangent[q] > 0.0,
-            Zone::Subset(holds) => holds.is_true_at(pair.position[point], k)?,
-        };
-        if inside {
-            // a smoothed law has a tangent where the law itself has none
-            let tangent = match layer.tangent[q] {
-                0.0 => pair.law.robin_tangent(point, layer.compression[q]),
-                tangent => tangent,
-            };
-            weight[q] = model.area[q] * tangent;
-        }
+/// Return whether a point at x with this tangent of the layer is in the zone of a surface, 0 or 1 of `between`, in
+/// iteration `k`.
+fn is_inside(zone: &Zone, surface: usize, tangent: f64, x: [f64; 3], k: usize) -> Result<bool> {
+    match zone {
+        Zone::None => Ok(false),
+        Zone::Full => Ok(true),
+        Zone::Active => Ok(tangent > 0.0),
+        Zone::Subset(holds) => holds.is_true_at(x, k),
+        Zone::Sides(zones) => is_inside(&zones[surface], surface, tangent, x, k),
     }
-    Ok(weight)
 }
 
 /// Return the first body that is unconstrained under the Robin term `weight` (omega psi kappa of the contact rows, 2n), and its motion. Springs
@@ -267,6 +277,11 @@ pub fn prepare(model: &mut Model) -> Result<()> {
 /// Return the springs of an extension at the contact rows, 2n.
 fn stiff_springs(model: &Model) -> Vec<f64> {
     model.holding_stiffness().iter().map(|k| STIFF * k).collect()
+}
+
+/// Return the springs of an extension with the matrix of all bodies, n.
+pub fn stiff_joint_springs(model: &Model) -> Vec<f64> {
+    closing(&stiff_springs(model)).collect()
 }
 
 /// Return the iterate with the given trace (2n). Values at rows that a support prescribes are ignored. Collective.

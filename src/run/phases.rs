@@ -3,29 +3,28 @@
 
 use super::inner::SolverFactory;
 use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Clock, Done, Legs, Prepared};
+use super::stages::{Begin, Built, Clock, Done, Legs, MeshFile, Prepared};
 use super::{steps, warnings};
 use crate::contact::pieces::{self, Cut};
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, Verified};
+use crate::discretize::{self, Discrete, Verified};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
-use crate::mesh;
+use crate::mesh::{self, Loaded};
 use crate::model::{BodySlot, JointStep, LinearStep};
 use crate::output;
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
-use crate::robin::{Coefficient, SweepCg};
+use crate::robin::{Coefficient, SweepCg, stiff_joint_springs};
 use crate::scene::Scene;
 use crate::scene::remove;
 use crate::solver::{Dense, Krylov, MakeSolver, options};
 use serde_json::Value;
-use std::path::PathBuf;
 use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
@@ -110,8 +109,8 @@ struct MeshedScene<const D: usize> {
     session: Session,
     scene: Rc<Scene>,
     verified: Verified<D>,
-    /// SHA-256 and path of the file of the mesh, on the rank that has read it.
-    file: Option<(String, PathBuf)>,
+    /// The file of the mesh, on the rank that has read it.
+    file: Option<MeshFile>,
     cut: Cut<D>,
 }
 
@@ -154,8 +153,7 @@ where
             },
             discrete,
             splits: verified.splits(),
-            mesh: file.as_ref().map(|(digest, _)| digest.clone()),
-            mesh_file: file.as_ref().map(|(_, path)| path.clone()),
+            mesh: file.clone(),
             linear: inner.plan.linear,
             interpolation: inner.interpolation.take(),
             near_null_space: std::mem::take(&mut inner.near_null_space),
@@ -192,19 +190,21 @@ where
     }
 }
 
-/// Return the bodies of a scene and their mesh, with SHA-256 and path of its file. The first rank runs Gmsh, reads the mesh and checks it. Collective.
+/// Return the bodies of a scene and their mesh, with its file. The first rank runs Gmsh, reads the mesh and checks it.
+/// Collective.
 fn verified<const D: usize>(
     session: &Session,
     scene: &Scene,
     interrupt: &Interrupt,
-) -> Result<(Verified<D>, Option<(String, PathBuf)>)> {
+) -> Result<(Verified<D>, Option<MeshFile>)> {
     let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
     let (mut file, mut notes) = (None, Vec::new());
     let read = || {
         interrupt.release()?;
-        let loaded = mesh::load::<D>(&scene.mesh, order, interrupt)?;
-        (file, notes) = (Some((loaded.digest, loaded.file)), loaded.notes);
-        Ok(loaded.mesh)
+        let Loaded { mesh, file: path, digest, without_hxt, notes: said, .. } =
+            mesh::load(&scene.mesh, order, interrupt)?;
+        (file, notes) = (Some(MeshFile { digest, path, without_hxt }), said);
+        Ok(mesh)
     };
     let verified = discretize::verify(scene, &Ranks::new(session), read);
     let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
@@ -305,7 +305,7 @@ fn serves(last: &Built, scene: &Scene) -> bool {
     // how linear steps are solved was chosen for the method
     let [old_joint, new_joint] = both.map(|scene| {
         let MethodSpec { name, linear, .. } = &scene.method;
-        matches!(name, MethodName::Auto | MethodName::Newton).then_some((*name, *linear))
+        matches!(name, MethodName::Auto | MethodName::Newton | MethodName::Semismooth).then_some((*name, *linear))
     });
     last.condensed.len() == last.discrete.bodies.len()
         && old_meshes == new_meshes
@@ -325,27 +325,36 @@ fn settings(scene: &Scene) -> Value {
 /// automatic start, it is stored in `start`.
 fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
     let scene = built.scene.clone();
-    if scene.method.name != MethodName::Robin {
-        return linear_step(session, built, start).map(Method::Newton);
+    let rule = || gamma::rule(&scene.method.gamma, &scene.own_rules);
+    match scene.method.name {
+        MethodName::Robin => {
+            let (rule, coefficient) = (rule()?, Some(coefficient_of(&scene, &built.discrete)));
+            crate::robin::prepare(&mut built.discrete.model)?;
+            Ok(Method::Robin { rule, coefficient, linear: Box::new(SweepCg::with_robin_term()) })
+        }
+        MethodName::Semismooth => {
+            Ok(Method::Robin { rule: rule()?, coefficient: None, linear: linear_step(session, built, start)? })
+        }
+        _ => linear_step(session, built, start).map(Method::Newton),
     }
-    let rule = gamma::rule(&scene.method.gamma, &scene.own_rules)?;
-    crate::robin::prepare(&mut built.discrete.model)?;
-    Ok(Method::Robin { rule, coefficient: coefficient_of(&scene), linear: Box::new(SweepCg::with_robin_term()) })
 }
 
-fn coefficient_of(scene: &Scene) -> Coefficient {
-    Coefficient::new(scene.method.psi.clone(), scene.method.robin)
+/// Return the Robin term of a scene.
+fn coefficient_of(scene: &Scene, discrete: &Discrete) -> Coefficient {
+    let MethodSpec { psi, robin, .. } = &scene.method;
+    let sides = (0..discrete.model.pairs.len()).map(|i| discrete.sides(i)).collect();
+    Coefficient::new(psi.clone(), sides, *robin)
 }
 
-/// Return the solver of the linear steps of Newton's method.
+/// Return the solver of linear steps of all bodies.
 fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Box<dyn LinearStep>> {
     let Built { scene, discrete, linear, options, interpolation, near_null_space, .. } = built;
-    let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
-    let modes = std::mem::take(near_null_space);
+    let (linear, interpolation, modes) = (*linear, interpolation.take(), std::mem::take(near_null_space));
     if linear == Linear::Sweeps {
-        crate::robin::prepare(model)?;
-        return Ok(Box::new(SweepCg::new(coefficient_of(scene))));
+        crate::robin::prepare(&mut discrete.model)?;
+        return Ok(Box::new(SweepCg::new(coefficient_of(scene, discrete))));
     }
+    let model = &mut discrete.model;
     // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
     // not distributed
     let is_dense = linear == Linear::Dense;
@@ -359,8 +368,9 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &modes, interpolation)?)))
     };
     let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
-    if let Some(springs) = first_springs(model, start) {
-        step.set_up(&springs)?;
-    }
+    // the first system of the paper's iteration is the extension of its start
+    let extends = scene.method.name == MethodName::Semismooth;
+    let springs = if extends { Some(stiff_joint_springs(model)) } else { first_springs(model, start) };
+    springs.map_or(Ok(()), |springs| step.set_up(&springs))?;
     Ok(step)
 }

@@ -96,10 +96,10 @@ pub fn plan(facts: Vec<BodyFacts>, asked: &SolverRequest) -> Plan {
 }
 
 impl SolverRequest {
-    /// Return whether Newton's method may use one matrix of all bodies.
+    /// Return whether the method may use one matrix of all bodies.
     pub fn may_join(&self) -> bool {
-        let newton = matches!(self.method, MethodName::Auto | MethodName::Newton);
-        newton && self.linear != Some(Linear::Sweeps)
+        let joins = matches!(self.method, MethodName::Auto | MethodName::Newton | MethodName::Semismooth);
+        joins && self.linear != Some(Linear::Sweeps)
     }
 
     /// Return whether the user wants a KSP of PETSc for a body; a KSP for all bodies together needs them uncondensed.

@@ -125,6 +125,7 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
         ranks: session.size(),
         title: scene.title.clone(),
         dofs: bodies.iter().map(|body| body.dofs).sum(),
+        meshes_without_hxt: built.mesh.as_ref().map_or(0, |mesh| mesh.without_hxt.into()),
         bodies: bodies.iter().zip(solvers).map(|(info, solver)| body_report(info, solver)).collect(),
         times: clock.times.clone(),
         memory: clock.memory.clone(),

@@ -24,10 +24,8 @@ pub struct Built {
     pub discrete: Discrete,
     /// A line for each group of the mesh that is split into bodies.
     pub splits: Vec<String>,
-    /// SHA-256 of the file of its mesh, on the rank that has read the file; none on other ranks.
-    pub mesh: Option<String>,
-    /// The file itself, on this rank.
-    pub mesh_file: Option<PathBuf>,
+    /// The file of its mesh, on the rank that has read it; none on other ranks.
+    pub mesh: Option<MeshFile>,
     /// Places that the page of the run marks, on the first rank; none without a page.
     pub marks: Vec<Mark>,
     /// The solver of linear steps.
@@ -46,6 +44,17 @@ pub struct Built {
     pub warnings: Vec<String>,
     /// The legs of the load history; none if this problem serves all load steps. On a leg, all loads are proportional.
     pub legs: Option<Rc<dyn Legs>>,
+}
+
+/// The file of a mesh.
+#[derive(Debug, Clone)]
+pub struct MeshFile {
+    /// SHA-256 of its contents.
+    pub digest: String,
+    /// Its path.
+    pub path: PathBuf,
+    /// Whether Gmsh was to take its default algorithm for tetrahedra instead of HXT.
+    pub without_hxt: bool,
 }
 
 /// A scene with its mesh, from which the problem of each leg of its load history is prepared.

@@ -82,10 +82,13 @@ pub fn message(outcome: &Outcome, model: &Model) -> String {
     }
 }
 
-/// Return what to try instead. Only the method `robin` has a step length that a user can make shorter; other methods choose it
-/// themselves.
+/// Return what to try instead. Only `robin` and `semismooth` have a step length that a user can make shorter; other
+/// methods choose it themselves.
 fn alternative(outcome: &Outcome) -> &'static str {
-    if outcome.method == "robin" { "a smaller method.gamma, or --method auto" } else { "another --method" }
+    match outcome.method {
+        "robin" | "semismooth" => "a smaller method.gamma, or --method auto",
+        _ => "another --method",
+    }
 }
 
 /// Return the message on a number that is not finite in iteration `k`.

@@ -1,6 +1,7 @@
 //! Meshes that are none are refused with body, place and element; those that are give what they gave.
 
 use crate::common::{Run, Scene, output, root, solve, solve_on, text_of};
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
@@ -477,4 +478,67 @@ fn parts_of_a_group_are_bodies() {
     std::fs::write(&scene.path, text).expect("a scene");
     let run = solve(&scene, &[]);
     assert!(run.code == 3 && run.stderr.contains("`all_blocks_1` is a connected part"), "{}", run.said());
+}
+
+/// A unit cube under pressure, meshed by a Gmsh of a version that is said to be this one: the counter of meshes without
+/// HXT, and the calls.
+fn by_version(folder: &Path, version: &str, geo: &str, threads: &str) -> (u64, Vec<String>) {
+    let bin = folder.join(version);
+    std::fs::create_dir_all(&bin).expect("a folder");
+    let log = bin.join("calls");
+    let program = format!(
+        "#!/bin/sh\n[ \"$1\" = --version ] && {{ echo {version}; exit; }}\necho \"$*\" >>'{}'\nPATH=${{PATH#*:}} exec gmsh \"$@\"\n",
+        log.display()
+    );
+    let path = bin.join("gmsh");
+    // its time of change is part of the key in the cache
+    if !path.exists() {
+        std::fs::write(&path, program).expect("a program");
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).expect("a program");
+    }
+    std::fs::write(&log, "").expect("a file");
+    std::fs::write(folder.join("cube.geo"), geo).expect("a script");
+    let scene = format!(
+        "dimension = 3\nmesh = {{ geo = \"cube.geo\"{threads} }}\n[[body]]\nname = \"all\"\nyoung = 1\npoisson = 0\n\
+         fix = [{{ on = \"bottom\", x = 0, y = 0, z = 0 }}]\nload = [{{ on = \"top\", pressure = 1 }}]\n"
+    );
+    std::fs::write(folder.join("scene.toml"), scene).expect("a scene");
+    let mut command = Command::new(crate::common::WINKLER);
+    crate::common::environment(&mut command);
+    let found = format!("{}:{}", bin.display(), std::env::var("PATH").expect("a path"));
+    command.args(["solve", "scene.toml", "--json"]).current_dir(folder).env("PATH", found);
+    command.env("WINKLER_CACHE", folder.join("cache"));
+    let (status, said, complaint) = output(command, Duration::from_secs(60));
+    assert!(status.success(), "{said}{complaint}");
+    let report: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let calls = std::fs::read_to_string(&log).expect("a file");
+    (report["meshes_without_hxt"].as_u64().expect("a counter"), calls.lines().map(str::to_owned).collect())
+}
+
+/// HXT is the default from the version on that makes one mesh in all runs, gives way where it fails, and is what
+/// threads are for.
+#[test]
+fn tetrahedra_are_by_hxt_where_it_is_steady() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cube = "SetFactory(\"OpenCASCADE\");\nBox(1) = {0, 0, 0, 1, 1, 1};\nBox(2) = {0, 0, 1, 1, 1, 1};\nCoherence;\n\
+                MeshSize{:} = 0.5;\nPhysical Volume(\"all\") = {1, 2};\n\
+                Physical Surface(\"bottom\") = Surface In BoundingBox{-1, -1, -0.1, 2, 2, 0.1};\n\
+                Physical Surface(\"top\") = Surface In BoundingBox{-1, -1, 1.9, 2, 2, 2.1};\n";
+    let quadrangles =
+        "Transfinite Curve{:} = 3;\nTransfinite Surface{:};\nRecombine Surface{:};\nTransfinite Volume{1};\n";
+    let beside = format!("{cube}{quadrangles}");
+    // the counter, the threads, and whether each call asks for HXT
+    for (version, geo, threads, without, number, expected) in [
+        ("4.11.1", cube, "", 1, 1, &[false][..]),
+        ("4.11.1", cube, ", threads = 2", 0, 2, &[true]),
+        ("4.12.0", cube, "", 0, 1, &[true]),
+        ("4.12.0", cube, "", 0, 1, &[]),
+        ("4.12.0", &beside, "", 1, 1, &[true, false]),
+        ("4.12.0", &beside, "", 1, 1, &[]),
+    ] {
+        let (counter, calls) = by_version(folder.path(), version, geo, threads);
+        let by_hxt: Vec<bool> = calls.iter().map(|call| call.contains("-algo hxt")).collect();
+        assert_eq!((counter, &by_hxt[..]), (without, expected), "{version} {threads} {calls:?}");
+        assert!(calls.iter().all(|call| call.contains(&format!("-nt {number}"))), "{calls:?}");
+    }
 }

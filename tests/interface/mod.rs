@@ -7,6 +7,7 @@ mod lines;
 mod manners;
 mod options;
 mod origins;
+mod paper;
 mod pictures;
 mod refusals;
 mod schema;

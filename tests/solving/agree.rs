@@ -31,6 +31,7 @@ const fn on(ranks: usize, method: &'static str, solver: &'static str) -> Way {
 }
 
 const NEWTON: &str = "name=\"newton\"";
+const SEMISMOOTH: &str = "name=\"semismooth\", gamma=1";
 const NEWTON_ROBIN: &str = "name=\"newton-robin\"";
 
 /// What Newton's method does for two bodies that are condensed: one sparse factor and assembly each, and no solve of a body.
@@ -46,7 +47,7 @@ const JOINED: &[(&str, usize)] = &[
     ("robin_updates", 0),
 ];
 
-const GROOVE: [Way; 26] = [
+const GROOVE: [Way; 32] = [
     by("gamma=0.6", "", &[("factorizations", 2), ("assemblies", 2)]),
     by("gamma=[0.9, 0.5, 0.6]", "", &[]),
     by("gamma=\"line-search\"", "", &[]),
@@ -55,6 +56,11 @@ const GROOVE: [Way; 26] = [
     // S is factored once a body, besides the start
     by("gamma=\"line-search\", psi=\"none\"", "", &[("dense_factorizations", 4)]),
     by("gamma=\"line-search\", psi=\"x > 2\"", "", &[]),
+    by("gamma=\"aitken\", psi=[\"full\", \"x > 2\"]", "", &[]),
+    by("gamma=\"0.6 + 0.3*exp(-k)\"", "", &[]),
+    by(SEMISMOOTH, "", CONDENSED),
+    by(SEMISMOOTH, "mumps", JOINED),
+    by("name=\"semismooth\", gamma=\"line-search\"", "hypre", JOINED),
     by(NEWTON_ROBIN, "", &[]),
     by(NEWTON, "condensed", CONDENSED),
     by(NEWTON, "mumps", JOINED),
@@ -76,16 +82,18 @@ const GROOVE: [Way; 26] = [
     on(2, "gamma=0.6", ""),
     Way { ranks: 2, ..typed("-ksp_type cg -pc_type hypre -upper_pc_type gamg", &[]) },
     on(2, NEWTON_ROBIN, "mumps"),
+    on(2, SEMISMOOTH, ""),
 ];
 
 /// A body that contact alone holds.
-const HELD: [Way; 11] = [
+const HELD: [Way; 12] = [
     by("gamma=0.6", "", &[]),
     by("gamma=\"line-search\"", "", &[]),
     // the start, and once more
     by("gamma=\"aitken\", robin=\"frozen\", start={normal=1e-4}", "", &[("dense_factorizations", 4)]),
     by("gamma=\"aitken\", robin=\"auto\"", "mumps", &[]),
     by("gamma=\"aitken\", robin={floor=1e4}", "", &[]),
+    by("name=\"semismooth\", gamma=0.9", "", CONDENSED),
     by(NEWTON_ROBIN, "mumps", &[]),
     by(NEWTON_ROBIN, "hypre", &[]),
     by(NEWTON, "condensed", CONDENSED),
@@ -95,10 +103,11 @@ const HELD: [Way; 11] = [
 ];
 
 /// Many bodies, and bodies in space.
-const JOINTLY: [Way; 4] = [
+const JOINTLY: [Way; 5] = [
     by(NEWTON, "mumps", &[("symbolic_factorizations", 1), ("body_solves", 0)]),
     by(NEWTON, "hypre", &[("body_solves", 0)]),
     by(NEWTON, "condensed", &[("body_solves", 0)]),
+    by(SEMISMOOTH, "hypre", &[("body_solves", 0)]),
     on(2, NEWTON, "condensed"),
 ];
 

@@ -101,6 +101,15 @@ fn inside_the_interval_the_energy_falls() {
     // what only contact holds has no lower bound where contact may vanish
     let held = run(LAYER, "{gamma=0.6, interval=true, stop={residual=1e-8}}").converged();
     assert!(held.report["gamma_interval"]["theorem"].is_null() && held.number("gamma_interval/descent") > 0.0);
+    // and without a solution there are no bounds, which the closing lines say
+    let ended = run(LAYER, "{gamma=0.6, interval=true, stop={iterations=2}}");
+    assert!(ended.code == 1 && ended.report["gamma_interval"].is_null());
+    assert!(
+        ended.stdout.contains("interval of gamma: unknown, as its bounds are those at a solution"),
+        "{}",
+        ended.said()
+    );
+    assert!(held.stdout.contains("theorem 3 promises convergence nowhere"), "{}", held.said());
     // nobody asked
     assert!(run(LAYER, "{gamma=0.6}").report["gamma_interval"].is_null());
 }

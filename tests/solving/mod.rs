@@ -8,6 +8,7 @@ mod interval;
 mod many;
 mod mechanisms;
 mod methods;
+mod paper;
 mod robustness;
 mod saturating;
 mod steps;
