@@ -530,7 +530,9 @@ impl RoundReport {
     /// Return the mesh with this number, its estimated errors and its cost as a line for the terminal.
     pub fn line(&self, number: usize) -> String {
         let errors = [self.pressure, self.displacement, self.force, self.energy];
-        let [pressure, displacement, force, energy] = errors.map(|error| sci(error, 2));
+        // a force that equilibrium alone determines has no error but roundoff
+        let in_words = |error: f64| if error < f64::EPSILON { "0".to_owned() } else { sci(error, 2) };
+        let [pressure, displacement, force, energy] = errors.map(in_words);
         format!(
             "  {number:>4} {:>10} {:>10} {pressure:>10} {displacement:>13} {force:>10} {energy:>10} {:>11} {:>9}",
             self.cells,

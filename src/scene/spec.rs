@@ -285,8 +285,8 @@ impl Scene {
     }
 
     /// Add a law of a layer, which [`LayerSpec::Own`](crate::problem::layer::LayerSpec::Own) uses by its name. `maker` gets the contact
-    /// points (x, y, z) of a pair and returns the law for all of them. The law is checked at the first point: it must increase, and have
-    /// its derivative and its integral.
+    /// points (x, y, z) of a pair and returns the law for all of them. The law is checked at the first point: it must increase, and its
+    /// energy must be the integral of its pressure.
     pub fn law<L: LayerLaw + 'static>(mut self, name: &str, maker: impl Fn(&[[f64; 3]]) -> L + 'static) -> Self {
         self.laws.insert(name, Rc::new(move |points: &[[f64; 3]]| Box::new(maker(points)) as _));
         self

@@ -86,7 +86,7 @@ impl Krylov {
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
         chosen.refuse_idle()?;
-        ksp.set_from_options()?;
+        ksp.set_from_options().map_err(|error| chosen.explain(error))?;
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
@@ -222,7 +222,7 @@ impl InnerSolver for Krylov {
                 self.stale = false;
                 self.fresh = None;
             }
-            self.ksp.set_up()?;
+            self.ksp.set_up().map_err(|error| self.chosen.explain(error))?;
         }
         Ok(())
     }

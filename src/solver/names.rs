@@ -51,6 +51,37 @@ pub(super) fn is_control_of_mumps(bare: &str) -> bool {
     bare.starts_with("mat_mumps_icntl_") || bare.starts_with("mat_mumps_cntl_")
 }
 
+/// Common types of KSP and of PC.
+const KSP_TYPES: &str = "cg fcg pipecg groppcg minres gmres fgmres bcgs richardson chebyshev preonly";
+const PC_TYPES: &str = "cholesky lu icc ilu hypre gamg mg jacobi pbjacobi bjacobi sor asm none";
+
+/// Return the object, KSP or PC, of which an option names the type, also in a nested solver; `None` for other options.
+pub(super) fn object_of_type(name: &str) -> Option<&'static str> {
+    [("ksp_type", "KSP"), ("pc_type", "PC")].into_iter().find_map(|(leaf, object)| nest_of(name, leaf).map(|_| object))
+}
+
+/// Return advice for an option, as the user wrote it, whose value is no type of PETSc.
+pub(super) fn type_instead(name: &str, value: &str) -> String {
+    let (nest, known) = name.strip_suffix("pc_type").map_or(("", KSP_TYPES), |nest| (nest, PC_TYPES));
+    if value == "mumps" {
+        let package = format!("{nest}pc_type cholesky {nest}pc_factor_mat_solver_type mumps");
+        return format!("MUMPS is a package of a factorisation: {package}");
+    }
+    let near = nearest(value, known.split(' ')).map(|near| format!("did you mean {name} {near}?"));
+    near.unwrap_or_else(|| "`-help` lists the types".to_owned())
+}
+
+/// Return what takes the place of an option of PETSc that no solver of this program can have.
+pub(super) fn instead(bare: &str) -> Option<&'static str> {
+    match bare {
+        "mat_type" | "vec_type" => Some("matrices are AIJ and vectors standard ones, in the memory of the host"),
+        _ if bare.starts_with("snes_") => Some(
+            "Newton's method is not PETSc's SNES: `method.stop` in the scene ends it, and history.csv has its residuals",
+        ),
+        _ => None,
+    }
+}
+
 /// Return the common name that is meant, perhaps with the prefix of a body, if one is near enough for a typing mistake.
 pub(super) fn meant(name: &str, bodies: &[&str]) -> Option<String> {
     let name = name.trim_start_matches('-');

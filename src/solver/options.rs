@@ -136,10 +136,15 @@ impl Chosen {
     /// Return the options of a family that the user wrote and that only [look](looks), as they were typed.
     pub fn all_looking(&self, family: &str) -> impl Iterator<Item = String> {
         let looking = self.choices.iter().filter(move |(name, _)| name.starts_with(family) && looks(name));
-        looking.map(|(name, choice)| match choice.origin {
+        looking.map(|(name, choice)| self.written(name, choice))
+    }
+
+    /// Return the name of an option as the user wrote it.
+    fn written(&self, name: &str, choice: &SolverOption) -> String {
+        match choice.origin {
             OptionOrigin::Own => format!("-{}_{name}", self.prefix),
             _ => format!("-{name}"),
-        })
+        }
     }
 
     /// Return the controls of MUMPS that the user wrote, and mark them as read.
@@ -187,6 +192,19 @@ impl Chosen {
             |(name, value): &(&str, &str)| is_limit(name) && value.parse::<i64>().is_ok_and(|limit| limit < 1);
         let idle = self.all_typed().find(is_idle);
         idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&format!("-{}_{name}", self.prefix), value)))
+    }
+
+    /// Name the option of an unknown type of KSP or PC, if that is why PETSc refused a solver, or return PETSc's error.
+    pub fn explain(&self, error: Error) -> Error {
+        let text = error.to_string();
+        let is_refused = |(name, choice): &(&String, &SolverOption)| {
+            let object = names::object_of_type(name);
+            object.is_some_and(|object| text.contains(&format!("requested {object} type {} ", choice.value())))
+        };
+        let Some((name, choice)) = self.choices.iter().find(is_refused) else { return error };
+        let (name, value) = (self.written(name, choice), choice.value());
+        let advice = names::type_instead(&name, value);
+        Error::new(Kind::Solver, format!("{name} {value}: this PETSc does not know the type `{value}`")).help(advice)
     }
 
     /// Return whether the user wrote an option for this solver alone.
@@ -345,8 +363,9 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
             }
             () => {
                 let error = Error::new(Kind::Solver, format!("no solver of this run reads the option {option}"));
-                let near = names::meant(option, bodies).map(|near| format!("did you mean -{near}?"));
-                return Err(error.help(near.unwrap_or_else(|| "`-help` lists the options of this run".to_owned())));
+                let near = || names::meant(option, bodies).map(|near| format!("did you mean -{near}?"));
+                let advice = names::instead(bare).map(str::to_owned).or_else(near);
+                return Err(error.help(advice.unwrap_or_else(|| "`-help` lists the options of this run".to_owned())));
             }
         }
     }

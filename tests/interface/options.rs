@@ -342,6 +342,25 @@ fn a_solver_without_iterations_is_refused() {
     assert!([0, 1].contains(&smoother.code), "{}", smoother.said());
 }
 
+/// Options of other programs with PETSc, and types that PETSc does not know, are refused with what takes their place.
+#[test]
+fn what_takes_the_place_of_an_option_is_told() {
+    for (options, words) in [
+        ("-mat_type baij", "matrices are AIJ"),
+        ("--method newton -newton_vec_type cuda", "matrices are AIJ"),
+        ("-snes_rtol 1e-8", "not PETSc's SNES"),
+        ("-snes_monitor", "not PETSc's SNES"),
+        ("-upper_pc_type mumps", "-upper_pc_type cholesky -upper_pc_factor_mat_solver_type mumps"),
+        ("-pc_type bjacobi -sub_pc_type mumps", "-sub_pc_type cholesky -sub_pc_factor_mat_solver_type mumps"),
+        ("-pc_type jacoby", "did you mean -pc_type jacobi?"),
+        ("--method newton -newton_ksp_type gmers", "did you mean -newton_ksp_type gmres?"),
+        ("-ksp_type nothing_like_it", "this PETSc does not know the type `nothing_like_it`"),
+    ] {
+        let run = groove(options);
+        assert!(run.code == 5 && run.stderr.contains(words), "{options}: {}", run.said());
+    }
+}
+
 /// Conjugate gradients that stagnate, because an option changes the problem, end with their last iteration.
 #[test]
 fn a_solve_that_stagnates_ends() {
