@@ -9,6 +9,7 @@ mod carrier;
 mod chords;
 mod facts;
 mod groups;
+mod kept;
 mod marks;
 mod mechanism;
 pub mod meshes;
@@ -28,6 +29,7 @@ pub use approach::mean_normal;
 pub use assembly::{Assembled, Factory};
 pub use facts::BodyInfo;
 pub use groups::find_group;
+pub use kept::Kept;
 pub use marks::marks;
 pub use pairs::{ContactFacts, corners};
 pub use post::ForceBalance;
@@ -35,10 +37,10 @@ pub use rigid::Obstacle;
 pub use surface::Neighbours;
 pub use verify::{Verified, verify};
 
-use crate::contact::{self, law};
+use crate::contact::{self, ContactPair, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
-use crate::model::{Body, BodySlot, Mechanism, Model};
+use crate::model::{Body, BodyCounts, BodySlot, Mechanism, Model};
 use crate::problem::Start;
 use crate::problem::contact::{Carrier, ContactSpec};
 use crate::scene::Scene;
@@ -62,31 +64,53 @@ pub struct Discrete {
     pub mechanisms: Vec<Mechanism>,
     /// The meshes, kept only if an estimate of the error was requested.
     pub meshes: Option<Rc<dyn Meshes>>,
-    /// Factor of the loads and prescribed displacements that the model has, relative to those that it was made with.
-    pub factor: f64,
-    /// Number of stiffness matrices assembled on this rank.
+    /// Whether all bodies have the matrices and solvers of the problem before.
+    pub is_renewed: bool,
+    /// What making the problems of this run took.
+    pub work: Work,
+}
+
+/// What making the problems of a run took on this rank.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Work {
+    /// Number of stiffness matrices assembled.
     pub assemblies: usize,
-    /// Number of stiffness matrices reused from an earlier scene.
+    /// Number of stiffness matrices reused from an earlier run.
     pub assemblies_avoided: usize,
+    /// Number of pairs whose surfaces were searched for common pieces.
+    pub pairings: usize,
+    /// Counters of bodies of earlier load steps that were made anew.
+    pub gone: BodyCounts,
+    /// Whether the run has made a problem before, as for an earlier load step.
+    has_begun: bool,
+}
+
+/// What a discrete problem is made from.
+pub struct Request<'a, const D: usize> {
+    /// The scene, with the bodies of `verified` under the loads of a step.
+    pub scene: &'a Scene,
+    pub verified: &'a Verified<D>,
+    /// Function that finds the common pieces of surfaces in this dimension.
+    pub cut: contact::pieces::Cut<D>,
+    /// Whether the meshes are kept for an estimate of the error.
+    pub keep: bool,
 }
 
 /// Turn a scene and its mesh into a model. Collective.
 ///
 /// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
-/// assembles it.
+/// assembles it. `factory` turns each body of this rank into one with a solver.
 ///
-/// `scene` has the bodies of `verified`, with the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
-/// `factory` turns each body of this rank into one with a solver. `keep` requests that the meshes are kept for an estimate of the
-/// error.
+/// The problem `before` on the same mesh, which left `kept`, gives all pairs and bodies that would be the same but for loads, prescribed displacements, gaps
+/// and laws.
 ///
 /// # Errors
 /// The scene may contradict its mesh: missing groups, surfaces of the wrong body, supports that contradict each other, surfaces
 /// that do not face each other. Failures of `factory` are returned, too.
 pub fn discretize<const D: usize>(
-    scene: &Scene,
-    verified: &Verified<D>,
-    cut: contact::pieces::Cut<D>,
-    keep: bool,
+    request: &Request<D>,
+    kept: &mut Kept<D>,
+    before: Option<Discrete>,
     exchange: Rc<dyn Exchange>,
     factory: &mut impl Factory,
 ) -> Result<Discrete>
@@ -94,13 +118,16 @@ where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
 {
+    let (mut work, mut earlier, mut earlier_pairs) = before.map(Discrete::into_parts).unwrap_or_default();
+    let Request { scene, verified, keep, .. } = *request;
     let mut prepared = None;
     let shared = broadcast(&*exchange, || {
-        let (shared, whole) = prepare(scene, verified, cut, keep, exchange.ranks(), factory)?;
+        let (shared, whole) = prepare(request, exchange.ranks(), factory, kept, std::mem::take(&mut earlier_pairs))?;
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan, is_kept, pairings } =
+        shared;
     let of_pairs: Vec<ContactSpec> = contacts.iter().map(|contact| contact.spec(&scene.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
@@ -108,16 +135,27 @@ where
         for (pair, spec) in pairs.iter_mut().zip(&of_pairs) {
             pair.law = law::of_pair(spec, &scene.laws, &pair.position)?;
         }
+    } else {
+        work.pairings += pairings;
+    }
+    for (slot, _) in earlier.iter_mut().zip(&is_kept).filter(|(_, is_kept)| !**is_kept) {
+        let gone = slot.local.take().filter(|body| body.dofs().leads());
+        work.gone += gone.map_or(BodyCounts::default(), |body| body.counts());
     }
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
     let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
+    let mut earlier = earlier.into_iter();
     for (body, local) in locals.into_iter().enumerate() {
+        let before = earlier.next();
         if let Some(local) = local {
-            assembler.make(&scene.bodies[body], local, &mut slots[body], &mut infos[body])?;
+            assembler.make(&scene.bodies[body], local, before, &mut slots[body], &mut infos[body])?;
         }
     }
-    let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
+    let Assembler { assemblies, avoided, shapes, .. } = assembler;
+    work.assemblies += assemblies;
+    work.assemblies_avoided += if work.has_begun { 0 } else { avoided };
+    work.has_begun = true;
     let meshes = keep.then(|| Rc::new(KeptMeshes { shapes, fine }) as Rc<dyn Meshes>);
     let of_rank = |slot: BodySlot| match rank == 0 && !slot.motions.is_empty() {
         true => BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot },
@@ -126,8 +164,8 @@ where
     slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    let (bodies, specs, factor) = (infos, of_pairs, 1.0);
-    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, factor, assemblies, assemblies_avoided })
+    let (bodies, specs, is_renewed) = (infos, of_pairs, is_kept.iter().all(|is_kept| *is_kept));
+    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, is_renewed, work })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
@@ -162,11 +200,17 @@ impl Discrete {
         model.set_gaps();
     }
 
-    /// Give the loads and prescribed displacements this factor.
-    pub fn scale_loads(&mut self, factor: f64) {
-        let ratio = factor / self.factor;
-        self.factor = factor;
-        self.model.scale_loads(ratio);
+    /// Begin another run with the bodies of this problem: its counters start at zero, and what is reused counts as avoided.
+    pub fn begin_anew(&mut self) {
+        self.work = Work::default();
+        self.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(Body::begin_anew);
+    }
+
+    /// Return the work so far, the bodies with a mesh, and the pairs, for the problem that follows.
+    fn into_parts(self) -> (Work, Vec<BodySlot>, Vec<(ContactPair, ContactFacts)>) {
+        let Self { work, model: Model { mut bodies, pairs, .. }, contacts, .. } = self;
+        bodies.retain(|slot| !slot.is_rigid);
+        (work, bodies, pairs.into_iter().zip(contacts).collect())
     }
 
     /// Return which surface carries the contact points of each pair.

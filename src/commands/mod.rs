@@ -79,7 +79,11 @@ impl Terminal {
         let mut lines = vec![format!("{}: decided", scene.title)];
         let name = scene.method.name.name();
         let newton = matches!(scene.method.name, MethodName::Auto | MethodName::Newton | MethodName::NewtonRobin);
-        let linear = if newton { format!("; Newton's linear steps: {}", built.linear.name()) } else { String::new() };
+        let linear = if newton {
+            format!("; Newton's linear steps: {}", built.solvers.plan.linear.name())
+        } else {
+            String::new()
+        };
         lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));
         lines.push(format!("  inner solver: {} ({})", solvers_in_words(&solvers), built.choice));
         lines.push(format!("  {} ranks, {}", session.size(), session.blas_name()));

@@ -2,6 +2,7 @@
 
 use super::body::BodyMesh;
 use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
+use super::kept::MatrixInputs;
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
@@ -211,15 +212,22 @@ fn too_large(spec: &BodySpec) -> Error {
         .label("their forces are beyond the range of numbers")
 }
 
-/// Return the bodies with their spaces, elasticity, supports and springs.
+/// Return the bodies with their spaces, elasticity, supports and springs. `kept` are bodies of an earlier problem on the mesh, whose spaces serve.
 ///
 /// # Errors
 /// The scene contradicts its mesh.
-pub fn parts<'a, const D: usize>(scene: &'a Scene, verified: &Verified<D>) -> Result<Vec<SceneBody<'a, D>>> {
+pub fn parts<'a, const D: usize>(
+    scene: &'a Scene,
+    verified: &Verified<D>,
+    kept: &[MatrixInputs<D>],
+) -> Result<Vec<SceneBody<'a, D>>> {
     let Verified { mesh, checked, .. } = verified;
     let mut parts = Vec::new();
     for (index, spec) in scene.bodies.iter().enumerate() {
-        let space = space(spec, mesh, scene.plane)?;
+        let space = match kept.get(index) {
+            Some(kept) => kept.space.clone(),
+            None => Rc::new(space(spec, mesh, scene.plane)?),
+        };
         let checked = &checked[index];
         refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
@@ -232,7 +240,7 @@ pub fn parts<'a, const D: usize>(scene: &'a Scene, verified: &Verified<D>) -> Re
         let none = || Csr::new(space.dofs());
         let (rows, nodal_rows, approach) = (none(), none(), none());
         let mesh = BodyMesh {
-            space: Rc::new(space),
+            space,
             regions,
             held,
             springs,

@@ -9,7 +9,7 @@ use crate::fem::PointExtent;
 use crate::mesh::{Asked, BodyCheck, Duty, EDGES, Groups, LENGTHS, Mesh};
 use crate::problem::body::plain;
 use crate::problem::pattern::{BODY, Pattern, is_pattern};
-use crate::problem::{BodySpec, LoadKind, SpringKind};
+use crate::problem::{BodySpec, LoadKind, MeshSource, SpringKind};
 use crate::problem::{Order, Plane};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -25,10 +25,44 @@ pub struct Verified<const D: usize> {
     pub points: usize,
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
+    /// The groups that lie on each body, see [`patterns::lying`].
+    lying: Vec<Vec<u32>>,
+    /// What its scene needs of the mesh.
+    used: MeshUse,
     /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
     pub checked: Rc<[BodyCheck]>,
     /// What is to be said of the file, and of surfaces that are sets of nodes, on the first rank.
     pub notes: Vec<String>,
+}
+
+/// The mesh that a scene names, and what its lines need of the groups. Scenes that agree in this have the same bodies on the same mesh.
+#[derive(PartialEq)]
+pub struct MeshUse {
+    source: MeshSource,
+    dimension: usize,
+    plane: Plane,
+    /// Tables of bodies: name, whether each part is a body, order.
+    bodies: Vec<(String, bool, Order)>,
+    /// Groups of each body, and of the contacts.
+    groups: Vec<Vec<(String, Need)>>,
+    has_rules: bool,
+}
+
+impl MeshUse {
+    /// Return what a scene needs.
+    pub fn of(scene: &Scene) -> Self {
+        let body = |body: &BodySpec| (body.name.value.clone(), body.split, body.order);
+        let owned = |(on, need): (&Located<String>, Need)| (on.value.clone(), need);
+        let of_bodies = scene.bodies.iter().map(|body| of_body(body).into_iter().map(owned).collect());
+        Self {
+            source: scene.mesh.clone(),
+            dimension: scene.dimension.value,
+            plane: scene.plane,
+            bodies: scene.bodies.iter().map(body).collect(),
+            groups: of_bodies.chain([of_contacts(scene).map(owned).collect()]).collect(),
+            has_rules: scene.rules().next().is_some(),
+        }
+    }
 }
 
 /// What all ranks have of a mesh.
@@ -58,8 +92,8 @@ pub fn verify<const D: usize>(
 ) -> Result<Verified<D>> {
     let mut verified = None;
     let head = broadcast(exchange, || {
-        let (found, lying) = check(scene, read()?)?;
-        let head = MeshHeader::of(&found, lying);
+        let found = check(scene, read()?)?;
+        let head = MeshHeader::of(&found);
         verified = Some(found);
         Ok(head)
     })?;
@@ -69,8 +103,8 @@ pub fn verify<const D: usize>(
     }
 }
 
-/// Check the mesh of a scene. Return also which groups lie on which bodies.
-fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D>, Vec<Vec<u32>>)> {
+/// Check the mesh of a scene.
+fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<Verified<D>> {
     size(&mesh)?;
     mesh.sort_cells();
     // The radius of a body of revolution is measured from its axis.
@@ -83,10 +117,25 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.pairs().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), scene.rules().next().is_some())?;
-    Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into(), notes }, lying))
+    let used = MeshUse::of(scene);
+    Ok(Verified { points: mesh.points.len(), mesh, bodies, lying, used, checked: checked.into(), notes })
 }
 
 impl<const D: usize> Verified<D> {
+    /// Return whether another scene has the same bodies on this mesh.
+    pub fn serves(&self, scene: &Scene) -> bool {
+        self.used == MeshUse::of(scene)
+    }
+
+    /// Take the bodies of another scene that this mesh serves.
+    ///
+    /// # Errors
+    /// A line of the scene acts on no body, or on several.
+    pub fn follow(&mut self, scene: &Scene) -> Result<()> {
+        self.bodies = patterns::bodies(scene, &self.mesh, &self.lying)?;
+        Ok(())
+    }
+
     /// Return a line for each group that is split into bodies: its name, and the number and names of the bodies.
     pub fn splits(&self) -> Vec<String> {
         let mut splits: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -110,7 +159,7 @@ impl<const D: usize> Verified<D> {
 }
 
 impl MeshHeader {
-    fn of<const D: usize>(verified: &Verified<D>, lying: Vec<Vec<u32>>) -> Self {
+    fn of<const D: usize>(verified: &Verified<D>) -> Self {
         let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
         Self {
             path: path.clone(),
@@ -119,7 +168,7 @@ impl MeshHeader {
             split: *split,
             straightened: *straightened,
             points: verified.points,
-            lying,
+            lying: verified.lying.clone(),
         }
     }
 
@@ -128,7 +177,8 @@ impl MeshHeader {
         let Self { path, order, groups, split, straightened, points, lying } = self;
         let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
         let bodies = patterns::bodies(scene, &mesh, &lying)?;
-        Ok(Verified { mesh, points, bodies, checked: Rc::new([]), notes: Vec::new() })
+        let used = MeshUse::of(scene);
+        Ok(Verified { mesh, points, bodies, lying, used, checked: Rc::new([]), notes: Vec::new() })
     }
 }
 
@@ -166,6 +216,8 @@ enum Need {
     Nodes,
     /// Points: springs.
     Points,
+    /// Cells: a region.
+    Cells,
 }
 
 /// Replace each group of points that the scene names as a surface by facets: those of the boundary of a body all of whose nodes
@@ -240,7 +292,8 @@ fn of_body(body: &BodySpec) -> Vec<(&Located<String>, Need)> {
         SpringKind::Normal(_) => (&spring.on, Need::Facets),
         SpringKind::Vector(_) => (&spring.on, Need::Points),
     });
-    load.chain(fix).chain(spring).collect()
+    let region = body.regions.iter().map(|region| (&region.on, Need::Cells));
+    load.chain(fix).chain(spring).chain(region).collect()
 }
 
 fn of_contacts(scene: &Scene) -> impl Iterator<Item = (&Located<String>, Need)> {

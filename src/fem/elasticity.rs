@@ -26,6 +26,15 @@ struct MaterialRegion {
     constant: Option<(Material, [f64; 3])>,
 }
 
+/// Elasticities are equal if the constants of all cells are.
+impl PartialEq for Elasticity {
+    fn eq(&self, other: &Self) -> bool {
+        let specs = |of: &Self| of.regions.iter().map(|region| region.spec.clone()).collect::<Vec<_>>();
+        (self.dimension, self.plane, &self.of_cell, specs(self))
+            == (other.dimension, other.plane, &other.of_cell, specs(other))
+    }
+}
+
 /// The reason why there is no elasticity at a point.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Flaw {

@@ -3,7 +3,7 @@
 use super::Motion;
 use super::dofs::{Distribution, Dofs};
 use crate::error::{Error, Kind, Result};
-use crate::fem::{Couplings, ElasticBody};
+use crate::fem::ElasticBody;
 use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
 use crate::petsc::{Rows, Schur, Session};
@@ -58,7 +58,9 @@ struct Interior {
     load: Vec<f64>,
     /// The factor, once the interior is eliminated.
     schur: Option<RefCell<Schur>>,
-    /// Whether it was eliminated in an earlier run.
+    /// Eliminations in this run.
+    eliminations: usize,
+    /// Whether one of an earlier run serves.
     is_reused: bool,
     /// Wall seconds of the elimination.
     seconds: f64,
@@ -78,7 +80,6 @@ impl Body {
         make: MakeSolver,
         words: String,
     ) -> Self {
-        elastic.held = Couplings::default();
         let prescribed = std::mem::take(&mut elastic.prescribed);
         let dofs = Dofs::new(elastic.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
         let (diagonal, make) = (Vec::new(), Some(make));
@@ -125,6 +126,7 @@ impl Body {
             whole,
             load,
             schur: None,
+            eliminations: 0,
             is_reused: false,
             seconds: 0.0,
         };
@@ -143,6 +145,11 @@ impl Body {
             self.elastic = interior.eliminate()?;
         }
         Ok(())
+    }
+
+    /// Return whether the solver of G was made.
+    pub fn has_solver(&self) -> bool {
+        self.matrix.is_some()
     }
 
     /// Return the dofs.
@@ -273,34 +280,32 @@ impl Body {
         self.interior.as_ref().map_or(counts, |interior| interior.count(counts))
     }
 
-    /// Set the counters to zero for another run with the same K and f. Work that need not be repeated counts as avoided.
+    /// Set the counters to zero for another run with the same K. Work that need not be repeated counts as avoided.
     pub fn begin_anew(&mut self) {
-        self.interior.iter_mut().for_each(|interior| interior.is_reused = true);
+        self.interior.iter_mut().for_each(|interior| (interior.eliminations, interior.is_reused) = (0, false));
         self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
     }
 
-    /// Replace the loads f and the `prescribed` (dof, value) of a condensed body and keep what was made of K. Return false, with nothing changed, if
-    /// the body is not condensed, or other dofs are prescribed.
-    pub fn reload(&mut self, load: &[f64], prescribed: &[(usize, f64)]) -> Result<bool> {
-        let Some(interior) = &mut self.interior else { return Ok(false) };
-        let dofs = |prescribed: &[(usize, f64)]| prescribed.iter().map(|entry| entry.0).collect::<Vec<_>>();
-        let fits = interior.schur.is_some() && dofs(&interior.whole.prescribed) == dofs(prescribed);
-        if fits {
-            interior.whole.reload(load.to_vec(), prescribed.to_vec());
-            interior.load = interior.interface.turn(&interior.whole.load);
-            let stiffness = std::mem::take(&mut self.elastic.stiffness);
-            self.elastic = ElasticBody { stiffness, ..interior.loads()? };
+    /// Replace the loads f on all dofs that this rank knows, and the values of the `prescribed` (dof, value), which are the same dofs as before. What was made of
+    /// K stays.
+    pub fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> Result<()> {
+        let stiffness = std::mem::take(&mut self.elastic.stiffness);
+        if let Some(interior) = &mut self.interior {
+            interior.is_reused = interior.eliminations == 0;
+            let is_same = interior.reload(load, prescribed);
+            if !is_same && interior.schur.is_some() {
+                self.elastic = interior.loads()?;
+            }
+        } else {
+            let held = std::mem::take(&mut self.elastic.held);
+            let mut whole = ElasticBody { held, ..ElasticBody::default() };
+            whole.reload(load, prescribed);
+            let own = self.dofs.distribution.as_ref().map(|distribution| distribution.restrict(&whole));
+            self.elastic = ElasticBody { held: std::mem::take(&mut whole.held), ..own.unwrap_or(whole) };
+            self.dofs.prescribed = std::mem::take(&mut self.elastic.prescribed);
         }
-        Ok(fits)
-    }
-
-    /// Multiply all loads and prescribed values.
-    pub fn scale_loads(&mut self, ratio: f64) {
-        let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &mut self.elastic;
-        let interior = self.interior.iter_mut().flat_map(|interior| &mut interior.load);
-        load.iter_mut().chain(lifting).chain(interior).for_each(|force| *force *= ratio);
-        self.dofs.prescribed.iter_mut().for_each(|(_, value)| *value *= ratio);
-        [strain_constant, energy_constant].into_iter().for_each(|energy| *energy *= ratio * ratio);
+        self.elastic.stiffness = stiffness;
+        Ok(())
     }
 
     /// Return one line about the inner solver.
@@ -332,8 +337,17 @@ impl Interior {
         let stiffness = Csr::full(interface.len(), schur.take_complement());
         self.schur = Some(RefCell::new(schur));
         let body = ElasticBody { stiffness, ..self.loads()? };
-        self.seconds = began.elapsed().as_secs_f64();
+        (self.eliminations, self.seconds) = (1, began.elapsed().as_secs_f64());
         Ok(body)
+    }
+
+    /// Replace the loads and prescribed values of the whole body. Return whether these are the same as before.
+    fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> bool {
+        let of = |whole: &ElasticBody| [whole.load.clone(), whole.lifting.clone()];
+        let (before, whole) = (of(&self.whole), &mut self.whole);
+        whole.reload(load, prescribed);
+        self.load = self.interface.turn(&whole.load);
+        before == of(whole)
     }
 
     /// Do some work with the factor.
@@ -386,10 +400,11 @@ impl Interior {
 
     /// Add the elimination to the counters of the body.
     fn count(&self, counts: BodyCounts) -> BodyCounts {
-        let eliminations = usize::from(self.schur.is_some() && !self.is_reused);
+        let eliminations = self.eliminations;
         let seconds = eliminations as f64 * self.seconds;
         BodyCounts {
             factorizations: eliminations,
+            condensations: eliminations,
             factorizations_avoided: usize::from(self.is_reused),
             symbolic: eliminations,
             first_seconds: seconds,

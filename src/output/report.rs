@@ -41,6 +41,10 @@ pub struct Report {
     pub symbolic_factorizations: usize,
     /// Stiffness matrices assembled.
     pub assemblies: usize,
+    /// Bodies condensed to their interfaces.
+    pub condensations: usize,
+    /// Pairs of surfaces that were searched for common pieces.
+    pub pairings: usize,
     /// Stiffness matrices reused from an earlier run of a sweep.
     pub assemblies_avoided: usize,
     /// Numeric factorisations of stiffness matrices reused from an earlier run of a sweep.

@@ -5,6 +5,7 @@
 
 mod extent;
 pub mod inner;
+pub mod meshed;
 pub mod phases;
 mod plan;
 pub mod recorder;

@@ -1,0 +1,158 @@
+//! The mesh of a scene with what was made on it, for the problems of all load steps, and of other scenes with the same bodies on it.
+
+use super::inner::SolverFactory;
+use super::warnings;
+use crate::contact::ContactPair;
+use crate::contact::pieces::{self, Cut};
+use crate::discretize::{self, Discrete, Kept, Request, Verified};
+use crate::error::Result;
+use crate::exchange::Plain;
+use crate::interrupt::Interrupt;
+use crate::mesh;
+use crate::output::Mark;
+use crate::parallel::{Ranks, collectively};
+use crate::petsc::Session;
+use crate::problem::{BodySpec, Order};
+use crate::scene::Scene;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+/// A mesh without its space dimension.
+pub trait SceneMesh {
+    /// Return the session of its ranks.
+    fn session(&self) -> &Session;
+
+    /// Return whether another scene has the same bodies on this mesh.
+    fn serves(&self, scene: &Scene) -> bool;
+
+    /// Take the bodies of another scene that it serves.
+    ///
+    /// # Errors
+    /// A line of the scene acts on no body, or on several.
+    fn follow(&mut self, scene: &Scene) -> Result<()>;
+
+    /// Return the bodies of the scene, each with a name of its own.
+    fn bodies(&self) -> &[BodySpec];
+
+    /// Make the discrete problem of a scene with the bodies of this mesh, from the problem `before` on it. Collective.
+    ///
+    /// # Errors
+    /// See [`discretize::discretize`].
+    fn discretize(&mut self, scene: &Scene, before: Option<Discrete>, inner: &mut SolverFactory) -> Result<Discrete>;
+
+    /// Return the number of dofs of linear elements in space; none in the plane.
+    fn dofs_in_space(&self) -> usize;
+
+    /// Return a line for each group that is split into bodies.
+    fn splits(&self) -> Vec<String>;
+
+    /// Return the warnings about the mesh and its file.
+    fn warnings(&self) -> Vec<String>;
+
+    /// Return SHA-256 of the file, and the file, on the rank that has read it.
+    fn file(&self) -> Option<(String, PathBuf)>;
+
+    /// Return the places that a page marks.
+    fn marks(&self, bodies: &[BodySpec], pairs: &[ContactPair]) -> Vec<Mark>;
+}
+
+/// The implementation of [`SceneMesh`] in `D` dimensions.
+struct CheckedMesh<const D: usize> {
+    session: Session,
+    verified: Verified<D>,
+    file: Option<(String, PathBuf)>,
+    cut: Cut<D>,
+    kept: Kept<D>,
+}
+
+/// Read and check the mesh of a scene. The first rank runs Gmsh, reads the mesh and checks it. Collective.
+///
+/// # Errors
+/// What Gmsh, the reader and the checks refuse.
+pub fn read(session: &Session, scene: &Scene, interrupt: &Interrupt) -> Result<Box<dyn SceneMesh>> {
+    match scene.dimension.value {
+        2 => read_in::<2>(session, scene, interrupt, pieces::in_plane),
+        _ => read_in::<3>(session, scene, interrupt, pieces::in_space),
+    }
+}
+
+fn read_in<const D: usize>(
+    session: &Session,
+    scene: &Scene,
+    interrupt: &Interrupt,
+    cut: Cut<D>,
+) -> Result<Box<dyn SceneMesh>>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
+    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
+    let (mut file, mut notes) = (None, Vec::new());
+    let read = || {
+        interrupt.release()?;
+        let loaded = mesh::load::<D>(&scene.mesh, order, interrupt)?;
+        (file, notes) = (Some((loaded.digest, loaded.file)), loaded.notes);
+        Ok(loaded.mesh)
+    };
+    let verified = discretize::verify(scene, &Ranks::new(session), read);
+    let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
+    let mut verified = collectively(session, verified)?;
+    verified.notes.splice(0..0, notes);
+    verified.mesh.forget_tags();
+    Ok(Box::new(CheckedMesh { session: session.clone(), verified, file, cut, kept: Kept::default() }))
+}
+
+impl<const D: usize> SceneMesh for CheckedMesh<D>
+where
+    [f64; D]: Plain,
+    [[f64; D]; D]: Plain,
+{
+    fn session(&self) -> &Session {
+        &self.session
+    }
+
+    fn serves(&self, scene: &Scene) -> bool {
+        self.verified.serves(scene)
+    }
+
+    fn follow(&mut self, scene: &Scene) -> Result<()> {
+        self.verified.follow(scene)
+    }
+
+    fn bodies(&self) -> &[BodySpec] {
+        &self.verified.bodies
+    }
+
+    fn discretize(&mut self, scene: &Scene, before: Option<Discrete>, inner: &mut SolverFactory) -> Result<Discrete> {
+        let Self { session, verified, cut, kept, .. } = self;
+        let keep = scene.estimate || scene.adapt.is_some();
+        let request = Request { scene, verified, cut: *cut, keep };
+        let exchange = Rc::new(Ranks::new(session));
+        let discrete = discretize::discretize(&request, kept, before, exchange, inner);
+        let mut discrete = collectively(session, discrete)?;
+        discrete.share();
+        Ok(discrete)
+    }
+
+    fn dofs_in_space(&self) -> usize {
+        if D == 3 { D * self.verified.points } else { 0 }
+    }
+
+    fn splits(&self) -> Vec<String> {
+        self.verified.splits()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let Verified { mesh, notes, .. } = &self.verified;
+        let changed = warnings::in_parts(mesh.split).into_iter().chain(warnings::made_straight(mesh.straightened));
+        changed.chain(notes.iter().cloned()).collect()
+    }
+
+    fn file(&self) -> Option<(String, PathBuf)> {
+        self.file.clone()
+    }
+
+    fn marks(&self, bodies: &[BodySpec], pairs: &[ContactPair]) -> Vec<Mark> {
+        discretize::marks(&self.verified.mesh, bodies, pairs)
+    }
+}
