@@ -40,11 +40,11 @@ pub use verify::{Verified, verify};
 use crate::contact::{self, ContactPair, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
-use crate::model::{Body, BodyCounts, BodySlot, Mechanism, Model};
+use crate::model::{Body, BodySlot, Mechanism, Model};
 use crate::problem::Start;
 use crate::problem::contact::{Carrier, ContactSpec};
 use crate::scene::Scene;
-use assembly::Assembler;
+use assembly::{Assembler, EarlierBody};
 use body::BodyMesh;
 use meshes::{KeptMeshes, Meshes};
 use prepare::{ReplicatedProblem, WholeProblem, prepare};
@@ -66,23 +66,10 @@ pub struct Discrete {
     pub meshes: Option<Rc<dyn Meshes>>,
     /// Whether all bodies have the matrices and solvers of the problem before.
     pub is_renewed: bool,
-    /// What making the problems of this run took.
-    pub work: Work,
-}
-
-/// What making the problems of a run took on this rank.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Work {
-    /// Number of stiffness matrices assembled.
+    /// Number of stiffness matrices that this rank has assembled in the run.
     pub assemblies: usize,
-    /// Number of stiffness matrices reused from an earlier run.
-    pub assemblies_avoided: usize,
-    /// Number of pairs whose surfaces were searched for common pieces.
+    /// Number of pairs whose surfaces it has searched for common pieces.
     pub pairings: usize,
-    /// Counters of bodies of earlier load steps that were made anew.
-    pub gone: BodyCounts,
-    /// Whether the run has made a problem before, as for an earlier load step.
-    has_begun: bool,
 }
 
 /// What a discrete problem is made from.
@@ -96,13 +83,31 @@ pub struct Request<'a, const D: usize> {
     pub keep: bool,
 }
 
+/// What a problem leaves for the next one.
+#[derive(Default)]
+struct Earlier {
+    assemblies: usize,
+    pairings: usize,
+    /// Bodies with a mesh.
+    bodies: Vec<BodySlot>,
+    pairs: Vec<(ContactPair, ContactFacts)>,
+}
+
+impl Earlier {
+    fn of(discrete: Discrete) -> Self {
+        let Discrete { model: Model { mut bodies, pairs, .. }, contacts, assemblies, pairings, .. } = discrete;
+        bodies.retain(|slot| !slot.is_rigid);
+        Self { assemblies, pairings, bodies, pairs: pairs.into_iter().zip(contacts).collect() }
+    }
+}
+
 /// Turn a scene and its mesh into a model. Collective.
 ///
 /// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
 /// assembles it. `factory` turns each body of this rank into one with a solver.
 ///
-/// The problem `before` on the same mesh, which left `kept`, gives all pairs and bodies that would be the same but for loads, prescribed displacements, gaps
-/// and laws.
+/// The problem `before` on the same mesh, which left `kept`, gives all pairs and bodies that would be the same but for
+/// loads, prescribed displacements, gaps and laws.
 ///
 /// # Errors
 /// The scene may contradict its mesh: missing groups, surfaces of the wrong body, supports that contradict each other, surfaces
@@ -118,7 +123,8 @@ where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
 {
-    let (mut work, mut earlier, mut earlier_pairs) = before.map(Discrete::into_parts).unwrap_or_default();
+    let Earlier { assemblies, pairings, bodies: earlier, pairs: mut earlier_pairs } =
+        before.map(Earlier::of).unwrap_or_default();
     let Request { scene, verified, keep, .. } = *request;
     let mut prepared = None;
     let shared = broadcast(&*exchange, || {
@@ -126,7 +132,7 @@ where
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan, is_kept, pairings } =
+    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched } =
         shared;
     let of_pairs: Vec<ContactSpec> = contacts.iter().map(|contact| contact.spec(&scene.contacts)).collect();
     let locals = give(prepared, &exchange)?;
@@ -135,27 +141,21 @@ where
         for (pair, spec) in pairs.iter_mut().zip(&of_pairs) {
             pair.law = law::of_pair(spec, &scene.laws, &pair.position)?;
         }
-    } else {
-        work.pairings += pairings;
-    }
-    for (slot, _) in earlier.iter_mut().zip(&is_kept).filter(|(_, is_kept)| !**is_kept) {
-        let gone = slot.local.take().filter(|body| body.dofs().leads());
-        work.gone += gone.map_or(BodyCounts::default(), |body| body.counts());
     }
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
-    let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
+    let mut assembler = Assembler { mesh, plane, rank, factory, assemblies, shapes: Vec::new() };
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
-    let mut earlier = earlier.into_iter();
+    // bodies that do not serve go before others are made
+    let serving = |(slot, serves): (BodySlot, &bool)| EarlierBody::new(slot, *serves);
+    let mut earlier = earlier.into_iter().zip(&is_kept).map(serving).collect::<Vec<_>>().into_iter();
     for (body, local) in locals.into_iter().enumerate() {
-        let before = earlier.next();
+        let before = earlier.next().unwrap_or_default();
         if let Some(local) = local {
             assembler.make(&scene.bodies[body], local, before, &mut slots[body], &mut infos[body])?;
         }
     }
-    let Assembler { assemblies, avoided, shapes, .. } = assembler;
-    work.assemblies += assemblies;
-    work.assemblies_avoided += if work.has_begun { 0 } else { avoided };
-    work.has_begun = true;
+    let Assembler { assemblies, shapes, .. } = assembler;
+    let pairings = pairings + if rank == 0 { searched } else { 0 };
     let meshes = keep.then(|| Rc::new(KeptMeshes { shapes, fine }) as Rc<dyn Meshes>);
     let of_rank = |slot: BodySlot| match rank == 0 && !slot.motions.is_empty() {
         true => BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot },
@@ -165,7 +165,7 @@ where
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
     let (bodies, specs, is_renewed) = (infos, of_pairs, is_kept.iter().all(|is_kept| *is_kept));
-    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, is_renewed, work })
+    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, is_renewed, assemblies, pairings })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
@@ -200,17 +200,10 @@ impl Discrete {
         model.set_gaps();
     }
 
-    /// Begin another run with the bodies of this problem: its counters start at zero, and what is reused counts as avoided.
+    /// Begin another run with the bodies of this problem: its counters start at zero.
     pub fn begin_anew(&mut self) {
-        self.work = Work::default();
+        (self.assemblies, self.pairings) = (0, 0);
         self.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(Body::begin_anew);
-    }
-
-    /// Return the work so far, the bodies with a mesh, and the pairs, for the problem that follows.
-    fn into_parts(self) -> (Work, Vec<BodySlot>, Vec<(ContactPair, ContactFacts)>) {
-        let Self { work, model: Model { mut bodies, pairs, .. }, contacts, .. } = self;
-        bodies.retain(|slot| !slot.is_rigid);
-        (work, bodies, pairs.into_iter().zip(contacts).collect())
     }
 
     /// Return which surface carries the contact points of each pair.

@@ -276,8 +276,8 @@ fn of_nodes<const D: usize>(side: &Side<D>, shares: &[(u32, f64)]) -> BTreeMap<u
     sums
 }
 
-/// Append the rows of the displacements of nodes of a contact point for one side of a pair. `index` is 0 for side a and 1 for side b, `shares` holds the
-/// shares of the side's nodes in the point, and `normal` points out of side a.
+/// Append the rows of the displacements of nodes of a contact point for one side of a pair. `index` is 0 for side a and
+/// 1 for side b, `shares` holds the shares of the side's nodes in the point, and `normal` points out of side a.
 fn push_rows<const D: usize>(
     pair: &mut ContactPair,
     index: usize,
@@ -359,7 +359,8 @@ impl ContactPair {
         Ok(())
     }
 
-    /// Set the rows of a side from those of the displacements of its nodes, for the dofs of this frame and the values of those that supports prescribe.
+    /// Set the rows of a side from those of the displacements of its nodes, for the dofs of this frame and the values
+    /// of those that supports prescribe.
     pub fn hold<const D: usize>(&mut self, side: usize, frame: &Frame<D>, prescribed: &HashMap<usize, f64>) {
         let nodal = &self.nodal[side];
         let mut held = Csr::new(nodal.columns);

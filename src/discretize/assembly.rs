@@ -10,7 +10,7 @@ use crate::fem::rigid;
 use crate::fem::{ElasticBody, Prolongation};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
-use crate::model::{Body, BodyFacts, BodySlot, Distribution, InterfaceDofs};
+use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution, InterfaceDofs};
 use crate::problem::{BodySpec, Plane};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -23,17 +23,33 @@ pub struct Assembler<'a, const D: usize, F> {
     pub rank: usize,
     /// The maker of solvers.
     pub factory: &'a mut F,
-    /// Number of assembled matrices.
+    /// Number of matrices that were assembled in the run.
     pub assemblies: usize,
-    /// Number of matrices reused from the problem before.
-    pub avoided: usize,
     /// Meshes of the bodies that this rank has.
     pub shapes: Vec<Rc<FemBody<D>>>,
 }
 
+/// A body of the problem before.
+#[derive(Default)]
+pub struct EarlierBody {
+    /// The body with its slot, if it serves again.
+    serving: Option<(Body, BodySlot)>,
+    /// Its counters, if another one takes its place.
+    counts: BodyCounts,
+}
+
+impl EarlierBody {
+    /// Keep a body if it serves again, and let it go otherwise.
+    pub fn new(mut slot: BodySlot, serves: bool) -> Self {
+        let Some(body) = slot.local.take() else { return Self::default() };
+        let counts = body.counts();
+        Self { serving: serves.then_some((body, slot)), counts }
+    }
+}
+
 impl<const D: usize, F: Factory> Assembler<'_, D, F> {
-    /// Assemble a body and give it a solver, from what this rank has of it, unless the body of the problem `before` serves under its loads. `slot` receives the
-    /// body, and `info` the evaluation of its displacements.
+    /// Assemble a body and give it a solver, from what this rank has of it, or take that of the problem `before`.
+    /// `slot` receives the body, and `info` the evaluation of its displacements.
     ///
     /// # Errors
     /// The scene contradicts its mesh in a way that shows when K is assembled, or the factory fails.
@@ -41,7 +57,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         &mut self,
         spec: &BodySpec,
         mut mesh: BodyMesh<D>,
-        before: Option<BodySlot>,
+        before: EarlierBody,
         slot: &mut BodySlot,
         info: &mut BodyInfo,
     ) -> Result<()> {
@@ -63,25 +79,25 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         Ok(())
     }
 
-    /// Give a body its solver: that of the problem before under other loads, or a new one. On ranks other than the `owner` scale and stiffness of rows
-    /// stay zero until [`Discrete::share`](super::Discrete::share).
+    /// Give a body its solver: that of the problem before under other loads, if it serves, or a new one. On ranks other
+    /// than the `owner` scale and stiffness of rows stay zero until [`Discrete::share`](super::Discrete::share).
     fn give_solver(
         &mut self,
         part: &mut SceneBody<D>,
-        before: Option<BodySlot>,
+        before: EarlierBody,
         slot: &mut BodySlot,
         owner: usize,
     ) -> Result<()> {
         let (load, is_owner) = (part.mesh.load_vector(), owner == self.rank);
-        if let Some(BodySlot { local: Some(mut body), scale, row_stiffness, .. }) = before {
+        if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
             body.reload(load, part.mesh.prescribed.clone())?;
-            self.avoided += usize::from(is_owner);
             (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
             // the sums of all ranks are known
             slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
         } else {
             self.assemblies += usize::from(is_owner);
             self.assemble(part, load, slot)?;
+            slot.local.iter_mut().for_each(|body| body.count_on(before.counts));
         }
         slot.scale = if is_owner { slot.scale } else { 0.0 };
         Ok(())
@@ -134,8 +150,8 @@ pub trait Factory {
     /// The choice of solvers of all bodies.
     type SolverPlan: Plain;
 
-    /// Choose the solvers of all bodies, in the order of the scene, on the first rank. `is_kept` says whether each body has the matrix of the problem before, and
-    /// then also whether its solver serves.
+    /// Choose the solvers of all bodies, in the order of the scene, on the first rank. `is_kept` says whether each body
+    /// has the matrix of the problem before, and then also whether its solver serves.
     ///
     /// # Errors
     /// PETSc lacks a solver that the scene asks for.

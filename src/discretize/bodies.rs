@@ -212,7 +212,8 @@ fn too_large(spec: &BodySpec) -> Error {
         .label("their forces are beyond the range of numbers")
 }
 
-/// Return the bodies with their spaces, elasticity, supports and springs. `kept` are bodies of an earlier problem on the mesh, whose spaces serve.
+/// Return the bodies with their spaces, elasticity, supports and springs. `kept` are bodies of an earlier problem on
+/// the mesh, whose spaces serve.
 ///
 /// # Errors
 /// The scene contradicts its mesh.

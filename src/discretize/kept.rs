@@ -1,9 +1,11 @@
-//! What one problem leaves for another on the same mesh: what its matrices and pairs were made of. The next problem makes only what differs.
+//! What one problem leaves for another on the same mesh: what its matrices and pairs were made of. The next problem
+//! makes only what differs.
 
 use super::bodies::SceneBody;
-use super::pairs::PairInputs;
+use super::pairs::{Contact, ContactFacts, KeptPairs, PairInputs};
 use super::partition::Partition;
 use super::whole::WholeBody;
+use crate::contact::ContactPair;
 use crate::fem::{Elasticity, Frame, NodalBlock, Space};
 use crate::linalg::Csr;
 use crate::problem::ContactSpec;
@@ -26,6 +28,23 @@ pub struct Kept<const D: usize> {
 impl<const D: usize> Default for Kept<D> {
     fn default() -> Self {
         Self { bodies: vec![], pairs: vec![], rules: vec![], partitions: vec![], owners: vec![] }
+    }
+}
+
+impl<const D: usize> Kept<D> {
+    /// Return the pairs of the problem, with these arrays and facts, for one with other `bodies`.
+    pub fn serving_pairs(
+        &mut self,
+        bodies: &[MatrixInputs<D>],
+        pairs: Vec<(ContactPair, ContactFacts)>,
+    ) -> KeptPairs<'_, D> {
+        let (pairs, both) = (pairs.into_iter().zip(self.pairs.drain(..)), || bodies.iter().zip(&self.bodies));
+        KeptPairs {
+            pairs: pairs.map(|((pair, facts), inputs)| Contact { pair, facts, inputs }).collect(),
+            rules: &self.rules,
+            is_material_same: both().map(|(body, before)| body.has_material_of(before)).collect(),
+            are_bodies_same: both().all(|(body, before)| body.has_pairs_of(before)),
+        }
     }
 }
 
@@ -69,10 +88,12 @@ impl<const D: usize> MatrixInputs<D> {
         self.elasticity == other.elasticity
     }
 
-    /// Return whether pairs that rules find between such bodies are the same: on planes of symmetry, which have no displacement, surfaces go on.
+    /// Return whether pairs that rules find between such bodies are the same: on planes of symmetry, which have no
+    /// displacement, surfaces go on.
     pub fn has_pairs_of(&self, other: &Self) -> bool {
-        let of = |body: &Self| (body.frame.clone(), body.supported.clone());
-        Rc::ptr_eq(&self.space, &other.space) && self.has_material_of(other) && of(self) == of(other)
+        Rc::ptr_eq(&self.space, &other.space)
+            && self.has_material_of(other)
+            && (&self.frame, &self.supported) == (&other.frame, &other.supported)
     }
 
     /// Return whether both bodies have the same matrix and the same contact rows.

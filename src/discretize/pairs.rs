@@ -145,7 +145,8 @@ fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
 }
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found; and the rigid parts, obstacles and
-/// offsets. `fine` requests integration points. Pairs of an earlier problem that serve get the gap, the law and the supports of this one.
+/// offsets. `fine` requests integration points. Pairs of an earlier problem that serve get the gap, the law and the
+/// supports of this one.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
@@ -214,9 +215,10 @@ impl<const D: usize> KeptPairs<'_, D> {
     /// Return whether the integration points of a pair serve, which know its gap, and where law or material jump.
     fn has_fine(&self, contact: &Contact<D>, spec: &ContactSpec) -> bool {
         let PairInputs { spec: earlier, bodies, fine, .. } = &contact.inputs;
-        let of = |spec: &ContactSpec| (spec.gap.clone(), spec.layer.clone(), spec.tension.clone());
+        let [before, now] = [earlier, spec].map(|spec| &spec.layer);
         fine.is_some()
-            && of(earlier) == of(spec)
+            && earlier.gap == spec.gap
+            && (before == now || before.is_uniform() && now.is_uniform())
             && bodies.iter().all(|&body| self.is_material_same.get(body).is_none_or(|is_same| *is_same))
     }
 
@@ -234,12 +236,6 @@ impl<const D: usize> KeptPairs<'_, D> {
 }
 
 impl<const D: usize> Contact<D> {
-    /// Return the pairs of a problem from its arrays and facts, and from what they were made of.
-    pub fn join(pairs: Vec<(ContactPair, ContactFacts)>, inputs: Vec<PairInputs<D>>) -> Vec<Self> {
-        let joined = pairs.into_iter().zip(inputs);
-        joined.map(|((pair, facts), inputs)| Self { pair, facts, inputs }).collect()
-    }
-
     /// Return the pair with the supports of these bodies, and with gap and law of `spec`.
     fn renewed(mut self, spec: &ContactSpec, laws: &OwnLaws, parts: &[SceneBody<D>]) -> Result<Self> {
         let spec = between(spec, self.facts.names.clone());

@@ -7,7 +7,7 @@ use super::bodies::parts;
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
 use super::kept::{Kept, MatrixInputs};
-use super::pairs::{self, Contact, ContactFacts, Contacts, KeptPairs};
+use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
 use super::whole::WholeBody;
 use super::{Request, chords, mechanism};
@@ -42,7 +42,7 @@ pub struct ReplicatedProblem<const D: usize, P> {
     /// Whether the matrix of each body, with its solver, is that of the problem before.
     pub is_kept: Vec<bool>,
     /// Number of pairs whose surfaces were searched for common pieces.
-    pub pairings: usize,
+    pub searched: usize,
 }
 
 /// All bodies before their matrices are assembled, with the ranks that own their nodes.
@@ -78,7 +78,8 @@ fn place_of(partitions: &[Rc<Partition>], body: usize) -> Option<(&Partition, us
 }
 
 /// Prepare a scene on its mesh for this number of `ranks`: bodies, pairs, free motions, solvers, and the partition; see
-/// [`discretize`](super::discretize). `kept` and the `pairs` are those of the problem before; `kept` becomes that of this one.
+/// [`discretize`](super::discretize). `kept` and the `pairs` are those of the problem before; `kept` becomes that of
+/// this one.
 ///
 /// # Errors
 /// The scene contradicts its mesh, or `factory` fails.
@@ -91,16 +92,10 @@ pub fn prepare<'a, const D: usize, F: Factory>(
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
     let Request { scene, verified, cut, keep } = *request;
     let mesh = &verified.mesh;
-    let before = std::mem::take(kept);
+    let mut before = std::mem::take(kept);
     let parts = parts(scene, verified, &before.bodies)?;
     kept.bodies = parts.iter().map(MatrixInputs::of).collect();
-    let earlier = || kept.bodies.iter().zip(&before.bodies);
-    let earlier_pairs = KeptPairs {
-        pairs: Contact::join(pairs, before.pairs),
-        rules: &before.rules,
-        is_material_same: earlier().map(|(body, before)| body.has_material_of(before)).collect(),
-        are_bodies_same: earlier().all(|(body, before)| body.has_pairs_of(before)),
-    };
+    let earlier_pairs = before.serving_pairs(&kept.bodies, pairs);
     let Contacts { all, rigid, searched } = pairs::all(scene, mesh, cut, &parts, keep, earlier_pairs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
     for Contact { pair, facts, inputs } in all {
@@ -116,10 +111,9 @@ pub fn prepare<'a, const D: usize, F: Factory>(
         body.part.mesh.prescribed = body.part.mesh.prescribed_sorted();
         inputs.complete(body);
     }
-    let mut is_kept = vec![false; bodies.len()];
-    for (is_kept, (body, before)) in is_kept.iter_mut().zip(kept.bodies.iter().zip(&before.bodies)) {
-        *is_kept = body.has_matrix_of(before);
-    }
+    let has_matrix =
+        |(i, body): (usize, &MatrixInputs<D>)| before.bodies.get(i).is_some_and(|it| body.has_matrix_of(it));
+    let mut is_kept: Vec<bool> = kept.bodies.iter().enumerate().map(has_matrix).collect();
     let plan = plan(&bodies, &verified.checked, factory, &mut is_kept)?;
     kept.partitions = partitions(&bodies, &pairs, factory, ranks, (before.partitions, &is_kept));
     kept.owners = owners(&bodies, &kept.partitions, ranks);
@@ -131,22 +125,13 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     kept.rules = scene.rules().cloned().collect();
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem {
-        bodies: shared,
-        pairs,
-        rigid,
-        contacts,
-        mechanisms,
-        fine,
-        plan,
-        is_kept,
-        pairings: searched,
-    };
+    let shared =
+        ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
     Ok((shared, WholeProblem { bodies, partitions: kept.partitions.clone(), keep }))
 }
 
-/// Return the factory's plan of the solvers of all bodies. `is_kept` says whether each has the matrix of the problem before, and then also whether its
-/// solver serves.
+/// Return the factory's plan of the solvers of all bodies. `is_kept` says whether each has the matrix of the problem
+/// before, and then also whether its solver serves.
 ///
 /// # Errors
 /// See [`Factory::plan`].
@@ -175,8 +160,8 @@ fn plan<const D: usize, F: Factory>(
     factory.plan(bodies.iter().zip(checked).map(of_body).collect(), is_kept)
 }
 
-/// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan. `kept` are the partitions of the problem before, with
-/// the bodies that have the same matrices.
+/// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan. `kept` are the
+/// partitions of the problem before, with the bodies that have the same matrices.
 fn partitions<const D: usize>(
     bodies: &[WholeBody<D>],
     pairs: &[ContactPair],

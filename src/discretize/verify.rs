@@ -9,7 +9,7 @@ use crate::fem::PointExtent;
 use crate::mesh::{Asked, BodyCheck, Duty, EDGES, Groups, LENGTHS, Mesh};
 use crate::problem::body::plain;
 use crate::problem::pattern::{BODY, Pattern, is_pattern};
-use crate::problem::{BodySpec, LoadKind, MeshSource, SpringKind};
+use crate::problem::{BodySpec, LoadKind, SpringKind};
 use crate::problem::{Order, Plane};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
@@ -27,42 +27,12 @@ pub struct Verified<const D: usize> {
     pub bodies: Vec<BodySpec>,
     /// The groups that lie on each body, see [`patterns::lying`].
     lying: Vec<Vec<u32>>,
-    /// What its scene needs of the mesh.
-    used: MeshUse,
+    /// The scene for which the mesh was checked.
+    scene: Scene,
     /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
     pub checked: Rc<[BodyCheck]>,
     /// What is to be said of the file, and of surfaces that are sets of nodes, on the first rank.
     pub notes: Vec<String>,
-}
-
-/// The mesh that a scene names, and what its lines need of the groups. Scenes that agree in this have the same bodies on the same mesh.
-#[derive(PartialEq)]
-pub struct MeshUse {
-    source: MeshSource,
-    dimension: usize,
-    plane: Plane,
-    /// Tables of bodies: name, whether each part is a body, order.
-    bodies: Vec<(String, bool, Order)>,
-    /// Groups of each body, and of the contacts.
-    groups: Vec<Vec<(String, Need)>>,
-    has_rules: bool,
-}
-
-impl MeshUse {
-    /// Return what a scene needs.
-    pub fn of(scene: &Scene) -> Self {
-        let body = |body: &BodySpec| (body.name.value.clone(), body.split, body.order);
-        let owned = |(on, need): (&Located<String>, Need)| (on.value.clone(), need);
-        let of_bodies = scene.bodies.iter().map(|body| of_body(body).into_iter().map(owned).collect());
-        Self {
-            source: scene.mesh.clone(),
-            dimension: scene.dimension.value,
-            plane: scene.plane,
-            bodies: scene.bodies.iter().map(body).collect(),
-            groups: of_bodies.chain([of_contacts(scene).map(owned).collect()]).collect(),
-            has_rules: scene.rules().next().is_some(),
-        }
-    }
 }
 
 /// What all ranks have of a mesh.
@@ -117,23 +87,30 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<Verified<D>
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.pairs().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), scene.rules().next().is_some())?;
-    let used = MeshUse::of(scene);
-    Ok(Verified { points: mesh.points.len(), mesh, bodies, lying, used, checked: checked.into(), notes })
+    let (points, scene) = (mesh.points.len(), scene.clone());
+    Ok(Verified { points, mesh, bodies, lying, scene, checked: checked.into(), notes })
 }
 
 impl<const D: usize> Verified<D> {
-    /// Return whether another scene has the same bodies on this mesh.
-    pub fn serves(&self, scene: &Scene) -> bool {
-        self.used == MeshUse::of(scene)
-    }
-
-    /// Take the bodies of another scene that this mesh serves.
+    /// Take the bodies of another scene, if they are the same on the same mesh, and its lines need the same of the same
+    /// groups. Return whether they are.
     ///
     /// # Errors
     /// A line of the scene acts on no body, or on several.
-    pub fn follow(&mut self, scene: &Scene) -> Result<()> {
-        self.bodies = patterns::bodies(scene, &self.mesh, &self.lying)?;
-        Ok(())
+    pub fn follow(&mut self, scene: &Scene) -> Result<bool> {
+        let body = |body: &BodySpec| {
+            (body.name.clone(), body.split, body.order, of_body(body).into_iter().map(owned).collect::<Vec<_>>())
+        };
+        let used = |scene: &Scene| {
+            let bodies: Vec<_> = scene.bodies.iter().map(body).collect();
+            let contacts: Vec<_> = of_contacts(scene).map(owned).collect();
+            (scene.mesh.clone(), scene.dimension.value, scene.plane, bodies, contacts, scene.rules().next().is_some())
+        };
+        let serves = used(&self.scene) == used(scene);
+        if serves {
+            self.bodies = patterns::bodies(scene, &self.mesh, &self.lying)?;
+        }
+        Ok(serves)
     }
 
     /// Return a line for each group that is split into bodies: its name, and the number and names of the bodies.
@@ -177,8 +154,8 @@ impl MeshHeader {
         let Self { path, order, groups, split, straightened, points, lying } = self;
         let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
         let bodies = patterns::bodies(scene, &mesh, &lying)?;
-        let used = MeshUse::of(scene);
-        Ok(Verified { mesh, points, bodies, lying, used, checked: Rc::new([]), notes: Vec::new() })
+        let scene = scene.clone();
+        Ok(Verified { mesh, points, bodies, lying, scene, checked: Rc::new([]), notes: Vec::new() })
     }
 }
 
@@ -280,6 +257,10 @@ fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, place: usize) -> 
         true => Pattern::new(&any).is_ok_and(|pattern| pattern.matches(group) || pattern.matches(&plain(group))),
         false => mesh.groups.place(&any) == Some(place),
     }
+}
+
+fn owned((on, need): (&Located<String>, Need)) -> (Located<String>, Need) {
+    (on.clone(), need)
 }
 
 fn of_body(body: &BodySpec) -> Vec<(&Located<String>, Need)> {

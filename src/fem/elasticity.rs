@@ -29,9 +29,8 @@ struct MaterialRegion {
 /// Elasticities are equal if the constants of all cells are.
 impl PartialEq for Elasticity {
     fn eq(&self, other: &Self) -> bool {
-        let specs = |of: &Self| of.regions.iter().map(|region| region.spec.clone()).collect::<Vec<_>>();
-        (self.dimension, self.plane, &self.of_cell, specs(self))
-            == (other.dimension, other.plane, &other.of_cell, specs(other))
+        let both = self.regions.iter().map(|region| &region.spec).eq(other.regions.iter().map(|region| &region.spec));
+        both && (self.dimension, self.plane, &self.of_cell) == (other.dimension, other.plane, &other.of_cell)
     }
 }
 

@@ -41,6 +41,8 @@ pub struct Body {
     keeps_stiffness: bool,
     /// Description of the solver to be made, for reports.
     words: String,
+    /// Counters of the body that it replaces in a history.
+    earlier: BodyCounts,
     interior: Option<Interior>,
 }
 
@@ -58,10 +60,8 @@ struct Interior {
     load: Vec<f64>,
     /// The factor, once the interior is eliminated.
     schur: Option<RefCell<Schur>>,
-    /// Eliminations in this run.
+    /// Eliminations in this run: none if one of an earlier run serves.
     eliminations: usize,
-    /// Whether one of an earlier run serves.
-    is_reused: bool,
     /// Wall seconds of the elimination.
     seconds: f64,
 }
@@ -83,7 +83,8 @@ impl Body {
         let prescribed = std::mem::take(&mut elastic.prescribed);
         let dofs = Dofs::new(elastic.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
         let (diagonal, make) = (Vec::new(), Some(make));
-        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: false, words, interior: None }
+        let earlier = BodyCounts::default();
+        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: false, words, earlier, interior: None }
     }
 
     /// Return a rigid part, whose dofs are the amounts of its `motions`, without a stiffness.
@@ -118,22 +119,13 @@ impl Body {
         let modes = unconstrained_modes.iter().map(on_interface).collect();
         let dofs = Dofs::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), modes, None);
         let (load, words) = (interface.turn(&whole.load), interface.in_words());
-        let interior = Interior {
-            session,
-            chosen,
-            dimension,
-            interface,
-            whole,
-            load,
-            schur: None,
-            eliminations: 0,
-            is_reused: false,
-            seconds: 0.0,
-        };
+        let interior =
+            Interior { session, chosen, dimension, interface, whole, load, schur: None, eliminations: 0, seconds: 0.0 };
         let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
         let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
         let (make, interior) = (Some(make), Some(interior));
-        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: true, words, interior }
+        let earlier = BodyCounts::default();
+        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: true, words, earlier, interior }
     }
 
     /// Eliminate the interior, if the body is to be condensed and is not yet.
@@ -277,21 +269,28 @@ impl Body {
     /// Return the counters of the work so far.
     pub fn counts(&self) -> BodyCounts {
         let counts = self.matrix.as_ref().map_or_else(BodyCounts::default, SpringMatrix::counts);
-        self.interior.as_ref().map_or(counts, |interior| interior.count(counts))
+        let mut all = self.interior.as_ref().map_or(counts, |interior| interior.count(counts));
+        all += self.earlier;
+        all
     }
 
-    /// Set the counters to zero for another run with the same K. Work that need not be repeated counts as avoided.
+    /// Count on from these counters.
+    pub fn count_on(&mut self, earlier: BodyCounts) {
+        self.earlier = earlier;
+    }
+
+    /// Set the counters to zero for another run.
     pub fn begin_anew(&mut self) {
-        self.interior.iter_mut().for_each(|interior| (interior.eliminations, interior.is_reused) = (0, false));
+        self.earlier = BodyCounts::default();
+        self.interior.iter_mut().for_each(|interior| interior.eliminations = 0);
         self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
     }
 
-    /// Replace the loads f on all dofs that this rank knows, and the values of the `prescribed` (dof, value), which are the same dofs as before. What was made of
-    /// K stays.
+    /// Replace the loads f on all dofs that this rank knows, and the values of the `prescribed` (dof, value), which are
+    /// the same dofs as before. What was made of K stays.
     pub fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> Result<()> {
         let stiffness = std::mem::take(&mut self.elastic.stiffness);
         if let Some(interior) = &mut self.interior {
-            interior.is_reused = interior.eliminations == 0;
             let is_same = interior.reload(load, prescribed);
             if !is_same && interior.schur.is_some() {
                 self.elastic = interior.loads()?;
@@ -405,7 +404,6 @@ impl Interior {
         BodyCounts {
             factorizations: eliminations,
             condensations: eliminations,
-            factorizations_avoided: usize::from(self.is_reused),
             symbolic: eliminations,
             first_seconds: seconds,
             factor_seconds: counts.factor_seconds + seconds,

@@ -184,7 +184,8 @@ impl Distribution {
         known
     }
 
-    /// Return the loads and prescribed values of a body on the owned dofs, without K, from those on the dofs of owned and ghost nodes.
+    /// Return the loads and prescribed values of a body on the owned dofs, without K, from those on the dofs of owned
+    /// and ghost nodes.
     pub fn restrict(&self, body: &ElasticBody) -> ElasticBody {
         let place = |&(dof, u): &(usize, f64)| Some((self.owned_positions.binary_search(&(dof as u32)).ok()?, u));
         ElasticBody {

@@ -39,6 +39,8 @@ pub struct JointStep {
     is_redundant: bool,
     /// Whether the bodies have given their K away.
     has_stiffness: bool,
+    /// Counters of the solver that it replaces in a history.
+    earlier: BodyCounts,
     /// Traces of the motions of rigid parts that the matrix has, one list a part.
     rigid: Vec<Vec<Vec<f64>>>,
     /// Motions of rigid parts that the matrix does not have.
@@ -79,8 +81,8 @@ impl JointStep {
         let is_redundant = !of_nodes && model.exchange.ranks() > 1;
         let motions = if of_nodes { border::motions(model) } else { Vec::new() };
         let rigid = if of_nodes { Vec::new() } else { rigid_traces(model) };
-        let has_stiffness = of_nodes;
-        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, rigid, motions, border: None })
+        let (has_stiffness, earlier, border) = (of_nodes, BodyCounts::default(), None);
+        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, earlier, rigid, motions, border })
     }
 
     /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error of x, by an iterative solver, or why the
@@ -217,7 +219,12 @@ impl LinearStep for JointStep {
         true
     }
 
+    fn count_on(&mut self, earlier: BodyCounts) {
+        self.earlier = earlier;
+    }
+
     fn begin_anew(&mut self) {
+        self.earlier = BodyCounts::default();
         self.matrix.begin_anew();
     }
 
@@ -288,7 +295,9 @@ impl LinearStep for JointStep {
     }
 
     fn counts(&self) -> BodyCounts {
-        self.matrix.counts()
+        let mut counts = self.matrix.counts();
+        counts += self.earlier;
+        counts
     }
 
     fn describe(&self) -> String {

@@ -45,10 +45,6 @@ pub struct Report {
     pub condensations: usize,
     /// Pairs of surfaces that were searched for common pieces.
     pub pairings: usize,
-    /// Stiffness matrices reused from an earlier run of a sweep.
-    pub assemblies_avoided: usize,
-    /// Numeric factorisations of stiffness matrices reused from an earlier run of a sweep.
-    pub factorizations_avoided: usize,
     /// Solves of one body, those of the start included.
     pub body_solves: usize,
     /// Changes of a body's Robin term.

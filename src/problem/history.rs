@@ -7,7 +7,7 @@
 use super::body::BodySpec;
 use super::contact::ContactSpec;
 use super::geometry::Geometry;
-use super::load::LoadKind;
+use super::load::{LoadKind, Support};
 use super::read::{Check, Either, Flaw, Form, file, kept, positive};
 use crate::error::{Error, Located, Result as Checked, joined};
 use crate::expression::Field;
@@ -81,6 +81,13 @@ impl History {
         !self.constant && self.steps[step].factors.iter().all(|factor| *factor == 0.0)
     }
 
+    /// Return whether a support has another displacement in a step than in the one before.
+    pub fn moves(&self, step: usize, bodies: &[BodySpec]) -> bool {
+        let differs = |path: Option<&Located<String>>| self.factor(step, path) != self.factor(step - 1, path);
+        let is_moved = |fix: &Support| fix.is_moved() && differs(fix.path.as_ref());
+        step > 0 && bodies.iter().flat_map(|body| &body.fix).any(is_moved)
+    }
+
     /// Return the factor at a step for a line with this path; 1 if the history has no such factor.
     fn factor(&self, step: usize, path: Option<&Located<String>>) -> f64 {
         let name = path.filter(|_| self.is_table()).map_or(COMMON, |path| &path.value);
@@ -137,10 +144,9 @@ fn has_common(body: &BodySpec) -> bool {
         LoadKind::Force { total, .. } | LoadKind::Moment(total) => total.iter().any(|force| *force != 0.0),
         LoadKind::Turning { force, moment } => force.iter().chain(moment).any(|component| *component != 0.0),
     };
-    let moves = |field: &Field| !field.is_zero();
     body.force.as_ref().is_some_and(|force| !force.iter().all(Field::is_zero))
         || body.load.iter().any(|load| load.path.is_none() && acts(&load.kind))
-        || body.fix.iter().any(|fix| fix.path.is_none() && fix.value.iter().flatten().chain(&fix.normal).any(moves))
+        || body.fix.iter().any(|fix| fix.path.is_none() && fix.is_moved())
 }
 
 /// The most steps that a number may stand for.

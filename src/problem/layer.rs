@@ -106,6 +106,15 @@ impl LayerSpec {
         };
         (law, list.into_iter().map(|(key, value, bounds)| Parameter { key, value, bounds }).collect())
     }
+
+    /// Return whether the law is known to be the same at all points.
+    pub fn is_uniform(&self) -> bool {
+        match self {
+            Self::Own(_) => false,
+            Self::Pressure { law, .. } => law.uses_only_first(),
+            _ => self.parameters().1.iter().all(|parameter| parameter.value.is_constant()),
+        }
+    }
 }
 
 /// A parameter of a law.

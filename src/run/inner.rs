@@ -7,7 +7,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::file::available_memory;
 use crate::linalg::Csr;
-use crate::model::Body;
+use crate::model::{Body, BodyCounts, LinearStep};
 use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Preset};
 use crate::scene::Scene;
@@ -34,6 +34,11 @@ pub struct SolverFactory<'a> {
     pub plan: Plan,
     /// What was asked for and planned for the problem before.
     before: Option<Solvers>,
+    /// The solver of the linear steps of the problem before. It goes when a body is made anew, since it has the
+    /// matrices of all.
+    step: Option<Box<dyn LinearStep>>,
+    /// Its counters.
+    counts: BodyCounts,
 }
 
 /// What was asked for, and the plan that was made.
@@ -43,8 +48,9 @@ pub struct Solvers {
 }
 
 impl<'a> SolverFactory<'a> {
-    /// Start from the free memory and the options that the user wrote. Bodies of the problem before had the solvers `before`. Collective.
-    pub fn new(session: &'a Session, scene: &Scene, before: Option<Solvers>) -> Result<Self> {
+    /// Start from the free memory and the options that the user wrote. The problem before had the solvers `before`.
+    /// Collective.
+    pub fn new(session: &'a Session, scene: &Scene, before: Option<(Solvers, Box<dyn LinearStep>)>) -> Result<Self> {
         let mine = available_memory() as u64;
         let mut least = mine;
         if session.size() > 1 {
@@ -59,6 +65,8 @@ impl<'a> SolverFactory<'a> {
             memory: least as usize,
             ranks: session.size(),
         };
+        let (before, step) = before.unzip();
+        let counts = step.as_ref().map_or(BodyCounts::default(), |step| step.counts());
         Ok(Self {
             session,
             asked,
@@ -67,6 +75,8 @@ impl<'a> SolverFactory<'a> {
             near_null_space: Vec::new(),
             plan: Plan { linear: Linear::Sweeps, bodies: Vec::new(), seconds: None },
             before,
+            step,
+            counts,
         })
     }
 
@@ -110,6 +120,11 @@ impl<'a> SolverFactory<'a> {
         }
     }
 
+    /// Return the solver of linear steps of the problem before, if it may serve again, and its counters.
+    pub fn linear_step(&mut self) -> (Option<Box<dyn LinearStep>>, BodyCounts) {
+        (self.step.take().filter(|_| self.has_same_steps()), self.counts)
+    }
+
     /// Return what was asked for, and the plan.
     pub fn into_solvers(self) -> Solvers {
         Solvers { asked: self.asked, plan: self.plan }
@@ -124,7 +139,8 @@ impl<'a> SolverFactory<'a> {
         self.before.as_ref().is_some_and(is_same)
     }
 
-    /// Clear the marks of bodies whose solver is another than in the problem before. Bodies that gave their K to one matrix serve together or not at all.
+    /// Clear the marks of bodies whose solver is another than in the problem before. Bodies that gave their K to one
+    /// matrix serve together or not at all.
     fn keep_solvers(&self, is_kept: &mut [bool]) {
         let Some(Solvers { plan: before, .. }) = &self.before else { return };
         let is_linear_same = self.has_same_steps();
@@ -240,10 +256,10 @@ impl Factory for SolverFactory<'_> {
                 before.and_then(|before| before.get(index)).is_some_and(|body| body.preset == Preset::Condensed);
             (body.is_kept, body.options) = (is_kept[index] && was_condensed, self.typed.of(&body.name));
         }
-        self.follow(match &self.before {
-            Some(before) if before.asked.is_like(&self.asked) && before.plan.is_for(&facts) => before.plan.of(facts),
-            _ => plan(facts, &self.asked),
-        });
+        // the free memory, which changes from moment to moment, does not change the solvers of the same bodies
+        let is_same = |before: &&Solvers| before.asked.is_like(&self.asked) && !is_kept.contains(&false);
+        let before = self.before.as_ref().filter(is_same).map(|before| before.plan.clone());
+        self.follow(before.unwrap_or_else(|| plan(facts, &self.asked)));
         self.keep_solvers(is_kept);
         for (index, (body, interface)) in self.plan.bodies.iter_mut().zip(interfaces).enumerate() {
             body.interface = Some(interface).filter(|_| body.preset == Preset::Condensed && !is_kept[index]);
@@ -284,6 +300,7 @@ impl Factory for SolverFactory<'_> {
     }
 
     fn make(&mut self, assembled: Assembled) -> Result<Body> {
+        self.step = None;
         let Assembled {
             name,
             dimension,

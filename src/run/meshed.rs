@@ -1,4 +1,5 @@
-//! The mesh of a scene with what was made on it, for the problems of all load steps, and of other scenes with the same bodies on it.
+//! The mesh of a scene with what was made on it, for the problems of all load steps, and of other scenes with the same
+//! bodies on it.
 
 use super::inner::SolverFactory;
 use super::warnings;
@@ -22,14 +23,14 @@ pub trait SceneMesh {
     /// Return the session of its ranks.
     fn session(&self) -> &Session;
 
-    /// Return whether another scene has the same bodies on this mesh.
-    fn serves(&self, scene: &Scene) -> bool;
+    /// Return what is known of it.
+    fn facts(&self) -> &MeshFacts;
 
-    /// Take the bodies of another scene that it serves.
+    /// Take the bodies of another scene, if they are the same on this mesh. Return whether they are.
     ///
     /// # Errors
     /// A line of the scene acts on no body, or on several.
-    fn follow(&mut self, scene: &Scene) -> Result<()>;
+    fn follow(&mut self, scene: &Scene) -> Result<bool>;
 
     /// Return the bodies of the scene, each with a name of its own.
     fn bodies(&self) -> &[BodySpec];
@@ -40,27 +41,27 @@ pub trait SceneMesh {
     /// See [`discretize::discretize`].
     fn discretize(&mut self, scene: &Scene, before: Option<Discrete>, inner: &mut SolverFactory) -> Result<Discrete>;
 
-    /// Return the number of dofs of linear elements in space; none in the plane.
-    fn dofs_in_space(&self) -> usize;
-
-    /// Return a line for each group that is split into bodies.
-    fn splits(&self) -> Vec<String>;
-
-    /// Return the warnings about the mesh and its file.
-    fn warnings(&self) -> Vec<String>;
-
-    /// Return SHA-256 of the file, and the file, on the rank that has read it.
-    fn file(&self) -> Option<(String, PathBuf)>;
-
     /// Return the places that a page marks.
     fn marks(&self, bodies: &[BodySpec], pairs: &[ContactPair]) -> Vec<Mark>;
+}
+
+/// What is known of a mesh.
+pub struct MeshFacts {
+    /// SHA-256 of its file, and the file, on the rank that has read it.
+    pub file: Option<(String, PathBuf)>,
+    /// Number of dofs of linear elements in space; none in the plane.
+    pub dofs_in_space: usize,
+    /// A line for each group that is split into bodies.
+    pub splits: Vec<String>,
+    /// Warnings about the mesh and its file.
+    pub warnings: Vec<String>,
 }
 
 /// The implementation of [`SceneMesh`] in `D` dimensions.
 struct CheckedMesh<const D: usize> {
     session: Session,
     verified: Verified<D>,
-    file: Option<(String, PathBuf)>,
+    facts: MeshFacts,
     cut: Cut<D>,
     kept: Kept<D>,
 }
@@ -97,9 +98,16 @@ where
     let verified = discretize::verify(scene, &Ranks::new(session), read);
     let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
     let mut verified = collectively(session, verified)?;
-    verified.notes.splice(0..0, notes);
     verified.mesh.forget_tags();
-    Ok(Box::new(CheckedMesh { session: session.clone(), verified, file, cut, kept: Kept::default() }))
+    let Verified { mesh, notes: own, .. } = &verified;
+    let changed = warnings::in_parts(mesh.split).into_iter().chain(warnings::made_straight(mesh.straightened));
+    let facts = MeshFacts {
+        file,
+        dofs_in_space: if D == 3 { D * verified.points } else { 0 },
+        splits: verified.splits(),
+        warnings: changed.chain(notes).chain(own.iter().cloned()).collect(),
+    };
+    Ok(Box::new(CheckedMesh { session: session.clone(), verified, facts, cut, kept: Kept::default() }))
 }
 
 impl<const D: usize> SceneMesh for CheckedMesh<D>
@@ -111,11 +119,11 @@ where
         &self.session
     }
 
-    fn serves(&self, scene: &Scene) -> bool {
-        self.verified.serves(scene)
+    fn facts(&self) -> &MeshFacts {
+        &self.facts
     }
 
-    fn follow(&mut self, scene: &Scene) -> Result<()> {
+    fn follow(&mut self, scene: &Scene) -> Result<bool> {
         self.verified.follow(scene)
     }
 
@@ -132,24 +140,6 @@ where
         let mut discrete = collectively(session, discrete)?;
         discrete.share();
         Ok(discrete)
-    }
-
-    fn dofs_in_space(&self) -> usize {
-        if D == 3 { D * self.verified.points } else { 0 }
-    }
-
-    fn splits(&self) -> Vec<String> {
-        self.verified.splits()
-    }
-
-    fn warnings(&self) -> Vec<String> {
-        let Verified { mesh, notes, .. } = &self.verified;
-        let changed = warnings::in_parts(mesh.split).into_iter().chain(warnings::made_straight(mesh.straightened));
-        changed.chain(notes.iter().cloned()).collect()
-    }
-
-    fn file(&self) -> Option<(String, PathBuf)> {
-        self.file.clone()
     }
 
     fn marks(&self, bodies: &[BodySpec], pairs: &[ContactPair]) -> Vec<Mark> {

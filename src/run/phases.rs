@@ -12,7 +12,7 @@ use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
 use crate::interrupt::Interrupt;
-use crate::model::{BodyCounts, Field, JointStep, LinearStep};
+use crate::model::{Field, INNER_TOLERANCE, JointStep, LinearStep};
 use crate::output;
 use crate::parallel::collectively;
 use crate::petsc::Session;
@@ -43,7 +43,8 @@ pub fn build(
     Ok(built)
 }
 
-/// Build a scene from what the run of another one before it has left: all of it that the settings which differ do not touch. Collective.
+/// Build a scene from what the run of another one before it has left: all of it that the settings which differ do not
+/// touch. Collective.
 ///
 /// # Errors
 /// Those of [`build`].
@@ -56,17 +57,12 @@ pub fn build_after(
 ) -> Result<Built> {
     clock.begin();
     let stage = session.stage("mesh");
-    let (mesh, before) = match before.map(Done::into_mesh) {
-        Some((Some(mut mesh), mut before)) if mesh.serves(&scene) => {
-            collectively(session, mesh.follow(&scene))?;
-            before.discrete.begin_anew();
-            before.step.begin_anew();
-            (mesh, Some(before))
-        }
-        other => {
-            drop(other);
-            (meshed::read(session, &scene, interrupt)?, None)
-        }
+    let mut kept = before.map(Done::into_mesh).and_then(|(mesh, before)| Some((mesh?, before)));
+    let serves = kept.as_mut().map_or(Ok(false), |(mesh, _)| mesh.follow(&scene));
+    let serves = collectively(session, serves)?;
+    let (mesh, before) = match kept.filter(|_| serves) {
+        Some((mesh, before)) => (mesh, Some(before.begin_anew())),
+        None => (meshed::read(session, &scene, interrupt)?, None),
     };
     clock.phase("mesh");
     drop(stage);
@@ -88,10 +84,13 @@ pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock)
     let ready = built.and_then(|built| {
         if let Some(InitialGuess::Known(solution)) = &mut start {
             let Discrete { model, specs, is_renewed, .. } = &built.discrete;
-            let counts = model.bodies.iter().map(|slot| slot.motions.len());
+            let (history, counts) = (&built.scene.method.steps, model.bodies.iter().map(|slot| slot.motions.len()));
             let has_dofs = *is_renewed && counts.eq(solution.field.rigid.iter().map(Vec::len));
-            if !has_dofs || specs.iter().any(|spec| built.scene.method.steps.locks(step, spec)) {
-                // other dofs know the pressures alone
+            // with other dofs the pressures alone are known, and moved supports would strain the cells beside them
+            if !has_dofs
+                || specs.iter().any(|spec| history.locks(step, spec))
+                || history.moves(step, &built.scene.bodies)
+            {
                 solution.field = Field::default();
             }
         }
@@ -107,7 +106,8 @@ pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock)
     Ok(ready)
 }
 
-/// Build the problem of a scene on its mesh under the loads of a step of its history, or under the full loads. Collective.
+/// Build the problem of a scene on its mesh under the loads of a step of its history, or under the full loads.
+/// Collective.
 fn build_on(
     session: &Session,
     scene: Rc<Scene>,
@@ -119,29 +119,25 @@ fn build_on(
     let stage = session.stage("discretize");
     let mut stepped = Scene { bodies: mesh.bodies().to_vec(), ..(*scene).clone() };
     scene.method.steps.apply(step, &mut stepped.bodies, &mut stepped.contacts);
-    let (discrete, solvers, mut linear_step, marks) = match before {
-        Some(Before { discrete, solvers, step, marks }) => (Some(discrete), Some(solvers), Some(step), marks),
-        None => (None, None, None, Vec::new()),
+    let (discrete, solvers, marks) = match before {
+        Some(Before { discrete, solvers, step, marks }) => (Some(discrete), Some((solvers, step)), marks),
+        None => (None, None, Vec::new()),
     };
     let mut inner = SolverFactory::new(session, &stepped, solvers)?;
-    let mut discrete = mesh.discretize(&stepped, discrete, &mut inner)?;
-    let (rank, is_renewed) = (session.rank(), discrete.is_renewed && inner.has_same_steps());
-    if let Some(step) = linear_step.take_if(|_| !is_renewed) {
-        // all ranks have the counters of all bodies together
-        discrete.work.gone += if rank == 0 { step.counts() } else { BodyCounts::default() };
-    }
-    // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
-    // from them.
+    let discrete = mesh.discretize(&stepped, discrete, &mut inner)?;
+    let (linear_step, counts) = inner.linear_step();
+    // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large
+    // factorisations gain from them.
     let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-    let gains = mesh.dofs_in_space() >= LARGE_FRONTS && inner.factors();
+    let gains = mesh.facts().dofs_in_space >= LARGE_FRONTS && inner.factors();
     session.set_blas_threads(if gains { cores / session.size() } else { 1 });
     clock.estimate = inner.plan.seconds;
     clock.phase("discretize");
     drop(stage);
     let mut warnings = warnings::of_problem(session, &discrete);
-    warnings.extend(mesh.warnings());
+    warnings.extend(mesh.facts().warnings.iter().cloned());
     warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
-    let has_page = scene.output.report && rank == 0;
+    let has_page = scene.output.report && session.rank() == 0;
     let marks = match has_page && marks.is_empty() {
         true => mesh.marks(&stepped.bodies, &discrete.model.pairs),
         false => marks,
@@ -149,15 +145,16 @@ fn build_on(
     Ok(Built {
         scene,
         marks,
-        discrete,
-        splits: mesh.splits(),
-        file: mesh.file(),
+        splits: mesh.facts().splits.clone(),
+        file: mesh.facts().file.clone(),
         interpolation: inner.interpolation.take(),
         near_null_space: std::mem::take(&mut inner.near_null_space),
         choice: inner.reason(),
         options: inner.options(),
         solvers: inner.into_solvers(),
-        step: linear_step,
+        step: linear_step.filter(|_| discrete.is_renewed),
+        counts,
+        discrete,
         warnings,
         mesh: Some(mesh),
     })
@@ -254,7 +251,9 @@ fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Resul
 
 /// Set up the solvers of the bodies for sweeps, unless the problem before had the same.
 fn prepare_sweeps(built: &mut Built) -> Result<()> {
-    if built.step.take().is_some() { Ok(()) } else { crate::robin::prepare(&mut built.discrete.model) }
+    let model = &mut built.discrete.model;
+    // its linear steps may have left a rough tolerance
+    if built.step.take().is_some() { model.set_tolerance(INNER_TOLERANCE) } else { crate::robin::prepare(model) }
 }
 
 fn coefficient_of(scene: &Scene) -> Coefficient {
@@ -268,13 +267,12 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         prepare_sweeps(built)?;
         return Ok(Box::new(SweepCg::new(coefficient_of(&built.scene))));
     }
-    let Built { scene, discrete, step, options, interpolation, near_null_space, .. } = built;
+    let Built { scene, discrete, step, counts, options, interpolation, near_null_space, .. } = built;
     let model = &mut discrete.model;
-    if let Some(mut step) = step.take() {
-        if step.renew(model) {
-            return Ok(step);
-        }
-        discrete.work.gone += if model.exchange.rank() == 0 { step.counts() } else { BodyCounts::default() };
+    if let Some(mut step) = step.take()
+        && step.renew(model)
+    {
+        return Ok(step);
     }
     let (interpolation, modes) = (interpolation.take(), std::mem::take(near_null_space));
     // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
@@ -290,6 +288,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &modes, interpolation)?)))
     };
     let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
+    step.count_on(*counts);
     if let Some(springs) = first_springs(model, start) {
         step.set_up(&springs)?;
     }

@@ -95,21 +95,6 @@ pub fn plan(facts: Vec<BodyFacts>, asked: &SolverRequest) -> Plan {
     Plan { linear, bodies, seconds }
 }
 
-impl Plan {
-    /// Return whether it was made for bodies like these.
-    pub fn is_for(&self, bodies: &[BodyFacts]) -> bool {
-        let of = |body: &BodyFacts| (body.name.clone(), body.dofs, body.interface, body.is_quadratic, body.compactness);
-        self.bodies.len() == bodies.len()
-            && self.bodies.iter().zip(bodies).all(|(plan, body)| of(&plan.facts) == of(body))
-    }
-
-    /// Return the same plan for these bodies, which are like its own.
-    pub fn of(&self, bodies: Vec<BodyFacts>) -> Self {
-        let bodies = self.bodies.iter().zip(bodies).map(|(plan, facts)| BodyPlan { facts, ..plan.clone() });
-        Self { bodies: bodies.collect(), ..self.clone() }
-    }
-}
-
 impl SolverRequest {
     /// Return whether another request is the same but for the memory, which changes from moment to moment.
     pub fn is_like(&self, other: &Self) -> bool {

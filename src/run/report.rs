@@ -4,7 +4,7 @@ use super::stages::{All, Built, Clock, Done};
 use super::verdict::{self, message, status_name};
 use super::{extent, results, warnings};
 use crate::ddm::{Outcome, Row, Status};
-use crate::discretize::{BodyInfo, Discrete, Work};
+use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
 use crate::error::few;
 use crate::estimate::Estimate;
@@ -104,7 +104,6 @@ fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcom
     report.body_solves = counts.solves;
     report.inner_iterations = counts.inner_iterations + joint.inner_iterations;
     report.factorizations = counts.factorizations + joint.factorizations;
-    report.factorizations_avoided = counts.factorizations_avoided;
     report.dense_factorizations = counts.dense_factorizations + joint.dense_factorizations;
     report.symbolic_factorizations = counts.symbolic + joint.symbolic;
     report.patches = counts.patches + joint.patches;
@@ -113,7 +112,6 @@ fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcom
     report.assemblies = shared.assemblies;
     report.condensations = counts.condensations;
     report.pairings = shared.pairings;
-    report.assemblies_avoided = shared.assemblies_avoided;
     report.inner_times = InnerTimes {
         factor: counts.factor_seconds + joint.factor_seconds,
         first: counts.first_seconds + joint.first_seconds,
@@ -173,7 +171,6 @@ pub struct GatheredCounters {
     /// Counters, summed over all bodies.
     pub counts: BodyCounts,
     assemblies: usize,
-    assemblies_avoided: usize,
     pairings: usize,
     /// Inner solver of each body in words.
     pub solvers: Vec<String>,
@@ -195,20 +192,11 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
     few(kinds.iter().map(in_words)).join(", ")
 }
 
-/// Return the counters of bodies and solvers of earlier load steps that are gone, over all ranks. Collective.
-pub fn gone(discrete: &Discrete) -> BodyCounts {
-    let sum = |mut sum: BodyCounts, other: BodyCounts| {
-        sum += other;
-        sum
-    };
-    all_gather(&*discrete.model.exchange, discrete.work.gone).into_iter().reduce(sum).unwrap_or_default()
-}
-
 impl GatheredCounters {
     /// Gather the data on every rank. Collective.
     pub fn gather(discrete: &Discrete) -> Self {
-        let Work { assemblies, assemblies_avoided, pairings, gone, .. } = discrete.work;
-        let mut mine = Self { counts: gone, assemblies, assemblies_avoided, pairings, ..Self::default() };
+        let &Discrete { assemblies, pairings, .. } = discrete;
+        let mut mine = Self { assemblies, pairings, ..Self::default() };
         for slot in discrete.model.bodies.iter().filter(|slot| !slot.is_rigid) {
             let owned = slot.local.as_ref().filter(|body| body.dofs().leads());
             mine.solvers.push(owned.map_or_else(String::new, Body::describe));
@@ -220,7 +208,6 @@ impl GatheredCounters {
     fn merged(mut self, other: Self) -> Self {
         self.counts += other.counts;
         self.assemblies += other.assemblies;
-        self.assemblies_avoided += other.assemblies_avoided;
         self.pairings += other.pairings;
         self.solvers.iter_mut().zip(other.solvers).for_each(|(mine, other)| mine.push_str(&other));
         self

@@ -7,7 +7,7 @@ use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
 use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
-use crate::model::{LinearStep, Model};
+use crate::model::{BodyCounts, LinearStep, Model};
 use crate::output::{BodyField, Mark, StepReport};
 use crate::scene::Scene;
 use crate::solver::options::Chosen;
@@ -33,6 +33,8 @@ pub struct Built {
     pub solvers: Solvers,
     /// The solver of the linear steps of the problem before, which may serve again.
     pub step: Option<Box<dyn LinearStep>>,
+    /// Counters of that solver.
+    pub counts: BodyCounts,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Prolongation>,
     /// Rigid motions of all bodies for GAMG of their matrix, until it takes them.
@@ -57,6 +59,15 @@ pub struct Before {
     pub step: Box<dyn LinearStep>,
     /// Places that the page marks.
     pub marks: Vec<Mark>,
+}
+
+impl Before {
+    /// Return the same for another run, whose counters start at zero.
+    pub fn begin_anew(mut self) -> Self {
+        self.discrete.begin_anew();
+        self.step.begin_anew();
+        self
+    }
 }
 
 /// The start of a run that continues one on another mesh or in another process.

@@ -1,18 +1,16 @@
 //! Load steps: a sequence of solutions, each of which starts from the previous one.
 //!
-//! A step changes loads, prescribed displacements, gaps and motions of obstacles, and nothing else: no body is assembled, reduced or factored again, and no pair
-//! is searched for.
+//! A step changes loads, prescribed displacements, gaps and motions of obstacles, and nothing else: no body is
+//! assembled, reduced or factored again, and no pair is searched for.
 
 use super::phases::next_step;
 use super::recorder::{self, Recorder};
-use super::report::gone;
 use super::results;
 use super::stages::{All, Clock, Done, Prepared};
 use super::verdict::{message, status_name};
 use super::warnings;
 use crate::ddm::{InitialGuess, Observer, Outcome, Row, Solution, Status};
 use crate::error::Result;
-use crate::model::BodyCounts;
 use crate::problem::history::History;
 use std::rc::Rc;
 
@@ -28,7 +26,6 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
     let mut all = Steps::new(keep, &ready);
     loop {
         all.step += 1;
-        all.counts = gone(&ready.built.discrete);
         let last = all.step == count;
         let mut done = recorder::solve(ready, last, &mut all)?;
         let interrupted = matches!(done.outcome.status, Status::Interrupted { .. });
@@ -70,8 +67,6 @@ struct Steps<'a> {
     smoothed: usize,
     /// Wall seconds of the steps before.
     seconds: f64,
-    /// Counters of bodies and solvers that the steps before had, and the present one has not.
-    counts: BodyCounts,
 }
 
 impl<'a> Steps<'a> {
@@ -86,7 +81,6 @@ impl<'a> Steps<'a> {
             sweeps: 0,
             smoothed: 0,
             seconds: 0.0,
-            counts: BodyCounts::default(),
         }
     }
 
@@ -98,8 +92,6 @@ impl<'a> Steps<'a> {
         row.sweeps += self.sweeps;
         row.smoothed += self.smoothed;
         row.seconds += self.seconds;
-        row.factorizations += self.counts.factorizations;
-        row.inner_iterations += self.counts.inner_iterations;
         row
     }
 
