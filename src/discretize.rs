@@ -142,12 +142,14 @@ where
             pair.law = law::of_pair(spec, &scene.laws, &pair.position)?;
         }
     }
+    // solvers that do not serve go before others are made, on all ranks in the same order
+    let is_renewed = is_kept.iter().all(|is_kept| *is_kept);
+    factory.settle(is_renewed);
+    let serving = |(slot, serves): (BodySlot, &bool)| EarlierBody::new(slot, *serves);
+    let mut earlier = earlier.into_iter().zip(&is_kept).map(serving).collect::<Vec<_>>().into_iter();
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
     let mut assembler = Assembler { mesh, plane, rank, factory, assemblies, shapes: Vec::new() };
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
-    // bodies that do not serve go before others are made
-    let serving = |(slot, serves): (BodySlot, &bool)| EarlierBody::new(slot, *serves);
-    let mut earlier = earlier.into_iter().zip(&is_kept).map(serving).collect::<Vec<_>>().into_iter();
     for (body, local) in locals.into_iter().enumerate() {
         let before = earlier.next().unwrap_or_default();
         if let Some(local) = local {
@@ -164,7 +166,7 @@ where
     slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    let (bodies, specs, is_renewed) = (infos, of_pairs, is_kept.iter().all(|is_kept| *is_kept));
+    let (bodies, specs) = (infos, of_pairs);
     Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, is_renewed, assemblies, pairings })
 }
 

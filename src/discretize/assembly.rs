@@ -160,6 +160,10 @@ pub trait Factory {
     /// Follow the plan of the first rank on another rank.
     fn adopt(&mut self, plan: Self::SolverPlan);
 
+    /// Let the solver of all bodies go before others are made, unless it may serve again: `is_renewed` says whether all
+    /// bodies are those of the problem before. Collective.
+    fn settle(&mut self, is_renewed: bool);
+
     /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
     /// are in increasing order. Bodies that stay whole are in no set.
     fn distributed(&self) -> Vec<Vec<usize>>;

@@ -34,8 +34,7 @@ pub struct SolverFactory<'a> {
     pub plan: Plan,
     /// What was asked for and planned for the problem before.
     before: Option<Solvers>,
-    /// The solver of the linear steps of the problem before. It goes when a body is made anew, since it has the
-    /// matrices of all.
+    /// The solver of the linear steps of the problem before, if it may serve again.
     step: Option<Box<dyn LinearStep>>,
     /// Its counters.
     counts: BodyCounts,
@@ -122,7 +121,7 @@ impl<'a> SolverFactory<'a> {
 
     /// Return the solver of linear steps of the problem before, if it may serve again, and its counters.
     pub fn linear_step(&mut self) -> (Option<Box<dyn LinearStep>>, BodyCounts) {
-        (self.step.take().filter(|_| self.has_same_steps()), self.counts)
+        (self.step.take(), self.counts)
     }
 
     /// Return what was asked for, and the plan.
@@ -131,7 +130,7 @@ impl<'a> SolverFactory<'a> {
     }
 
     /// Return whether linear steps are solved as in the problem before.
-    pub fn has_same_steps(&self) -> bool {
+    fn has_same_steps(&self) -> bool {
         let is_robin = |asked: &SolverRequest| asked.method == MethodName::Robin;
         let is_same = |before: &Solvers| {
             before.plan.linear == self.plan.linear && is_robin(&before.asked) == is_robin(&self.asked)
@@ -272,6 +271,10 @@ impl Factory for SolverFactory<'_> {
         self.follow(plan);
     }
 
+    fn settle(&mut self, is_renewed: bool) {
+        self.step = self.step.take().filter(|_| is_renewed && self.has_same_steps());
+    }
+
     fn distributed(&self) -> Vec<Vec<usize>> {
         let plans = &self.plan.bodies;
         // a condensed body stays on one rank, and all ranks can have its Schur complement
@@ -300,7 +303,6 @@ impl Factory for SolverFactory<'_> {
     }
 
     fn make(&mut self, assembled: Assembled) -> Result<Body> {
-        self.step = None;
         let Assembled {
             name,
             dimension,

@@ -152,7 +152,7 @@ fn build_on(
         choice: inner.reason(),
         options: inner.options(),
         solvers: inner.into_solvers(),
-        step: linear_step.filter(|_| discrete.is_renewed),
+        step: linear_step,
         counts,
         discrete,
         warnings,
