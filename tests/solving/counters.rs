@@ -3,7 +3,8 @@
 //! For two bodies: the start factors each body with springs of its own and solves it once; every sweep solves each
 //! body once; a body is factored when its Robin term changed.
 
-use crate::common::{Run, case, distance, solve, solve_here, winkler};
+use crate::common::here::solve_here;
+use crate::common::{Run, case, distance, solve, winkler_on};
 
 /// Bodies that factor their own G; condensed ones count at the end.
 const COARSE: [&str; 4] = ["--set", "mesh.set.n=8", "--set", "solver=mumps"];
@@ -138,9 +139,15 @@ fn the_table_has_the_lengths_of_the_report() {
 
 /// The reports of a sweep.
 fn sweep(over: &[&str], more: &[&str]) -> Vec<serde_json::Value> {
+    sweep_on(1, over, more)
+}
+
+/// The same on several ranks.
+fn sweep_on(ranks: usize, over: &[&str], more: &[&str]) -> Vec<serde_json::Value> {
     let path = case("groove").display().to_string();
     let over: Vec<&str> = over.iter().flat_map(|over| ["--over", over]).collect();
-    let run = winkler(&[&["sweep", &path, "-o", "out", "--json", "--set", "mesh.set.n=8"][..], &over, more].concat());
+    let words = ["sweep", &path, "-o", "out", "--json", "--set", "mesh.set.n=8"];
+    let run = winkler_on(ranks, &[&words[..], &over, more].concat());
     assert_eq!(run.code, 0, "{}", run.said());
     serde_json::from_str(&run.stdout).expect("a list of reports")
 }
@@ -208,9 +215,12 @@ fn a_sweep_makes_what_a_setting_touches() {
         assert_eq!(factored, [*assemblies, *assemblies, 0, 0], "{over}");
         assert_eq!(multigrid[0], 2 * assemblies, "{over}");
     }
-    // solvers of another kind are made anew, and pairs are not
-    let reports = sweep(&["solver=mumps,condensed"], &["--set", method]);
-    assert_eq!(made(&reports[1]), [2, 2, 2, 0]);
+    // solvers of another kind are made anew, and pairs are not; a rank without a body lets others go when all ranks do
+    for ranks in [1, 3] {
+        let reports = sweep_on(ranks, &["solver=mumps,condensed,hypre"], &["--set", method]);
+        let expected = [[2, 1, 0, 1], [2, 2, 2, 0], [2, 1, 0, 0]];
+        assert!(reports.iter().map(made).eq(expected), "{ranks}");
+    }
 }
 
 /// The second of two values, which have commas inside brackets and quotes only.
