@@ -33,11 +33,12 @@ pub use kept::Kept;
 pub use marks::marks;
 pub use pairs::{ContactFacts, corners};
 pub use post::ForceBalance;
+pub use prepare::Request;
 pub use rigid::Obstacle;
 pub use surface::Neighbours;
 pub use verify::{Verified, verify};
 
-use crate::contact::{self, ContactPair, law};
+use crate::contact::{ContactPair, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::model::{Body, BodySlot, Mechanism, Model};
@@ -70,17 +71,6 @@ pub struct Discrete {
     pub assemblies: usize,
     /// Number of pairs whose surfaces it has searched for common pieces.
     pub pairings: usize,
-}
-
-/// What a discrete problem is made from.
-pub struct Request<'a, const D: usize> {
-    /// The scene, with the bodies of `verified` under the loads of a step.
-    pub scene: &'a Scene,
-    pub verified: &'a Verified<D>,
-    /// Function that finds the common pieces of surfaces in this dimension.
-    pub cut: contact::pieces::Cut<D>,
-    /// Whether the meshes are kept for an estimate of the error.
-    pub keep: bool,
 }
 
 /// What a problem leaves for the next one.

@@ -2,7 +2,6 @@
 
 use super::body::BodyMesh;
 use super::groups::{FieldValues, Line, find_group, not_on_body, of_body, point, without_area};
-use super::kept::MatrixInputs;
 use super::supports::{Constraints, moment_load, spring_blocks};
 use super::verify::Verified;
 use crate::contact::Side;
@@ -212,21 +211,21 @@ fn too_large(spec: &BodySpec) -> Error {
         .label("their forces are beyond the range of numbers")
 }
 
-/// Return the bodies with their spaces, elasticity, supports and springs. `kept` are bodies of an earlier problem on
-/// the mesh, whose spaces serve.
+/// Return the bodies with their spaces, elasticity, supports and springs. `spaces` are those of an earlier problem on the
+/// mesh; there are none before the first.
 ///
 /// # Errors
 /// The scene contradicts its mesh.
 pub fn parts<'a, const D: usize>(
     scene: &'a Scene,
     verified: &Verified<D>,
-    kept: &[MatrixInputs<D>],
+    spaces: &[Rc<Space<D>>],
 ) -> Result<Vec<SceneBody<'a, D>>> {
     let Verified { mesh, checked, .. } = verified;
     let mut parts = Vec::new();
     for (index, spec) in scene.bodies.iter().enumerate() {
-        let space = match kept.get(index) {
-            Some(kept) => kept.space.clone(),
+        let space = match spaces.get(index) {
+            Some(space) => space.clone(),
             None => Rc::new(space(spec, mesh, scene.plane)?),
         };
         let checked = &checked[index];

@@ -32,6 +32,11 @@ impl<const D: usize> Default for Kept<D> {
 }
 
 impl<const D: usize> Kept<D> {
+    /// Return the spaces of the bodies.
+    pub fn spaces(&self) -> Vec<Rc<Space<D>>> {
+        self.bodies.iter().map(|body| body.space.clone()).collect()
+    }
+
     /// Return the pairs of the problem, with these arrays and facts, for one with other `bodies`.
     pub fn serving_pairs(
         &mut self,
@@ -50,8 +55,7 @@ impl<const D: usize> Kept<D> {
 
 /// What the stiffness matrix and the contact rows of a body are made of.
 pub struct MatrixInputs<const D: usize> {
-    /// The space, which another problem on the mesh uses as well.
-    pub space: Rc<Space<D>>,
+    space: Rc<Space<D>>,
     elasticity: Rc<Elasticity>,
     springs: Vec<Vec<NodalBlock<D>>>,
     frame: Frame<D>,

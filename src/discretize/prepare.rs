@@ -9,8 +9,10 @@ use super::facts::BodyInfo;
 use super::kept::{Kept, MatrixInputs};
 use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
+use super::verify::Verified;
 use super::whole::WholeBody;
-use super::{Request, chords, mechanism};
+use super::{chords, mechanism};
+use crate::contact::pieces::Cut;
 use crate::contact::{self, ContactPair};
 use crate::error::Result;
 use crate::exchange::Plain;
@@ -18,8 +20,21 @@ use crate::fem::rigid::AtDofs;
 use crate::mesh::BodyCheck;
 use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, compactness};
 use crate::problem::Order;
+use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
+
+/// What a discrete problem is made from.
+pub struct Request<'a, const D: usize> {
+    /// The scene, with the bodies of `verified` under the loads of a step.
+    pub scene: &'a Scene,
+    /// The mesh.
+    pub verified: &'a Verified<D>,
+    /// Function that finds the common pieces of surfaces in this dimension.
+    pub cut: Cut<D>,
+    /// Whether the meshes are kept for an estimate of the error.
+    pub keep: bool,
+}
 
 /// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]
@@ -93,7 +108,7 @@ pub fn prepare<'a, const D: usize, F: Factory>(
     let Request { scene, verified, cut, keep } = *request;
     let mesh = &verified.mesh;
     let mut before = std::mem::take(kept);
-    let parts = parts(scene, verified, &before.bodies)?;
+    let parts = parts(scene, verified, &before.spaces())?;
     kept.bodies = parts.iter().map(MatrixInputs::of).collect();
     let earlier_pairs = before.serving_pairs(&kept.bodies, pairs);
     let Contacts { all, rigid, searched } = pairs::all(scene, mesh, cut, &parts, keep, earlier_pairs)?;

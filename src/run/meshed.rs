@@ -2,7 +2,6 @@
 //! bodies on it.
 
 use super::inner::SolverFactory;
-use super::warnings;
 use crate::contact::ContactPair;
 use crate::contact::pieces::{self, Cut};
 use crate::discretize::{self, Discrete, Kept, Request, Verified};
@@ -53,8 +52,12 @@ pub struct MeshFacts {
     pub dofs_in_space: usize,
     /// A line for each group that is split into bodies.
     pub splits: Vec<String>,
-    /// Warnings about the mesh and its file.
-    pub warnings: Vec<String>,
+    /// Number of cells that were split into simplices.
+    pub split: usize,
+    /// Number of curved cells that were made straight.
+    pub straightened: usize,
+    /// What is to be said of its file, and of surfaces that are sets of nodes, on the rank that has read it.
+    pub notes: Vec<String>,
 }
 
 /// The implementation of [`SceneMesh`] in `D` dimensions.
@@ -99,13 +102,14 @@ where
     let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
     let mut verified = collectively(session, verified)?;
     verified.mesh.forget_tags();
-    let Verified { mesh, notes: own, .. } = &verified;
-    let changed = warnings::in_parts(mesh.split).into_iter().chain(warnings::made_straight(mesh.straightened));
+    notes.append(&mut verified.notes);
     let facts = MeshFacts {
         file,
         dofs_in_space: if D == 3 { D * verified.points } else { 0 },
         splits: verified.splits(),
-        warnings: changed.chain(notes).chain(own.iter().cloned()).collect(),
+        split: verified.mesh.split,
+        straightened: verified.mesh.straightened,
+        notes,
     };
     Ok(Box::new(CheckedMesh { session: session.clone(), verified, facts, cut, kept: Kept::default() }))
 }

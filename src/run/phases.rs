@@ -2,7 +2,7 @@
 //! iteration. A problem takes over what the run of another scene before it has left.
 
 use super::inner::SolverFactory;
-use super::meshed::{self, SceneMesh};
+use super::meshed::{self, MeshFacts, SceneMesh};
 use super::recorder::{self, Recorder};
 use super::stages::{Before, Begin, Built, Clock, Done, Prepared};
 use super::{steps, warnings};
@@ -135,7 +135,9 @@ fn build_on(
     clock.phase("discretize");
     drop(stage);
     let mut warnings = warnings::of_problem(session, &discrete);
-    warnings.extend(mesh.facts().warnings.iter().cloned());
+    let MeshFacts { split, straightened, notes, .. } = mesh.facts();
+    warnings.extend(warnings::in_parts(*split).into_iter().chain(warnings::made_straight(*straightened)));
+    warnings.extend(notes.iter().cloned());
     warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
     let has_page = scene.output.report && session.rank() == 0;
     let marks = match has_page && marks.is_empty() {
