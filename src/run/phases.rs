@@ -3,9 +3,8 @@
 
 use super::inner::SolverFactory;
 use super::meshed::{self, MeshFacts, SceneMesh};
-use super::recorder::{self, Recorder};
 use super::stages::{Before, Begin, Built, Clock, Done, Prepared};
-use super::{steps, warnings};
+use super::warnings;
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
 use crate::discretize::{self, Discrete};
@@ -189,25 +188,6 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     }
     clock.phase("set-up");
     Ok(Prepared { built, method, start, steps, earlier: Vec::new(), warnings })
-}
-
-/// Iterate. From here on a signal ends the run after the current step, so that its results are written.
-///
-/// # Errors
-/// PETSc fails. A run that does not converge is not an error but a status of the outcome.
-pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
-    interrupt.hold();
-    let mut done = match ready.built.scene.method.steps.is_empty() {
-        true => recorder::solve(ready, true, keep).inspect(|done| {
-            if matches!(done.outcome.status, Status::Interrupted { .. }) {
-                keep.state(done);
-            }
-        }),
-        false => steps::iterate(ready, keep, clock),
-    }?;
-    warnings::note_ends(&mut done);
-    clock.phase("iterate");
-    Ok(done)
 }
 
 /// Estimate the error of the solution, if the scene requests it.

@@ -11,8 +11,28 @@ use super::verdict::{message, status_name};
 use super::warnings;
 use crate::ddm::{InitialGuess, Observer, Outcome, Row, Solution, Status};
 use crate::error::Result;
+use crate::interrupt::Interrupt;
 use crate::problem::history::History;
 use std::rc::Rc;
+
+/// Iterate. From here on a signal ends the run after the current step, so that its results are written.
+///
+/// # Errors
+/// PETSc fails. A run that does not converge is not an error but a status of the outcome.
+pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
+    interrupt.hold();
+    let mut done = match ready.built.scene.method.steps.is_empty() {
+        true => recorder::solve(ready, true, keep).inspect(|done| {
+            if matches!(done.outcome.status, Status::Interrupted { .. }) {
+                keep.state(done);
+            }
+        }),
+        false => steps(ready, keep, clock),
+    }?;
+    warnings::note_ends(&mut done);
+    clock.phase("iterate");
+    Ok(done)
+}
 
 /// Solve the load steps of a scene and report each. The outcome is that of the last step with the counters and rows of all steps.
 ///
@@ -21,7 +41,7 @@ use std::rc::Rc;
 ///
 /// # Errors
 /// Failures of the solver library, and loads that a body cannot have.
-pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
+fn steps(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
     let count = ready.built.scene.method.steps.steps.len();
     let mut all = Steps::new(keep, &ready);
     loop {
