@@ -19,7 +19,7 @@ use std::sync::{Arc, OnceLock};
 pub type Library = BTreeMap<String, Arc<Data>>;
 
 /// A function given by a file, which is read when the function is first needed.
-#[derive(Debug)]
+#[derive(Debug, PartialEq)]
 pub struct Data {
     /// The settings of the scene.
     pub spec: DataSpec,

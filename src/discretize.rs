@@ -9,6 +9,7 @@ mod carrier;
 mod chords;
 mod facts;
 mod groups;
+mod kept;
 mod marks;
 mod mechanism;
 pub mod meshes;
@@ -28,21 +29,23 @@ pub use approach::mean_normal;
 pub use assembly::{Assembled, Factory};
 pub use facts::BodyInfo;
 pub use groups::find_group;
+pub use kept::Kept;
 pub use marks::marks;
 pub use pairs::{ContactFacts, corners};
 pub use post::ForceBalance;
+pub use prepare::Request;
 pub use rigid::Obstacle;
 pub use surface::Neighbours;
 pub use verify::{Verified, verify};
 
-use crate::contact::{self, law};
+use crate::contact::{ContactPair, law};
 use crate::error::Result;
 use crate::exchange::{Exchange, Plain, broadcast, scatter};
 use crate::model::{Body, BodySlot, Mechanism, Model};
 use crate::problem::Start;
 use crate::problem::contact::{Carrier, ContactSpec};
 use crate::scene::Scene;
-use assembly::Assembler;
+use assembly::{Assembler, EarlierBody};
 use body::BodyMesh;
 use meshes::{KeptMeshes, Meshes};
 use prepare::{ReplicatedProblem, WholeProblem, prepare};
@@ -62,31 +65,47 @@ pub struct Discrete {
     pub mechanisms: Vec<Mechanism>,
     /// The meshes, kept only if an estimate of the error was requested.
     pub meshes: Option<Rc<dyn Meshes>>,
-    /// Factor of the loads and prescribed displacements that the model has, relative to those that it was made with.
-    pub factor: f64,
-    /// Number of stiffness matrices assembled on this rank.
+    /// Whether all bodies have the matrices and solvers of the problem before.
+    pub is_renewed: bool,
+    /// Number of stiffness matrices that this rank has assembled in the run.
     pub assemblies: usize,
-    /// Number of stiffness matrices reused from an earlier scene.
-    pub assemblies_avoided: usize,
+    /// Number of pairs whose surfaces it has searched for common pieces.
+    pub pairings: usize,
+}
+
+/// What a problem leaves for the next one.
+#[derive(Default)]
+struct Earlier {
+    assemblies: usize,
+    pairings: usize,
+    /// Bodies with a mesh.
+    bodies: Vec<BodySlot>,
+    pairs: Vec<(ContactPair, ContactFacts)>,
+}
+
+impl Earlier {
+    fn of(discrete: Discrete) -> Self {
+        let Discrete { model: Model { mut bodies, pairs, .. }, contacts, assemblies, pairings, .. } = discrete;
+        bodies.retain(|slot| !slot.is_rigid);
+        Self { assemblies, pairings, bodies, pairs: pairs.into_iter().zip(contacts).collect() }
+    }
 }
 
 /// Turn a scene and its mesh into a model. Collective.
 ///
 /// The first rank prepares everything but matrices, as in a serial run. Then every rank receives what it needs of each body, and
-/// assembles it.
+/// assembles it. `factory` turns each body of this rank into one with a solver.
 ///
-/// `scene` has the bodies of `verified`, with the loads of a step. `cut` finds the common pieces of surfaces in this dimension.
-/// `factory` turns each body of this rank into one with a solver. `keep` requests that the meshes are kept for an estimate of the
-/// error.
+/// The problem `before` on the same mesh, which left `kept`, gives all pairs and bodies that would be the same but for
+/// loads, prescribed displacements, gaps and laws.
 ///
 /// # Errors
 /// The scene may contradict its mesh: missing groups, surfaces of the wrong body, supports that contradict each other, surfaces
 /// that do not face each other. Failures of `factory` are returned, too.
 pub fn discretize<const D: usize>(
-    scene: &Scene,
-    verified: &Verified<D>,
-    cut: contact::pieces::Cut<D>,
-    keep: bool,
+    request: &Request<D>,
+    kept: &mut Kept<D>,
+    before: Option<Discrete>,
     exchange: Rc<dyn Exchange>,
     factory: &mut impl Factory,
 ) -> Result<Discrete>
@@ -94,13 +113,17 @@ where
     [f64; D]: Plain,
     [[f64; D]; D]: Plain,
 {
+    let Earlier { assemblies, pairings, bodies: earlier, pairs: mut earlier_pairs } =
+        before.map(Earlier::of).unwrap_or_default();
+    let Request { scene, verified, keep, .. } = *request;
     let mut prepared = None;
     let shared = broadcast(&*exchange, || {
-        let (shared, whole) = prepare(scene, verified, cut, keep, exchange.ranks(), factory)?;
+        let (shared, whole) = prepare(request, exchange.ranks(), factory, kept, std::mem::take(&mut earlier_pairs))?;
         prepared = Some(whole);
         Ok(shared)
     })?;
-    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan } = shared;
+    let ReplicatedProblem { bodies: shared, mut pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched } =
+        shared;
     let of_pairs: Vec<ContactSpec> = contacts.iter().map(|contact| contact.spec(&scene.contacts)).collect();
     let locals = give(prepared, &exchange)?;
     if exchange.rank() > 0 {
@@ -109,15 +132,22 @@ where
             pair.law = law::of_pair(spec, &scene.laws, &pair.position)?;
         }
     }
+    // solvers that do not serve go before others are made, on all ranks in the same order
+    let is_renewed = is_kept.iter().all(|is_kept| *is_kept);
+    factory.settle(is_renewed);
+    let serving = |(slot, serves): (BodySlot, &bool)| EarlierBody::new(slot, *serves);
+    let mut earlier = earlier.into_iter().zip(&is_kept).map(serving).collect::<Vec<_>>().into_iter();
     let (mesh, plane, rank) = (&verified.mesh, scene.plane, exchange.rank());
-    let mut assembler = Assembler { mesh, plane, rank, factory, assemblies: 0, avoided: 0, shapes: Vec::new() };
+    let mut assembler = Assembler { mesh, plane, rank, factory, assemblies, shapes: Vec::new() };
     let (mut slots, mut infos): (Vec<_>, Vec<_>) = shared.into_iter().unzip();
     for (body, local) in locals.into_iter().enumerate() {
+        let before = earlier.next().unwrap_or_default();
         if let Some(local) = local {
-            assembler.make(&scene.bodies[body], local, &mut slots[body], &mut infos[body])?;
+            assembler.make(&scene.bodies[body], local, before, &mut slots[body], &mut infos[body])?;
         }
     }
-    let Assembler { assemblies, avoided: assemblies_avoided, shapes, .. } = assembler;
+    let Assembler { assemblies, shapes, .. } = assembler;
+    let pairings = pairings + if rank == 0 { searched } else { 0 };
     let meshes = keep.then(|| Rc::new(KeptMeshes { shapes, fine }) as Rc<dyn Meshes>);
     let of_rank = |slot: BodySlot| match rank == 0 && !slot.motions.is_empty() {
         true => BodySlot { local: Some(Body::rigid(&slot.motions)), ..slot },
@@ -126,8 +156,8 @@ where
     slots.extend(rigid.into_iter().map(of_rank));
     let mut model = Model::new(slots, pairs, exchange);
     model.mechanism = mechanisms.iter().find(|mechanism| mechanism.work != 0.0).cloned();
-    let (bodies, specs, factor) = (infos, of_pairs, 1.0);
-    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, factor, assemblies, assemblies_avoided })
+    let (bodies, specs) = (infos, of_pairs);
+    Ok(Discrete { model, bodies, contacts, specs, mechanisms, meshes, is_renewed, assemblies, pairings })
 }
 
 /// Send every rank what it needs of each body. The first rank has everything in `prepared`. Collective.
@@ -162,11 +192,10 @@ impl Discrete {
         model.set_gaps();
     }
 
-    /// Give the loads and prescribed displacements this factor.
-    pub fn scale_loads(&mut self, factor: f64) {
-        let ratio = factor / self.factor;
-        self.factor = factor;
-        self.model.scale_loads(ratio);
+    /// Begin another run with the bodies of this problem: its counters start at zero.
+    pub fn begin_anew(&mut self) {
+        (self.assemblies, self.pairings) = (0, 0);
+        self.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(Body::begin_anew);
     }
 
     /// Return which surface carries the contact points of each pair.

@@ -106,6 +106,13 @@ impl Expression {
     }
 }
 
+/// Expressions are equal if they are computed alike, wherever they stand.
+impl PartialEq for Expression {
+    fn eq(&self, other: &Self) -> bool {
+        self.program == other.program
+    }
+}
+
 impl fmt::Debug for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Expression({:?})", self.text)
@@ -121,6 +128,17 @@ pub enum Field {
     Expression(Expression),
     /// A function of the place (x, y, z). Scene files have none.
     Function(Rc<dyn Fn([f64; 3]) -> f64>),
+}
+
+impl PartialEq for Field {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => a == b,
+            (Self::Expression(a), Self::Expression(b)) => a == b,
+            (Self::Function(a), Self::Function(b)) => Rc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
 }
 
 impl From<f64> for Field {

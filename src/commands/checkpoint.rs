@@ -115,7 +115,7 @@ impl Checkpoint {
     /// The checkpoint is of another problem.
     pub fn resume(self, scene: &Scene, built: &Built) -> Result<Begin> {
         // only the first rank has read the mesh
-        if built.mesh.is_some() && self.head.problem != problem_digest(scene, built) {
+        if built.file.is_some() && self.head.problem != problem_digest(scene, built) {
             let message = format!("{} is of another scene or mesh", self.path.display());
             let help = "a run goes on with the scene and the overrides that it began with; only `title`, `units`, `[output]`, `[solver]` and \
                         `[method]` without its `steps` may change. Or begin anew, without `--restart`";
@@ -139,7 +139,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Option<Checkpoint> {
 
 /// Return a digest of a scene without output, solvers and method (but for its load steps), of the file of the mesh, and of the bodies and contact points
 /// made from it, on the rank that has read the mesh. The file counts because nodes, cells and groups may differ where their numbers are the same.
-fn problem_digest(scene: &Scene, Built { mesh, discrete, .. }: &Built) -> String {
+fn problem_digest(scene: &Scene, Built { file, discrete, .. }: &Built) -> String {
     let mut problem = scene.problem();
     problem["method"] = problem["method"]["steps"].take();
     remove(&mut problem, "", &["solver", "estimate"]);
@@ -147,6 +147,6 @@ fn problem_digest(scene: &Scene, Built { mesh, discrete, .. }: &Built) -> String
     let bodies = discrete.bodies.iter().map(|body| (&body.name, body.nodes, body.cells, body.dofs));
     // gaps follow from these and the scene, and may change from step to step
     let pairs = discrete.model.pairs.iter().map(|pair| (&pair.position, &pair.area));
-    let file = mesh.as_ref().map(|mesh| &mesh.digest);
-    digest(&(problem.to_string(), file, bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
+    let mesh = file.as_ref().map(|mesh| &mesh.digest);
+    digest(&(problem.to_string(), mesh, bodies.collect::<Vec<_>>(), pairs.collect::<Vec<_>>()))
 }

@@ -79,7 +79,8 @@ impl Terminal {
         let mut lines = vec![format!("{}: decided", scene.title)];
         let name = scene.method.name.name();
         let has_steps = scene.method.name != MethodName::Robin;
-        let linear = if has_steps { format!("; linear steps: {}", built.linear.name()) } else { String::new() };
+        let linear = built.solvers.plan.linear.name();
+        let linear = if has_steps { format!("; linear steps: {linear}") } else { String::new() };
         lines.push(format!("  method: {name}{linear}; until {}", run::targets(scene)));
         lines.push(format!("  inner solver: {} ({})", solvers_in_words(&solvers), built.choice));
         lines.push(format!("  {} ranks, {}", session.size(), session.blas_name()));

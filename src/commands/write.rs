@@ -55,7 +55,7 @@ impl ResultFiles<'_> {
         let mut plots = Plots::default();
         plots.add("pressure", done, &shown);
         let mut written = if is_first { self.tables_and_plots(&report, &shown, &plots) } else { Ok(()) };
-        if let Some(mesh) = done.built.mesh.as_ref().filter(|_| self.fields && self.plan.adapts()) {
+        if let Some(mesh) = done.built.file.as_ref().filter(|_| self.fields && self.plan.adapts()) {
             written = written.and(copy_mesh(folder, &mesh.path));
         }
         if self.fields {

@@ -12,7 +12,7 @@ use std::collections::{HashMap, HashSet};
 const HELD: f64 = 1e-6;
 
 /// The planes of symmetry that meet a surface at its ends.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Mirrors<const D: usize> {
     /// Unit normals of the planes through each node.
     planes: HashMap<u32, Vec<[f64; D]>>,

@@ -6,11 +6,11 @@ use super::pieces::{Intersection, WHOLE};
 use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
-use crate::fem::{NodeDofs, area_vector, cross, length, pad};
+use crate::fem::{Frame, NodeDofs, Space, area_vector, cross, length, pad};
 use crate::linalg::{Csr, dot};
 use crate::problem::order::Order;
 use serde::{Deserialize, Deserializer, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 
 /// A discretised pair of surfaces: n contact points with one pressure each.
@@ -41,9 +41,13 @@ pub struct ContactPair {
     pub normal: Vec<[f64; 3]>,
     /// Length of the sum of the outer unit normals of both sides, n: zero where they are opposite.
     pub tilt: Vec<f64>,
+    /// Whether the normals were turned across motions that nothing holds ([`ContactPair::turn`]).
+    pub is_turned: bool,
     /// Spread of the normals of the facets around each point, n; empty where no facet of the pair leans. The first rank alone has it.
     #[serde(skip)]
     pub spread: Vec<[[f64; 3]; 3]>,
+    /// Mean distance of the meshes around each point along the normal, n.
+    pub distance: Vec<f64>,
     /// Initial gap d_q along the normal, n: the distance of the meshes plus the gap that the scene adds.
     pub gap: Vec<f64>,
     /// Closing of the gap (a length) that an earlier load step has found and locked.
@@ -202,7 +206,9 @@ pub fn assemble<const D: usize>(
         normal: nodes.iter().map(|at| pad(at.direction)).collect(),
         tilt: nodes.iter().map(|at| at.tilt).collect(),
         spread: spreads(&nodes, a.tilt().max(b.tilt()).max(ROUNDING)),
-        gap: gaps(a, &points, &position, gap)?,
+        is_turned: false,
+        distance: distances(a, &points),
+        gap: Vec::new(),
         nodes: nodes.iter().map(|at| at.node).collect(),
         face: faces(a, &on_side, &points, &position),
         on_side,
@@ -223,9 +229,11 @@ pub fn assemble<const D: usize>(
     for (index, side) in [a, b].into_iter().enumerate() {
         for (q, point) in points.iter().enumerate() {
             let shares = point.shares(index);
-            push_rows(&mut pair, index, &side.dofs(), of_nodes(side, &shares), nodes[q].direction);
+            push_rows(&mut pair, index, side.space, of_nodes(side, &shares), nodes[q].direction);
         }
+        pair.hold(index, side.frame, side.prescribed);
     }
+    pair.set_gap(gap)?;
     Ok(pair)
 }
 
@@ -255,26 +263,13 @@ fn faces<const D: usize>(a: &Side<D>, on_side: &[u32], points: &[&Accumulator], 
     on_side.iter().map(number).collect()
 }
 
-/// Return the initial gap at each contact point: the mean distance of the meshes plus the scene's own gap.
-///
-/// # Errors
-/// [`Fault::Gap`] if the scene's own gap is not finite at a point.
-fn gaps<const D: usize>(
-    a: &Side<D>,
-    points: &[&Accumulator],
-    position: &[[f64; 3]],
-    own: &dyn Fn([f64; 3]) -> f64,
-) -> Result<Vec<f64>, Fault> {
+/// Return the mean distance of the meshes around each contact point.
+fn distances<const D: usize>(a: &Side<D>, points: &[&Accumulator]) -> Vec<f64> {
     let size = (points.len() as f64 * a.mean_measure()).powf(1.0 / (D - 1) as f64);
     // Matching surfaces differ by the rounding of the coordinates of both sides, along any normal.
     let rounding = (1e-12 * size).max(a.rounding_along_normals());
-    let gap = |(point, &x): (&&Accumulator, &[f64; 3])| {
-        let distance = point.gap / point.weight;
-        let distance = if distance.abs() < rounding { 0.0 } else { distance };
-        let own = own(x);
-        if own.is_finite() { Ok(distance + own) } else { Err(Fault::Gap(x)) }
-    };
-    points.iter().zip(position).map(gap).collect()
+    let means = points.iter().map(|point| point.gap / point.weight);
+    means.map(|distance| if distance.abs() < rounding { 0.0 } else { distance }).collect()
 }
 
 /// Return the shares of the nodes of a body in a point, from those of nodes on faces.
@@ -284,40 +279,27 @@ fn of_nodes<const D: usize>(side: &Side<D>, shares: &[(u32, f64)]) -> BTreeMap<u
     sums
 }
 
-/// Append the rows of a contact point for one side of a pair. `index` is 0 for side a and 1 for side b, `shares` holds the
-/// shares of the side's nodes in the point, and `normal` points out of side a.
+/// Append the rows of the displacements of nodes of a contact point for one side of a pair. `index` is 0 for side a and
+/// 1 for side b, `shares` holds the shares of the side's nodes in the point, and `normal` points out of side a.
 fn push_rows<const D: usize>(
     pair: &mut ContactPair,
     index: usize,
-    side: &NodeDofs<D>,
+    space: &Space<D>,
     shares: impl IntoIterator<Item = (u32, f64)>,
     normal: [f64; D],
 ) {
     let sign = [1.0, -1.0][index];
-    let (mut nodal, mut entries) = (Vec::new(), BTreeMap::new());
+    let mut nodal = Vec::new();
     let (mut resultant, mut moment) = ([0.0; 3], [0.0; 3]);
     for (n, share) in shares {
         let entry = normal.map(|normal| sign * share * normal);
         nodal.extend((0..D).map(|c| (D * n as usize + c, entry[c])));
-        add(&mut resultant, side.space.net_force(entry));
-        add(&mut moment, side.space.net_moment(n, entry));
-        for (node, dofs) in side.frame.force(n, entry) {
-            for (c, value) in dofs.into_iter().enumerate() {
-                *entries.entry(D * node as usize + c).or_insert(0.0) += value;
-            }
-        }
+        add(&mut resultant, space.net_force(entry));
+        add(&mut moment, space.net_moment(n, entry));
     }
-    let mut prescribed = 0.0;
-    entries.retain(|dof, entry| {
-        let value = side.prescribed.get(dof);
-        prescribed += value.map_or(0.0, |u| *entry * u);
-        value.is_none()
-    });
-    pair.rows[index].push_row(entries);
     pair.nodal[index].push_row(nodal);
     pair.resultant[index].push(resultant);
-    pair.moment[index].push(moment_in_scene(&side.space.datum, resultant, moment));
-    pair.prescribed[index].push(prescribed);
+    pair.moment[index].push(moment_in_scene(&space.datum, resultant, moment));
 }
 
 /// Return the moment about the origin of the scene of a force whose moment about `datum` is given.
@@ -367,6 +349,48 @@ impl Accumulator {
 }
 
 impl ContactPair {
+    /// Let the scene add `own(x)` to the distance of the meshes.
+    ///
+    /// # Errors
+    /// [`Fault::Gap`] if that is not finite at a point.
+    pub fn set_gap(&mut self, own: &dyn Fn([f64; 3]) -> f64) -> Result<(), Fault> {
+        let gap = |(distance, &x): (&f64, &[f64; 3])| match own(x) {
+            own if own.is_finite() => Ok(distance + own),
+            _ => Err(Fault::Gap(x)),
+        };
+        self.gap = self.distance.iter().zip(&self.position).map(gap).collect::<Result<_, _>>()?;
+        Ok(())
+    }
+
+    /// Set the rows of a side from those of the displacements of its nodes, for the dofs of this frame and the values
+    /// of those that supports prescribe.
+    pub fn hold<const D: usize>(&mut self, side: usize, frame: &Frame<D>, prescribed: &HashMap<usize, f64>) {
+        let nodal = &self.nodal[side];
+        let mut held = Csr::new(nodal.columns);
+        self.prescribed[side].clear();
+        for q in 0..nodal.rows() {
+            let (mut entries, mut along) = (BTreeMap::new(), 0.0);
+            let row: Vec<(usize, f64)> = nodal.row(q).collect();
+            for at_node in row.chunk_by(|p, q| p.0 / D == q.0 / D) {
+                let mut entry = [0.0; D];
+                at_node.iter().for_each(|(i, value)| entry[i % D] = *value);
+                for (node, dofs) in frame.force((at_node[0].0 / D) as u32, entry) {
+                    for (c, value) in dofs.into_iter().enumerate() {
+                        *entries.entry(D * node as usize + c).or_insert(0.0) += value;
+                    }
+                }
+            }
+            entries.retain(|dof, entry| {
+                let value = prescribed.get(dof);
+                along += value.map_or(0.0, |u| *entry * u);
+                value.is_none()
+            });
+            held.push_row(entries);
+            self.prescribed[side].push(along);
+        }
+        self.rows[side] = held;
+    }
+
     /// Return the number of contact points.
     pub fn len(&self) -> usize {
         self.area.len()
@@ -392,15 +416,16 @@ impl ContactPair {
 
     /// Replace the unit normals at all points, and with them the rows of both sides.
     pub fn turn<const D: usize>(&mut self, normal: &[[f64; D]], sides: [NodeDofs<D>; 2]) {
-        for (index, side) in sides.into_iter().enumerate() {
+        for (index, NodeDofs { space, frame, prescribed }) in sides.into_iter().enumerate() {
             let shares: Vec<Vec<(u32, f64)>> = (0..self.len()).map(|q| self.shares::<D>(index, q)).collect();
-            (self.rows[index], self.nodal[index]) = (Csr::new(side.space.dofs()), Csr::new(side.space.dofs()));
-            self.prescribed[index].clear();
+            self.nodal[index] = Csr::new(space.dofs());
             self.resultant[index].clear();
             self.moment[index].clear();
-            shares.into_iter().zip(normal).for_each(|(shares, n)| push_rows(self, index, &side, shares, *n));
+            shares.into_iter().zip(normal).for_each(|(shares, n)| push_rows(self, index, space, shares, *n));
+            self.hold(index, frame, prescribed);
         }
         self.normal = normal.iter().map(|&n| pad(n)).collect();
+        self.is_turned = true;
     }
 
     /// Return the number of facets of side a without a partner.

@@ -51,6 +51,13 @@ impl Method {
             Method::Newton(linear) | Method::Robin { linear, .. } => &mut **linear,
         }
     }
+
+    /// Return the solver of linear steps alone.
+    pub fn into_linear(self) -> Box<dyn LinearStep> {
+        match self {
+            Method::Newton(linear) | Method::Robin { linear, .. } => linear,
+        }
+    }
 }
 
 /// Run a method on a model from its start until a rule ends it. With `wants_interval` the interval (33) of gamma is found at the end, which takes

@@ -10,7 +10,7 @@ use crate::fem::rigid;
 use crate::fem::{ElasticBody, Prolongation};
 use crate::linalg::Csr;
 use crate::mesh::Mesh;
-use crate::model::{Body, BodyFacts, BodySlot, Distribution, InterfaceDofs};
+use crate::model::{Body, BodyCounts, BodyFacts, BodySlot, Distribution, InterfaceDofs};
 use crate::problem::{BodySpec, Plane};
 use std::cell::OnceCell;
 use std::rc::Rc;
@@ -23,17 +23,33 @@ pub struct Assembler<'a, const D: usize, F> {
     pub rank: usize,
     /// The maker of solvers.
     pub factory: &'a mut F,
-    /// Number of assembled matrices.
+    /// Number of matrices that were assembled in the run.
     pub assemblies: usize,
-    /// Number of matrices reused from an earlier scene.
-    pub avoided: usize,
     /// Meshes of the bodies that this rank has.
     pub shapes: Vec<Rc<FemBody<D>>>,
 }
 
+/// A body of the problem before.
+#[derive(Default)]
+pub struct EarlierBody {
+    /// The body with its slot, if it serves again.
+    serving: Option<(Body, BodySlot)>,
+    /// Its counters, if another one takes its place.
+    counts: BodyCounts,
+}
+
+impl EarlierBody {
+    /// Keep a body if it serves again, and let it go otherwise.
+    pub fn new(mut slot: BodySlot, serves: bool) -> Self {
+        let Some(body) = slot.local.take() else { return Self::default() };
+        let counts = body.counts();
+        Self { serving: serves.then_some((body, slot)), counts }
+    }
+}
+
 impl<const D: usize, F: Factory> Assembler<'_, D, F> {
-    /// Assemble a body and give it a solver, from what this rank has of it. `slot` receives the body, and `info` the evaluation of its
-    /// displacements.
+    /// Assemble a body and give it a solver, from what this rank has of it, or take that of the problem `before`.
+    /// `slot` receives the body, and `info` the evaluation of its displacements.
     ///
     /// # Errors
     /// The scene contradicts its mesh in a way that shows when K is assembled, or the factory fails.
@@ -41,6 +57,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         &mut self,
         spec: &BodySpec,
         mut mesh: BodyMesh<D>,
+        before: EarlierBody,
         slot: &mut BodySlot,
         info: &mut BodyInfo,
     ) -> Result<()> {
@@ -48,7 +65,7 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         let mut part = SceneBody { spec, elasticity: Rc::new(elasticity), mesh };
         let own = part.mesh.own_nodes();
         if part.mesh.is_owned {
-            self.give_solver(&mut part, slot, info.rank)?;
+            self.give_solver(&mut part, before, slot, info.rank)?;
         }
         let SceneBody { elasticity, mesh, .. } = part;
         let (name, exact, supports) = (info.name.clone(), spec.exact.clone(), spec.fix.len());
@@ -62,20 +79,27 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
         Ok(())
     }
 
-    /// Give a body its solver: that of an earlier scene with other loads, or a new one. On ranks other than the `owner` the scale stays zero until
-    /// [`Discrete::share`](super::Discrete::share).
-    fn give_solver(&mut self, part: &mut SceneBody<D>, slot: &mut BodySlot, owner: usize) -> Result<()> {
-        let mesh = &part.mesh;
-        let load = mesh.load_vector();
-        let kept = self.factory.kept(&slot.name).filter(|_| mesh.owned.is_none());
-        if let Some(before) = reload(kept, &load, &mesh.prescribed)? {
-            self.avoided += 1;
-            (slot.local, slot.scale, slot.row_stiffness) = (before.local, before.scale, before.row_stiffness);
+    /// Give a body its solver: that of the problem before under other loads, if it serves, or a new one. On ranks other
+    /// than the `owner` scale and stiffness of rows stay zero until [`Discrete::share`](super::Discrete::share).
+    fn give_solver(
+        &mut self,
+        part: &mut SceneBody<D>,
+        before: EarlierBody,
+        slot: &mut BodySlot,
+        owner: usize,
+    ) -> Result<()> {
+        let (load, is_owner) = (part.mesh.load_vector(), owner == self.rank);
+        if let Some((mut body, BodySlot { scale, row_stiffness, .. })) = before.serving {
+            body.reload(load, part.mesh.prescribed.clone())?;
+            (slot.local, slot.scale, slot.row_stiffness) = (Some(body), scale, row_stiffness);
+            // the sums of all ranks are known
+            slot.row_stiffness.iter_mut().filter(|_| !is_owner).for_each(|stiffness| *stiffness = 0.0);
         } else {
-            self.assemblies += usize::from(owner == self.rank);
+            self.assemblies += usize::from(is_owner);
             self.assemble(part, load, slot)?;
+            slot.local.iter_mut().for_each(|body| body.count_on(before.counts));
         }
-        slot.scale = if owner == self.rank { slot.scale } else { 0.0 };
+        slot.scale = if is_owner { slot.scale } else { 0.0 };
         Ok(())
     }
 
@@ -121,29 +145,24 @@ impl<const D: usize, F: Factory> Assembler<'_, D, F> {
     }
 }
 
-/// Return the body of an earlier scene under other loads, or `None` if it cannot be reused.
-fn reload(kept: Option<BodySlot>, load: &[f64], prescribed: &[(usize, f64)]) -> Result<Option<BodySlot>> {
-    let Some(mut slot) = kept else { return Ok(None) };
-    let serves = match slot.local.as_mut() {
-        Some(body) => body.reload(load, prescribed)?,
-        None => false,
-    };
-    Ok(serves.then_some(slot))
-}
-
 /// A maker of the inner solvers of bodies.
 pub trait Factory {
     /// The choice of solvers of all bodies.
     type SolverPlan: Plain;
 
-    /// Choose the solvers of all bodies, in the order of the scene, on the first rank.
+    /// Choose the solvers of all bodies, in the order of the scene, on the first rank. `is_kept` says whether each body
+    /// has the matrix of the problem before, and then also whether its solver serves.
     ///
     /// # Errors
     /// PETSc lacks a solver that the scene asks for.
-    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>) -> Result<Self::SolverPlan>;
+    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>, is_kept: &mut [bool]) -> Result<Self::SolverPlan>;
 
     /// Follow the plan of the first rank on another rank.
     fn adopt(&mut self, plan: Self::SolverPlan);
+
+    /// Let the solver of all bodies go before others are made, unless it may serve again: `is_renewed` says whether all
+    /// bodies are those of the problem before. Collective.
+    fn settle(&mut self, is_renewed: bool);
 
     /// Return the sets of bodies whose nodes the plan distributes over the ranks. Bodies of one set share a matrix; their indices
     /// are in increasing order. Bodies that stay whole are in no set.
@@ -157,10 +176,6 @@ pub trait Factory {
     /// # Errors
     /// PETSc refuses a matrix or the value of an option.
     fn make(&mut self, assembled: Assembled) -> Result<Body>;
-
-    /// Return a body of this name with the same K and contact rows that an earlier scene or leg has left. It is on the rank that
-    /// owns the body.
-    fn kept(&mut self, name: &str) -> Option<BodySlot>;
 }
 
 /// A body that is ready for its inner solver.

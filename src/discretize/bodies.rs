@@ -211,15 +211,23 @@ fn too_large(spec: &BodySpec) -> Error {
         .label("their forces are beyond the range of numbers")
 }
 
-/// Return the bodies with their spaces, elasticity, supports and springs.
+/// Return the bodies with their spaces, elasticity, supports and springs. `spaces` are those of an earlier problem on the
+/// mesh; there are none before the first.
 ///
 /// # Errors
 /// The scene contradicts its mesh.
-pub fn parts<'a, const D: usize>(scene: &'a Scene, verified: &Verified<D>) -> Result<Vec<SceneBody<'a, D>>> {
+pub fn parts<'a, const D: usize>(
+    scene: &'a Scene,
+    verified: &Verified<D>,
+    spaces: &[Rc<Space<D>>],
+) -> Result<Vec<SceneBody<'a, D>>> {
     let Verified { mesh, checked, .. } = verified;
     let mut parts = Vec::new();
     for (index, spec) in scene.bodies.iter().enumerate() {
-        let space = space(spec, mesh, scene.plane)?;
+        let space = match spaces.get(index) {
+            Some(space) => space.clone(),
+            None => Rc::new(space(spec, mesh, scene.plane)?),
+        };
         let checked = &checked[index];
         refuse_parts(spec, &space, &checked.parts, mesh)?;
         let elasticity = elasticity(spec, &space, mesh, scene.plane)?;
@@ -232,7 +240,7 @@ pub fn parts<'a, const D: usize>(scene: &'a Scene, verified: &Verified<D>) -> Re
         let none = || Csr::new(space.dofs());
         let (rows, nodal_rows, approach) = (none(), none(), none());
         let mesh = BodyMesh {
-            space: Rc::new(space),
+            space,
             regions,
             held,
             springs,

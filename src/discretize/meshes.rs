@@ -82,7 +82,7 @@ pub struct KeptMeshes<const D: usize> {
     /// Bodies in the order of the scene.
     pub shapes: Vec<Rc<FemBody<D>>>,
     /// Integration points of each pair.
-    pub fine: Vec<Fine<D>>,
+    pub fine: Vec<Rc<Fine<D>>>,
 }
 
 impl<const D: usize> Meshes for KeptMeshes<D> {
@@ -227,7 +227,7 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
     }
 
     fn beyond_means(&self, pair: usize, rows: &Csr) -> Vec<f64> {
-        let Fine { near, sides, .. } = &self.kept.fine[pair];
+        let Fine { near, sides, .. } = &*self.kept.fine[pair];
         let (mut mean, split) = (vec![0.0; near.at.len()], self.split.facets(&sides[1].facets));
         rows.multiply(self.u, &mut mean);
         let lacks = |(q, mean): (usize, f64)| {

@@ -1,6 +1,6 @@
 //! What one rank has of the dofs of a distributed body.
 
-use crate::fem::{Couplings, ElasticBody, Prolongation};
+use crate::fem::{ElasticBody, Prolongation};
 use crate::linalg::Csr;
 use crate::model::Distribution;
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ impl OwnedDofs {
     /// Restrict a body that was assembled for owned nodes to the owned dofs. The columns of K become those of the matrix with its
     /// rows.
     pub fn restrict<const D: usize>(&self, body: ElasticBody) -> ElasticBody {
-        let own = &self.distribution.owned_positions;
+        let (own, loads) = (&self.distribution.owned_positions, self.distribution.restrict(&body));
         let Csr { ptr, mut col, mut values, .. } = body.stiffness;
         let mut starts = vec![0];
         let mut row = Vec::new();
@@ -59,14 +59,10 @@ impl OwnedDofs {
             }
             starts.push(range.end as i32);
         }
-        let place = |&(dof, value): &(usize, f64)| Some((own.binary_search(&(dof as u32)).ok()?, value));
         ElasticBody {
             stiffness: Csr { columns: self.distribution.total, ptr: starts, col, values },
-            load: self.distribution.of_known(&body.load),
-            prescribed: body.prescribed.iter().filter_map(place).collect(),
-            held: Couplings::default(),
-            lifting: if body.lifting.is_empty() { Vec::new() } else { self.distribution.of_known(&body.lifting) },
-            ..body
+            held: body.held,
+            ..loads
         }
     }
 }

@@ -8,7 +8,7 @@ use super::groups::{Owners, find_group, point};
 use super::surface::ContactSurface;
 use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
-use crate::contact::{self, Chords, ContactPair, Fault, Fine, Side};
+use crate::contact::{self, Chords, ContactPair, Fault, Fine, Mirrors, Side};
 use crate::error::{Error, Located, Result};
 use crate::fem::{Facets, jumping, minus, unit};
 use crate::linalg::{bounds, dot};
@@ -17,16 +17,49 @@ use crate::problem::contact::{Carrier, ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, HashMap, HashSet};
+use std::rc::Rc;
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
     /// Arrays on which the method works.
     pub pair: ContactPair,
-    /// Integration points, if they were requested.
-    pub fine: Option<Fine<D>>,
+    pub facts: ContactFacts,
+    pub inputs: PairInputs<D>,
+}
+
+/// What a pair was made of, and what it has besides its arrays and facts.
+pub struct PairInputs<const D: usize> {
+    /// The contact of the scene, with the names of the two surfaces.
+    spec: ContactSpec,
+    /// Indices of the bodies; an obstacle follows all bodies.
+    bodies: [usize; 2],
+    /// Planes of symmetry at the ends of both sides.
+    mirrors: [Mirrors<D>; 2],
     /// Whether its surfaces look away from each other, as the faces under head and nut of a bolt.
     pub is_through: bool,
-    pub facts: ContactFacts,
+    /// Whether a rule found it.
+    is_found: bool,
+    /// Integration points, if they were requested.
+    pub fine: Option<Rc<Fine<D>>>,
+}
+
+/// The contacts of a problem.
+pub struct Contacts<const D: usize> {
+    /// All pairs, and what is known of each.
+    pub all: Vec<Contact<D>>,
+    /// Number of pairs whose surfaces were searched for common pieces.
+    pub searched: usize,
+}
+
+/// The pairs of a problem on the same mesh.
+pub struct KeptPairs<'a, const D: usize> {
+    pub pairs: Vec<Contact<D>>,
+    /// Rules that found some of them.
+    pub rules: &'a [ContactSpec],
+    /// Whether the material of each body is the same.
+    pub is_material_same: Vec<bool>,
+    /// Whether rules find the same pairs between the bodies.
+    pub are_bodies_same: bool,
 }
 
 /// Facts of a pair besides its arrays.
@@ -108,6 +141,7 @@ fn between(spec: &ContactSpec, names: [String; 2]) -> ContactSpec {
 }
 
 /// Return all pairs of the scene: first the named ones in the order of the file, then those that are found. `fine` requests integration points.
+/// Pairs of an earlier problem that serve get the gap, the law and the supports of this one.
 ///
 /// # Errors
 /// A surface is missing, bounds no body or several, or does not face its partner. A law or a gap has no value somewhere.
@@ -117,23 +151,117 @@ pub fn all<const D: usize>(
     cut: Cut<D>,
     parts: &[SceneBody<D>],
     fine: bool,
-) -> Result<Vec<Contact<D>>> {
+    mut kept: KeptPairs<D>,
+) -> Result<Contacts<D>> {
     let points = parts.iter().zip(0..).filter(|_| scene.pairs().next().is_some());
     let owners =
         Owners::new(points.flat_map(|(part, body)| part.mesh.space.mesh_points().map(move |p| (p, body))).collect());
     let rules: Vec<&ContactSpec> = scene.rules().collect();
-    let named = || scene.pairs();
-    let mut found = named().map(|named| self::named(named, mesh, &owners, parts)).collect::<Result<Vec<_>>>()?;
-    let sorted = |[a, b]: [usize; 2]| [a.min(b), a.max(b)];
-    let taken: HashSet<[usize; 2]> = found.iter().map(|found| sorted(found.bodies)).collect();
-    found.extend(auto::find(&rules, cut, parts, &taken)?);
-    let mut contacts: Vec<Contact<D>> = Vec::new();
-    for pair in found {
-        contacts.extend(pair.orient(scene, parts).assemble(&scene.laws, parts, cut, fine)?);
+    let (mut all, mut searched, mut taken) = (Vec::new(), 0, HashSet::new());
+    for spec in scene.pairs() {
+        let pair = named(spec, mesh, &owners, parts)?.orient(scene, parts);
+        taken.insert([pair.bodies[0].min(pair.bodies[1]), pair.bodies[0].max(pair.bodies[1])]);
+        if let Some(contact) = kept.take(&pair, fine) {
+            all.push(contact.renewed(spec, &scene.laws, parts)?);
+        } else {
+            searched += 1;
+            all.extend(pair.assemble(&scene.laws, parts, cut, fine)?);
+        }
     }
-    refuse_second_layers(scene, &contacts[..named().count()])?;
-    auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.table))?;
-    Ok(contacts)
+    let count = all.len();
+    if searched == 0 && kept.has_found(&rules, scene, fine) {
+        for contact in kept.pairs {
+            let spec = &scene.contacts[contact.facts.table];
+            all.push(contact.renewed(spec, &scene.laws, parts)?);
+        }
+    } else {
+        for pair in auto::find(&rules, cut, parts, &taken)? {
+            searched += 1;
+            all.extend(pair.orient(scene, parts).assemble(&scene.laws, parts, cut, fine)?);
+        }
+    }
+    if searched > 0 {
+        refuse_second_layers(scene, &all[..count])?;
+    }
+    auto::all_find_some(&rules, all.iter().map(|contact| contact.facts.table))?;
+    Ok(Contacts { all, searched })
+}
+
+impl<const D: usize> KeptPairs<'_, D> {
+    /// Return the pair of an earlier problem that serves as this one, if there is one.
+    fn take(&mut self, pair: &SurfacePair<D>, fine: bool) -> Option<Contact<D>> {
+        let serves = |contact: &Contact<D>| {
+            let (PairInputs { spec, bodies, mirrors, .. }, is_swapped) = (&contact.inputs, contact.facts.swapped);
+            let [a, b] = &pair.sides;
+            spec.has_points_of(pair.spec)
+                && !contact.pair.is_turned
+                && (*bodies, is_swapped) == (pair.bodies, pair.swapped)
+                && (&mirrors[0], &mirrors[1]) == (&a.mirrors, &b.mirrors)
+                && (!fine || self.has_fine(contact, pair.spec))
+        };
+        let place = self.pairs.iter().position(serves)?;
+        Some(self.pairs.remove(place))
+    }
+
+    /// Return whether the integration points of a pair serve, which know its gap, and where law or material jump.
+    fn has_fine(&self, contact: &Contact<D>, spec: &ContactSpec) -> bool {
+        let PairInputs { spec: earlier, bodies, fine, .. } = &contact.inputs;
+        let [before, now] = [earlier, spec].map(|spec| &spec.layer);
+        fine.is_some()
+            && earlier.gap == spec.gap
+            && (before == now || before.is_uniform() && now.is_uniform())
+            && bodies.iter().all(|&body| self.is_material_same.get(body).is_none_or(|is_same| *is_same))
+    }
+
+    /// Return whether rules find the pairs that are left.
+    fn has_found(&self, rules: &[&ContactSpec], scene: &Scene, fine: bool) -> bool {
+        let is_same = |(a, b): (&ContactSpec, &&ContactSpec)| a.has_points_of(b);
+        self.are_bodies_same
+            && self.rules.len() == rules.len()
+            && self.rules.iter().zip(rules).all(is_same)
+            && self.pairs.iter().all(|contact| {
+                let has_fine = || self.has_fine(contact, &scene.contacts[contact.facts.table]);
+                contact.inputs.is_found && !contact.pair.is_turned && (!fine || has_fine())
+            })
+    }
+}
+
+impl<const D: usize> Contact<D> {
+    /// Return the pair with the supports of these bodies, and with gap and law of `spec`.
+    fn renewed(mut self, spec: &ContactSpec, laws: &OwnLaws, parts: &[SceneBody<D>]) -> Result<Self> {
+        let spec = between(spec, self.facts.names.clone());
+        let Self { pair, inputs, .. } = &mut self;
+        pair.bodies = inputs.bodies;
+        for (side, part) in inputs.bodies.iter().map(|&body| parts.get(body)).enumerate() {
+            let held = part.map(|part| &part.mesh.held);
+            held.iter().for_each(|held| pair.hold(side, &held.frame, &held.prescribed));
+        }
+        pair.offset = 0.0;
+        pair.law = law::of_pair(&spec, laws, &pair.position).map_err(|error| error.because(of_pair(&spec)))?;
+        pair.set_gap(&|x| spec.gap.eval(x)).map_err(|fault| refuse(&spec, fault, String::new))?;
+        check(pair, &spec)?;
+        inputs.spec = spec;
+        Ok(self)
+    }
+}
+
+/// Check the overlap of a pair, and the pressure that is known for it.
+///
+/// # Errors
+/// The bodies overlap where the scene refuses that, or the pressure has no value at a point.
+fn check(pair: &ContactPair, spec: &ContactSpec) -> Result<()> {
+    let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
+    if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
+        let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
+        let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", pair.surfaces[0], pair.surfaces[1]);
+        return Err(Error::scene(&spec.between[0].place, message)
+            .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
+    }
+    if let Some(field) = &spec.reference {
+        let value = |&x: &[f64; 3]| field.eval_finite("the reference", x).map(drop);
+        pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(spec)))?;
+    }
+    Ok(())
 }
 
 /// Refuse two layers between the same facets. A facet may face facets of several surfaces, each with a layer of its own.
@@ -262,17 +390,7 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
             assembled => assembled.map_err(|fault| refuse(&spec, fault, || why(&a, &b, cut)))?,
         };
         pair.surfaces = surfaces;
-        let deepest = (0..pair.len()).min_by(|&q, &r| pair.gap[q].total_cmp(&pair.gap[r])).unwrap_or(0);
-        if spec.overlap == Overlap::Refuse && pair.gap[deepest] < 0.0 {
-            let (depth, at) = (-pair.gap[deepest], point(pair.position[deepest]));
-            let message = format!("`{}` and `{}` overlap by {depth:.3e} at {at}", pair.surfaces[0], pair.surfaces[1]);
-            return Err(Error::scene(&spec.between[0].place, message)
-                .help("move a body, give a larger gap, or let the layer take it: overlap = \"compress\""));
-        }
-        if let Some(field) = &spec.reference {
-            let value = |&x: &[f64; 3]| field.eval_finite("the reference", x).map(drop);
-            pair.position.iter().try_for_each(value).map_err(|error| error.because(of_pair(&spec)))?;
-        }
+        check(&pair, &spec)?;
         let surface = ContactSurface::new(&a, &pair);
         let jumps = |k: usize, side: &Side<D>| match parts.get(bodies[k]) {
             Some(part) => jumping(side.space, &part.elasticity, &side.facets.nodes),
@@ -289,11 +407,11 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
         let facing = Facing::all(parts, [&a, &b], &common, &pair);
+        let fine = fine.map(Rc::new);
         Ok(Some(Contact {
             pair,
-            fine,
-            is_through,
             facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface, facing },
+            inputs: PairInputs { spec, bodies, mirrors: [a.mirrors, b.mirrors], is_through, is_found, fine },
         }))
     }
 }

@@ -24,8 +24,8 @@ pub trait Post {
     /// Return the integral of the rotation vector (x, y, z) over the cells that this rank writes.
     fn rotation(&self, v: &[f64]) -> [f64; 3];
 
-    /// Return the forces on the owned nodes under `factor` times the loads and the forces omega p of the contact rows of the body.
-    fn balance(&self, v: &[f64], force: &[f64], factor: f64) -> ForceBalance;
+    /// Return the forces on the owned nodes under the loads and the forces omega p of the contact rows of the body.
+    fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance;
 
     /// Return the contribution of owned nodes to the displacement of the body towards each of its contact surfaces.
     fn approach(&self, v: &[f64]) -> Vec<f64>;
@@ -165,14 +165,13 @@ impl<const D: usize> Post for FemBody<D> {
     }
 
     /// Reactions are the internal forces of the cells around the constrained nodes minus all known forces there.
-    fn balance(&self, v: &[f64], force: &[f64], factor: f64) -> ForceBalance {
+    fn balance(&self, v: &[f64], force: &[f64]) -> ForceBalance {
         let u = self.nodal(v);
         let mut contact = vec![0.0; u.len()];
         self.mesh.nodal_rows.add_transpose(-1.0, force, &mut contact);
         let space = &self.mesh.space;
         let mut all = ForceBalance::default();
-        let mut load = self.mesh.load.all(space.nodes.len());
-        load.iter_mut().for_each(|force| *force *= factor);
+        let load = self.mesh.load.all(space.nodes.len());
         all.push(self, &load);
         all.push(self, &contact);
         let mut known: Vec<f64> = load.iter().zip(&contact).map(|(load, contact)| load + contact).collect();

@@ -6,7 +6,8 @@ use super::assembly::Factory;
 use super::bodies::parts;
 use super::body::BodyMesh;
 use super::facts::BodyInfo;
-use super::pairs::{self, ContactFacts};
+use super::kept::{Kept, MatrixInputs};
+use super::pairs::{self, Contact, ContactFacts, Contacts};
 use super::partition::Partition;
 use super::verify::Verified;
 use super::whole::WholeBody;
@@ -21,6 +22,19 @@ use crate::model::{BodyFacts, BodySlot, InterfaceDofs, Mechanism, compactness};
 use crate::problem::Order;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
+use std::rc::Rc;
+
+/// What a discrete problem is made from.
+pub struct Request<'a, const D: usize> {
+    /// The scene, with the bodies of `verified` under the loads of a step.
+    pub scene: &'a Scene,
+    /// The mesh.
+    pub verified: &'a Verified<D>,
+    /// Function that finds the common pieces of surfaces in this dimension.
+    pub cut: Cut<D>,
+    /// Whether the meshes are kept for an estimate of the error.
+    pub keep: bool,
+}
 
 /// What all ranks have of a prepared problem.
 #[derive(Serialize, Deserialize)]
@@ -37,15 +51,19 @@ pub struct ReplicatedProblem<const D: usize, P> {
     /// Motions that nothing resists.
     pub mechanisms: Vec<Mechanism>,
     /// Integration points of each pair, if meshes are kept.
-    pub fine: Vec<contact::Fine<D>>,
+    pub fine: Vec<Rc<contact::Fine<D>>>,
     /// Choice of solvers.
     pub plan: P,
+    /// Whether the matrix of each body, with its solver, is that of the problem before.
+    pub is_kept: Vec<bool>,
+    /// Number of pairs whose surfaces were searched for common pieces.
+    pub searched: usize,
 }
 
 /// All bodies before their matrices are assembled, with the ranks that own their nodes.
 pub struct WholeProblem<'a, const D: usize> {
     bodies: Vec<WholeBody<'a, D>>,
-    partitions: Vec<Partition>,
+    partitions: Vec<Rc<Partition>>,
     /// Whether every rank keeps all meshes, for an estimate of the error.
     keep: bool,
 }
@@ -70,53 +88,67 @@ impl<const D: usize> WholeProblem<'_, D> {
 }
 
 /// Return the partition that contains a body, and the index of the body there. The result is `None` if the body stays whole.
-fn place_of(partitions: &[Partition], body: usize) -> Option<(&Partition, usize)> {
-    partitions.iter().find_map(|partition| Some((partition, partition.bodies.binary_search(&body).ok()?)))
+fn place_of(partitions: &[Rc<Partition>], body: usize) -> Option<(&Partition, usize)> {
+    partitions.iter().find_map(|partition| Some((&**partition, partition.bodies.binary_search(&body).ok()?)))
 }
 
 /// Prepare a scene on its mesh for this number of `ranks`: bodies, pairs, free motions, solvers, and the partition; see
-/// [`discretize`](super::discretize).
+/// [`discretize`](super::discretize). `kept` and the `pairs` are those of the problem before; `kept` becomes that of
+/// this one.
 ///
 /// # Errors
 /// The scene contradicts its mesh, or `factory` fails.
 pub fn prepare<'a, const D: usize, F: Factory>(
-    scene: &'a Scene,
-    verified: &Verified<D>,
-    cut: Cut<D>,
-    keep: bool,
+    request: &Request<'a, D>,
     ranks: usize,
     factory: &mut F,
+    kept: &mut Kept<D>,
+    pairs: Vec<(ContactPair, ContactFacts)>,
 ) -> Result<(ReplicatedProblem<D, F::SolverPlan>, WholeProblem<'a, D>)> {
+    let Request { scene, verified, cut, keep } = *request;
     let mesh = &verified.mesh;
-    let parts = parts(scene, verified)?;
+    let mut before = std::mem::take(kept);
+    let parts = parts(scene, verified, &before.spaces())?;
+    kept.bodies = parts.iter().map(MatrixInputs::of).collect();
+    let earlier_pairs = before.serving_pairs(&kept.bodies, pairs);
+    let Contacts { all, searched } = pairs::all(scene, mesh, cut, &parts, keep, earlier_pairs)?;
     let (mut pairs, mut contacts, mut fine) = (Vec::new(), Vec::new(), Vec::new());
-    let mut is_through = Vec::new();
-    for found in pairs::all(scene, mesh, cut, &parts, keep)? {
-        pairs.push(found.pair);
-        is_through.push(found.is_through);
-        contacts.push(found.facts);
-        fine.extend(found.fine);
+    for Contact { pair, facts, inputs } in all {
+        pairs.push(pair);
+        contacts.push(facts);
+        fine.extend(inputs.fine.clone());
+        kept.pairs.push(inputs);
     }
     let lack = chords::lack(&parts, mesh)?;
     let mut bodies = WholeBody::all(parts, &pairs, mesh)?;
     let mechanisms = mechanism::fix(&mut bodies, &mut pairs, lack);
+    let is_through: Vec<bool> = kept.pairs.iter().map(|inputs| inputs.is_through).collect();
     let rigid = rigid::all(scene, &mut pairs, &is_through, bodies.len())?;
-    for body in &mut bodies {
+    for (body, inputs) in bodies.iter_mut().zip(&mut kept.bodies) {
         body.part.mesh.prescribed = body.part.mesh.prescribed_sorted();
+        inputs.complete(body);
     }
-    let plan = plan(&bodies, &verified.checked, factory)?;
-    let partitions = partitions(&bodies, &pairs, factory, ranks);
-    for (index, (owner, ranks)) in owners(&bodies, &partitions, ranks).into_iter().enumerate() {
+    let has_matrix =
+        |(i, body): (usize, &MatrixInputs<D>)| before.bodies.get(i).is_some_and(|it| body.has_matrix_of(it));
+    let mut is_kept: Vec<bool> = kept.bodies.iter().enumerate().map(has_matrix).collect();
+    let plan = plan(&bodies, &verified.checked, factory, &mut is_kept)?;
+    kept.partitions = partitions(&bodies, &pairs, factory, ranks, (before.partitions, &is_kept));
+    kept.owners = owners(&bodies, &kept.partitions, ranks);
+    for (index, (owner, ranks)) in kept.owners.iter().enumerate() {
         let body = &mut bodies[index];
-        (body.owner, body.ranks) = (owner, ranks);
+        (body.owner, body.ranks) = (*owner, ranks.clone());
+        is_kept[index] &= before.owners.get(index) == Some(&kept.owners[index]);
     }
+    kept.rules = scene.rules().cloned().collect();
     let checked = bodies.iter().zip(&*verified.checked);
     let shared = checked.map(|(body, checked)| body.shared(&pairs, checked, scene.plane)).collect();
-    let shared = ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan };
-    Ok((shared, WholeProblem { bodies, partitions, keep }))
+    let shared =
+        ReplicatedProblem { bodies: shared, pairs, rigid, contacts, mechanisms, fine, plan, is_kept, searched };
+    Ok((shared, WholeProblem { bodies, partitions: kept.partitions.clone(), keep }))
 }
 
-/// Return the factory's plan of the solvers of all bodies.
+/// Return the factory's plan of the solvers of all bodies. `is_kept` says whether each has the matrix of the problem
+/// before, and then also whether its solver serves.
 ///
 /// # Errors
 /// See [`Factory::plan`].
@@ -124,6 +156,7 @@ fn plan<const D: usize, F: Factory>(
     bodies: &[WholeBody<D>],
     checked: &[BodyCheck],
     factory: &mut F,
+    is_kept: &mut [bool],
 ) -> Result<F::SolverPlan> {
     let of_body = |(WholeBody { part, rigid_modes, .. }, checked): (&WholeBody<D>, &BodyCheck)| {
         let (spec, mesh) = (part.spec, &part.mesh);
@@ -141,24 +174,36 @@ fn plan<const D: usize, F: Factory>(
         };
         (facts, interface)
     };
-    factory.plan(bodies.iter().zip(checked).map(of_body).collect())
+    factory.plan(bodies.iter().zip(checked).map(of_body).collect(), is_kept)
 }
 
-/// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan.
+/// Distribute the nodes of the bodies that share a matrix over the ranks, by the factory's plan. `kept` are the
+/// partitions of the problem before, with the bodies that have the same matrices.
 fn partitions<const D: usize>(
     bodies: &[WholeBody<D>],
     pairs: &[ContactPair],
     factory: &impl Factory,
     ranks: usize,
-) -> Vec<Partition> {
+    kept: (Vec<Rc<Partition>>, &[bool]),
+) -> Vec<Rc<Partition>> {
     let wants_coarse = |body: usize| factory.wants_interpolation(&bodies[body].part.spec.name.value);
-    let partition = |set: Vec<usize>| Partition::new(set, bodies, pairs, ranks, &wants_coarse);
+    let partition = |set: Vec<usize>| {
+        let serves = |partition: &&Rc<Partition>| partition.bodies == set && set.iter().all(|&body| kept.1[body]);
+        match kept.0.iter().find(serves) {
+            Some(partition) => partition.clone(),
+            None => Rc::new(Partition::new(set, bodies, pairs, ranks, &wants_coarse)),
+        }
+    };
     factory.distributed().into_iter().map(partition).collect()
 }
 
 /// Return for each body the rank that owns it or most of it, and all ranks that own nodes of it. A body that is not distributed
 /// stays whole; such bodies are assigned so that all ranks get about equally many of their dofs.
-fn owners<const D: usize>(bodies: &[WholeBody<D>], partitions: &[Partition], ranks: usize) -> Vec<(usize, Vec<usize>)> {
+fn owners<const D: usize>(
+    bodies: &[WholeBody<D>],
+    partitions: &[Rc<Partition>],
+    ranks: usize,
+) -> Vec<(usize, Vec<usize>)> {
     let dofs = |body: usize| if place_of(partitions, body).is_some() { 0 } else { bodies[body].part.mesh.space.dofs() };
     let owners = crate::parallel::owners(&(0..bodies.len()).map(dofs).collect::<Vec<_>>(), ranks);
     let of_body = |(body, owner): (usize, usize)| match place_of(partitions, body) {

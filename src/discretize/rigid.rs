@@ -99,14 +99,14 @@ impl<'a> Obstacle<'a> {
         both.map(|(closing, turn)| approach * closing + turn).collect()
     }
 
-    /// Return the approach and the turn of the obstacle, from the amounts of its free motions. `share` is the factor of prescribed motions.
-    pub fn moved(&self, amounts: &[f64], share: f64) -> (f64, [f64; 3]) {
+    /// Return the approach and the turn of the obstacle, from the amounts of its free motions.
+    pub fn moved(&self, amounts: &[f64]) -> (f64, [f64; 3]) {
         let mut amounts = amounts.iter();
         let approach = match self.spec.force {
             Some(_) => amounts.next().copied().unwrap_or(0.0),
-            None => share * self.spec.approach().unwrap_or(0.0),
+            None => self.spec.approach().unwrap_or(0.0),
         };
-        let mut turn = self.spec.tilt().unwrap_or_default().map(|c| share * c);
+        let mut turn = self.spec.tilt().unwrap_or_default();
         if self.spec.moment.is_some() {
             for (axis, a) in self.axes().into_iter().zip(amounts) {
                 (0..3).for_each(|c| turn[c] += a * axis[c]);

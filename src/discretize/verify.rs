@@ -25,6 +25,10 @@ pub struct Verified<const D: usize> {
     pub points: usize,
     /// The bodies of the scene, each with a name of its own.
     pub bodies: Vec<BodySpec>,
+    /// The groups that lie on each body, see [`patterns::lying`].
+    lying: Vec<Vec<u32>>,
+    /// The scene for which the mesh was checked.
+    scene: Scene,
     /// Result of the check for each body, in the same order, on the first rank. Bodies that the mesh does not have are missing.
     pub checked: Rc<[BodyCheck]>,
     /// What is to be said of the file, and of surfaces that are sets of nodes, on the first rank.
@@ -58,8 +62,8 @@ pub fn verify<const D: usize>(
 ) -> Result<Verified<D>> {
     let mut verified = None;
     let head = broadcast(exchange, || {
-        let (found, lying) = check(scene, read()?)?;
-        let head = MeshHeader::of(&found, lying);
+        let found = check(scene, read()?)?;
+        let head = MeshHeader::of(&found);
         verified = Some(found);
         Ok(head)
     })?;
@@ -69,8 +73,8 @@ pub fn verify<const D: usize>(
     }
 }
 
-/// Check the mesh of a scene. Return also which groups lie on which bodies.
-fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D>, Vec<Vec<u32>>)> {
+/// Check the mesh of a scene.
+fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<Verified<D>> {
     size(&mesh)?;
     mesh.sort_cells();
     // The radius of a body of revolution is measured from its axis.
@@ -83,10 +87,32 @@ fn check<const D: usize>(scene: &Scene, mut mesh: Mesh<D>) -> Result<(Verified<D
     let asked: Vec<Asked> = bodies.iter().map(asked).collect();
     let contacts = scene.pairs().flat_map(|contact| &contact.between).map(|name| name.value.as_str());
     let checked = mesh.check(&asked, &contacts.collect::<Vec<_>>(), scene.rules().next().is_some())?;
-    Ok((Verified { points: mesh.points.len(), mesh, bodies, checked: checked.into(), notes }, lying))
+    let (points, scene) = (mesh.points.len(), scene.clone());
+    Ok(Verified { points, mesh, bodies, lying, scene, checked: checked.into(), notes })
 }
 
 impl<const D: usize> Verified<D> {
+    /// Take the bodies of another scene, if they are the same on the same mesh, and its lines need the same of the same
+    /// groups. Return whether they are.
+    ///
+    /// # Errors
+    /// A line of the scene acts on no body, or on several.
+    pub fn follow(&mut self, scene: &Scene) -> Result<bool> {
+        let body = |body: &BodySpec| {
+            (body.name.clone(), body.split, body.order, of_body(body).into_iter().map(owned).collect::<Vec<_>>())
+        };
+        let used = |scene: &Scene| {
+            let bodies: Vec<_> = scene.bodies.iter().map(body).collect();
+            let contacts: Vec<_> = of_contacts(scene).map(owned).collect();
+            (scene.mesh.clone(), scene.dimension.value, scene.plane, bodies, contacts, scene.rules().next().is_some())
+        };
+        let serves = used(&self.scene) == used(scene);
+        if serves {
+            self.bodies = patterns::bodies(scene, &self.mesh, &self.lying)?;
+        }
+        Ok(serves)
+    }
+
     /// Return a line for each group that is split into bodies: its name, and the number and names of the bodies.
     pub fn splits(&self) -> Vec<String> {
         let mut splits: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -110,7 +136,7 @@ impl<const D: usize> Verified<D> {
 }
 
 impl MeshHeader {
-    fn of<const D: usize>(verified: &Verified<D>, lying: Vec<Vec<u32>>) -> Self {
+    fn of<const D: usize>(verified: &Verified<D>) -> Self {
         let Mesh { path, order, groups, split, straightened, .. } = &verified.mesh;
         Self {
             path: path.clone(),
@@ -119,7 +145,7 @@ impl MeshHeader {
             split: *split,
             straightened: *straightened,
             points: verified.points,
-            lying,
+            lying: verified.lying.clone(),
         }
     }
 
@@ -128,7 +154,8 @@ impl MeshHeader {
         let Self { path, order, groups, split, straightened, points, lying } = self;
         let mesh = Mesh { split, straightened, ..Mesh::new(path, Vec::new(), order, groups) };
         let bodies = patterns::bodies(scene, &mesh, &lying)?;
-        Ok(Verified { mesh, points, bodies, checked: Rc::new([]), notes: Vec::new() })
+        let scene = scene.clone();
+        Ok(Verified { mesh, points, bodies, lying, scene, checked: Rc::new([]), notes: Vec::new() })
     }
 }
 
@@ -166,6 +193,8 @@ enum Need {
     Nodes,
     /// Points: springs.
     Points,
+    /// Cells: a region.
+    Cells,
 }
 
 /// Replace each group of points that the scene names as a surface by facets: those of the boundary of a body all of whose nodes
@@ -230,6 +259,10 @@ fn names<const D: usize>(on: &Located<String>, mesh: &Mesh<D>, place: usize) -> 
     }
 }
 
+fn owned((on, need): (&Located<String>, Need)) -> (Located<String>, Need) {
+    (on.clone(), need)
+}
+
 fn of_body(body: &BodySpec) -> Vec<(&Located<String>, Need)> {
     let load = body.load.iter().map(|load| match load.kind {
         LoadKind::Force { rigid: false, .. } => (&load.on, Need::Either),
@@ -240,7 +273,8 @@ fn of_body(body: &BodySpec) -> Vec<(&Located<String>, Need)> {
         SpringKind::Normal(_) => (&spring.on, Need::Facets),
         SpringKind::Vector(_) => (&spring.on, Need::Points),
     });
-    load.chain(fix).chain(spring).collect()
+    let region = body.regions.iter().map(|region| (&region.on, Need::Cells));
+    load.chain(fix).chain(spring).chain(region).collect()
 }
 
 fn of_contacts(scene: &Scene) -> impl Iterator<Item = (&Located<String>, Need)> {

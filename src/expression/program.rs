@@ -61,7 +61,21 @@ impl Number for f64 {
     }
 }
 
+impl PartialEq for Operation {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Number(a), Self::Number(b)) => a == b,
+            (Self::Variable(a), Self::Variable(b)) | (Self::Factor(a), Self::Factor(b)) => a == b,
+            (Self::Unary(a), Self::Unary(b)) => std::ptr::eq(*a, *b),
+            (Self::Binary(a), Self::Binary(b)) => std::ptr::eq(*a, *b),
+            (Self::Data(a), Self::Data(b)) => a == b,
+            _ => false,
+        }
+    }
+}
+
 /// An expression as a sequence of steps.
+#[derive(PartialEq)]
 pub(super) struct Program {
     steps: Vec<Operation>,
     /// Largest number of values on the stack.

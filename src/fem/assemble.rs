@@ -192,7 +192,7 @@ fn sets_by_node<'a, I: Iterator<Item = &'a [u32]>>(n: usize, sets: impl Fn() -> 
 }
 
 /// A stiffness between two nodes of one cell or facet, as springs to the ground give it.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "[[f64; D]; D]: Plain")]
 pub struct NodalBlock<const D: usize> {
     /// The two nodes.

@@ -26,6 +26,14 @@ struct MaterialRegion {
     constant: Option<(Material, [f64; 3])>,
 }
 
+/// Elasticities are equal if the constants of all cells are.
+impl PartialEq for Elasticity {
+    fn eq(&self, other: &Self) -> bool {
+        let both = self.regions.iter().map(|region| &region.spec).eq(other.regions.iter().map(|region| &region.spec));
+        both && (self.dimension, self.plane, &self.of_cell) == (other.dimension, other.plane, &other.of_cell)
+    }
+}
+
 /// The reason why there is no elasticity at a point.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Flaw {

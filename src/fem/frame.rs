@@ -25,7 +25,7 @@ use std::collections::{BTreeMap, HashMap};
 pub type Row<const D: usize> = Vec<(u32, SMatrix<f64, D, D>)>;
 
 /// Constraints of nodes, as rows of u = T v and of the inverse map.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "[f64; D]: Plain, [[f64; D]; D]: Plain")]
 pub struct Frame<const D: usize> {
     /// C: the dofs that move a node. The first entry of a tied node is that of its master, the entry of a turned node its own.

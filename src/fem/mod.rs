@@ -20,7 +20,7 @@ pub mod surface;
 mod tests;
 
 pub use crate::linalg::{cross, length, minus, pad, unit};
-pub use assemble::{Couplings, ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
+pub use assemble::{ElasticBody, NodalBlock, NodalForces, NodeGraph, support};
 pub use elasticity::Elasticity;
 pub use element::EDGES;
 pub use facets::{Facets, area_vector};

@@ -68,7 +68,7 @@ pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// A sparse matrix in compressed rows: row `i` has the columns `col[ptr[i]..ptr[i+1]]`, sorted.
-#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Csr {
     pub columns: usize,
     /// Row starts, one more than there are rows.

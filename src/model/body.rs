@@ -3,7 +3,7 @@
 use super::Motion;
 use super::dofs::{Distribution, Dofs};
 use crate::error::{Error, Kind, Result};
-use crate::fem::{Couplings, ElasticBody};
+use crate::fem::ElasticBody;
 use crate::file::available_memory;
 use crate::linalg::{Csr, dot};
 use crate::petsc::{Rows, Schur, Session};
@@ -41,6 +41,8 @@ pub struct Body {
     keeps_stiffness: bool,
     /// Description of the solver to be made, for reports.
     words: String,
+    /// Counters of the body that it replaces in a history.
+    earlier: BodyCounts,
     interior: Option<Interior>,
 }
 
@@ -58,8 +60,8 @@ struct Interior {
     load: Vec<f64>,
     /// The factor, once the interior is eliminated.
     schur: Option<RefCell<Schur>>,
-    /// Whether it was eliminated in an earlier run.
-    is_reused: bool,
+    /// Eliminations in this run: none if one of an earlier run serves.
+    eliminations: usize,
     /// Wall seconds of the elimination.
     seconds: f64,
 }
@@ -78,11 +80,11 @@ impl Body {
         make: MakeSolver,
         words: String,
     ) -> Self {
-        elastic.held = Couplings::default();
         let prescribed = std::mem::take(&mut elastic.prescribed);
         let dofs = Dofs::new(elastic.load.len(), prescribed, rows, unconstrained_modes, distribution.map(Rc::new));
         let (diagonal, make) = (Vec::new(), Some(make));
-        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: false, words, interior: None }
+        let earlier = BodyCounts::default();
+        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: false, words, earlier, interior: None }
     }
 
     /// Return a rigid part, whose dofs are the amounts of its `motions`, without a stiffness.
@@ -117,21 +119,13 @@ impl Body {
         let modes = unconstrained_modes.iter().map(on_interface).collect();
         let dofs = Dofs::new(interface.dofs.len(), Vec::new(), interface.rows.clone(), modes, None);
         let (load, words) = (interface.turn(&whole.load), interface.in_words());
-        let interior = Interior {
-            session,
-            chosen,
-            dimension,
-            interface,
-            whole,
-            load,
-            schur: None,
-            is_reused: false,
-            seconds: 0.0,
-        };
+        let interior =
+            Interior { session, chosen, dimension, interface, whole, load, schur: None, eliminations: 0, seconds: 0.0 };
         let make: MakeSolver = Box::new(|stiffness: Rows| Ok(Box::new(Dense::new(stiffness))));
         let (elastic, diagonal) = (ElasticBody::default(), Vec::new());
         let (make, interior) = (Some(make), Some(interior));
-        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: true, words, interior }
+        let earlier = BodyCounts::default();
+        Self { dofs, elastic, diagonal, matrix: None, make, keeps_stiffness: true, words, earlier, interior }
     }
 
     /// Eliminate the interior, if the body is to be condensed and is not yet.
@@ -143,6 +137,11 @@ impl Body {
             self.elastic = interior.eliminate()?;
         }
         Ok(())
+    }
+
+    /// Return whether the solver of G was made.
+    pub fn has_solver(&self) -> bool {
+        self.matrix.is_some()
     }
 
     /// Return the dofs.
@@ -270,37 +269,42 @@ impl Body {
     /// Return the counters of the work so far.
     pub fn counts(&self) -> BodyCounts {
         let counts = self.matrix.as_ref().map_or_else(BodyCounts::default, SpringMatrix::counts);
-        self.interior.as_ref().map_or(counts, |interior| interior.count(counts))
+        let mut all = self.interior.as_ref().map_or(counts, |interior| interior.count(counts));
+        all += self.earlier;
+        all
     }
 
-    /// Set the counters to zero for another run with the same K and f. Work that need not be repeated counts as avoided.
+    /// Count on from these counters.
+    pub fn count_on(&mut self, earlier: BodyCounts) {
+        self.earlier = earlier;
+    }
+
+    /// Set the counters to zero for another run.
     pub fn begin_anew(&mut self) {
-        self.interior.iter_mut().for_each(|interior| interior.is_reused = true);
+        self.earlier = BodyCounts::default();
+        self.interior.iter_mut().for_each(|interior| interior.eliminations = 0);
         self.matrix.iter_mut().for_each(SpringMatrix::begin_anew);
     }
 
-    /// Replace the loads f and the `prescribed` (dof, value) of a condensed body and keep what was made of K. Return false, with nothing changed, if
-    /// the body is not condensed, or other dofs are prescribed.
-    pub fn reload(&mut self, load: &[f64], prescribed: &[(usize, f64)]) -> Result<bool> {
-        let Some(interior) = &mut self.interior else { return Ok(false) };
-        let dofs = |prescribed: &[(usize, f64)]| prescribed.iter().map(|entry| entry.0).collect::<Vec<_>>();
-        let fits = interior.schur.is_some() && dofs(&interior.whole.prescribed) == dofs(prescribed);
-        if fits {
-            interior.whole.reload(load.to_vec(), prescribed.to_vec());
-            interior.load = interior.interface.turn(&interior.whole.load);
-            let stiffness = std::mem::take(&mut self.elastic.stiffness);
-            self.elastic = ElasticBody { stiffness, ..interior.loads()? };
+    /// Replace the loads f on all dofs that this rank knows, and the values of the `prescribed` (dof, value), which are
+    /// the same dofs as before. What was made of K stays.
+    pub fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> Result<()> {
+        let stiffness = std::mem::take(&mut self.elastic.stiffness);
+        if let Some(interior) = &mut self.interior {
+            let is_same = interior.reload(load, prescribed);
+            if !is_same && interior.schur.is_some() {
+                self.elastic = interior.loads()?;
+            }
+        } else {
+            let held = std::mem::take(&mut self.elastic.held);
+            let mut whole = ElasticBody { held, ..ElasticBody::default() };
+            whole.reload(load, prescribed);
+            let own = self.dofs.distribution.as_ref().map(|distribution| distribution.restrict(&whole));
+            self.elastic = ElasticBody { held: std::mem::take(&mut whole.held), ..own.unwrap_or(whole) };
+            self.dofs.prescribed = std::mem::take(&mut self.elastic.prescribed);
         }
-        Ok(fits)
-    }
-
-    /// Multiply all loads and prescribed values.
-    pub fn scale_loads(&mut self, ratio: f64) {
-        let ElasticBody { load, lifting, strain_constant, energy_constant, .. } = &mut self.elastic;
-        let interior = self.interior.iter_mut().flat_map(|interior| &mut interior.load);
-        load.iter_mut().chain(lifting).chain(interior).for_each(|force| *force *= ratio);
-        self.dofs.prescribed.iter_mut().for_each(|(_, value)| *value *= ratio);
-        [strain_constant, energy_constant].into_iter().for_each(|energy| *energy *= ratio * ratio);
+        self.elastic.stiffness = stiffness;
+        Ok(())
     }
 
     /// Return one line about the inner solver.
@@ -332,8 +336,17 @@ impl Interior {
         let stiffness = Csr::full(interface.len(), schur.take_complement());
         self.schur = Some(RefCell::new(schur));
         let body = ElasticBody { stiffness, ..self.loads()? };
-        self.seconds = began.elapsed().as_secs_f64();
+        (self.eliminations, self.seconds) = (1, began.elapsed().as_secs_f64());
         Ok(body)
+    }
+
+    /// Replace the loads and prescribed values of the whole body. Return whether these are the same as before.
+    fn reload(&mut self, load: Vec<f64>, prescribed: Vec<(usize, f64)>) -> bool {
+        let of = |whole: &ElasticBody| [whole.load.clone(), whole.lifting.clone()];
+        let (before, whole) = (of(&self.whole), &mut self.whole);
+        whole.reload(load, prescribed);
+        self.load = self.interface.turn(&whole.load);
+        before == of(whole)
     }
 
     /// Do some work with the factor.
@@ -386,11 +399,11 @@ impl Interior {
 
     /// Add the elimination to the counters of the body.
     fn count(&self, counts: BodyCounts) -> BodyCounts {
-        let eliminations = usize::from(self.schur.is_some() && !self.is_reused);
+        let eliminations = self.eliminations;
         let seconds = eliminations as f64 * self.seconds;
         BodyCounts {
             factorizations: eliminations,
-            factorizations_avoided: usize::from(self.is_reused),
+            condensations: eliminations,
             symbolic: eliminations,
             first_seconds: seconds,
             factor_seconds: counts.factor_seconds + seconds,

@@ -2,6 +2,7 @@
 //! ranks.
 
 use crate::exchange::{Exchange, Serial, all_gather};
+use crate::fem::ElasticBody;
 use crate::linalg::{Csr, axpy, dot};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -181,6 +182,20 @@ impl Distribution {
             positions.iter().zip(rows).for_each(|(&at, &row)| known[at as usize] = values[row as usize - first]);
         }
         known
+    }
+
+    /// Return the loads and prescribed values of a body on the owned dofs, without K, from those on the dofs of owned
+    /// and ghost nodes.
+    pub fn restrict(&self, body: &ElasticBody) -> ElasticBody {
+        let place = |&(dof, u): &(usize, f64)| Some((self.owned_positions.binary_search(&(dof as u32)).ok()?, u));
+        ElasticBody {
+            load: self.of_known(&body.load),
+            prescribed: body.prescribed.iter().filter_map(place).collect(),
+            lifting: if body.lifting.is_empty() { Vec::new() } else { self.of_known(&body.lifting) },
+            energy_constant: body.energy_constant,
+            strain_constant: body.strain_constant,
+            ..ElasticBody::default()
+        }
     }
 
     /// Return the values at owned dofs from those at the dofs of owned and ghost nodes.

@@ -39,6 +39,10 @@ pub struct JointStep {
     is_redundant: bool,
     /// Whether the bodies have given their K away.
     has_stiffness: bool,
+    /// Counters of the solver that it replaces in a history.
+    earlier: BodyCounts,
+    /// Traces of the motions of rigid parts that the matrix has, one list a part.
+    rigid: Vec<Vec<Vec<f64>>>,
     /// Motions of rigid parts that the matrix does not have.
     motions: Vec<BorderMotion>,
     /// Their elimination for the springs of the last solve.
@@ -76,7 +80,9 @@ impl JointStep {
         let matrix = SpringMatrix::new(rows_of(stiffness, start)?, &rows, row_stiffness, coarse, make)?;
         let is_redundant = !of_nodes && model.exchange.ranks() > 1;
         let motions = if of_nodes { border::motions(model) } else { Vec::new() };
-        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness: of_nodes, motions, border: None })
+        let rigid = if of_nodes { Vec::new() } else { rigid_traces(model) };
+        let (has_stiffness, earlier, border) = (of_nodes, BodyCounts::default(), None);
+        Ok(Self { matrix, rows, offset, pins, first, is_redundant, has_stiffness, earlier, rigid, motions, border })
     }
 
     /// Solve G x = r with the matrix until `enough` accepts an iterate. Return the estimated energy norm of the error of x, by an iterative solver, or why the
@@ -205,6 +211,23 @@ impl LinearStep for JointStep {
         self.matrix.set_up()
     }
 
+    fn renew(&mut self, model: &Model) -> bool {
+        if !self.has_stiffness {
+            return self.rigid == rigid_traces(model);
+        }
+        (self.motions, self.border) = (border::motions(model), None);
+        true
+    }
+
+    fn count_on(&mut self, earlier: BodyCounts) {
+        self.earlier = earlier;
+    }
+
+    fn begin_anew(&mut self) {
+        self.earlier = BodyCounts::default();
+        self.matrix.begin_anew();
+    }
+
     fn multiply(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
         if !self.has_stiffness {
             return model.multiply(v);
@@ -272,12 +295,20 @@ impl LinearStep for JointStep {
     }
 
     fn counts(&self) -> BodyCounts {
-        self.matrix.counts()
+        let mut counts = self.matrix.counts();
+        counts += self.earlier;
+        counts
     }
 
     fn describe(&self) -> String {
         self.matrix.solver().describe()
     }
+}
+
+/// Return the traces of the motions of all rigid parts, one list a part.
+fn rigid_traces(model: &Model) -> Vec<Vec<Vec<f64>>> {
+    let of_part = |slot: &BodySlot| slot.motions.iter().map(|motion| motion.trace.clone()).collect();
+    model.bodies.iter().filter(|slot| slot.is_rigid).map(of_part).collect()
 }
 
 /// Return B x at the points, n, and x'r, the squared energy norm of an iterate x. `x` and `r` have the rows of this rank, from number `first` on. One message.

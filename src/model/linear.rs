@@ -83,6 +83,18 @@ pub trait LinearStep {
         Ok(())
     }
 
+    /// Go on with a model of the same bodies, whose loads, gaps, laws and rigid parts may differ. Return whether the
+    /// solver serves it.
+    fn renew(&mut self, _model: &Model) -> bool {
+        false
+    }
+
+    /// Count on from these counters.
+    fn count_on(&mut self, _earlier: BodyCounts) {}
+
+    /// Set the counters to zero for another run.
+    fn begin_anew(&mut self) {}
+
     /// Return K v for the displacements v of every local body. Collective.
     fn multiply(&mut self, model: &mut Model, v: &[Vec<f64>]) -> Vec<Vec<f64>> {
         model.multiply(v)

@@ -176,19 +176,6 @@ impl Model {
         model
     }
 
-    /// Multiply all loads and prescribed displacements.
-    pub fn scale_loads(&mut self, ratio: f64) {
-        for slot in &mut self.bodies {
-            let sprung = slot.sprung.iter_mut().flat_map(|sprung| &mut sprung.motions);
-            slot.motions.iter_mut().chain(sprung).for_each(|motion| motion.work *= ratio);
-            slot.imposed.iter_mut().for_each(|u| *u *= ratio);
-            slot.local.iter_mut().for_each(|body| body.scale_loads(ratio));
-        }
-        let prescribed = self.pairs.iter_mut().flat_map(|pair| &mut pair.prescribed).flatten();
-        prescribed.for_each(|u| *u *= ratio);
-        self.set_gaps();
-    }
-
     /// Set all gaps from those of the pairs and what prescribed displacements close.
     pub fn set_gaps(&mut self) {
         self.gap = self.pairs.iter().flat_map(|pair| (0..pair.len()).map(move |q| free_gap(pair, q))).collect();
@@ -418,11 +405,13 @@ pub(crate) mod sample {
             on_side: vec![0, 1],
             face: vec![1; 2],
             tilt: vec![0.0; 2],
+            is_turned: false,
             spread: Vec::new(),
             uncertainty: 0.0,
             position: vec![[0.0; 3]; 2],
             area: AREA[2 * i..2 * i + 2].to_vec(),
             normal: vec![[0.0, 1.0, 0.0]; 2],
+            distance: vec![0.0; 2],
             gap: vec![0.0; 2],
             offset: 0.0,
             prescribed: [vec![0.0; 2], vec![0.0; 2]],

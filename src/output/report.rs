@@ -43,10 +43,10 @@ pub struct Report {
     pub meshes_without_hxt: usize,
     /// Stiffness matrices assembled.
     pub assemblies: usize,
-    /// Stiffness matrices reused from an earlier run of a sweep.
-    pub assemblies_avoided: usize,
-    /// Numeric factorisations of stiffness matrices reused from an earlier run of a sweep.
-    pub factorizations_avoided: usize,
+    /// Bodies condensed to their interfaces.
+    pub condensations: usize,
+    /// Pairs of surfaces that were searched for common pieces.
+    pub pairings: usize,
     /// Solves of one body, those of the start included.
     pub body_solves: usize,
     /// Changes of a body's Robin term.

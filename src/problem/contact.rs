@@ -169,6 +169,15 @@ impl ContactSpec {
         Self { bond: true, ..self }
     }
 
+    /// Return whether another contact has the same points, where meshes and bodies are the same.
+    pub fn has_points_of(&self, other: &Self) -> bool {
+        let of = |spec: &Self| {
+            let kinds = [spec.obstacle, spec.is_touching(), spec.preload.is_some()];
+            (spec.table, spec.between.clone(), spec.of.clone(), spec.distance, [spec.angle, spec.edge], kinds)
+        };
+        of(self) == of(other)
+    }
+
     /// Return whether the distance of the meshes counts as zero.
     pub fn is_touching(&self) -> bool {
         self.touching || self.bond || self.obstacle

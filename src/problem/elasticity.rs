@@ -19,8 +19,15 @@ pub struct ElasticitySpec {
     pub place: Place,
 }
 
+/// Constants are equal wherever they stand.
+impl PartialEq for ElasticitySpec {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.constants, &self.axes) == (&other.constants, &other.axes)
+    }
+}
+
 /// The elastic constants, each a number or an expression. Moduli are stresses; Poisson's ratios have no unit.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Constants {
     /// Young's modulus and Poisson's ratio.
     Isotropic {
@@ -36,7 +43,7 @@ pub enum Constants {
 }
 
 /// The directions of the material's axes.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "AxesKeys", untagged)]
 pub enum AxesSpec {
     /// A direction along axis 1, and one towards axis 2.

@@ -1,14 +1,13 @@
 //! Histories of loads: factors of loads and prescribed displacements, step by step.
 //!
-//! A line of the scene (a load or a support) with a `path` takes the factor of that name. A leg is a series of consecutive steps whose
-//! factors are positive multiples of each other. On a leg all loads have one common factor, the share, so that nothing is assembled anew.
+//! A line of the scene (a load or a support) with a `path` takes the factor of that name.
 //!
 //! In a scene they are `steps` of `[method]`: factors of all loads, or a table with a factor for each load.
 
 use super::body::BodySpec;
 use super::contact::ContactSpec;
 use super::geometry::Geometry;
-use super::load::LoadKind;
+use super::load::{LoadKind, Support};
 use super::read::{Check, Either, Flaw, Form, file, kept, positive};
 use crate::error::{Error, Located, Result as Checked, joined};
 use crate::expression::Field;
@@ -17,7 +16,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::json;
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::PathBuf;
 
 /// The name of the factor of all lines without a `path`.
@@ -35,8 +33,6 @@ pub struct History {
     pub table: Option<Located<PathBuf>>,
     /// Whether some loads have no factor and stay constant.
     pub constant: bool,
-    /// Whether no two steps are of one leg, as where a step locks what it finds, or where factors change gaps.
-    pub apart: bool,
     /// Number of steps that were solved before this process started.
     pub begun: usize,
 }
@@ -73,19 +69,6 @@ impl History {
         self.table.is_some()
     }
 
-    /// Return the leg of a step: the steps around it with proportional loads.
-    pub fn leg(&self, step: usize) -> Range<usize> {
-        let is_proportional = |other: &usize| self.ratio(*other, step).is_some();
-        let begin = (0..step).rev().take_while(is_proportional).last().unwrap_or(step);
-        let end = (step..self.steps.len()).take_while(is_proportional).last().map_or(step, |last| last + 1);
-        begin..end
-    }
-
-    /// Return the ratio of the loads of a step to the loads of the last step of its leg.
-    pub fn share(&self, step: usize) -> f64 {
-        self.leg(step).next_back().and_then(|last| self.ratio(step, last)).unwrap_or(1.0)
-    }
-
     /// Return a history of one step: the first one with the largest sum of absolute factors.
     pub fn heaviest(&self) -> Self {
         let size = |step: &&LoadStep| step.factors.iter().map(|factor| factor.abs()).sum::<f64>();
@@ -98,20 +81,11 @@ impl History {
         !self.constant && self.steps[step].factors.iter().all(|factor| *factor == 0.0)
     }
 
-    /// Return the number r > 0 with loads of `step` = r * loads of `other`, if there is one. Both steps without loads have r = 1.
-    fn ratio(&self, step: usize, other: usize) -> Option<f64> {
-        if self.apart {
-            return (step == other).then_some(1.0);
-        }
-        // constant loads have the factor 1 in every step
-        let constant = self.constant.then_some(1.0);
-        let factors = |step: usize| self.steps[step].factors.iter().copied().chain(constant);
-        let both = || factors(step).zip(factors(other));
-        let (a, b) = both().max_by(|x, y| x.1.abs().total_cmp(&y.1.abs()))?;
-        let ratio = if b == 0.0 { 1.0 } else { a / b };
-        // the tolerance allows for factors that are rounded decimals
-        let fits = |(a, b): (f64, f64)| (a - ratio * b).abs() <= 4.0 * f64::EPSILON * a.abs();
-        (ratio > 0.0 && both().all(fits)).then_some(ratio)
+    /// Return whether a support has another displacement in a step than in the one before.
+    pub fn moves(&self, step: usize, bodies: &[BodySpec]) -> bool {
+        let differs = |path: Option<&Located<String>>| self.factor(step, path) != self.factor(step - 1, path);
+        let is_moved = |fix: &Support| fix.is_moved() && differs(fix.path.as_ref());
+        step > 0 && bodies.iter().flat_map(|body| &body.fix).any(is_moved)
     }
 
     /// Return the factor at a step for a line with this path; 1 if the history has no such factor.
@@ -121,22 +95,24 @@ impl History {
         column.map_or(1.0, |column| self.steps[step].factors[column])
     }
 
-    /// Give all loads, prescribed displacements and contacts the factors of the last step of the leg of `step`. Without such a step these are 1.
+    /// Give all loads, prescribed displacements and contacts the factors of a step. Without such a step these are 1.
     pub fn apply(&self, step: usize, bodies: &mut [BodySpec], contacts: &mut [ContactSpec]) {
-        let last = self.leg(step).next_back().filter(|_| step < self.steps.len());
-        let factors = last.map_or(vec![1.0; self.names.len().max(1)], |last| self.steps[last].factors.clone());
+        let of_step = self.steps.get(step).map(|step| step.factors.clone());
+        let factors = of_step.clone().unwrap_or_else(|| vec![1.0; self.names.len().max(1)]);
         contacts.iter_mut().for_each(|contact| contact.set_factors(&factors));
-        let Some(last) = last else { return };
+        if of_step.is_none() {
+            return;
+        }
         for contact in contacts {
             contact.factor = match contact.preload {
-                Some(_) => self.preload_factor(last, contact),
-                None => self.factor(last, contact.path.as_ref()),
+                Some(_) => self.preload_factor(step, contact),
+                None => self.factor(step, contact.path.as_ref()),
             };
         }
         for body in bodies {
-            body.load.iter_mut().for_each(|load| load.factor = self.factor(last, load.path.as_ref()));
-            body.fix.iter_mut().for_each(|fix| fix.factor = self.factor(last, fix.path.as_ref()));
-            body.force_factor = self.factor(last, None);
+            body.load.iter_mut().for_each(|load| load.factor = self.factor(step, load.path.as_ref()));
+            body.fix.iter_mut().for_each(|fix| fix.factor = self.factor(step, fix.path.as_ref()));
+            body.force_factor = self.factor(step, None);
         }
     }
 }
@@ -168,10 +144,9 @@ fn has_common(body: &BodySpec) -> bool {
         LoadKind::Force { total, .. } | LoadKind::Moment(total) => total.iter().any(|force| *force != 0.0),
         LoadKind::Turning { force, moment } => force.iter().chain(moment).any(|component| *component != 0.0),
     };
-    let moves = |field: &Field| !field.is_zero();
     body.force.as_ref().is_some_and(|force| !force.iter().all(Field::is_zero))
         || body.load.iter().any(|load| load.path.is_none() && acts(&load.kind))
-        || body.fix.iter().any(|fix| fix.path.is_none() && fix.value.iter().flatten().chain(&fix.normal).any(moves))
+        || body.fix.iter().any(|fix| fix.path.is_none() && fix.is_moved())
 }
 
 /// The most steps that a number may stand for.
@@ -360,30 +335,5 @@ fn step(names: &[String], record: &csv::StringRecord, before: Option<&LoadStep>)
     match before.filter(|before| before.time >= step.time) {
         Some(before) => Err(format!("the time {} comes after {}", step.time, before.time)),
         None => Ok(step),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn history(rows: &[[f64; 2]], constant: bool) -> History {
-        let step = |(number, row): (usize, &[f64; 2])| LoadStep { time: number as f64, factors: row.to_vec() };
-        let steps = rows.iter().enumerate().map(step).collect();
-        History { names: vec!["a".into(), "b".into()], steps, constant, ..History::default() }
-    }
-
-    #[test]
-    fn legs_are_steps_in_proportion() {
-        let rows = [[0.0, 0.0], [0.0, 0.0], [0.1, 0.3], [0.2, 0.6], [0.7, 2.1], [-0.1, -0.3], [0.0, 1.0], [0.0, 0.5]];
-        let loading = history(&rows, false);
-        let legs: Vec<_> = (0..8).map(|step| loading.leg(step)).collect();
-        assert_eq!(legs, [0..2, 0..2, 2..5, 2..5, 2..5, 5..6, 6..8, 6..8]);
-        assert_eq!([0, 1, 4, 5, 6, 7].map(|step| loading.share(step)), [1.0, 1.0, 1.0, 1.0, 2.0, 1.0]);
-        assert!((loading.share(3) - 2.0 / 7.0).abs() < 1e-15);
-        // with loads that stay as they are only equal steps are in proportion
-        let constant = history(&rows, true);
-        assert_eq!([0, 2, 3].map(|step| constant.leg(step)), [0..2, 2..3, 3..4]);
-        assert_eq!(History::of_shares(vec![0.5, 2.0, 1.0]).leg(1), 0..3);
     }
 }

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// The law of a Winkler layer. Parameters are numbers or expressions in the coordinates.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "LayerKeys", rename_all = "lowercase")]
 pub enum LayerSpec {
     /// p = (c/B)^(1/a), the layer of the paper.
@@ -35,7 +35,7 @@ pub enum LayerSpec {
 }
 
 /// The parameters of the power law.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Power {
     /// compression at unit pressure, > 0
@@ -46,7 +46,7 @@ pub struct Power {
 }
 
 /// The parameter of the linear law.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Linear {
     /// pressure per compression, > 0
@@ -54,7 +54,7 @@ pub struct Linear {
 }
 
 /// The parameters of the exponential law.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Exponential {
     /// a pressure, > 0
@@ -64,7 +64,7 @@ pub struct Exponential {
 }
 
 /// The parameters of the cubic law.
-#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cubic {
     /// stiffness at first touch, > 0
@@ -105,6 +105,15 @@ impl LayerSpec {
             Self::Table(_) | Self::Own(_) | Self::Pressure { .. } => ("", Vec::new()),
         };
         (law, list.into_iter().map(|(key, value, bounds)| Parameter { key, value, bounds }).collect())
+    }
+
+    /// Return whether the law is known to be the same at all points.
+    pub fn is_uniform(&self) -> bool {
+        match self {
+            Self::Own(_) => false,
+            Self::Pressure { law, .. } => law.uses_only_first(),
+            _ => self.parameters().1.iter().all(|parameter| parameter.value.is_constant()),
+        }
     }
 }
 

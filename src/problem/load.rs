@@ -84,6 +84,13 @@ pub enum LoadKind {
     },
 }
 
+impl Support {
+    /// Return whether it prescribes a displacement that is not zero.
+    pub fn is_moved(&self) -> bool {
+        self.value.iter().flatten().chain(&self.normal).any(|field| !field.is_zero())
+    }
+}
+
 /// A support.
 #[derive(Clone, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

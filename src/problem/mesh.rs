@@ -53,7 +53,7 @@ struct MeshKeys {
 }
 
 /// Where the mesh comes from. Paths are joined with the folder of the scene file.
-#[derive(Debug, Clone, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, JsonSchema)]
 #[schemars(with = "Either<String, MeshKeys>")]
 pub enum MeshSource {
     /// What Gmsh meshes.
@@ -68,7 +68,7 @@ pub enum MeshSource {
 }
 
 /// A Gmsh script with numbers set in it (`gmsh -setnumber NAME VALUE`), or a shape of another program.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct GmshSource {
     /// The script, or the file of the shape.
     pub file: Located<PathBuf>,
@@ -240,7 +240,7 @@ impl Serialize for MeshSource {
 }
 
 /// A mesh as arrays: points, and named groups of simplices. Arrays that are no mesh are refused when they are used.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MeshArrays {
     /// Coordinates (x, y, z) of the points; z = 0 in plane problems. Some points may belong to no group.
     pub points: Vec<[f64; 3]>,
@@ -251,7 +251,7 @@ pub struct MeshArrays {
 }
 
 /// A named group of simplices: the cells of a body, a boundary, or points.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct GroupArrays {
     /// Name of the group.
     pub name: String,

@@ -266,12 +266,14 @@ fn springs(model: &Model, body: usize, weight: &[f64]) -> DMatrix<f64> {
 /// loads move the body; with 1e6 its rounding shows in the last of eight digits of Aitken's rule.
 const STIFF: f64 = 1e4;
 
-/// Give every body the Robin term of its extension, and set its solver up. A refusal of the solver or of an option then comes before the first sweep, and
-/// the extension needs no other factorisation.
+/// Give every body the Robin term of its extension, and set up the solvers of those that have none yet. A refusal of
+/// the solver or of an option then comes before the first sweep, and the extension needs no other factorisation.
 pub fn prepare(model: &mut Model) -> Result<()> {
+    let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
+    let is_new: Vec<bool> = bodies.map(|body| !body.has_solver()).collect();
     model.robin(&stiff_springs(model))?;
-    let mut bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-    bodies.try_for_each(|body| body.set_up())
+    let bodies = model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut()).zip(is_new);
+    bodies.filter(|(_, is_new)| *is_new).try_for_each(|(body, _)| body.set_up())
 }
 
 /// Return the springs of an extension at the contact rows, 2n.

@@ -7,7 +7,7 @@ use crate::error::{Error, Kind, Result};
 use crate::fem::Prolongation;
 use crate::file::available_memory;
 use crate::linalg::Csr;
-use crate::model::{Body, BodySlot};
+use crate::model::{Body, BodyCounts, LinearStep};
 use crate::petsc::{HAS_HYPRE, Rows, Session};
 use crate::problem::{Linear, MethodName, Preset};
 use crate::scene::Scene;
@@ -18,7 +18,7 @@ use crate::solver::preset::{self, Smoother};
 use crate::solver::{InterfaceDofs, Krylov, MakeSolver};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A factory that makes the inner solvers of a scene's bodies by its plan.
 pub struct SolverFactory<'a> {
@@ -32,13 +32,24 @@ pub struct SolverFactory<'a> {
     pub near_null_space: Vec<Vec<f64>>,
     /// The plan, once it is made.
     pub plan: Plan,
-    /// Condensed bodies that an earlier scene has left. `local` exists on the rank that owns the body.
-    kept: HashMap<String, BodySlot>,
+    /// What was asked for and planned for the problem before.
+    before: Option<Solvers>,
+    /// The solver of the linear steps of the problem before, if it may serve again.
+    step: Option<Box<dyn LinearStep>>,
+    /// Its counters.
+    counts: BodyCounts,
+}
+
+/// What was asked for, and the plan that was made.
+pub struct Solvers {
+    asked: SolverRequest,
+    pub plan: Plan,
 }
 
 impl<'a> SolverFactory<'a> {
-    /// Start from the free memory and the options that the user wrote. This scene can reuse the bodies `kept` of an earlier one. Collective.
-    pub fn new(session: &'a Session, scene: &Scene, kept: Vec<BodySlot>) -> Result<Self> {
+    /// Start from the free memory and the options that the user wrote. The problem before had the solvers `before`.
+    /// Collective.
+    pub fn new(session: &'a Session, scene: &Scene, before: Option<(Solvers, Box<dyn LinearStep>)>) -> Result<Self> {
         let mine = available_memory() as u64;
         let mut least = mine;
         if session.size() > 1 {
@@ -53,6 +64,8 @@ impl<'a> SolverFactory<'a> {
             memory: least as usize,
             ranks: session.size(),
         };
+        let (before, step) = before.unzip();
+        let counts = step.as_ref().map_or(BodyCounts::default(), |step| step.counts());
         Ok(Self {
             session,
             asked,
@@ -60,7 +73,9 @@ impl<'a> SolverFactory<'a> {
             interpolation: None,
             near_null_space: Vec::new(),
             plan: Plan { linear: Linear::Sweeps, bodies: Vec::new(), seconds: None },
-            kept: kept.into_iter().map(|slot| (slot.name.clone(), slot)).collect(),
+            before,
+            step,
+            counts,
         })
     }
 
@@ -93,14 +108,54 @@ impl<'a> SolverFactory<'a> {
     }
 
     /// Return the options of all PETSc solvers of a run: of bodies that sweeps solve by one, or of the matrix of all bodies.
-    pub fn into_options(self) -> Vec<Chosen> {
+    pub fn options(&self) -> Vec<Chosen> {
         match self.plan.linear {
             Linear::Dense => Vec::new(),
-            Linear::Direct | Linear::Multigrid => vec![self.asked.whole],
+            Linear::Direct | Linear::Multigrid => vec![self.asked.whole.clone()],
             Linear::Sweeps => {
-                let solved = self.plan.bodies.into_iter().filter(|body| body.preset != Preset::Condensed);
-                solved.map(|body| body.facts.options).collect()
+                let solved = self.plan.bodies.iter().filter(|body| body.preset != Preset::Condensed);
+                solved.map(|body| body.facts.options.clone()).collect()
             }
+        }
+    }
+
+    /// Return the solver of linear steps of the problem before, if it may serve again, and its counters.
+    pub fn linear_step(&mut self) -> (Option<Box<dyn LinearStep>>, BodyCounts) {
+        (self.step.take(), self.counts)
+    }
+
+    /// Return what was asked for, and the plan.
+    pub fn into_solvers(self) -> Solvers {
+        Solvers { asked: self.asked, plan: self.plan }
+    }
+
+    /// Return whether linear steps are solved as in the problem before.
+    fn has_same_steps(&self) -> bool {
+        let is_robin = |asked: &SolverRequest| asked.method == MethodName::Robin;
+        let is_same = |before: &Solvers| {
+            before.plan.linear == self.plan.linear && is_robin(&before.asked) == is_robin(&self.asked)
+        };
+        self.before.as_ref().is_some_and(is_same)
+    }
+
+    /// Clear the marks of bodies whose solver is another than in the problem before. Bodies that gave their K to one
+    /// matrix serve together or not at all.
+    fn keep_solvers(&self, is_kept: &mut [bool]) {
+        let Some(Solvers { plan: before, .. }) = &self.before else { return };
+        let is_linear_same = self.has_same_steps();
+        for (is_kept, (body, before)) in is_kept.iter_mut().zip(self.plan.bodies.iter().zip(&before.bodies)) {
+            let is_same = (body.preset, body.is_distributed) == (before.preset, before.is_distributed);
+            *is_kept &= is_same && (is_linear_same || body.preset == Preset::Condensed);
+        }
+        let factors =
+            matches!(self.asked.whole.get("pc_type"), Some("cholesky" | "lu")) && self.distributed().is_empty();
+        let is_given = match self.plan.linear {
+            Linear::Multigrid => true,
+            Linear::Direct => !factors,
+            Linear::Dense | Linear::Sweeps => false,
+        };
+        if is_given && is_kept.contains(&false) {
+            is_kept.fill(false);
         }
     }
 
@@ -196,23 +251,33 @@ impl<'a> SolverFactory<'a> {
 impl Factory for SolverFactory<'_> {
     type SolverPlan = Plan;
 
-    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>) -> Result<Plan> {
+    fn plan(&mut self, bodies: Vec<(BodyFacts, InterfaceDofs)>, is_kept: &mut [bool]) -> Result<Plan> {
         preset::check(self.asked.preset, HAS_HYPRE)?;
         let (mut facts, interfaces): (Vec<BodyFacts>, Vec<InterfaceDofs>) = bodies.into_iter().unzip();
-        for body in &mut facts {
-            (body.is_kept, body.options) = (self.kept.contains_key(&body.name), self.typed.of(&body.name));
+        let before = self.before.as_ref().map(|before| &before.plan.bodies);
+        for (index, body) in facts.iter_mut().enumerate() {
+            let was_condensed =
+                before.and_then(|before| before.get(index)).is_some_and(|body| body.preset == Preset::Condensed);
+            (body.is_kept, body.options) = (is_kept[index] && was_condensed, self.typed.of(&body.name));
         }
-        let mut plan = plan(facts, &self.asked);
-        for (body, interface) in plan.bodies.iter_mut().zip(interfaces) {
-            body.interface = Some(interface).filter(|_| body.preset == Preset::Condensed);
+        // the free memory, which changes from moment to moment, does not change the solvers of the same bodies
+        let is_same = |before: &&Solvers| before.asked.is_like(&self.asked) && !is_kept.contains(&false);
+        let before = self.before.as_ref().filter(is_same).map(|before| before.plan.clone());
+        self.follow(before.unwrap_or_else(|| plan(facts, &self.asked)));
+        self.keep_solvers(is_kept);
+        for (index, (body, interface)) in self.plan.bodies.iter_mut().zip(interfaces).enumerate() {
+            body.interface = Some(interface).filter(|_| body.preset == Preset::Condensed && !is_kept[index]);
         }
-        self.follow(plan.clone());
-        Ok(plan)
+        Ok(self.plan.clone())
     }
 
     fn adopt(&mut self, mut plan: Plan) {
         plan.bodies.iter_mut().for_each(|body| body.facts.options = self.typed.of(&body.facts.name));
         self.follow(plan);
+    }
+
+    fn settle(&mut self, is_renewed: bool) {
+        self.step = self.step.take().filter(|_| is_renewed && self.has_same_steps());
     }
 
     fn distributed(&self) -> Vec<Vec<usize>> {
@@ -285,9 +350,5 @@ impl Factory for SolverFactory<'_> {
             Ok(Box::new(Krylov::new(&session, chosen, dimension, stiffness, &modes, levels)?))
         });
         Ok(Body::new(body, rows, unconstrained_modes, distribution, make, words))
-    }
-
-    fn kept(&mut self, name: &str) -> Option<BodySlot> {
-        self.kept.remove(name).filter(|slot| slot.local.is_some())
     }
 }

@@ -5,6 +5,7 @@
 
 mod extent;
 pub mod inner;
+pub mod meshed;
 pub mod phases;
 mod plan;
 pub mod recorder;
@@ -15,9 +16,10 @@ pub mod steps;
 pub mod verdict;
 mod warnings;
 
-pub use phases::{build, build_after, estimate, iterate, set_up, targets};
+pub use phases::{build, build_after, estimate, set_up, targets};
 pub use recorder::Recorder;
 pub use stages::{All, Begin, Built, Clock, Done, Prepared, Recovered};
+pub use steps::iterate;
 pub use warnings::{in_parts, made_straight};
 
 use crate::error::few;

@@ -2,29 +2,23 @@
 //! iteration. A problem takes over what the run of another scene before it has left.
 
 use super::inner::SolverFactory;
-use super::recorder::{self, Recorder};
-use super::stages::{Begin, Built, Clock, Done, Legs, MeshFile, Prepared};
-use super::{steps, warnings};
-use crate::contact::pieces::{self, Cut};
+use super::meshed::{self, MeshFacts, SceneMesh};
+use super::stages::{Before, Begin, Built, Clock, Done, Prepared};
+use super::warnings;
 use crate::ddm::gamma;
 use crate::ddm::{InitialGuess, Method, Outcome, Status, first_springs};
-use crate::discretize::{self, Discrete, Verified};
+use crate::discretize::{self, Discrete};
 use crate::error::Result;
 use crate::estimate::{self, Estimate};
-use crate::exchange::Plain;
 use crate::interrupt::Interrupt;
-use crate::mesh::{self, Loaded};
-use crate::model::{BodySlot, JointStep, LinearStep};
+use crate::model::{Field, INNER_TOLERANCE, JointStep, LinearStep};
 use crate::output;
-use crate::parallel::{Ranks, collectively};
+use crate::parallel::collectively;
 use crate::petsc::Session;
-use crate::problem::Order;
 use crate::problem::method::{Linear, MethodName, MethodSpec};
 use crate::robin::{Coefficient, SweepCg, stiff_joint_springs};
 use crate::scene::Scene;
-use crate::scene::remove;
 use crate::solver::{Dense, Krylov, MakeSolver, options};
-use serde_json::Value;
 use std::rc::Rc;
 
 /// Dofs from which the fronts of a factorisation in space are large enough for BLAS threads.
@@ -40,177 +34,131 @@ pub fn build(
     interrupt: &Interrupt,
     clock: &mut Clock,
 ) -> Result<Built> {
-    build_after(session, scene.into(), None, interrupt, clock)
-}
-
-/// Build a scene with what the run of another scene before it has left, if only the method differs: the condensed bodies, and the whole
-/// problem if linear steps are solved alike. Collective.
-pub fn build_after(
-    session: &Session,
-    mut scene: Rc<Scene>,
-    before: Option<Done>,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Built> {
-    if scene.contacts.iter().any(|contact| contact.preload.is_some() || contact.factors().next().is_some()) {
-        // the gaps of a model are those of one leg
-        Rc::make_mut(&mut scene).method.steps.apart = true;
-    }
-    let mut kept = Vec::new();
-    if let Some(Done { built: mut last, .. }) = before.filter(|done| settings(&done.built.scene) == settings(&scene)) {
-        if serves(&last, &scene) {
-            let discrete = &mut last.discrete;
-            discrete.model.exchange = Rc::new(Ranks::new(session));
-            discrete.scale_loads(1.0);
-            let bodies = discrete.model.bodies.iter_mut().filter_map(|slot| slot.local.as_mut());
-            discrete.assemblies_avoided = bodies.map(|body| body.begin_anew()).count();
-            discrete.assemblies = 0;
-            return Ok(Built { scene, ..last });
-        }
-        kept = last.into_condensed();
-    }
-    match scene.dimension.value {
-        2 => build_in::<2>(session, scene, pieces::in_plane, kept, interrupt, clock),
-        _ => build_in::<3>(session, scene, pieces::in_space, kept, interrupt, clock),
-    }
-}
-
-/// Do the work of [`build`] in `D` dimensions.
-fn build_in<const D: usize>(
-    session: &Session,
-    scene: Rc<Scene>,
-    cut: Cut<D>,
-    kept: Vec<BodySlot>,
-    interrupt: &Interrupt,
-    clock: &mut Clock,
-) -> Result<Built>
-where
-    [f64; D]: Plain,
-    [[f64; D]; D]: Plain,
-{
-    let stage = session.stage("mesh");
-    clock.begin();
-    let (mut verified, file) = verified::<D>(session, &scene, interrupt)?;
-    clock.phase("mesh");
-    drop(stage);
-    verified.mesh.forget_tags();
-    let source = MeshedScene { session: session.clone(), scene, verified, file, cut };
-    let history = &source.scene.method.steps;
-    let begun = history.begun;
-    let mut built = source.build(begun, kept, clock)?;
-    if begun < history.steps.len() && history.leg(begun) != (0..history.steps.len()) {
-        built.legs = Some(Rc::new(source));
+    let mut built = build_after(session, scene.into(), None, interrupt, clock)?;
+    let history = &built.scene.method.steps;
+    if history.begun + 1 >= history.steps.len() {
+        built.mesh = None;
     }
     Ok(built)
 }
 
-/// A scene with its mesh, from which discrete problems are built.
-struct MeshedScene<const D: usize> {
-    session: Session,
-    scene: Rc<Scene>,
-    verified: Verified<D>,
-    /// The file of the mesh, on the rank that has read it.
-    file: Option<MeshFile>,
-    cut: Cut<D>,
-}
-
-impl<const D: usize> MeshedScene<D>
-where
-    [f64; D]: Plain,
-    [[f64; D]; D]: Plain,
-{
-    /// Build the problem under the loads of a step of the scene's history, or under the full loads. Collective.
-    fn build(&self, step: usize, kept: Vec<BodySlot>, clock: &mut Clock) -> Result<Built> {
-        let Self { session, verified, file, cut, .. } = self;
-        let stage = session.stage("discretize");
-        let mut scene = Scene { bodies: verified.bodies.clone(), ..(*self.scene).clone() };
-        self.scene.method.steps.apply(step, &mut scene.bodies, &mut scene.contacts);
-        let scene = &scene;
-        let mut inner = SolverFactory::new(session, scene, kept)?;
-        let exchange = Rc::new(Ranks::new(session));
-        let keep = scene.estimate || scene.adapt.is_some();
-        let discrete = discretize::discretize(scene, verified, *cut, keep, exchange, &mut inner);
-        let mut discrete = collectively(session, discrete)?;
-        discrete.share();
-        // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large factorisations gain
-        // from them.
-        let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
-        let gains = D == 3 && verified.points * D >= LARGE_FRONTS && inner.factors();
-        session.set_blas_threads(if gains { cores / session.size() } else { 1 });
-        clock.estimate = inner.plan.seconds;
-        clock.phase("discretize");
-        drop(stage);
-        let mut warnings = warnings::of_problem(session, &discrete);
-        warnings.extend(self.of_mesh());
-        warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
-        let has_page = scene.output.report && session.rank() == 0;
-        let built = Built {
-            scene: self.scene.clone(),
-            marks: if has_page {
-                discretize::marks(&verified.mesh, &scene.bodies, &discrete.model.pairs)
-            } else {
-                Vec::new()
-            },
-            discrete,
-            splits: verified.splits(),
-            mesh: file.clone(),
-            linear: inner.plan.linear,
-            interpolation: inner.interpolation.take(),
-            near_null_space: std::mem::take(&mut inner.near_null_space),
-            choice: inner.reason(),
-            condensed: inner.condensed(),
-            options: inner.into_options(),
-            warnings,
-            legs: None,
-        };
-        Ok(built)
-    }
-
-    /// Return the warnings about the mesh and its file.
-    fn of_mesh(&self) -> Vec<String> {
-        let Verified { mesh, notes, .. } = &self.verified;
-        let changed = warnings::in_parts(mesh.split).into_iter().chain(warnings::made_straight(mesh.straightened));
-        changed.chain(notes.iter().cloned()).collect()
-    }
-}
-
-impl<const D: usize> Legs for MeshedScene<D>
-where
-    [f64; D]: Plain,
-    [[f64; D]; D]: Plain,
-{
-    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared> {
-        let built = self.build(step, condensed, clock);
-        set_up(
-            &self.session,
-            built.map_err(|error| error.because(format!("it is in load step {}", step + 1)))?,
-            begin,
-            clock,
-        )
-    }
-}
-
-/// Return the bodies of a scene and their mesh, with its file. The first rank runs Gmsh, reads the mesh and checks it.
-/// Collective.
-fn verified<const D: usize>(
+/// Build a scene from what the run of another one before it has left: all of it that the settings which differ do not
+/// touch. Collective.
+///
+/// # Errors
+/// Those of [`build`].
+pub fn build_after(
     session: &Session,
-    scene: &Scene,
+    scene: Rc<Scene>,
+    before: Option<Done>,
     interrupt: &Interrupt,
-) -> Result<(Verified<D>, Option<MeshFile>)> {
-    let order = scene.bodies.iter().map(|body| body.order).max().unwrap_or(Order::P1);
-    let (mut file, mut notes) = (None, Vec::new());
-    let read = || {
-        interrupt.release()?;
-        let Loaded { mesh, file: path, digest, without_hxt, notes: said, .. } =
-            mesh::load(&scene.mesh, order, interrupt)?;
-        (file, notes) = (Some(MeshFile { digest, path, without_hxt }), said);
-        Ok(mesh)
+    clock: &mut Clock,
+) -> Result<Built> {
+    clock.begin();
+    let stage = session.stage("mesh");
+    let mut kept = before.map(Done::into_mesh).and_then(|(mesh, before)| Some((mesh?, before)));
+    let serves = kept.as_mut().map_or(Ok(false), |(mesh, _)| mesh.follow(&scene));
+    let serves = collectively(session, serves)?;
+    let (mesh, before) = match kept.filter(|_| serves) {
+        Some((mesh, before)) => (mesh, Some(before.begin_anew())),
+        None => (meshed::read(session, &scene, interrupt)?, None),
     };
-    let verified = discretize::verify(scene, &Ranks::new(session), read);
-    let verified = verified.and_then(|verified| interrupt.release().map(|()| verified));
-    let mut verified = collectively(session, verified)?;
-    verified.notes.splice(0..0, notes);
-    Ok((verified, file))
+    clock.phase("mesh");
+    drop(stage);
+    let step = scene.method.steps.begun;
+    build_on(session, scene, mesh, step, before, clock)
+}
+
+/// Prepare the problem of the load step that follows those of `done`, from a solution or automatically. Collective.
+///
+/// # Errors
+/// Loads that a body cannot have, and failures of the solver library.
+pub fn next_step(done: Done, mut start: Option<InitialGuess>, clock: &mut Clock) -> Result<Prepared> {
+    let step = done.steps.len();
+    let (scene, steps, earlier) = (done.built.scene.clone(), done.steps.clone(), done.earlier.clone());
+    let (mut known, mut warnings) = (done.built.warnings.clone(), done.warnings.clone());
+    let (Some(mesh), before) = done.into_mesh() else { unreachable!("a history keeps its mesh up to the last step") };
+    let session = mesh.session().clone();
+    let built = build_on(&session, scene, mesh, step, Some(before), clock);
+    let ready = built.and_then(|built| {
+        if let Some(InitialGuess::Known(solution)) = &mut start {
+            let Discrete { model, specs, is_renewed, .. } = &built.discrete;
+            let (history, counts) = (&built.scene.method.steps, model.bodies.iter().map(|slot| slot.motions.len()));
+            let has_dofs = *is_renewed && counts.eq(solution.field.rigid.iter().map(Vec::len));
+            // with other dofs the pressures alone are known, and moved supports would strain the cells beside them
+            if !has_dofs
+                || specs.iter().any(|spec| history.locks(step, spec))
+                || history.moves(step, &built.scene.bodies)
+            {
+                solution.field = Field::default();
+            }
+        }
+        set_up(&session, built, Begin { start, steps }, clock)
+    });
+    let mut ready = ready.map_err(|error| error.because(format!("it is in load step {}", step + 1)))?;
+    ready.earlier = earlier;
+    for (all, new) in [(&mut known, &mut ready.built.warnings), (&mut warnings, &mut ready.warnings)] {
+        new.retain(|warning| !all.contains(warning));
+        all.append(new);
+    }
+    (ready.built.warnings, ready.warnings) = (known, warnings);
+    Ok(ready)
+}
+
+/// Build the problem of a scene on its mesh under the loads of a step of its history, or under the full loads.
+/// Collective.
+fn build_on(
+    session: &Session,
+    scene: Rc<Scene>,
+    mut mesh: Box<dyn SceneMesh>,
+    step: usize,
+    before: Option<Before>,
+    clock: &mut Clock,
+) -> Result<Built> {
+    let stage = session.stage("discretize");
+    let mut stepped = Scene { bodies: mesh.bodies().to_vec(), ..(*scene).clone() };
+    scene.method.steps.apply(step, &mut stepped.bodies, &mut stepped.contacts);
+    let (discrete, solvers, marks) = match before {
+        Some(Before { discrete, solvers, step, marks }) => (Some(discrete), Some((solvers, step)), marks),
+        None => (None, None, Vec::new()),
+    };
+    let mut inner = SolverFactory::new(session, &stepped, solvers)?;
+    let discrete = mesh.discretize(&stepped, discrete, &mut inner)?;
+    let (linear_step, counts) = inner.linear_step();
+    // BLAS threads slow down small fronts, several ranks, and the short vectors of a Krylov method. Large
+    // factorisations gain from them.
+    let cores = std::thread::available_parallelism().map_or(1, |cores| cores.get());
+    let gains = mesh.facts().dofs_in_space >= LARGE_FRONTS && inner.factors();
+    session.set_blas_threads(if gains { cores / session.size() } else { 1 });
+    clock.estimate = inner.plan.seconds;
+    clock.phase("discretize");
+    drop(stage);
+    let mut warnings = warnings::of_problem(session, &discrete);
+    let MeshFacts { split, straightened, notes, .. } = mesh.facts();
+    warnings.extend(warnings::in_parts(*split).into_iter().chain(warnings::made_straight(*straightened)));
+    warnings.extend(notes.iter().cloned());
+    warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
+    let has_page = scene.output.report && session.rank() == 0;
+    let marks = match has_page && marks.is_empty() {
+        true => mesh.marks(&stepped.bodies, &discrete.model.pairs),
+        false => marks,
+    };
+    Ok(Built {
+        scene,
+        marks,
+        splits: mesh.facts().splits.clone(),
+        file: mesh.facts().file.clone(),
+        interpolation: inner.interpolation.take(),
+        near_null_space: std::mem::take(&mut inner.near_null_space),
+        choice: inner.reason(),
+        options: inner.options(),
+        solvers: inner.into_solvers(),
+        step: linear_step,
+        counts,
+        discrete,
+        warnings,
+        mesh: Some(mesh),
+    })
 }
 
 /// Make the method and factor every body for the start. Then refuse options that no solver has read.
@@ -228,17 +176,11 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     }
     let mut start = match start {
         Some(start) => start,
-        None if scene.method.steps.is_empty() => discretize::start(&scene, &built.discrete)?.into(),
-        None => InitialGuess::Automatic,
+        None => discretize::start(&scene, &built.discrete)?.into(),
     };
-    let mut full = start.clone();
     // A condensed body lives on one rank. If its factorisation is refused, no other rank may wait for it in what follows.
     collectively(session, built.discrete.model.condense())?;
-    let method = collectively(session, make(session, &mut built, &mut full))?;
-    if scene.method.steps.is_empty() {
-        // The start that the set-up found is that of the run. Load steps have other loads.
-        start = full;
-    }
+    let method = collectively(session, make(session, &mut built, &mut start))?;
     let names: Vec<&str> = built.discrete.bodies.iter().map(|body| body.name.as_str()).collect();
     let warnings = collectively(session, options::unread(session, &names))?;
     if built.options.is_empty() && session.options().has("-help") {
@@ -246,25 +188,6 @@ pub fn set_up(session: &Session, mut built: Built, begin: Begin, clock: &mut Clo
     }
     clock.phase("set-up");
     Ok(Prepared { built, method, start, steps, earlier: Vec::new(), warnings })
-}
-
-/// Iterate. From here on a signal ends the run after the current step, so that its results are written.
-///
-/// # Errors
-/// PETSc fails. A run that does not converge is not an error but a status of the outcome.
-pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
-    interrupt.hold();
-    let mut done = match ready.built.scene.method.steps.is_empty() {
-        true => recorder::solve(ready, true, keep).inspect(|done| {
-            if matches!(done.outcome.status, Status::Interrupted { .. }) {
-                keep.state(done);
-            }
-        }),
-        false => steps::iterate(ready, keep, clock),
-    }?;
-    warnings::note_ends(&mut done);
-    clock.phase("iterate");
-    Ok(done)
 }
 
 /// Estimate the error of the solution, if the scene requests it.
@@ -296,31 +219,6 @@ pub fn targets(scene: &Scene) -> String {
     rules.collect::<Vec<_>>().join(" or ")
 }
 
-/// Return whether the problem of the run before serves a scene that differs in the method alone: all bodies are condensed, and linear steps
-/// are solved alike.
-fn serves(last: &Built, scene: &Scene) -> bool {
-    let both = [&*last.scene, scene];
-    // an estimate of the error needs the meshes, which are kept only for it
-    let [old_meshes, new_meshes] = both.map(|scene| scene.estimate);
-    // how linear steps are solved was chosen for the method
-    let [old_joint, new_joint] = both.map(|scene| {
-        let MethodSpec { name, linear, .. } = &scene.method;
-        matches!(name, MethodName::Auto | MethodName::Newton | MethodName::Semismooth).then_some((*name, *linear))
-    });
-    last.condensed.len() == last.discrete.bodies.len()
-        && old_meshes == new_meshes
-        // tables of factors change the loads of bodies, and steps that are legs of their own change gaps
-        && both.iter().all(|scene| !scene.method.steps.is_table() && !scene.method.steps.apart)
-        && old_joint == new_joint
-}
-
-/// Return the settings of a scene on which its discrete problem can depend.
-fn settings(scene: &Scene) -> Value {
-    let mut settings = scene.settings();
-    remove(&mut settings, "", &["title", "units", "method", "output"]);
-    settings
-}
-
 /// Make the method of a scene and set up the solvers that it needs. Errors occur before the first sweep. If the set-up finds an
 /// automatic start, it is stored in `start`.
 fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Method> {
@@ -329,7 +227,7 @@ fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Resul
     match scene.method.name {
         MethodName::Robin => {
             let (rule, coefficient) = (rule()?, Some(coefficient_of(&scene, &built.discrete)));
-            crate::robin::prepare(&mut built.discrete.model)?;
+            prepare_sweeps(built)?;
             Ok(Method::Robin { rule, coefficient, linear: Box::new(SweepCg::with_robin_term()) })
         }
         MethodName::Semismooth => {
@@ -337,6 +235,13 @@ fn make(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Resul
         }
         _ => linear_step(session, built, start).map(Method::Newton),
     }
+}
+
+/// Set up the solvers of the bodies for sweeps, unless the problem before had the same.
+fn prepare_sweeps(built: &mut Built) -> Result<()> {
+    let model = &mut built.discrete.model;
+    // its linear steps may have left a rough tolerance
+    if built.step.take().is_some() { model.set_tolerance(INNER_TOLERANCE) } else { crate::robin::prepare(model) }
 }
 
 /// Return the Robin term of a scene.
@@ -348,13 +253,19 @@ fn coefficient_of(scene: &Scene, discrete: &Discrete) -> Coefficient {
 
 /// Return the solver of linear steps of all bodies.
 fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Box<dyn LinearStep>> {
-    let Built { scene, discrete, linear, options, interpolation, near_null_space, .. } = built;
-    let (linear, interpolation, modes) = (*linear, interpolation.take(), std::mem::take(near_null_space));
+    let linear = built.solvers.plan.linear;
     if linear == Linear::Sweeps {
-        crate::robin::prepare(&mut discrete.model)?;
-        return Ok(Box::new(SweepCg::new(coefficient_of(scene, discrete))));
+        prepare_sweeps(built)?;
+        return Ok(Box::new(SweepCg::new(coefficient_of(&built.scene, &built.discrete))));
     }
+    let Built { scene, discrete, step, counts, options, interpolation, near_null_space, .. } = built;
     let model = &mut discrete.model;
+    if let Some(mut step) = step.take()
+        && step.renew(model)
+    {
+        return Ok(step);
+    }
+    let (interpolation, modes) = (interpolation.take(), std::mem::take(near_null_space));
     // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
     // not distributed
     let is_dense = linear == Linear::Dense;
@@ -368,6 +279,7 @@ fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -
         Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &modes, interpolation)?)))
     };
     let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
+    step.count_on(*counts);
     // the first system of the paper's iteration is the extension of its start
     let extends = scene.method.name == MethodName::Semismooth;
     let springs = if extends { Some(stiff_joint_springs(model)) } else { first_springs(model, start) };

@@ -96,6 +96,12 @@ pub fn plan(facts: Vec<BodyFacts>, asked: &SolverRequest) -> Plan {
 }
 
 impl SolverRequest {
+    /// Return whether another request is the same but for the memory, which changes from moment to moment.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let of = |asked: &Self| (asked.preset, asked.linear, asked.method, asked.ranks);
+        of(self) == of(other)
+    }
+
     /// Return whether the method may use one matrix of all bodies.
     pub fn may_join(&self) -> bool {
         let joins = matches!(self.method, MethodName::Auto | MethodName::Newton | MethodName::Semismooth);

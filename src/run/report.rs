@@ -100,14 +100,14 @@ fn add_counters(report: &mut Report, shared: &GatheredCounters, outcome: &Outcom
     report.body_solves = counts.solves;
     report.inner_iterations = counts.inner_iterations + joint.inner_iterations;
     report.factorizations = counts.factorizations + joint.factorizations;
-    report.factorizations_avoided = counts.factorizations_avoided;
     report.dense_factorizations = counts.dense_factorizations + joint.dense_factorizations;
     report.symbolic_factorizations = counts.symbolic + joint.symbolic;
     report.patches = counts.patches + joint.patches;
     report.robin_updates = counts.robin_updates;
     report.robin_updates_skipped = counts.robin_skipped;
     report.assemblies = shared.assemblies;
-    report.assemblies_avoided = shared.assemblies_avoided;
+    report.condensations = counts.condensations;
+    report.pairings = shared.pairings;
     report.inner_times = InnerTimes {
         factor: counts.factor_seconds + joint.factor_seconds,
         first: counts.first_seconds + joint.first_seconds,
@@ -125,7 +125,7 @@ pub fn headline(session: &Session, built: &Built, solvers: &[String], clock: &Cl
         ranks: session.size(),
         title: scene.title.clone(),
         dofs: bodies.iter().map(|body| body.dofs).sum(),
-        meshes_without_hxt: built.mesh.as_ref().map_or(0, |mesh| mesh.without_hxt.into()),
+        meshes_without_hxt: built.file.as_ref().map_or(0, |mesh| mesh.without_hxt.into()),
         bodies: bodies.iter().zip(solvers).map(|(info, solver)| body_report(info, solver)).collect(),
         times: clock.times.clone(),
         memory: clock.memory.clone(),
@@ -168,7 +168,7 @@ pub struct GatheredCounters {
     /// Counters, summed over all bodies.
     pub counts: BodyCounts,
     assemblies: usize,
-    assemblies_avoided: usize,
+    pairings: usize,
     /// Inner solver of each body in words.
     pub solvers: Vec<String>,
 }
@@ -192,8 +192,8 @@ pub fn solvers_in_words(solvers: &[String]) -> String {
 impl GatheredCounters {
     /// Gather the data on every rank. Collective.
     pub fn gather(discrete: &Discrete) -> Self {
-        let &Discrete { assemblies, assemblies_avoided, .. } = discrete;
-        let mut mine = Self { assemblies, assemblies_avoided, ..Self::default() };
+        let &Discrete { assemblies, pairings, .. } = discrete;
+        let mut mine = Self { assemblies, pairings, ..Self::default() };
         for slot in discrete.model.bodies.iter().filter(|slot| !slot.is_rigid) {
             let owned = slot.local.as_ref().filter(|body| body.dofs().leads());
             mine.solvers.push(owned.map_or_else(String::new, Body::describe));
@@ -205,7 +205,7 @@ impl GatheredCounters {
     fn merged(mut self, other: Self) -> Self {
         self.counts += other.counts;
         self.assemblies += other.assemblies;
-        self.assemblies_avoided += other.assemblies_avoided;
+        self.pairings += other.pairings;
         self.solvers.iter_mut().zip(other.solvers).for_each(|(mine, other)| mine.push_str(&other));
         self
     }

@@ -326,7 +326,7 @@ pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
 pub fn obstacle(done: &Done, i: usize) -> Option<ObstacleReport> {
     let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.specs[i]);
     let found = spec.obstacle.then(|| Obstacle::new(pair, spec))?;
-    let (approach, tilt) = found.moved(&done.outcome.iterate.rigid[pair.bodies[1]], done.built.discrete.factor);
+    let (approach, tilt) = found.moved(&done.outcome.iterate.rigid[pair.bodies[1]]);
     let force = &done.outcome.layer.force[done.model().range(i)];
     let (force, moment) = (resultant(force, &pair.resultant[1]), resultant(force, &pair.moment[1]));
     let moment = found.moment(force, moment).map(|component| 0.0 - component);
@@ -399,7 +399,7 @@ fn names(info: &BodyInfo) -> Vec<String> {
 fn add_forces(done: &Done, body: usize, recovered: &Recovered, mine: &mut [f64]) {
     let (model, info) = (done.model(), &done.built.discrete.bodies[body]);
     let force = model.at_rows(body, &done.outcome.layer.force);
-    let ForceBalance { parts, size } = info.post().balance(&recovered.bent, &force, done.built.discrete.factor);
+    let ForceBalance { parts, size } = info.post().balance(&recovered.bent, &force);
     let numbers = parts.iter().flat_map(|part| [part.force, part.moment]).flatten().chain(size);
     mine.iter_mut().zip(numbers).for_each(|(mine, number)| *mine = number);
 }

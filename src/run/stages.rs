@@ -1,18 +1,18 @@
 //! The stages of a run, each made from the previous one: [`Scene`], [`Built`], [`Prepared`], [`Done`]; and the clock that measures its phases.
 
+use super::inner::Solvers;
+use super::meshed::{MeshFile, SceneMesh};
 use crate::ddm::{InitialGuess, Method, Outcome, Row};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
 use crate::fem::Prolongation;
 use crate::file::bytes_in_proc;
-use crate::model::{BodySlot, Model};
+use crate::model::{BodyCounts, LinearStep, Model};
 use crate::output::{BodyField, Mark, StepReport};
-use crate::problem::method::Linear;
 use crate::scene::Scene;
 use crate::solver::options::Chosen;
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::rc::Rc;
 use std::time::Instant;
 
@@ -25,42 +25,48 @@ pub struct Built {
     /// A line for each group of the mesh that is split into bodies.
     pub splits: Vec<String>,
     /// The file of its mesh, on the rank that has read it; none on other ranks.
-    pub mesh: Option<MeshFile>,
+    pub file: Option<MeshFile>,
     /// Places that the page of the run marks, on the first rank; none without a page.
     pub marks: Vec<Mark>,
-    /// The solver of linear steps.
-    pub linear: Linear,
+    /// The solvers that were asked for and planned.
+    pub solvers: Solvers,
+    /// The solver of the linear steps of the problem before, which may serve again.
+    pub step: Option<Box<dyn LinearStep>>,
+    /// Counters of that solver.
+    pub counts: BodyCounts,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Prolongation>,
     /// Rigid motions of all bodies for GAMG of their matrix, until it takes them.
     pub near_null_space: Vec<Vec<f64>>,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
-    /// Names of the condensed bodies, which another run can reuse.
-    pub condensed: Vec<String>,
     /// Options of all PETSc solvers of the problem: of bodies, or of the joint matrix of all bodies.
     pub options: Vec<Chosen>,
     /// Warnings on the problem.
     pub warnings: Vec<String>,
-    /// The legs of the load history; none if this problem serves all load steps. On a leg, all loads are proportional.
-    pub legs: Option<Rc<dyn Legs>>,
+    /// The mesh, for problems of other load steps or scenes; none where no other problem follows.
+    pub mesh: Option<Box<dyn SceneMesh>>,
 }
 
-/// The file of a mesh.
-#[derive(Debug, Clone)]
-pub struct MeshFile {
-    /// SHA-256 of its contents.
-    pub digest: String,
-    /// Its path.
-    pub path: PathBuf,
-    /// Whether Gmsh was to take its default algorithm for tetrahedra instead of HXT.
-    pub without_hxt: bool,
+/// What a problem leaves for the one that follows on its mesh.
+pub struct Before {
+    /// The discrete problem.
+    pub discrete: Discrete,
+    /// The solvers that were asked for and planned.
+    pub solvers: Solvers,
+    /// The solver of its linear steps.
+    pub step: Box<dyn LinearStep>,
+    /// Places that the page marks.
+    pub marks: Vec<Mark>,
 }
 
-/// A scene with its mesh, from which the problem of each leg of its load history is prepared.
-pub trait Legs {
-    /// Prepare the problem of the leg that begins with a step. Condensed bodies of the leg before are reused. Collective.
-    fn prepare(&self, step: usize, begin: Begin, condensed: Vec<BodySlot>, clock: &mut Clock) -> Result<Prepared>;
+impl Before {
+    /// Return the same for another run, whose counters start at zero.
+    pub fn begin_anew(mut self) -> Self {
+        self.discrete.begin_anew();
+        self.step.begin_anew();
+        self
+    }
 }
 
 /// The start of a run that continues one on another mesh or in another process.
@@ -106,21 +112,11 @@ pub struct Done {
     pub recovered: Option<Rc<All>>,
 }
 
-impl Built {
-    /// Return the condensed bodies with their counters reset, for other loads, layers or gaps.
-    pub fn into_condensed(self) -> Vec<BodySlot> {
-        let mut slots = self.discrete.model.bodies;
-        slots.retain(|slot| self.condensed.contains(&slot.name));
-        slots.iter_mut().filter_map(|slot| slot.local.as_mut()).for_each(|body| body.begin_anew());
-        slots
-    }
-}
-
 impl Done {
-    /// Return the same problem and method, prepared for another run that starts from this outcome.
-    pub fn go_on(self, start: impl FnOnce(Outcome) -> InitialGuess) -> Prepared {
-        let Self { built, method, outcome, steps, earlier, warnings, .. } = self;
-        Prepared { built, method, start: start(outcome), steps, earlier, warnings }
+    /// Return the mesh, and what was made on it, for the problem that follows.
+    pub fn into_mesh(self) -> (Option<Box<dyn SceneMesh>>, Before) {
+        let Built { discrete, solvers, marks, mesh, .. } = self.built;
+        (mesh, Before { discrete, solvers, step: self.method.into_linear(), marks })
     }
 
     /// Return the model of the discrete problem.

@@ -1,21 +1,38 @@
 //! Load steps: a sequence of solutions, each of which starts from the previous one.
 //!
-//! A leg of a load history is a sequence of steps in which all loads and prescribed displacements have a common factor. A step within a leg changes
-//! loads alone, and no body is assembled, reduced or factorised again. Another leg is another problem on the same mesh, which reuses condensed
-//! bodies.
+//! A step changes loads, prescribed displacements, gaps and motions of obstacles, and nothing else: no body is
+//! assembled, reduced or factored again, and no pair is searched for.
 
+use super::phases::next_step;
 use super::recorder::{self, Recorder};
-use super::report::GatheredCounters;
 use super::results;
-use super::stages::{All, Begin, Clock, Done, Prepared};
+use super::stages::{All, Clock, Done, Prepared};
 use super::verdict::{message, status_name};
 use super::warnings;
 use crate::ddm::{InitialGuess, Observer, Outcome, Row, Solution, Status};
-use crate::discretize::{self, Discrete};
 use crate::error::Result;
-use crate::model::BodyCounts;
+use crate::interrupt::Interrupt;
 use crate::problem::history::History;
 use std::rc::Rc;
+
+/// Iterate. From here on a signal ends the run after the current step, so that its results are written.
+///
+/// # Errors
+/// PETSc fails. A run that does not converge is not an error but a status of the outcome.
+pub fn iterate(ready: Prepared, interrupt: &Interrupt, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
+    interrupt.hold();
+    let mut done = match ready.built.scene.method.steps.is_empty() {
+        true => recorder::solve(ready, true, keep).inspect(|done| {
+            if matches!(done.outcome.status, Status::Interrupted { .. }) {
+                keep.state(done);
+            }
+        }),
+        false => steps(ready, keep, clock),
+    }?;
+    warnings::note_ends(&mut done);
+    clock.phase("iterate");
+    Ok(done)
+}
 
 /// Solve the load steps of a scene and report each. The outcome is that of the last step with the counters and rows of all steps.
 ///
@@ -24,21 +41,16 @@ use std::rc::Rc;
 ///
 /// # Errors
 /// Failures of the solver library, and loads that a body cannot have.
-pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
-    let scene = ready.built.scene.clone();
-    let history = &scene.method.steps;
+fn steps(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) -> Result<Done> {
+    let count = ready.built.scene.method.steps.steps.len();
     let mut all = Steps::new(keep, &ready);
     loop {
-        ready.built.discrete.scale_loads(history.share(all.step));
-        if !matches!(ready.start, InitialGuess::Known(_)) {
-            ready.start = discretize::start(&scene, &ready.built.discrete)?.into();
-        }
         all.step += 1;
-        let last = all.step == history.steps.len();
+        let last = all.step == count;
         let mut done = recorder::solve(ready, last, &mut all)?;
         let interrupted = matches!(done.outcome.status, Status::Interrupted { .. });
         if interrupted && !last {
-            let (step, count) = (all.step, history.steps.len());
+            let step = all.step;
             done.warnings.push(format!(
                 "interrupted in load step {step} of {count}: pressures and displacements are those of this step"
             ));
@@ -55,14 +67,9 @@ pub fn iterate(mut ready: Prepared, keep: &mut dyn Recorder, clock: &mut Clock) 
             all.complete(&mut done);
             return Ok(done);
         }
-        let usable = done.outcome.status.is_solved() || done.outcome.status == Status::IterationLimit;
-        ready = match history.leg(all.step).contains(&(all.step - 1)) {
-            true => done.go_on(|Outcome { iterate: field, layer, .. }| match usable {
-                true => InitialGuess::Known(Box::new(Solution { field, compression: layer.compression })),
-                false => InitialGuess::Automatic,
-            }),
-            false => all.end_leg(done, usable, clock)?,
-        };
+        clock.phase("iterate");
+        let start = all.next_start(&done);
+        ready = next_step(done, start, clock)?;
     }
 }
 
@@ -80,8 +87,6 @@ struct Steps<'a> {
     smoothed: usize,
     /// Wall seconds of the steps before.
     seconds: f64,
-    /// Counters of the bodies in the legs before.
-    counts: BodyCounts,
 }
 
 impl<'a> Steps<'a> {
@@ -96,7 +101,6 @@ impl<'a> Steps<'a> {
             sweeps: 0,
             smoothed: 0,
             seconds: 0.0,
-            counts: BodyCounts::default(),
         }
     }
 
@@ -108,8 +112,6 @@ impl<'a> Steps<'a> {
         row.sweeps += self.sweeps;
         row.smoothed += self.smoothed;
         row.seconds += self.seconds;
-        row.factorizations += self.counts.factorizations;
-        row.inner_iterations += self.counts.inner_iterations;
         row
     }
 
@@ -136,34 +138,15 @@ impl<'a> Steps<'a> {
     fn complete(&self, done: &mut Done) {
         let Done { outcome, earlier, .. } = done;
         (outcome.iterations, outcome.sweeps) = (self.iterations, self.sweeps);
-        outcome.joint += self.counts;
         outcome.rows = std::mem::take(earlier);
     }
 
-    /// End a leg and return the problem of the next one, which begins with the pressures of this one. Collective.
-    fn end_leg(&mut self, done: Done, usable: bool, clock: &mut Clock) -> Result<Prepared> {
-        clock.phase("iterate");
-        self.counts += GatheredCounters::gather(&done.built.discrete).counts;
-        self.counts += done.outcome.joint;
-        let Discrete { assemblies, assemblies_avoided, .. } = done.built.discrete;
-        let Done { built, method, outcome, steps, earlier, mut warnings, .. } = done;
-        let known = || Box::new(Solution { compression: outcome.layer.compression, ..Solution::default() });
-        let start = (usable && !self.history.is_at_rest(self.step)).then(|| InitialGuess::Known(known()));
-        let (legs, mut known) = (built.legs.clone(), built.warnings.clone());
-        drop(method);
-        let condensed = built.into_condensed();
-        let Some(legs) = legs else { unreachable!("a history of several legs comes with the way to them") };
-        let mut ready = legs.prepare(self.step, Begin { start, steps }, condensed, clock)?;
-        ready.earlier = earlier;
-        ready.built.legs = Some(legs);
-        ready.built.discrete.assemblies += assemblies;
-        ready.built.discrete.assemblies_avoided += assemblies_avoided;
-        for (all, new) in [(&mut known, &mut ready.built.warnings), (&mut warnings, &mut ready.warnings)] {
-            new.retain(|warning| !all.contains(warning));
-            all.append(new);
-        }
-        (ready.built.warnings, ready.warnings) = (known, warnings);
-        Ok(ready)
+    /// Return the start of the step that follows this one, none if the scene has it.
+    fn next_start(&self, done: &Done) -> Option<InitialGuess> {
+        let Outcome { status, iterate, layer, .. } = &done.outcome;
+        let is_usable = status.is_solved() || *status == Status::IterationLimit;
+        let known = || Solution { field: iterate.clone(), compression: layer.compression.clone() };
+        (is_usable && !self.history.is_at_rest(self.step)).then(|| InitialGuess::Known(Box::new(known())))
     }
 }
 

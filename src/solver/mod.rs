@@ -59,8 +59,8 @@ pub struct BodyCounts {
     pub patches: usize,
     /// Number of symbolic factorisations.
     pub symbolic: usize,
-    /// Number of numeric factorisations of K that were reused from an earlier run.
-    pub factorizations_avoided: usize,
+    /// Number of bodies condensed to their interfaces. Each is one of the `factorizations`, too.
+    pub condensations: usize,
     /// Number of solves G z = r.
     pub solves: usize,
     /// Number of Krylov iterations in these solves.
@@ -83,7 +83,7 @@ impl std::ops::AddAssign for BodyCounts {
         self.dense_factorizations += other.dense_factorizations;
         self.patches += other.patches;
         self.symbolic += other.symbolic;
-        self.factorizations_avoided += other.factorizations_avoided;
+        self.condensations += other.condensations;
         self.solves += other.solves;
         self.inner_iterations += other.inner_iterations;
         self.robin_updates += other.robin_updates;

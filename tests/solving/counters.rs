@@ -3,7 +3,8 @@
 //! For two bodies: the start factors each body with springs of its own and solves it once; every sweep solves each
 //! body once; a body is factored when its Robin term changed.
 
-use crate::common::{Run, case, distance, solve, winkler};
+use crate::common::here::solve_here;
+use crate::common::{Run, case, distance, solve, winkler_on};
 
 /// Bodies that factor their own G; condensed ones count at the end.
 const COARSE: [&str; 4] = ["--set", "mesh.set.n=8", "--set", "solver=mumps"];
@@ -136,32 +137,95 @@ fn the_table_has_the_lengths_of_the_report() {
     assert!(inner.iter().all(|&seconds| seconds > 0.0) && inner.iter().sum::<f64>() < run.number("times/total"));
 }
 
+/// The reports of a sweep.
+fn sweep(over: &[&str], more: &[&str]) -> Vec<serde_json::Value> {
+    sweep_on(1, over, more)
+}
+
+/// The same on several ranks.
+fn sweep_on(ranks: usize, over: &[&str], more: &[&str]) -> Vec<serde_json::Value> {
+    let path = case("groove").display().to_string();
+    let over: Vec<&str> = over.iter().flat_map(|over| ["--over", over]).collect();
+    let words = ["sweep", &path, "-o", "out", "--json", "--set", "mesh.set.n=8"];
+    let run = winkler_on(ranks, &[&words[..], &over, more].concat());
+    assert_eq!(run.code, 0, "{}", run.said());
+    serde_json::from_str(&run.stdout).expect("a list of reports")
+}
+
+/// What a run has made.
+const MADE: [&str; 4] = ["assemblies", "symbolic_factorizations", "condensations", "pairings"];
+
+fn made(report: &serde_json::Value) -> [u64; 4] {
+    MADE.map(|name| report[name].as_u64().expect("a count"))
+}
+
 /// A sweep over methods factors each body once, and every run is the one that `solve` makes.
 #[test]
 fn a_sweep_over_methods_keeps_condensed_bodies() {
-    let sweep = |over: &[&str], more: &[&str]| -> Vec<serde_json::Value> {
-        let path = case("groove").display().to_string();
-        let over: Vec<&str> = over.iter().flat_map(|over| ["--over", over]).collect();
-        let run =
-            winkler(&[&["sweep", &path, "-o", "out", "--json", "--set", "mesh.set.n=8"][..], &over, more].concat());
-        assert_eq!(run.code, 0, "{}", run.said());
-        serde_json::from_str(&run.stdout).expect("a list of reports")
-    };
-    let done =
-        ["assemblies", "factorizations", "symbolic_factorizations", "assemblies_avoided", "factorizations_avoided"];
-    let counts = |report: &serde_json::Value| done.map(|name| report[name].as_u64().expect("a count"));
-    let (once, never) = ([2, 2, 2, 0, 0], [0, 0, 0, 2, 2]);
+    let (once, never) = ([2, 2, 2, 1], [0; 4]);
     let reports = sweep(&["method.gamma=0.5,0.6"], &[]);
-    assert_eq!([counts(&reports[0]), counts(&reports[1])], [once, never]);
+    assert_eq!([made(&reports[0]), made(&reports[1])], [once, never]);
     // each method with its own linear steps, whatever the one before had
     let methods = ["newton-robin", "newton", "robin", "newton-robin", "robin", "newton"];
     let reports = sweep(&[&format!("method.name={}", methods.join(","))], &[]);
     assert!(reports.iter().zip(methods).all(|(report, method)| report["method"] == method));
     assert!(reports[1..].iter().all(|report| report["factorizations"] == 0));
-    // another load, layer, mesh, body or solver: nothing is left
-    let (load, layer) = ("body.1.load.0.pressure=10,\"8 + x\"", "contact.0.layer.power.a=0.5,1");
-    for over in [load, layer, "mesh.set.n=4,8", "body.0.young=1e5,2e5", "solver=mumps,condensed"] {
-        assert!(sweep(&[over], &[]).iter().all(|report| counts(report)[3..] == [0, 0]), "{over}");
+}
+
+/// The second of two scenes makes what the setting touches that differs: nothing for laws, gaps, loads, moved supports
+/// and methods, a body for its material or supports, all for another mesh. Its results are those of a run of its own.
+#[test]
+fn a_sweep_makes_what_a_setting_touches() {
+    let (nothing, body, all) = ([0, 0, 0, 0], [1, 1, 1, 0], [2, 2, 2, 1]);
+    let end = |support: &str| format!("{{on=\"lower_end\",{support}}}");
+    // free along a contact surface, the end is a plane of symmetry no more: the surface has other normals there
+    let supports = |one: &str, other: &str| format!("body.0.fix.1={},{}", end(one), end(other));
+    let settings = [
+        ("contact.0.layer={power={B=1e-5,a=0.5}},{linear={stiffness=1e6}}".to_owned(), nothing),
+        ("contact.0.gap=\"1e-4*x\",\"2e-4*x\"".to_owned(), nothing),
+        ("body.1.load.0.pressure=10,\"8 + x\"".to_owned(), nothing),
+        (supports("x=0,y=0", "x=0,y=1e-4"), nothing),
+        ("body.0.young=1e5,2e5".to_owned(), body),
+        (supports("x=0,y=0", "y=0"), [1, 1, 1, 1]),
+        ("body.0.order=1,2".to_owned(), all),
+        ("mesh.set.n=4,8".to_owned(), all),
+    ];
+    let method = "method={name=\"newton\", stop={residual=1e-10}}";
+    let with = |solver: &'static str| ["--set", method, "--set", solver];
+    for (over, expected) in &settings {
+        let reports = sweep(&[over], &with("solver=condensed"));
+        assert_eq!([made(&reports[0]), made(&reports[1])], [[2, 2, 2, 1], *expected], "{over}");
+        let (key, values) = over.split_once('=').expect("a setting");
+        let set = format!("{key}={}", second(values));
+        let alone = solve_here(case("groove"), &["mesh.set.n=8", &set, method, "solver=mumps"]);
+        for path in ["pairs/0/peak_pressure", "pairs/0/normal_force", "F1"] {
+            let ours = reports[1].pointer(&format!("/{path}")).and_then(serde_json::Value::as_f64).expect(path);
+            let theirs = alone.number(path);
+            assert!((ours / theirs - 1.0).abs() < 1e-6, "{over}, {path}: {ours} {theirs}");
+        }
     }
-    assert_eq!(counts(&sweep(&["method.gamma=0.5,0.6"], &["--set", "solver=mumps"])[1])[0], 2);
+    for (over, [assemblies, ..]) in [&settings[0], &settings[4]] {
+        // one factorisation has the pattern of all bodies; a matrix of multigrid has their values, and none has its own
+        // any more
+        let [factored, multigrid] =
+            ["solver=mumps", "solver=hypre"].map(|solver| made(&sweep(&[over], &with(solver))[1]));
+        assert_eq!(factored, [*assemblies, *assemblies, 0, 0], "{over}");
+        assert_eq!(multigrid[0], 2 * assemblies, "{over}");
+    }
+    // solvers of another kind are made anew, and pairs are not; a rank without a body lets others go when all ranks do
+    for ranks in [1, 3] {
+        let reports = sweep_on(ranks, &["solver=mumps,condensed,hypre"], &["--set", method]);
+        let expected = [[2, 1, 0, 1], [2, 2, 2, 0], [2, 1, 0, 0]];
+        assert!(reports.iter().map(made).eq(expected), "{ranks}");
+    }
+}
+
+/// The second of two values, which have commas inside brackets and quotes only.
+fn second(values: &str) -> &str {
+    let mut depth = 0;
+    let comma = values.char_indices().find(|(_, c)| {
+        depth += i32::from(*c == '{') - i32::from(*c == '}');
+        *c == ',' && depth == 0
+    });
+    &values[comma.expect("two values").0 + 1..]
 }

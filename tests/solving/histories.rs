@@ -101,19 +101,28 @@ fn sweeps_go_on_in_another_direction() {
     }
 }
 
-/// Steps with loads in proportion are one problem, and others are as many as there are directions; condensed bodies serve all of them.
+/// Steps change vectors alone, whatever direction their loads have: bodies are assembled and condensed once, and
+/// surfaces are searched once.
 #[test]
-fn only_another_direction_makes_another_problem() {
-    let counts = |table: &str, solver: &str| {
-        let run = solve(with_table(table), &["--set", &format!("solver={solver}")]).converged();
-        ["assemblies", "assemblies_avoided", "factorizations_avoided"].map(|name| run.count(name))
-    };
-    let (straight, bent) =
-        ("press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.4\n", "press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.5\n0.1,0.25\n");
-    assert_eq!(counts(straight, "mumps"), [2, 0, 0]);
-    assert_eq!(counts(bent, "mumps"), [4, 0, 0]);
-    assert_eq!(counts(straight, "condensed"), [2, 0, 0]);
-    assert_eq!(counts(bent, "condensed"), [2, 2, 2]);
+fn a_history_has_one_set_up() {
+    let names = ["assemblies", "condensations", "pairings"];
+    let counts = |run: &Run| names.map(|name| run.count(name));
+    let bent = "press,lift\n0.1,0.2\n0.4,0.8\n0.2,0.5\n0.1,0.25\n";
+    let gap = ["--set", "contact.0.gap=\"1e-4*lift\""];
+    for more in [&[][..], &gap] {
+        let of = |solver: &str| {
+            let solver = format!("solver={solver}");
+            solve(with_table(bent), &[&["--set", &solver], more].concat()).converged()
+        };
+        let [factored, condensed, multigrid] = ["mumps", "condensed", "hypre"].map(of);
+        assert_eq!([&factored, &multigrid].map(counts), [[2, 0, 1]; 2]);
+        assert_eq!(factored.count("symbolic_factorizations"), 1);
+        assert_eq!(counts(&condensed), [2, 2, 1]);
+        assert_eq!(condensed.count("factorizations"), 2);
+    }
+    // the offset of a preload is an unknown of the first step alone
+    let bolt = solve(case("bolt"), &[]).converged();
+    assert_eq!(["assemblies", "pairings"].map(|name| bolt.count(name)), [4, 3]);
     // one column of all loads: no line names it
     let scene = case("groove-held");
     let folder = tempfile::tempdir().expect("a folder");
