@@ -189,7 +189,7 @@ const CASES: &[Case] = &[
     ("n = 32", "n = 99999999999999999999", "99999999999999999999", "the number is too large", ""),
     // Keys.
     ("young = 2.1e5", "yuong = 2.1e5", "yuong", "unknown key `yuong` in [[body]]", "did you mean `young`?"),
-    ("young = 2.1e5", "density = 2.1e5", "density", "unknown key `density` in [[body]]", "its keys are name, young, poisson, "),
+    ("young = 2.1e5", "mass = 2.1e5", "mass", "unknown key `mass` in [[body]]", "its keys are name, young, poisson, "),
     ("title = ", "colour = ", "colour", "unknown key `colour` in the scene", "title, dimension, plane, units, mesh"),
     ("[method]", "[methods]", "methods", "unknown key `methods` in the scene", "`method`"),
     ("B = 2.5e-5", "b = 2.5e-5", "b", "unknown key `b` in `power`", "`B`"),
