@@ -4,7 +4,7 @@ use super::element::{self, EDGES, Gradients, Rule, Slopes, Values};
 use super::{cross, lagrange, minus, pad};
 use crate::exchange::Plain;
 use crate::linalg::dot;
-use crate::mesh::{Group, Mesh, Numbering, datum};
+use crate::mesh::{self, Group, Mesh, Numbering, datum};
 use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -33,25 +33,26 @@ pub struct Space<const D: usize> {
     /// Body node of each mesh point that is one; unknown in a part of a body.
     #[serde(skip)]
     from_mesh: Numbering,
-    /// First of the nodes inside each edge for the point of the mesh in its middle, if there are several. They lie in the direction from the end with the
-    /// lower number in the mesh to the other one.
+    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge, unless nodes of edges are points themselves. They
+    /// lie in the direction from the end with the lower number in the mesh to the other one.
     #[serde(skip)]
-    edges: Numbering,
+    edges: Option<Numbering>,
     /// Area (volume) of all cells, once it has been requested.
     #[serde(skip)]
     measure: OnceCell<f64>,
 }
 
 impl<const D: usize> Space<D> {
-    /// Make the space of `order` on the cells of `group` (of dimension `D`). The order of the mesh is at least `order`.
+    /// Make the space of `order` on the cells of `group` (of dimension `D`). The mesh is not linear unless `order` is 1.
+    ///
+    /// Vertices are points of the mesh, and so are mid-edge nodes on a mesh of order two. Other nodes lie on the map of the cell.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
-        let shape = element::node_count(D + 1, order.of_shape());
-        let points = || group.connectivity.chunks_exact(group.stride).map(|cell| &cell[..shape]);
-        let numbering = |is_node: bool| {
-            let chosen = move |k: &usize| is_node == (order == Order::P2 || *k <= D);
-            Numbering::new(points().flat_map(move |cell| (0..shape).filter(chosen).map(|k| cell[k])))
-        };
+        let is_whole = order == Order::P1 || order.max(mesh.order) == Order::P2;
+        let own = if is_whole { stride } else { D + 1 };
+        let cells = || group.connectivity.chunks_exact(group.stride);
+        let inside = mesh.order.degree() - 1;
+        let edges = || cells().flat_map(move |cell| cell[D + 1..].chunks_exact(inside)).map(edge_point);
         let mut space = Space {
             order,
             nodes: Vec::new(),
@@ -60,43 +61,40 @@ impl<const D: usize> Space<D> {
             stride,
             cells: Vec::with_capacity(group.connectivity.len() / group.stride * stride),
             axisymmetric: false,
-            from_mesh: numbering(true),
-            edges: numbering(false),
+            from_mesh: Numbering::new(cells().flat_map(move |cell| &cell[..own]).copied()),
+            edges: (!is_whole).then(|| Numbering::new(edges())),
             measure: OnceCell::new(),
         };
-        let places = if order > Order::P2 { lagrange::of(order, D + 1).nodes.clone() } else { Vec::new() };
-        points().for_each(|cell| space.add_cell(mesh, cell, &places));
+        let places = element::nodes::<3>(order).into_iter().skip(own);
+        let weights: Vec<Vec<f64>> = places.map(|l| mesh::weights(mesh.order, &l)).collect();
+        cells().for_each(|cell| space.add_cell(mesh, cell, own, &weights));
         space
     }
 
-    /// Add the nodes of a cell of the mesh. `places` are the barycentric coordinates of the nodes of orders above two, which lie where the quadratic cell
-    /// of the mesh has them.
-    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], places: &[[f64; 3]]) {
+    /// Add the nodes of a cell of the mesh. The first `own` points are nodes, and the others have these `weights` of the points.
+    fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], own: usize, weights: &[Vec<f64>]) {
         let at = |point: &u32| mesh.points[*point as usize];
-        let whole = places.is_empty();
-        for point in &cell[..if whole { cell.len() } else { D + 1 }] {
+        for point in &cell[..own] {
             let (node, is_new) = self.from_mesh.number(*point, self.nodes.len() as u32);
             if is_new {
                 self.nodes.push(at(point));
             }
             self.cells.push(node);
         }
-        if whole {
-            return;
-        }
+        let Some(edges) = &mut self.edges else { return };
         let x: Vec<[f64; D]> = cell.iter().map(at).collect();
-        let place = |local: usize| element::interpolate(&x, &element::values(Order::P2, &places[local]));
+        let place = |local: usize| element::interpolate(&x, &weights[local - own]);
         let count = self.order.degree() as u32 - 1;
-        for (&middle, &(i, j)) in cell[D + 1..].iter().zip(&EDGES) {
+        for (inside, &(i, j)) in cell[D + 1..].chunks_exact(mesh.order.degree() - 1).zip(&EDGES) {
             let is_forward = cell[i] < cell[j];
-            let (first, is_new) = self.edges.number(middle, self.nodes.len() as u32);
+            let (first, is_new) = edges.number(edge_point(inside), self.nodes.len() as u32);
             if is_new {
                 let ends = if is_forward { [i, j] } else { [j, i] };
                 self.nodes.extend(element::inside_edge(self.order, D + 1, ends).map(place));
             }
             self.cells.extend((0..count).map(|k| first + if is_forward { k } else { count - 1 - k }));
         }
-        for local in (D + 1) + (cell.len() - D - 1) * count as usize..self.stride {
+        for local in D + 1 + D * (D + 1) / 2 * count as usize..self.stride {
             self.cells.push(self.nodes.len() as u32);
             self.nodes.push(place(local));
         }
@@ -131,8 +129,7 @@ impl<const D: usize> Space<D> {
 
     /// Return the space with other nodes and cells, which has no link to points of the mesh.
     pub fn with(&self, nodes: Vec<[f64; D]>, cells: Vec<u32>) -> Self {
-        let (from_mesh, edges) = (Numbering::default(), Numbering::default());
-        Space { nodes, cells, from_mesh, edges, measure: OnceCell::new(), ..*self }
+        Space { nodes, cells, from_mesh: Numbering::default(), edges: None, measure: OnceCell::new(), ..*self }
     }
 
     /// Turn the space into the meridian of a body of revolution.
@@ -199,7 +196,7 @@ impl<const D: usize> Space<D> {
 
     /// Return the points of the mesh on the cells of the body.
     pub fn mesh_points(&self) -> impl Iterator<Item = u32> {
-        self.from_mesh.points().chain(self.edges.points())
+        self.from_mesh.points().chain(self.edges.iter().flat_map(Numbering::points))
     }
 
     /// Return the point of the mesh that each node is, or [`Space::NO_POINT`].
@@ -300,15 +297,14 @@ impl<const D: usize> Space<D> {
     /// not sorted above order two. Nodes inside the simplex are left out.
     pub(super) fn simplex(&self, points: &[u32], dimension: usize) -> Option<Vec<u32>> {
         let vertices = dimension + 1;
-        let wanted = element::node_count(vertices, self.order.of_shape());
-        let [own, edges] = if self.order > Order::P2 { [vertices, wanted] } else { [wanted, wanted] };
-        let mut nodes = Vec::with_capacity(wanted);
-        for &point in &points[..own] {
-            nodes.push(self.from_mesh.get(point)?);
-        }
-        for &middle in &points[own..edges] {
-            let first = self.edges.get(middle)?;
-            nodes.extend(first..first + self.order.degree() as u32 - 1);
+        let own = if self.order == Order::P2 && self.edges.is_none() { points.len() } else { vertices };
+        let mut nodes = points[..own].iter().map(|&point| self.from_mesh.get(point)).collect::<Option<Vec<u32>>>()?;
+        if let Some(edges) = self.edges.as_ref().filter(|_| dimension > 0) {
+            let inside = 2 * (points.len() - vertices) / (dimension * vertices);
+            for edge in points[vertices..].chunks_exact(inside) {
+                let first = edges.get(edge_point(edge))?;
+                nodes.extend(first..first + self.order.degree() as u32 - 1);
+            }
         }
         Some(nodes)
     }
@@ -326,13 +322,19 @@ impl<const D: usize> Space<D> {
         };
         if group.dimension == 0 {
             // a set of nodes holds the edges whose middles it has
-            let firsts = group.connectivity.iter().filter_map(|&point| self.edges.get(point));
+            let of_edge = |point: &u32| self.edges.as_ref()?.get(*point);
+            let firsts = group.connectivity.iter().filter_map(of_edge);
             nodes.extend(firsts.flat_map(|first| first..first + self.order.degree() as u32 - 1));
         }
         nodes.sort_unstable();
         nodes.dedup();
         nodes
     }
+}
+
+/// Return the point of the mesh that stands for the edge with these points inside: the middle of a quadratic one.
+fn edge_point(inside: &[u32]) -> u32 {
+    inside.iter().copied().min().unwrap_or_default()
 }
 
 /// A point of a cell, with the shape functions of the cell there.

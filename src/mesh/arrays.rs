@@ -30,13 +30,12 @@ pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>
     }
     let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
     let mesh = Mesh::new(NAME.into(), points, *own, groups.into());
-    Ok(if *own < order { mesh.higher_order() } else { mesh })
+    Ok(if *own == Order::P1 && order > Order::P1 { mesh.higher_order() } else { mesh })
 }
 
 fn group_of<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order) -> Result<Group> {
     let GroupArrays { name, dimension, connectivity } = arrays;
-    let (corners, edges) = (dimension + 1, dimension * (dimension + 1) / 2);
-    let stride = if order == Order::P1 { corners } else { corners + edges };
+    let stride = simplex::stride(*dimension, Some(order));
     let refuse = |what: String| refuse_arrays(format!("group `{name}` {what}"));
     if name.is_empty() || *dimension > D {
         return Err(refuse(format!("is of dimension {dimension}"))

@@ -1,6 +1,6 @@
 //! From the nodes and elements of a file, in its numbers, to a [`Mesh`].
 //!
-//! Some programs write the boundary of quadratic cells as linear lines and facets. These get the mid-edge nodes of the cells.
+//! Some programs write the boundary of curved cells as linear lines and facets. These get the nodes inside the edges of the cells.
 
 use super::Mesh;
 use super::groups::{self, Group, Numbering};
@@ -52,7 +52,7 @@ pub struct MeshBuilder<const D: usize> {
 }
 
 /// The advice about elements of higher orders.
-const ORDERS: &str = "use elements of order 1 or 2: `gmsh -order 2`";
+const ORDERS: &str = "use elements of order 1 or 2, in the plane up to 8: `gmsh -order 2`";
 
 /// Return an element type of Gmsh.
 pub fn kind_of(number: i32) -> std::result::Result<ElementType, Flaw> {
@@ -144,12 +144,13 @@ impl<const D: usize> MeshBuilder<D> {
     pub fn check_type(&mut self, kind: ElementType, groups: &[usize]) -> std::result::Result<(), Flaw> {
         let Some(&group) = groups.first() else { return Ok(()) };
         let name = &self.groups[group].name;
-        if !kind.is_known() {
-            let ElementType { shape, nodes, number } = kind;
+        let highest = if D == 2 { Order::new(Order::HIGHEST) } else { Some(Order::P2) };
+        if kind.order > highest {
+            let ElementType { shape, nodes, number, .. } = kind;
             let what = format!("group `{name}` has {} elements of {nodes} nodes (Gmsh's type {number})", shape.name);
             return Err(Flaw::new(what, ORDERS));
         }
-        let Some(order) = kind.order() else { return Ok(()) };
+        let Some(order) = kind.order else { return Ok(()) };
         match self.orders[kind.shape.dimension].get_or_insert((order, group)).0 == order {
             true => Ok(()),
             false => Err(other_order(name)),
@@ -182,7 +183,7 @@ impl<const D: usize> MeshBuilder<D> {
         let mut simplices = match kind.is_divided() {
             true => Middles { points: &mut self.points, known: &mut self.middles }.simplices(kind, &own),
             false => {
-                simplex::from_gmsh_order(&mut own);
+                kind.reorder(&mut own);
                 own
             }
         };
@@ -232,8 +233,8 @@ impl<const D: usize> MeshBuilder<D> {
             let Flaw { what, help } = other_order(&self.groups[*group].name);
             return Err(fail(what).help(help));
         }
-        if order == Some(Order::P2) {
-            raise(&mut self.groups, &mut self.points, D);
+        if let Some(order) = order.filter(|order| *order > Order::P1) {
+            raise(&mut self.groups, &mut self.points, order, D);
         }
         // Empty groups of other programs are dropped.
         let mut groups = self.groups;
@@ -267,33 +268,46 @@ fn other_order(group: &str) -> Flaw {
     Flaw::new(what, "save all elements with one order: gmsh -order 1 or 2")
 }
 
-/// Give linear elements below the dimension `space` of quadratic cells the mid-edge nodes of the cells. Elements that are no
+/// Give linear elements below the dimension `space` of cells of a higher order the nodes inside the edges of the cells. Elements that are no
 /// edges or facets of cells get new nodes, with straight edges.
-fn raise(groups: &mut [Group], points: &mut Vec<[f64; 3]>, space: usize) {
+fn raise(groups: &mut [Group], points: &mut Vec<[f64; 3]>, order: Order, space: usize) {
     let is_linear = |group: &&mut Group| group.dimension > 0 && group.stride == group.dimension + 1;
     if !groups.iter_mut().any(|group| is_linear(&group)) {
         return;
     }
-    let sorted = |a: u32, b: u32| [a.min(b), a.max(b)];
-    let mut of_edge: HashMap<[u32; 2], u32> = HashMap::new();
+    let inside = order.degree() - 1;
+    // from the end with the smaller number to the other one
+    let mut of_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
     for cell in groups.iter().filter(|group| group.dimension == space).flat_map(Group::simplices) {
-        let middles = EDGES.iter().zip(&cell[space + 1..]);
-        of_edge.extend(middles.map(|([a, b], middle)| (sorted(cell[*a], cell[*b]), *middle)));
+        for ([a, b], nodes) in EDGES.iter().zip(cell[space + 1..].chunks_exact(inside)) {
+            let (ends, nodes) = sorted([cell[*a], cell[*b]], nodes.to_vec());
+            of_edge.insert(ends, nodes);
+        }
     }
     for group in groups.iter_mut().filter(is_linear) {
-        let (vertices, edges) = (group.stride, group.dimension * (group.dimension + 1) / 2);
-        let mut connectivity = Vec::with_capacity(group.len() * (vertices + edges));
+        let edges = group.dimension * (group.dimension + 1) / 2;
+        let mut connectivity = Vec::with_capacity(group.len() * (group.stride + edges * inside));
         for simplex in group.simplices() {
             connectivity.extend_from_slice(simplex);
-            for &[a, b] in &EDGES[..edges] {
-                let ends = sorted(simplex[a], simplex[b]);
-                connectivity.push(*of_edge.entry(ends).or_insert_with(|| {
-                    let [a, b] = ends.map(|end| points[end as usize]);
-                    points.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
-                    (points.len() - 1) as u32
-                }));
+            for ends in EDGES[..edges].iter().map(|edge| edge.map(|corner| simplex[corner])) {
+                let (key, _) = sorted(ends, Vec::new());
+                let nodes = of_edge.entry(key).or_insert_with(|| {
+                    let [a, b] = key.map(|end| points[end as usize]);
+                    let share = |k: usize| (k + 1) as f64 / (inside + 1) as f64;
+                    points.extend((0..inside).map(|k| std::array::from_fn(|c| a[c] + share(k) * (b[c] - a[c]))));
+                    (points.len() as u32 - inside as u32..points.len() as u32).collect()
+                });
+                connectivity.extend(sorted(ends, nodes.clone()).1);
             }
         }
-        (group.stride, group.connectivity) = (vertices + edges, connectivity);
+        (group.stride, group.connectivity) = (group.stride + edges * inside, connectivity);
     }
+}
+
+/// Return the ends of an edge in increasing order, and its nodes turned round with them.
+fn sorted([a, b]: [u32; 2], mut nodes: Vec<u32>) -> ([u32; 2], Vec<u32>) {
+    if a > b {
+        nodes.reverse();
+    }
+    ([a.min(b), a.max(b)], nodes)
 }

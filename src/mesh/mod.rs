@@ -22,6 +22,7 @@ mod msh;
 mod msh2;
 mod scan;
 mod script;
+mod shape;
 mod simplex;
 mod split;
 #[cfg(test)]
@@ -36,8 +37,8 @@ pub use locality::bisect;
 pub use msh::parse;
 pub use script::unstructured;
 pub use script::view;
+pub use shape::weights;
 pub use simplex::EDGES;
-pub use vertices::is_smooth;
 
 use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;
@@ -51,8 +52,8 @@ pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 /// A mesh: points and named groups of simplices.
 ///
 /// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower dimension. The
-/// local numbering is VTK's: vertices come first. For `Order::P2` mid-edges follow in the order `01` (line), `01 12 02`
-/// (triangle), `01 12 02 03 13 23` (tetrahedron).
+/// local numbering is VTK's: vertices come first. The points inside edges follow in the order `01` (line), `01 12 02`
+/// (triangle), `01 12 02 03 13 23` (tetrahedron), those of one edge from its first to its second end. There are no points inside simplices.
 ///
 /// No simplex is degenerate: its measure is above 1e-12 times its longest edge to the power of its dimension. Cells have
 /// positive volume, group names are unique, no group is empty, and coordinates are finite.
@@ -74,7 +75,7 @@ pub struct Mesh<const D: usize> {
     pub groups: Groups,
     /// Number of quadrangles, hexahedra, prisms and pyramids that were split into simplices.
     pub split: usize,
-    /// Number of quadratic cells whose edges were made straight because the curved boundary folded them.
+    /// Number of curved cells whose edges were made straight because the curved boundary folded them.
     pub straightened: usize,
 }
 

@@ -147,10 +147,22 @@ impl Contents {
         let mut contents = Self { nodes, ..Self::default() };
         for (tag, group) in (1..).zip(mesh.groups.iter()) {
             contents.groups.push((group.dimension, group.name.clone()));
-            let kind = ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride);
+            let Some(kind) =
+                ElementType::of(ElementType::number([&POINT, &LINE, &TRIANGLE][group.dimension], group.stride))
+            else {
+                continue;
+            };
             for simplex in group.simplices() {
+                let mut nodes = simplex.to_vec();
+                // the third edge of a triangle is turned round, which turns it back
+                kind.reorder(&mut nodes);
                 let number = contents.elements.len() as u64 + 1;
-                contents.elements.push((number, kind, tag, simplex.iter().map(|&node| u64::from(node) + 1).collect()));
+                contents.elements.push((
+                    number,
+                    kind.number,
+                    tag,
+                    nodes.into_iter().map(|node| u64::from(node) + 1).collect(),
+                ));
             }
         }
         contents

@@ -6,10 +6,10 @@
 //!
 //! Quadratic cells get nodes in the middle of the diagonals. A diagonal of a face has its node where the map of the face takes the
 //! centre of the reference square, and a diagonal through a cell where the map of the cell takes the centre of the reference cube.
-//! The boundary of the simplices is thus interpolated from that of the cells.
+//! The boundary of the simplices is thus interpolated from that of the cells. Quadrangles of higher orders, which are in the plane, get nodes where the
+//! map that blends their edges takes the points of the diagonal.
 
 use super::simplex::{EDGES, ElementType, QUADRANGLE, Shape};
-use crate::problem::order::Order;
 use std::collections::HashMap;
 
 /// Return the quadrangular faces of a shape. A quadrangle has one, itself.
@@ -51,8 +51,8 @@ const CELL: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 pub struct Middles<'a> {
     /// Coordinates of all points, to which new ones are appended.
     pub points: &'a mut Vec<[f64; 3]>,
-    /// The node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its diagonal, each
-    /// twice.
+    /// The first node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its diagonal, each
+    /// twice. Further ones follow, from the end with the smaller number.
     pub known: &'a mut HashMap<[u32; 4], u32>,
 }
 
@@ -61,17 +61,71 @@ impl Middles<'_> {
     pub fn simplices(&mut self, kind: ElementType, cell: &[u32]) -> Vec<u32> {
         let Shape { dimension, .. } = *kind.shape;
         let vertices = divided(kind.shape, cell);
-        if kind.order() == Some(Order::P1) {
+        let inside = kind.order.map_or(0, |order| order.degree() - 1);
+        if inside == 0 {
             return vertices;
         }
         let mut simplices = Vec::new();
         for simplex in vertices.chunks_exact(dimension + 1) {
             simplices.extend_from_slice(simplex);
             for [a, b] in &EDGES[..dimension * (dimension + 1) / 2] {
-                simplices.push(self.middle(kind.shape, cell, [simplex[*a], simplex[*b]]));
+                let ends = [simplex[*a], simplex[*b]];
+                match inside {
+                    1 => simplices.push(self.middle(kind.shape, cell, ends)),
+                    _ => simplices.extend(self.inside(inside, cell, ends)),
+                }
             }
         }
         simplices
+    }
+
+    /// Return the nodes between two vertices of a quadrangle with the nodes `cell`, so many on each edge, from the first vertex to the second one.
+    fn inside(&mut self, count: usize, cell: &[u32], ends: [u32; 2]) -> Vec<u32> {
+        let on_edge = |edge: usize| &cell[4 + edge * count..][..count];
+        let of_edge = |[a, b]: [u32; 2]| {
+            let edge = QUADRANGLE.edges.iter().position(|&[i, j]| [cell[i], cell[j]] == [a, b])?;
+            Some(on_edge(edge).to_vec())
+        };
+        let [a, b] = ends;
+        let turned = |mut nodes: Vec<u32>| {
+            nodes.reverse();
+            nodes
+        };
+        if let Some(nodes) = of_edge(ends).or_else(|| of_edge([b, a]).map(turned)) {
+            return nodes;
+        }
+        let mut key = [cell[0], cell[1], cell[2], cell[3]];
+        key.sort_unstable();
+        let first = self.known.get(&key).copied().unwrap_or_else(|| self.blend(count, cell, a.min(b)));
+        self.known.insert(key, first);
+        let nodes = (first..first + count as u32).collect();
+        if a < b { nodes } else { turned(nodes) }
+    }
+
+    /// Make the nodes on a diagonal of a quadrangle, from the vertex `from`, and return the first one.
+    fn blend(&mut self, count: usize, cell: &[u32], from: u32) -> u32 {
+        let first = self.points.len() as u32;
+        // the four edges from this vertex and to the opposite one: 0 1, 1 2 and 0 3, 3 2
+        let start = cell[..4].iter().position(|&vertex| vertex == from).unwrap_or(0);
+        let edge = |at: usize, k: usize| cell[4 + (start + at) % 4 * count + k];
+        for k in 0..count {
+            let (turned, s) = (count - 1 - k, (k + 1) as f64 / (count + 1) as f64);
+            let vertex = |at: usize, weight: f64| (-weight, cell[(start + at) % 4]);
+            let parts = [
+                (1.0 - s, edge(0, k)),
+                (s, edge(2, turned)),
+                (1.0 - s, edge(3, turned)),
+                (s, edge(1, k)),
+                vertex(0, (1.0 - s) * (1.0 - s)),
+                vertex(1, s * (1.0 - s)),
+                vertex(2, s * s),
+                vertex(3, s * (1.0 - s)),
+            ];
+            let at = |c| parts.iter().map(|&(weight, node)| weight * self.points[node as usize][c]).sum();
+            let place = std::array::from_fn(at);
+            self.points.push(place);
+        }
+        first
     }
 
     /// Return the node in the middle between two vertices of a quadratic cell with the nodes `cell`.

@@ -27,11 +27,6 @@ impl Order {
     pub fn degree(self) -> usize {
         usize::from(self.0)
     }
-
-    /// Return the order of the mesh that gives bodies of this order their shape: 1 or 2.
-    pub fn of_shape(self) -> Self {
-        self.min(Self::P2)
-    }
 }
 
 impl Default for Order {

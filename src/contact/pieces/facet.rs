@@ -47,8 +47,8 @@ pub(super) struct Facet<const D: usize> {
 
 impl<const D: usize> Facet<D> {
     pub fn of(side: &Side<D>, i: usize) -> Self {
-        let (order, on) = (side.facets.order.of_shape(), side.on_facet(i));
-        let mut x = side.facets.shape(i, side.space);
+        let (order, on) = (side.facets.order, side.on_facet(i));
+        let mut x = side.facets.coordinates(i, side.space);
         let from = x[0];
         x.iter_mut().for_each(|x| *x = minus(*x, from));
         Self {
@@ -72,8 +72,17 @@ impl<const D: usize> Facet<D> {
     /// Return a bound of the sum of the sizes of the terms that [`Facet::at`] adds.
     fn terms(&self, l: &[f64; D]) -> f64 {
         let reach = 1.0 + 2.0 * l[1..].iter().map(|l| l.abs()).sum::<f64>();
-        // The quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size.
-        self.size * if self.order == Order::P1 { reach } else { 3.0 * reach * reach }
+        self.size
+            * match self.order {
+                Order::P1 => reach,
+                // the quadratic functions, l (2l - 1) and 4 l m for barycentric coordinates l and m, sum to less than 3 reach^2 in size
+                Order::P2 => 3.0 * reach * reach,
+                // those of higher orders sum to less than 2.3 on the facet, and grow beyond it at most as Chebyshev's polynomials
+                order => {
+                    let x = (l[1] - l[0]).abs().max(1.0);
+                    2.3 * (x + (x * x - 1.0).sqrt()).powi(order.degree() as i32)
+                }
+            }
     }
 
     /// Return the derivative of x by the barycentric coordinate l[k + 1]. When that coordinate grows, l[0] becomes smaller by as much.

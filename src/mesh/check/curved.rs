@@ -1,6 +1,6 @@
-//! Quadratic cells: each mid-edge node serves one edge, and no curved cell is folded.
+//! Curved cells: each node inside an edge serves one edge, and no curved cell is folded.
 //!
-//! A mesher moves mid-edge nodes to the curved boundary after it has made the straight cells. If a cell is flat, or large in
+//! A mesher moves the points of edges to the curved boundary after it has made the straight cells. If a cell is flat, or large in
 //! comparison with the radius of the boundary, its map may no longer be one to one. With straight edges it is a good cell. The
 //! boundary there is then that of linear elements.
 
@@ -8,20 +8,23 @@ use super::faces::Cells;
 use crate::error::Result;
 use crate::linalg::{cross, dot, minus, pad};
 use crate::mesh::Mesh;
+use crate::mesh::shape;
 use crate::mesh::simplex::EDGES;
 use crate::problem::order::Order;
+use nalgebra::DMatrix;
 use std::collections::HashSet;
+use std::sync::OnceLock;
 
 /// Share of the largest coefficient of a Jacobian below which a value is rounding. The Jacobian is zero where a cell is flat at
 /// a corner, as at the end of two edges that touch each other.
 const ROUNDING: f64 = 1e-9;
 
-/// Check the mid-edge nodes of a body and the Jacobians of its curved cells.
+/// Check the nodes inside the edges of a body and the Jacobians of its curved cells.
 ///
 /// # Errors
-/// A mid-edge node is on two edges or at a corner, or a cell is folded. The error gives the cell and the place in it.
+/// A node is on two edges or at a corner of another one, or a cell is folded. The error gives the cell and the place in it.
 pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
-    if !cells.is_quadratic() {
+    if !cells.is_curved() {
         return Ok(());
     }
     let mut ends = vec![None; cells.node_count()];
@@ -29,15 +32,18 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
         let nodes = cells.cell(cell);
         for j in 0..=D {
             for i in 0..=j {
-                let node = if i == j { nodes[i] } else { cells.simplices().middle(cell, [i, j]) };
+                let inside = (i < j).then(|| cells.simplices().inside(cell, [i, j])).into_iter().flatten();
                 let own = [nodes[i].min(nodes[j]), nodes[i].max(nodes[j])];
-                if *ends[node as usize].get_or_insert(own) != own {
-                    let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
-                    return Err(error.help("mesh the geometry again"));
+                for node in inside.chain((i == j).then_some(nodes[i])) {
+                    if *ends[node as usize].get_or_insert(own) != own {
+                        let error = cells.refuse("a node lies on two edges", &[cell], cells.at(node));
+                        return Err(error.help("mesh the geometry again"));
+                    }
                 }
             }
         }
-        if is_folded(&nodes.iter().map(|&node| cells.at(node)).collect::<Vec<_>>(), D) {
+        let x: Vec<[f64; 3]> = nodes.iter().map(|&node| cells.at(node)).collect();
+        if is_curved(&x, D) && is_folded(&x, D) {
             let error = cells.refuse("a curved cell is folded", &[cell], cells.at(nodes[0]));
             return Err(error.help("refine the mesh there, or use order = 1"));
         }
@@ -45,37 +51,118 @@ pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
     Ok(())
 }
 
-/// Return whether a quadratic cell with these nodes, corners first, may be folded: a coefficient of its Jacobian in Bernstein's basis is negative.
+/// Return the points inside each edge of a simplex, with their number and the ends of the edge.
+fn edges(points: usize, dimension: usize) -> (usize, impl Iterator<Item = ([usize; 2], usize)>) {
+    let edges = dimension * (dimension + 1) / 2;
+    let inside = (points - dimension - 1) / edges;
+    (inside, EDGES.into_iter().zip((dimension + 1..points).step_by(inside.max(1))))
+}
+
+/// Return whether a cell has a point of an edge that is off its place on the chord by more than rounding. Most cells have none.
+fn is_curved(x: &[[f64; 3]], dimension: usize) -> bool {
+    let (inside, mut edges) = edges(x.len(), dimension);
+    edges.any(|([i, j], first)| {
+        let size: f64 = (0..3).map(|c| (x[j][c] - x[i][c]).abs()).sum();
+        (0..inside).any(|k| {
+            let at = on_chord([x[i], x[j]], k, inside);
+            (0..3).any(|c| (x[first + k][c] - at[c]).abs() > 0.5 * ROUNDING * size)
+        })
+    })
+}
+
+/// Return the place of point `k` of so many inside an edge if it is straight.
+fn on_chord<const N: usize>([a, b]: [[f64; N]; 2], k: usize, inside: usize) -> [f64; N] {
+    let s = (k + 1) as f64 / (inside + 1) as f64;
+    std::array::from_fn(|c| (1.0 - s) * a[c] + s * b[c])
+}
+
+/// Return whether a curved cell with these nodes, corners first, may be folded: a coefficient of its Jacobian in Bernstein's basis is negative.
 ///
-/// The Jacobian is a polynomial of degree D, which lies between its least and its largest coefficient. A cell that passes has none that is
+/// The Jacobian is a polynomial that lies between its least and its largest coefficient. A cell that passes has none that is
 /// negative. One that fails may still be good, but is so distorted that its straight form serves better.
 fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
-    let coefficients = coefficients(&control_points(x, dimension), dimension);
+    let coefficients = if dimension == 2 { areas(x) } else { volumes(&control_points(x)) };
     let largest = coefficients.iter().fold(0.0, |max: f64, c| max.max(c.abs()));
     coefficients.iter().any(|c| *c < -ROUNDING * largest)
 }
 
-/// Return the control points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij` from corners and mid-edge nodes, where `l_i` are
+/// Return the powers of l_0, l_1 and l_2 in each polynomial of Bernstein's basis of a degree on the triangle.
+fn powers(degree: usize) -> impl Iterator<Item = [usize; 3]> {
+    (0..=degree).flat_map(move |j| (0..=degree - j).map(move |i| [degree - i - j, i, j]))
+}
+
+/// Return the position of powers among all [`powers`] of their degree.
+fn index(powers: [usize; 3]) -> usize {
+    let degree: usize = powers.iter().sum();
+    (0..powers[2]).map(|j| degree + 1 - j).sum::<usize>() + powers[1]
+}
+
+/// Return the multinomial coefficient of powers.
+fn multinomial(powers: [usize; 3]) -> f64 {
+    let choose = |n: usize, k: usize| (1..=k).map(|i| (n - k + i) as f64 / i as f64).product::<f64>();
+    choose(powers.iter().sum(), powers[0]) * choose(powers[1] + powers[2], powers[1])
+}
+
+/// Return the matrix from the points of a triangle of a degree to the control points of its [map](shape).
+fn to_control_points(order: Order) -> &'static DMatrix<f64> {
+    static MATRICES: [OnceLock<DMatrix<f64>>; Order::HIGHEST] = [const { OnceLock::new() }; Order::HIGHEST];
+    let degree = order.degree();
+    MATRICES[degree - 1].get_or_init(|| {
+        let all: Vec<[usize; 3]> = powers(degree).collect();
+        let place = |at: &[usize; 3]| at.map(|power| power as f64 / degree as f64);
+        let values: Vec<f64> = all.iter().flat_map(|at| shape::weights(order, &place(at))).collect();
+        let values = DMatrix::from_row_slice(all.len(), 3 * degree, &values);
+        let basis = DMatrix::from_fn(all.len(), all.len(), |row, column| {
+            let l = place(&all[row]);
+            multinomial(all[column]) * (0..3).map(|k| l[k].powi(all[column][k] as i32)).product::<f64>()
+        });
+        basis.lu().solve(&values).unwrap_or(values)
+    })
+}
+
+/// Return the coefficients of the Jacobian of a triangle in Bernstein's basis.
+///
+/// With the control points b of degree k, the derivatives along the edges 01 and 02 have the control points k (b_(p + e_1) - b_(p + e_0)) and
+/// k (b_(p + e_2) - b_(p + e_0)). The coefficient of a product of two polynomials is the mean of the products of theirs, with multinomial weights.
+fn areas(x: &[[f64; 3]]) -> Vec<f64> {
+    let Some(order) = Order::new(x.len() / 3) else { return Vec::new() };
+    let (matrix, degree) = (to_control_points(order), order.degree());
+    let b: Vec<[f64; 2]> = (0..matrix.nrows())
+        .map(|row| std::array::from_fn(|c| x.iter().enumerate().map(|(k, x)| matrix[(row, k)] * x[c]).sum()))
+        .collect();
+    let along = |at: [usize; 3], k: usize| -> [f64; 2] {
+        let raised = |k: usize| b[index(std::array::from_fn(|i| at[i] + usize::from(i == k)))];
+        minus(raised(k), raised(0))
+    };
+    let below: Vec<([usize; 3], f64, [[f64; 2]; 2])> =
+        powers(degree - 1).map(|at| (at, multinomial(at), [along(at, 1), along(at, 2)])).collect();
+    let mut coefficients = vec![0.0; degree * (2 * degree - 1)];
+    for (p, weight, [first, _]) in &below {
+        for (q, other, [_, second]) in &below {
+            let sum: [usize; 3] = std::array::from_fn(|i| p[i] + q[i]);
+            coefficients[index(sum)] +=
+                weight * other / multinomial(sum) * (first[0] * second[1] - first[1] * second[0]);
+        }
+    }
+    coefficients
+}
+
+/// Return the control points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij` from the corners and mid-edge nodes of a tetrahedron, where `l_i` are
 /// the barycentric coordinates.
-fn control_points(x: &[[f64; 3]], dimension: usize) -> [[[f64; 3]; 4]; 4] {
+fn control_points(x: &[[f64; 3]]) -> [[[f64; 3]; 4]; 4] {
     let mut b = [[[0.0; 3]; 4]; 4];
-    (0..=dimension).for_each(|i| b[i][i] = x[i]);
-    for (&middle, [i, j]) in x[dimension + 1..].iter().zip(EDGES) {
+    (0..4).for_each(|i| b[i][i] = x[i]);
+    for (&middle, [i, j]) in x[4..].iter().zip(EDGES) {
         b[i][j] = std::array::from_fn(|c| 2.0 * middle[c] - 0.5 * (x[i][c] + x[j][c]));
         b[j][i] = b[i][j];
     }
     b
 }
 
-/// Return the coefficients of the Jacobian in Bernstein's basis. The derivative along edge 0a is `2 sum_k l_k (b_ak - b_0k)`. The coefficient of a
-/// determinant of such sums at `l_k l_m ...` is the mean over all orders of k, m, ...
-fn coefficients(b: &[[[f64; 3]; 4]; 4], dimension: usize) -> Vec<f64> {
+/// Return the coefficients of the Jacobian of a quadratic tetrahedron in Bernstein's basis. The derivative along edge 0a is
+/// `2 sum_k l_k (b_ak - b_0k)`. The coefficient of a determinant of such sums at `l_k l_m l_n` is the mean over all orders of k, m and n.
+fn volumes(b: &[[[f64; 3]; 4]; 4]) -> Vec<f64> {
     let d = |a: usize, k: usize| -> [f64; 3] { minus(b[a][k], b[0][k]) };
-    if dimension == 2 {
-        let area = |k: usize, m: usize| cross(d(1, k), d(2, m))[2];
-        let pairs = (0..3).flat_map(|k| (0..=k).map(move |m| (k, m)));
-        return pairs.map(|(k, m)| 0.5 * (area(k, m) + area(m, k))).collect();
-    }
     let volume = |[k, m, n]: [usize; 3]| dot(&d(1, k), &cross(d(2, m), d(3, n)));
     let orders = |k, m, n| [[k, m, n], [m, n, k], [n, k, m], [m, k, n], [k, n, m], [n, m, k]];
     let triples = (0..4).flat_map(|k| (0..=k).flat_map(move |m| (0..=m).map(move |n| (k, m, n))));
@@ -90,7 +177,7 @@ impl<const D: usize> Mesh<D> {
         if self.order == Order::P1 {
             return;
         }
-        let mut straight_edges = HashSet::new();
+        let mut straight_points = HashSet::new();
         loop {
             let folded: Vec<Vec<u32>> = self.folded_cells();
             if folded.is_empty() {
@@ -98,13 +185,14 @@ impl<const D: usize> Mesh<D> {
             }
             let mut has_moved = false;
             for cell in &folded {
-                for (&[i, j], &middle) in EDGES.iter().zip(&cell[D + 1..]) {
-                    if !straight_edges.insert(middle) {
-                        continue;
+                let (inside, edges) = edges(cell.len(), D);
+                for ([i, j], first) in edges {
+                    let ends = [cell[i], cell[j]].map(|node| self.points[node as usize]);
+                    for k in (0..inside).filter(|k| straight_points.insert(cell[first + k])) {
+                        let straight = on_chord(ends, k, inside);
+                        let point = &mut self.points[cell[first + k] as usize];
+                        has_moved |= std::mem::replace(point, straight) != straight;
                     }
-                    let [x, y] = [cell[i], cell[j]].map(|node| self.points[node as usize]);
-                    let straight = std::array::from_fn(|c| 0.5 * (x[c] + y[c]));
-                    has_moved |= std::mem::replace(&mut self.points[middle as usize], straight) != straight;
                 }
             }
             if !has_moved {
@@ -120,21 +208,15 @@ impl<const D: usize> Mesh<D> {
         let of_cells = self.groups.iter().filter(|group| group.dimension == D);
         let cells = of_cells.flat_map(|group| group.connectivity.chunks_exact(group.stride));
         let place = |&node: &u32| pad(self.points[node as usize]);
-        let folded = |cell: &&[u32]| is_folded(&cell.iter().map(place).collect::<Vec<_>>(), D);
-        let mut found: Vec<Vec<u32>> =
-            cells.filter(|cell| self.is_curved(cell)).filter(folded).map(<[u32]>::to_vec).collect();
+        let folded = |cell: &&[u32]| {
+            let x: Vec<[f64; 3]> = cell.iter().map(place).collect();
+            is_curved(&x, D) && is_folded(&x, D)
+        };
+        let mut found: Vec<Vec<u32>> = cells.filter(folded).map(<[u32]>::to_vec).collect();
         // A cell may be in several groups.
         found.sort_unstable();
         found.dedup();
         found
-    }
-
-    /// Return whether a quadratic cell has an edge whose middle is off its chord by more than rounding. Most cells have none.
-    fn is_curved(&self, cell: &[u32]) -> bool {
-        EDGES.iter().zip(&cell[D + 1..]).any(|(&[i, j], &middle)| {
-            let [x, y, m] = [cell[i], cell[j], middle].map(|node| self.points[node as usize]);
-            (0..D).any(|c| (2.0 * m[c] - x[c] - y[c]).abs() > 1e-9 * (0..D).map(|c| (x[c] - y[c]).abs()).sum::<f64>())
-        })
     }
 }
 
@@ -153,6 +235,42 @@ mod tests {
     fn a_triangle_folds_at_a_quarter() {
         assert!(!triangle([0.5, 0.5, 0.0]) && !triangle([0.25 + 1e-6, 0.25 + 1e-6, 0.0]));
         assert!(triangle([0.25 - 1e-6, 0.25 - 1e-6, 0.0]));
+    }
+
+    /// A triangle with the arc of an angle as its edge 12, and the least Jacobian that differences of its map have on a grid.
+    fn sector(order: Order, angle: f64) -> (Vec<[f64; 3]>, f64) {
+        let degree = order.degree();
+        let arc = |s: f64| [(angle * s).cos(), (angle * s).sin(), 0.0];
+        let mut x = vec![[0.0; 3], arc(0.0), arc(1.0)];
+        let share = |k: usize| k as f64 / degree as f64;
+        x.extend((1..degree).map(|k| arc(0.0).map(|c| share(k) * c)));
+        x.extend((1..degree).map(|k| arc(share(k))));
+        x.extend((1..degree).map(|k| arc(1.0).map(|c| share(k) * c)));
+        let at = |u: f64, v: f64| -> [f64; 2] {
+            let weights = shape::weights(order, &[1.0 - u - v, u, v]);
+            std::array::from_fn(|c| weights.iter().zip(&x).map(|(weight, x)| weight * x[c]).sum())
+        };
+        let (n, step) = (12, 1e-5);
+        let jacobian = |(i, j): (usize, usize)| {
+            let [u, v] = [i, j].map(|k| k as f64 / n as f64);
+            let along = |p: [f64; 2], q: [f64; 2]| minus(p, q).map(|d| 0.5 * d / step);
+            let (a, b) = (along(at(u + step, v), at(u - step, v)), along(at(u, v + step), at(u, v - step)));
+            a[0] * b[1] - a[1] * b[0]
+        };
+        let least = (0..=n).flat_map(|i| (0..=n - i).map(move |j| (i, j))).map(jacobian).fold(f64::INFINITY, f64::min);
+        (x, least)
+    }
+
+    /// Sectors of any order that pass have a positive Jacobian. That of more than 180 degrees is folded at its centre.
+    #[test]
+    fn triangles_of_all_orders_that_pass_are_not_folded() {
+        for order in (2..=Order::HIGHEST).filter_map(Order::new) {
+            for angle in [0.3, 0.8, 1.2, 1.6, 2.0, 2.4, 2.8, 3.1, 3.5, 4.5] {
+                let (x, least) = sector(order, angle);
+                assert!(is_folded(&x, 2) || least > -1e-6, "{order:?} {angle}: {least}");
+            }
+            assert!(!is_folded(&sector(order, 1.2).0, 2) && is_folded(&sector(order, 3.5).0, 2), "{order:?}");
+        }
     }
 
     /// Return the least Jacobian of the map with these control points on a grid of the cell.
@@ -186,7 +304,7 @@ mod tests {
                 std::array::from_fn(|c| 0.5 * (corners[i][c] + corners[j][c]) + size * random())
             };
             let x = [&corners[..], &EDGES.map(middle)].concat();
-            let (found, least) = (is_folded(&x, 3), least(&control_points(&x, 3)));
+            let (found, least) = (is_folded(&x, 3), least(&control_points(&x)));
             assert!(found || least > 0.0, "{least}");
             counts[usize::from(found)] += 1;
         }
