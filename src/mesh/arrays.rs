@@ -30,7 +30,7 @@ pub fn mesh<const D: usize>(arrays: &MeshArrays, order: Order) -> Result<Mesh<D>
     }
     let points = points.iter().map(|x| std::array::from_fn(|c| x[c])).collect();
     let mesh = Mesh::new(NAME.into(), points, *own, groups.into());
-    Ok(if *own == Order::P1 && order > Order::P1 { mesh.higher_order() } else { mesh })
+    Ok(if *own == Order::P1 && order > Order::P1 { mesh.higher_order(Order::P2) } else { mesh })
 }
 
 fn group_of<const D: usize>(arrays: &GroupArrays, points: &[[f64; 3]], order: Order) -> Result<Group> {

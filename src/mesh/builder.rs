@@ -5,7 +5,7 @@
 use super::Mesh;
 use super::groups::{self, Group, Numbering};
 use super::scan::{DAMAGED, Flaw};
-use super::simplex::{self, EDGES, ElementType, THINGS};
+use super::simplex::{self, ElementType, THINGS};
 use super::split::Middles;
 use crate::error::{Error, Result};
 use crate::problem::body::plain;
@@ -234,7 +234,7 @@ impl<const D: usize> MeshBuilder<D> {
             return Err(fail(what).help(help));
         }
         if let Some(order) = order.filter(|order| *order > Order::P1) {
-            raise(&mut self.groups, &mut self.points, order, D);
+            groups::raise(&mut self.groups, &mut self.points, order, D);
         }
         // Empty groups of other programs are dropped.
         let mut groups = self.groups;
@@ -266,48 +266,4 @@ impl<const D: usize> MeshBuilder<D> {
 fn other_order(group: &str) -> Flaw {
     let what = format!("group `{group}` is of another order than other elements");
     Flaw::new(what, "save all elements with one order: gmsh -order 1 or 2")
-}
-
-/// Give linear elements below the dimension `space` of cells of a higher order the nodes inside the edges of the cells. Elements that are no
-/// edges or facets of cells get new nodes, with straight edges.
-fn raise(groups: &mut [Group], points: &mut Vec<[f64; 3]>, order: Order, space: usize) {
-    let is_linear = |group: &&mut Group| group.dimension > 0 && group.stride == group.dimension + 1;
-    if !groups.iter_mut().any(|group| is_linear(&group)) {
-        return;
-    }
-    let inside = order.degree() - 1;
-    // from the end with the smaller number to the other one
-    let mut of_edge: HashMap<[u32; 2], Vec<u32>> = HashMap::new();
-    for cell in groups.iter().filter(|group| group.dimension == space).flat_map(Group::simplices) {
-        for ([a, b], nodes) in EDGES.iter().zip(cell[space + 1..].chunks_exact(inside)) {
-            let (ends, nodes) = sorted([cell[*a], cell[*b]], nodes.to_vec());
-            of_edge.insert(ends, nodes);
-        }
-    }
-    for group in groups.iter_mut().filter(is_linear) {
-        let edges = group.dimension * (group.dimension + 1) / 2;
-        let mut connectivity = Vec::with_capacity(group.len() * (group.stride + edges * inside));
-        for simplex in group.simplices() {
-            connectivity.extend_from_slice(simplex);
-            for ends in EDGES[..edges].iter().map(|edge| edge.map(|corner| simplex[corner])) {
-                let (key, _) = sorted(ends, Vec::new());
-                let nodes = of_edge.entry(key).or_insert_with(|| {
-                    let [a, b] = key.map(|end| points[end as usize]);
-                    let share = |k: usize| (k + 1) as f64 / (inside + 1) as f64;
-                    points.extend((0..inside).map(|k| std::array::from_fn(|c| a[c] + share(k) * (b[c] - a[c]))));
-                    (points.len() as u32 - inside as u32..points.len() as u32).collect()
-                });
-                connectivity.extend(sorted(ends, nodes.clone()).1);
-            }
-        }
-        (group.stride, group.connectivity) = (group.stride + edges * inside, connectivity);
-    }
-}
-
-/// Return the ends of an edge in increasing order, and its nodes turned round with them.
-fn sorted([a, b]: [u32; 2], mut nodes: Vec<u32>) -> ([u32; 2], Vec<u32>) {
-    if a > b {
-        nodes.reverse();
-    }
-    ([a.min(b), a.max(b)], nodes)
 }

@@ -1,7 +1,10 @@
 //! The groups of a mesh by name, and compact numberings of their points.
 
+use super::simplex::EDGES;
 use crate::problem::body::plain;
+use crate::problem::order::Order;
 use serde::{Deserialize, Serialize};
+use smallvec::SmallVec;
 use std::collections::{HashMap, HashSet};
 use std::ops::{Deref, DerefMut};
 
@@ -134,6 +137,48 @@ pub fn renumber(groups: &mut [Group]) -> Vec<u32> {
         *point = number.get(*point).unwrap_or(ABSENT);
     }
     number.points().collect()
+}
+
+/// Give linear simplices points inside their edges: those of the cells of dimension `space` that have an order above one, else new ones on straight edges.
+pub fn raise<const N: usize>(groups: &mut [Group], points: &mut Vec<[f64; N]>, order: Order, space: usize) {
+    let (inside, degree) = (order.degree() - 1, order.degree() as f64);
+    let is_linear = |group: &Group| group.dimension > 0 && group.stride == group.dimension + 1;
+    // the points of each edge from its end with the smaller number
+    let mut of_edge: HashMap<[u32; 2], SmallVec<[u32; 2]>> = HashMap::new();
+    let is_needed = groups.iter().any(is_linear);
+    for cell in groups
+        .iter()
+        .filter(|group| is_needed && group.dimension == space && !is_linear(group))
+        .flat_map(Group::simplices)
+    {
+        for ([a, b], nodes) in EDGES.iter().zip(cell[space + 1..].chunks_exact(inside)) {
+            let [a, b] = [cell[*a], cell[*b]];
+            of_edge.insert([a.min(b), a.max(b)], turned(nodes, a > b));
+        }
+    }
+    for group in groups.iter_mut().filter(|group| is_linear(group)) {
+        let edges = &EDGES[..group.dimension * (group.dimension + 1) / 2];
+        let mut connectivity = Vec::with_capacity(group.len() * (group.stride + edges.len() * inside));
+        for simplex in group.simplices() {
+            connectivity.extend_from_slice(simplex);
+            for [a, b] in edges.iter().map(|edge| edge.map(|corner| simplex[corner])) {
+                let nodes = of_edge.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                    let [from, to] = [a.min(b), a.max(b)].map(|end| points[end as usize]);
+                    let first = points.len() as u32;
+                    let at = |s: f64| std::array::from_fn(|c| (1.0 - s) * from[c] + s * to[c]);
+                    points.extend((1..=inside).map(|k| at(k as f64 / degree)));
+                    (first..first + inside as u32).collect()
+                });
+                connectivity.extend(turned(nodes, a > b));
+            }
+        }
+        (group.stride, group.connectivity) = (group.stride + edges.len() * inside, connectivity);
+    }
+}
+
+fn turned(nodes: &[u32], is_turned: bool) -> SmallVec<[u32; 2]> {
+    let count = nodes.len();
+    (0..count).map(|k| nodes[if is_turned { count - 1 - k } else { k }]).collect()
 }
 
 /// The entry of a point that is not a node.

@@ -94,7 +94,7 @@ fn from_file<const D: usize>(file: &Located<PathBuf>, order: Order, interrupt: &
     };
     loaded.mesh = match (loaded.mesh.order, order) {
         (own, Order::P1) if own > Order::P1 => loaded.mesh.lower_order(),
-        (Order::P1, order) if order > Order::P1 => loaded.mesh.higher_order(),
+        (Order::P1, order) if order > Order::P1 => loaded.mesh.higher_order(Order::P2),
         _ => loaded.mesh,
     };
     Ok(loaded)

@@ -42,7 +42,6 @@ pub use simplex::EDGES;
 
 use crate::linalg::{bounds, pad};
 use crate::problem::order::Order;
-use std::collections::HashMap;
 use std::path::PathBuf;
 
 /// Lengths of a mesh that a run computes with. The lengths of atoms and of galaxies lie between 1e-40 and 1e40 in all units in
@@ -142,27 +141,10 @@ impl<const D: usize> Mesh<D> {
         Mesh { points, order: Order::P1, groups, path: self.path.clone(), ..*self }
     }
 
-    /// Return the mesh of the same simplices with points in the middles of their edges, which stay straight. The mesh has the order 1.
-    pub fn higher_order(&self) -> Mesh<D> {
+    /// Return the mesh of the same simplices with points inside their edges, which stay straight. The mesh has the order 1.
+    pub fn higher_order(&self, order: Order) -> Mesh<D> {
         let (mut points, mut groups) = (self.points.clone(), self.groups.to_vec());
-        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
-        for group in groups.iter_mut() {
-            let edges = &EDGES[..group.dimension * (group.dimension + 1) / 2];
-            let mut connectivity = Vec::with_capacity(group.len() * (group.stride + edges.len()));
-            for simplex in group.simplices() {
-                connectivity.extend(simplex);
-                for [a, b] in edges.iter().map(|edge| edge.map(|corner| simplex[corner])) {
-                    let middle = *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                        let [a, b] = [a, b].map(|end| points[end as usize]);
-                        points.push(std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
-                        points.len() as u32 - 1
-                    });
-                    connectivity.push(middle);
-                }
-            }
-            group.stride += edges.len();
-            group.connectivity = connectivity;
-        }
-        Mesh { points, order: Order::P2, groups: groups.into(), path: self.path.clone(), ..*self }
+        groups::raise(&mut groups, &mut points, order, D);
+        Mesh { points, order, groups: groups.into(), path: self.path.clone(), ..*self }
     }
 }
