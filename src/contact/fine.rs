@@ -320,7 +320,8 @@ impl<const D: usize> Projections<D> {
     }
 }
 
-/// Return the facet of side b for each contact point: the partner of the nearest integration point on the facets of side a at its node. `position` gives the place of a contact point, measured from the datum of the mesh.
+/// Return the facet of side b for each contact point: the partner of the nearest integration point on the facets of
+/// side a at its node. `position` gives the place of a contact point, measured from the datum of the mesh.
 fn nearest_facets<const D: usize>(
     a: &Side<D>,
     common: &Intersection<D>,

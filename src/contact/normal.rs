@@ -57,7 +57,8 @@ fn facing<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) ->
     let mut sums = vec![none; a.nodes.len()];
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let on = a.on_facet(chunk[0].facet_a);
-        // The vertices, between which directions are interpolated, need not carry points up to order two; all other nodes do so by their own functions.
+        // The vertices, between which directions are interpolated, need not carry points up to order two; all other
+        // nodes do so by their own functions.
         let [vertices, all] = [(Order::P1, D), (a.facets.order, on.len())]
             .map(|(order, count)| PressureBasis::on(order, count, chunk, &b.facets));
         for point in chunk {

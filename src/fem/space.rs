@@ -33,8 +33,9 @@ pub struct Space<const D: usize> {
     /// Body node of each mesh point that is one; unknown in a part of a body.
     #[serde(skip)]
     from_mesh: Numbering,
-    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge, unless nodes of edges are points themselves. They
-    /// lie in the direction from the end with the lower number in the mesh to the other one.
+    /// First of the nodes inside each edge for the [point](edge_point) of the mesh that stands for the edge, unless
+    /// nodes of edges are points themselves. They lie in the direction from the end with the lower number in the mesh
+    /// to the other one.
     #[serde(skip)]
     edges: Option<Numbering>,
     /// Area (volume) of all cells, once it has been requested.
@@ -43,9 +44,11 @@ pub struct Space<const D: usize> {
 }
 
 impl<const D: usize> Space<D> {
-    /// Make the space of `order` on the cells of `group` (of dimension `D`). The mesh is not linear unless `order` is 1.
+    /// Make the space of `order` on the cells of `group` (of dimension `D`). The mesh is not linear unless `order` is
+    /// 1.
     ///
-    /// Vertices are points of the mesh, and so are mid-edge nodes on a mesh of order two. Other nodes lie on the map of the cell.
+    /// Vertices are points of the mesh, and so are mid-edge nodes on a mesh of order two. Other nodes lie on the map of
+    /// the cell.
     pub fn new(mesh: &Mesh<D>, group: &Group, order: Order) -> Self {
         let stride = element::node_count(D + 1, order);
         let is_whole = order == Order::P1 || order.max(mesh.order) == Order::P2;
@@ -71,7 +74,8 @@ impl<const D: usize> Space<D> {
         space
     }
 
-    /// Add the nodes of a cell of the mesh. The first `own` points are nodes, and the others have these `weights` of the points.
+    /// Add the nodes of a cell of the mesh. The first `own` points are nodes, and the others have these `weights` of
+    /// the points.
     fn add_cell(&mut self, mesh: &Mesh<D>, cell: &[u32], own: usize, weights: &[Vec<f64>]) {
         let at = |point: &u32| mesh.points[*point as usize];
         for point in &cell[..own] {

@@ -1,6 +1,7 @@
 //! From the nodes and elements of a file, in its numbers, to a [`Mesh`].
 //!
-//! Some programs write the boundary of curved cells as linear lines and facets. These get the nodes inside the edges of the cells.
+//! Some programs write the boundary of curved cells as linear lines and facets. These get the nodes inside the edges of
+//! the cells.
 
 use super::Mesh;
 use super::groups::{self, Group, Numbering};

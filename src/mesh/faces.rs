@@ -5,7 +5,8 @@ use super::EDGES;
 /// The cells of a body of simplices, with nodes numbered within the body.
 #[derive(Debug, Clone, Copy)]
 pub struct Simplices<'a, const D: usize> {
-    /// Nodes of all cells, `stride` per cell: corners, then those inside edges in the local numbering of [`Mesh`](super::Mesh).
+    /// Nodes of all cells, `stride` per cell: corners, then those inside edges in the local numbering of
+    /// [`Mesh`](super::Mesh).
     pub nodes: &'a [u32],
     /// Nodes per cell.
     pub stride: usize,
@@ -82,7 +83,8 @@ impl<const D: usize> Face<D> {
         std::array::from_fn(|i| OUTWARD[D - 2][self.opposite()][i])
     }
 
-    /// Return the nodes, in the order in which the normal points outwards. The corners come first, then the nodes inside the edges 01, 12, 02.
+    /// Return the nodes, in the order in which the normal points outwards. The corners come first, then the nodes
+    /// inside the edges 01, 12, 02.
     pub fn nodes(self, cells: Simplices<D>) -> impl Iterator<Item = u32> {
         let (cell, corners) = (self.cell(), self.corners());
         let ends = EDGES[..D * (D - 1) / 2].iter().map(move |edge| edge.map(|i| corners[i]));

@@ -139,7 +139,8 @@ pub fn renumber(groups: &mut [Group]) -> Vec<u32> {
     number.points().collect()
 }
 
-/// Give linear simplices points inside their edges: those of the cells of dimension `space` that have an order above one, else new ones on straight edges.
+/// Give linear simplices points inside their edges: those of the cells of dimension `space` that have an order above
+/// one, else new ones on straight edges.
 pub fn raise<const N: usize>(groups: &mut [Group], points: &mut Vec<[f64; N]>, order: Order, space: usize) {
     let (inside, degree) = (order.degree() - 1, order.degree() as f64);
     let is_linear = |group: &Group| group.dimension > 0 && group.stride == group.dimension + 1;

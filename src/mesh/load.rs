@@ -43,8 +43,9 @@ pub enum MeshOrigin {
 
 /// Load the mesh of a scene for displacements of an order, unless a signal ends it.
 ///
-/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of another order serves, too: without the points inside its
-/// edges for order 1, and with straight edges if its own order is 1. Folded cells become straight ([`Mesh::straightened`]).
+/// Gmsh meshes a `.geo` script with that order, unless the cache has the result. A mesh file of another order serves,
+/// too: without the points inside its edges for order 1, and with straight edges if its own order is 1. Folded cells
+/// become straight ([`Mesh::straightened`]).
 ///
 /// # Errors
 /// A file cannot be read, or the script does not take a number. Gmsh is missing or fails. The mesh is not one of named

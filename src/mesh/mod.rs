@@ -50,12 +50,13 @@ pub const LENGTHS: [f64; 2] = [1e-40, 1e40];
 
 /// A mesh: points and named groups of simplices.
 ///
-/// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower dimension. The
-/// local numbering is VTK's: vertices come first. The points inside edges follow in the order `01` (line), `01 12 02`
-/// (triangle), `01 12 02 03 13 23` (tetrahedron), those of one edge from its first to its second end. There are no points inside simplices.
+/// Groups are Gmsh's physical groups. Cells are groups of dimension `D`; surfaces, edges and points have lower
+/// dimension. The local numbering is VTK's: vertices come first. The points inside edges follow in the order `01`
+/// (line), `01 12 02` (triangle), `01 12 02 03 13 23` (tetrahedron), those of one edge from its first to its second
+/// end. There are no points inside simplices.
 ///
-/// No simplex is degenerate: its measure is above 1e-12 times its longest edge to the power of its dimension. Cells have
-/// positive volume, group names are unique, no group is empty, and coordinates are finite.
+/// No simplex is degenerate: its measure is above 1e-12 times its longest edge to the power of its dimension. Cells
+/// have positive volume, group names are unique, no group is empty, and coordinates are finite.
 #[derive(Debug, Clone)]
 pub struct Mesh<const D: usize> {
     /// The file that the user named (`.geo` or `.msh`), for messages.
@@ -141,7 +142,8 @@ impl<const D: usize> Mesh<D> {
         Mesh { points, order: Order::P1, groups, path: self.path.clone(), ..*self }
     }
 
-    /// Return the mesh of the same simplices with points inside their edges, which stay straight. The mesh has the order 1.
+    /// Return the mesh of the same simplices with points inside their edges, which stay straight. The mesh has the
+    /// order 1.
     pub fn higher_order(&self, order: Order) -> Mesh<D> {
         let (mut points, mut groups) = (self.points.clone(), self.groups.to_vec());
         groups::raise(&mut groups, &mut points, order, D);

@@ -1,19 +1,21 @@
 //! The shape of a curved simplex: the map that the points of its edges determine.
 //!
-//! The points inside an edge ij of a simplex of order k divide it into k equal parts in the parameter s. A displacement d(s) = s (1 - s) q(s) moves its chord
-//! to the curve through them, where q has the degree k - 2. The map is
+//! The points inside an edge ij of a simplex of order k divide it into k equal parts in the parameter s. A displacement
+//! d(s) = s (1 - s) q(s) moves its chord to the curve through them, where q has the degree k - 2. The map is
 //!
 //! ```text
 //! x(l) = sum_v l_v x_v + sum_ij l_i l_j q_ij((1 + l_j - l_i)/2)
 //! ```
-//! A power of s in d that is small of order h^m becomes a polynomial of degree m, so that all derivatives of the map are as small as elements of order k need
-//! (Lenoir, 1986). Points of a file inside triangles are not used: they do not change the boundary. Of order two this is the quadratic simplex.
+//! A power of s in d that is small of order h^m becomes a polynomial of degree m, so that all derivatives of the map
+//! are as small as elements of order k need (Lenoir, 1986). Points of a file inside triangles are not used: they do not
+//! change the boundary. Of order two this is the quadratic simplex.
 
 use super::simplex::EDGES;
 use crate::linalg::interpolation_weights;
 use crate::problem::order::Order;
 
-/// Return the weight of each point of a simplex of an order, vertices before those of the edges, in the point with barycentric coordinates `l`.
+/// Return the weight of each point of a simplex of an order, vertices before those of the edges, in the point with
+/// barycentric coordinates `l`.
 pub fn weights(order: Order, l: &[f64]) -> Vec<f64> {
     let inside: Vec<f64> = (1..order.degree()).map(|k| k as f64 / order.degree() as f64).collect();
     let mut weights = l.to_vec();
@@ -33,7 +35,8 @@ pub fn weights(order: Order, l: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// Points of straight edges leave a simplex straight, each point has its own weight, and edges of any order are curves of this order.
+    /// Points of straight edges leave a simplex straight, each point has its own weight, and edges of any order are
+    /// curves of this order.
     #[test]
     fn maps_follow_their_edges() {
         for order in (1..=Order::HIGHEST).filter_map(Order::new) {

@@ -72,8 +72,8 @@ pub const PYRAMID: Shape = Shape {
     faces: &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
 };
 
-/// Number and nodes of Gmsh's types of elements of a shape, from order one on. Where there are types with the nodes of corners and edges alone,
-/// these come first.
+/// Number and nodes of Gmsh's types of elements of a shape, from order one on. Where there are types with the nodes of
+/// corners and edges alone, these come first.
 const TYPES: [(&Shape, &[(i32, usize)]); 13] = [
     (&POINT, &[(POINTS, 1)]),
     (&LINE, &[(1, 2), (8, 3), (26, 4), (27, 5), (28, 6), (62, 7), (63, 8), (64, 9)]),
@@ -115,7 +115,8 @@ impl ElementType {
         })
     }
 
-    /// Return Gmsh's number of the type with this shape and number of nodes, all of them on edges if there is such a type.
+    /// Return Gmsh's number of the type with this shape and number of nodes, all of them on edges if there is such a
+    /// type.
     pub fn number(shape: &Shape, nodes: usize) -> i32 {
         let types = TYPES.iter().filter(|(own, _)| *own == shape).flat_map(|(_, types)| types.iter());
         types.into_iter().find(|kind| kind.1 == nodes).map_or(0, |kind| kind.0)
@@ -131,8 +132,8 @@ impl ElementType {
         stride(self.shape.dimension, self.order)
     }
 
-    /// Reorder the nodes of a simplex from Gmsh's order to ours, without those inside a triangle. Gmsh has the third edge of a triangle as 20, and
-    /// mid-edge 23 before 13 in the quadratic tetrahedron.
+    /// Reorder the nodes of a simplex from Gmsh's order to ours, without those inside a triangle. Gmsh has the third
+    /// edge of a triangle as 20, and mid-edge 23 before 13 in the quadratic tetrahedron.
     pub fn reorder(&self, simplex: &mut Vec<u32>) {
         simplex.truncate(self.stride());
         match (self.shape.dimension, self.order) {

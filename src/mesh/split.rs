@@ -1,13 +1,14 @@
 //! The division of quadrangles, hexahedra, prisms and pyramids into triangles and tetrahedra.
 //!
-//! Every cell is the cone from its vertex with the smallest number over the faces without that vertex. A quadrangle is the cone
-//! from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the numbers of its
-//! vertices alone, so that cells of any kind agree on common faces.
+//! Every cell is the cone from its vertex with the smallest number over the faces without that vertex. A quadrangle is
+//! the cone from its smallest vertex over the edges without it. The diagonal of a quadrangle therefore depends on the
+//! numbers of its vertices alone, so that cells of any kind agree on common faces.
 //!
-//! Quadratic cells get nodes in the middle of the diagonals. A diagonal of a face has its node where the map of the face takes the
-//! centre of the reference square, and a diagonal through a cell where the map of the cell takes the centre of the reference cube.
-//! The boundary of the simplices is thus interpolated from that of the cells. Quadrangles of higher orders, which are in the plane, get nodes where the
-//! map that blends their edges takes the points of the diagonal.
+//! Quadratic cells get nodes in the middle of the diagonals. A diagonal of a face has its node where the map of the
+//! face takes the centre of the reference square, and a diagonal through a cell where the map of the cell takes the
+//! centre of the reference cube. The boundary of the simplices is thus interpolated from that of the cells. Quadrangles
+//! of higher orders, which are in the plane, get nodes where the map that blends their edges takes the points of the
+//! diagonal.
 
 use super::simplex::{EDGES, ElementType, QUADRANGLE, Shape};
 use std::collections::HashMap;
@@ -51,8 +52,8 @@ const CELL: [usize; 8] = [0, 1, 2, 3, 4, 5, 6, 7];
 pub struct Middles<'a> {
     /// Coordinates of all points, to which new ones are appended.
     pub points: &'a mut Vec<[f64; 3]>,
-    /// The first node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its diagonal, each
-    /// twice. Further ones follow, from the end with the smaller number.
+    /// The first node of each divided face by its sorted vertices, and of each divided hexahedron by the ends of its
+    /// diagonal, each twice. Further ones follow, from the end with the smaller number.
     pub known: &'a mut HashMap<[u32; 4], u32>,
 }
 
@@ -79,7 +80,8 @@ impl Middles<'_> {
         simplices
     }
 
-    /// Return the nodes between two vertices of a quadrangle with the nodes `cell`, so many on each edge, from the first vertex to the second one.
+    /// Return the nodes between two vertices of a quadrangle with the nodes `cell`, so many on each edge, from the
+    /// first vertex to the second one.
     fn inside(&mut self, count: usize, cell: &[u32], ends: [u32; 2]) -> Vec<u32> {
         let on_edge = |edge: usize| &cell[4 + edge * count..][..count];
         let of_edge = |[a, b]: [u32; 2]| {

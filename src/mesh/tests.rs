@@ -100,7 +100,8 @@ fn extent<const D: usize>(mesh: &Mesh<D>, group: &Group) -> f64 {
         .sum()
 }
 
-/// Assert that groups have these measures, and that the points inside the edges of a straight mesh divide them into equal parts.
+/// Assert that groups have these measures, and that the points inside the edges of a straight mesh divide them into
+/// equal parts.
 fn assert_sizes<const D: usize>(mesh: &Mesh<D>, sizes: &[(&str, f64)]) {
     for (name, expected) in sizes {
         let size = extent(mesh, mesh.group(name).unwrap());
@@ -167,7 +168,8 @@ fn cubes_of_both_forms_and_orders() {
     }
 }
 
-/// A quarter of a ring, of triangles or of quadrangles that are divided: the points of both arcs lie on them, equally spaced, and the cells fit.
+/// A quarter of a ring, of triangles or of quadrangles that are divided: the points of both arcs lie on them, equally
+/// spaced, and the cells fit.
 #[test]
 fn arcs_of_all_orders() {
     const RING: &str = "For i In {1:2}\n Point(i) = {i, 0, 0}; Point(i + 2) = {0, i, 0};\nEndFor\nPoint(5) = {0, 0, 0};\n\

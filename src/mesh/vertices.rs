@@ -16,14 +16,16 @@ const AREA: f64 = 0.25;
 /// which is 0.009 for twelve edges, and those of higher orders by less.
 const SMOOTH: f64 = 0.02;
 
-/// A vertex of a boundary in the plane with the two edges that meet there: their points in a row, the vertex in the middle.
+/// A vertex of a boundary in the plane with the two edges that meet there: their points in a row, the vertex in the
+/// middle.
 type Passage = Vec<u32>;
 
 impl Mesh<2> {
-    /// Move the nearest vertex of each boundary that passes at one of the places to this place. The mesh has an order above one.
+    /// Move the nearest vertex of each boundary that passes at one of the places to this place. The mesh has an order
+    /// above one.
     ///
-    /// A vertex moves along the curves of both edges by at most half an edge, once. It stays at corners, where other groups begin,
-    /// where it has a name of its own or belongs to two bodies, and where a cell would become too small.
+    /// A vertex moves along the curves of both edges by at most half an edge, once. It stays at corners, where other
+    /// groups begin, where it has a name of its own or belongs to two bodies, and where a cell would become too small.
     pub fn move_vertices_to(&mut self, places: &[[f64; 3]]) {
         let passages = self.passages();
         let mut cells: HashMap<u32, Vec<Vec<u32>>> = HashMap::new();
@@ -89,10 +91,11 @@ impl Mesh<2> {
         points.iter().map(|&point| self.points[point as usize]).collect()
     }
 
-    /// Return the points of a passage with its vertex at `place`, or at the point of the curve that is nearest to it; none unless this vertex is the nearest
-    /// one of its curve and the place less than an edge away from it.
+    /// Return the points of a passage with its vertex at `place`, or at the point of the curve that is nearest to it;
+    /// none unless this vertex is the nearest one of its curve and the place less than an edge away from it.
     ///
-    /// Each edge is a polynomial of its order over the chord of both, and the points of the new edges are equally spaced along this chord.
+    /// Each edge is a polynomial of its order over the chord of both, and the points of the new edges are equally
+    /// spaced along this chord.
     fn moved_passage(&self, passage: &Passage, place: [f64; 2]) -> Option<Vec<[f64; 2]>> {
         let (points, degree) = (self.places(passage), self.order.degree());
         let (first, last) = (points[0], points[2 * degree]);
@@ -178,7 +181,8 @@ fn row(edge: &[u32], is_forward: bool) -> Vec<u32> {
 /// Return whether the two edges through points in a row have one tangent in the middle, where they meet.
 fn is_smooth(x: &[[f64; 2]]) -> bool {
     let degree = x.len() / 2;
-    // the derivative of the polynomial at 0 has the weights -(-1)^r C(k, r)/r at the points r = 1, ..., k of differences from the first one
+    // the derivative of the polynomial at 0 has the weights -(-1)^r C(k, r)/r at the points r = 1, ..., k of
+    // differences from the first one
     let tangent = |at: &dyn Fn(usize) -> [f64; 2]| {
         let (mut tangent, mut binomial) = ([0.0; 2], -1.0);
         for r in 1..=degree {
@@ -249,7 +253,8 @@ mod tests {
         assert_eq!(mesh.points, bent.points);
     }
 
-    /// On an arc the vertex and the points of its edges stay on the arc, to the error of polynomials of the order of the mesh, and nothing folds.
+    /// On an arc the vertex and the points of its edges stay on the arc, to the error of polynomials of the order of
+    /// the mesh, and nothing folds.
     #[test]
     fn vertices_move_along_an_arc() {
         let arc = |angle: f64, radius: f64| [radius * angle.sin(), radius * angle.cos()];

@@ -1,6 +1,7 @@
 //! The boundary of a body: a node that lies on a facet without belonging to it leaves a crack.
 //!
-//! Coincident nodes are a crack with two sets of nodes, other ones are hanging nodes. Curved facets count as their flat pieces between nodes.
+//! Coincident nodes are a crack with two sets of nodes, other ones are hanging nodes. Curved facets count as their flat
+//! pieces between nodes.
 
 use super::faces::Cells;
 use crate::error::Result;
@@ -15,7 +16,8 @@ type Point = [f64; 3];
 /// Distance from a facet, as a share of its size, within which a node touches it.
 const TOUCH: f64 = 1e-9;
 
-/// Local nodes of the flat pieces of a facet in space: a triangle, or four of them between the nodes of a quadratic facet.
+/// Local nodes of the flat pieces of a facet in space: a triangle, or four of them between the nodes of a quadratic
+/// facet.
 const PIECES: [&[[usize; 3]]; 2] = [&[[0, 1, 2]], &[[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]];
 
 /// Check that no node of the boundary lies on a facet to which it does not belong. `facets` are those of one cell alone.

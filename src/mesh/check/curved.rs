@@ -1,8 +1,8 @@
 //! Curved cells: each node inside an edge serves one edge, and no curved cell is folded.
 //!
-//! A mesher moves the points of edges to the curved boundary after it has made the straight cells. If a cell is flat, or large in
-//! comparison with the radius of the boundary, its map may no longer be one to one. With straight edges it is a good cell. The
-//! boundary there is then that of linear elements.
+//! A mesher moves the points of edges to the curved boundary after it has made the straight cells. If a cell is flat,
+//! or large in comparison with the radius of the boundary, its map may no longer be one to one. With straight edges it
+//! is a good cell. The boundary there is then that of linear elements.
 
 use super::faces::Cells;
 use crate::error::Result;
@@ -22,7 +22,8 @@ const ROUNDING: f64 = 1e-9;
 /// Check the nodes inside the edges of a body and the Jacobians of its curved cells.
 ///
 /// # Errors
-/// A node is on two edges or at a corner of another one, or a cell is folded. The error gives the cell and the place in it.
+/// A node is on two edges or at a corner of another one, or a cell is folded. The error gives the cell and the place in
+/// it.
 pub fn check<const D: usize>(cells: &Cells<D>) -> Result<()> {
     if !cells.is_curved() {
         return Ok(());
@@ -58,7 +59,8 @@ fn edges(points: usize, dimension: usize) -> (usize, impl Iterator<Item = ([usiz
     (inside, EDGES.into_iter().zip((dimension + 1..points).step_by(inside.max(1))))
 }
 
-/// Return whether a cell has a point of an edge that is off its place on the chord by more than rounding. Most cells have none.
+/// Return whether a cell has a point of an edge that is off its place on the chord by more than rounding. Most cells
+/// have none.
 fn is_curved(x: &[[f64; 3]], dimension: usize) -> bool {
     let (inside, mut edges) = edges(x.len(), dimension);
     edges.any(|([i, j], first)| {
@@ -76,10 +78,11 @@ fn on_chord<const N: usize>([a, b]: [[f64; N]; 2], k: usize, inside: usize) -> [
     std::array::from_fn(|c| (1.0 - s) * a[c] + s * b[c])
 }
 
-/// Return whether a curved cell with these nodes, corners first, may be folded: a coefficient of its Jacobian in Bernstein's basis is negative.
+/// Return whether a curved cell with these nodes, corners first, may be folded: a coefficient of its Jacobian in
+/// Bernstein's basis is negative.
 ///
-/// The Jacobian is a polynomial that lies between its least and its largest coefficient. A cell that passes has none that is
-/// negative. One that fails may still be good, but is so distorted that its straight form serves better.
+/// The Jacobian is a polynomial that lies between its least and its largest coefficient. A cell that passes has none
+/// that is negative. One that fails may still be good, but is so distorted that its straight form serves better.
 fn is_folded(x: &[[f64; 3]], dimension: usize) -> bool {
     let coefficients = if dimension == 2 { areas(x) } else { volumes(&control_points(x)) };
     let largest = coefficients.iter().fold(0.0, |max: f64, c| max.max(c.abs()));
@@ -122,8 +125,9 @@ fn to_control_points(order: Order) -> &'static DMatrix<f64> {
 
 /// Return the coefficients of the Jacobian of a triangle in Bernstein's basis.
 ///
-/// With the control points b of degree k, the derivatives along the edges 01 and 02 have the control points k (b_(p + e_1) - b_(p + e_0)) and
-/// k (b_(p + e_2) - b_(p + e_0)). The coefficient of a product of two polynomials is the mean of the products of theirs, with multinomial weights.
+/// With the control points b of degree k, the derivatives along the edges 01 and 02 have the control points k (b_(p +
+/// e_1) - b_(p + e_0)) and k (b_(p + e_2) - b_(p + e_0)). The coefficient of a product of two polynomials is the mean
+/// of the products of theirs, with multinomial weights.
 fn areas(x: &[[f64; 3]]) -> Vec<f64> {
     let Some(order) = Order::new(x.len() / 3) else { return Vec::new() };
     let (matrix, degree) = (to_control_points(order), order.degree());
@@ -147,8 +151,8 @@ fn areas(x: &[[f64; 3]]) -> Vec<f64> {
     coefficients
 }
 
-/// Return the control points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij` from the corners and mid-edge nodes of a tetrahedron, where `l_i` are
-/// the barycentric coordinates.
+/// Return the control points `b_ij` of the quadratic map `sum_ij l_i l_j b_ij` from the corners and mid-edge nodes of a
+/// tetrahedron, where `l_i` are the barycentric coordinates.
 fn control_points(x: &[[f64; 3]]) -> [[[f64; 3]; 4]; 4] {
     let mut b = [[[0.0; 3]; 4]; 4];
     (0..4).for_each(|i| b[i][i] = x[i]);
@@ -159,8 +163,9 @@ fn control_points(x: &[[f64; 3]]) -> [[[f64; 3]; 4]; 4] {
     b
 }
 
-/// Return the coefficients of the Jacobian of a quadratic tetrahedron in Bernstein's basis. The derivative along edge 0a is
-/// `2 sum_k l_k (b_ak - b_0k)`. The coefficient of a determinant of such sums at `l_k l_m l_n` is the mean over all orders of k, m and n.
+/// Return the coefficients of the Jacobian of a quadratic tetrahedron in Bernstein's basis. The derivative along edge
+/// 0a is `2 sum_k l_k (b_ak - b_0k)`. The coefficient of a determinant of such sums at `l_k l_m l_n` is the mean over
+/// all orders of k, m and n.
 fn volumes(b: &[[[f64; 3]; 4]; 4]) -> Vec<f64> {
     let d = |a: usize, k: usize| -> [f64; 3] { minus(b[a][k], b[0][k]) };
     let volume = |[k, m, n]: [usize; 3]| dot(&d(1, k), &cross(d(2, m), d(3, n)));
@@ -237,7 +242,8 @@ mod tests {
         assert!(triangle([0.25 - 1e-6, 0.25 - 1e-6, 0.0]));
     }
 
-    /// A triangle with the arc of an angle as its edge 12, and the least Jacobian that differences of its map have on a grid.
+    /// A triangle with the arc of an angle as its edge 12, and the least Jacobian that differences of its map have on a
+    /// grid.
     fn sector(order: Order, angle: f64) -> (Vec<[f64; 3]>, f64) {
         let degree = order.degree();
         let arc = |s: f64| [(angle * s).cos(), (angle * s).sin(), 0.0];

@@ -292,7 +292,8 @@ fn high_orders() {
     problem().converges("smooth", 8, [2, 2, 4], [8.3, 7.85], 1e-10);
 }
 
-/// Orders k + 1 and k on circles, too, which the edges of a mesh of order k follow. The compression is positive everywhere.
+/// Orders k + 1 and k on circles, too, which the edges of a mesh of order k follow. The compression is positive
+/// everywhere.
 #[test]
 fn high_orders_on_curves() {
     let compression = || number(0.9) + number(0.3) * x(0) - number(0.4) * x(1) * x(1);
