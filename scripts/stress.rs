@@ -10,6 +10,8 @@ mod mixed;
 mod random;
 #[path = "../tests/stress/runs.rs"]
 mod runs;
+#[path = "../tests/stress/saturating.rs"]
+mod saturating;
 #[path = "../tests/stress/scenes.rs"]
 mod scenes;
 #[path = "../tests/stress/slender.rs"]
@@ -33,7 +35,7 @@ use winkler::petsc::Session;
 /// laws of every form in one scene, springs to the ground, own weight, and given starts. With --slender they are leaves, discs, plates, frames and
 /// hoops from 1:5 to 1:200, in the plane, of revolution and in space. A seed stands for other scenes then.
 ///
-/// With --mixed they have obstacles, bonds and forces besides.
+/// With --mixed they have obstacles, bonds and forces besides. With --saturating the layers saturate.
 ///
 /// Exits with 1 if the default method fails on a scene that has a solution, or if any method is wrong.
 #[derive(Parser)]
@@ -54,6 +56,9 @@ struct Arguments {
     /// Draws obstacles, bonds and forces
     #[arg(long, conflicts_with_all = ["wide", "slender"])]
     mixed: bool,
+    /// Draws layers that saturate
+    #[arg(long, conflicts_with_all = ["wide", "slender", "mixed"])]
+    saturating: bool,
     /// Seed of the series
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -158,6 +163,7 @@ fn write(arguments: &Arguments, folder: &Path, index: usize) -> Result<(Case, Pa
         (true, _) => wide::scene,
         (_, true) => slender::scene,
         _ if arguments.mixed => mixed::scene,
+        _ if arguments.saturating => saturating::scene,
         _ => scenes::scene,
     };
     let case = draw(arguments.seed, index, Path::new(env!("CARGO_MANIFEST_DIR")));

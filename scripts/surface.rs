@@ -16,7 +16,7 @@ struct Asked {
     /// File to write: .npy, or rows of numbers parted by commas
     file: PathBuf,
     /// Points along each side
-    #[arg(long, default_value = "1024")]
+    #[arg(long, default_value = "1024", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(2..))]
     points: usize,
     /// Length of a side
     #[arg(long, default_value = "1")]

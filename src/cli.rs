@@ -14,7 +14,7 @@ use std::ffi::OsString;
 use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 
-/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition on PETSc.
+/// Frictionless contact of elastic bodies through nonlinear Winkler layers, by Newton's method or Robin-Robin domain decomposition on PETSc.
 ///
 /// PETSc options are typed as in every PETSc program, for all bodies (-ksp_type cg -pc_type hypre) or for one
 /// (-upper_ksp_type cg); -help lists them.
@@ -142,14 +142,11 @@ pub fn run(words: Vec<OsString>) -> i32 {
         Ok(parsed) => parsed,
         Err(refusal) => return refusal.print(),
     };
-    let interrupt = match Interrupt::watch() {
-        Ok(interrupt) => interrupt,
-        Err(error) => return complain(&error),
+    let work = move |interrupt: &Interrupt| match cli.command {
+        Command::Solving(command) => with_session(&petsc, interrupt, command),
+        command => without_session(interrupt, command, petsc),
     };
-    match cli.command {
-        Command::Solving(command) => with_session(&petsc, &interrupt, command),
-        command => without_session(&interrupt, command, petsc),
-    }
+    Interrupt::watch(work).unwrap_or_else(|error| complain(&error))
 }
 
 /// Parse the words of a command line into a command and the options of PETSc.
@@ -164,7 +161,9 @@ fn parse(words: Vec<OsString>) -> std::result::Result<(Cli, Vec<String>), CliErr
             return refuse(message, "type it in UTF-8, or rename the file".to_owned());
         }
     };
-    let (program, petsc) = options::split(words);
+    let parser = Cli::command();
+    let commands = parser.get_subcommands().map(clap::Command::get_name).chain(["help"]).collect::<Vec<_>>();
+    let (program, petsc) = options::split(words, &commands);
     if let Some(flag) = option_with_one_dash(&petsc) {
         return refuse(format!("PETSc knows no option -{flag}"), format!("did you mean --{flag}?"));
     }

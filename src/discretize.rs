@@ -29,9 +29,10 @@ pub use assembly::{Assembled, Factory};
 pub use facts::BodyInfo;
 pub use groups::find_group;
 pub use marks::marks;
-pub use pairs::ContactFacts;
+pub use pairs::{ContactFacts, corners};
 pub use post::ForceBalance;
 pub use rigid::Obstacle;
+pub use surface::Neighbours;
 pub use verify::{Verified, verify};
 
 use crate::contact::{self, law};

@@ -4,6 +4,7 @@
 //! the energy norm; in cells of quadratic elements, that of the recovered displacement from its nodal interpolant where this is smaller. The recovered displacement also shows the part of the displacement that the elements cannot represent, which acts like a load
 //! on the discrete problem. The response to that load is the error of nodal displacements and nodal pressures.
 
+mod force;
 mod held;
 mod pressure;
 pub mod sizes;
@@ -43,11 +44,13 @@ pub struct Estimate {
     pub pressure: Vec<f64>,
     /// The part of it on the facets at sharp ends of the contact, where the pressure may be singular.
     pub ends: Vec<f64>,
+    /// Place in the scene of the largest part of it.
+    pub worst: Vec<[f64; 3]>,
     /// Why the error of the pressures of each pair is a guess, if it is one.
     pub guesses: Vec<Option<Guess>>,
     /// Relative error of the normal displacements of all contact surfaces, prescribed ones included, measured likewise.
     pub displacement: f64,
-    /// Relative error of the sum of the pressures of each pair, with the factor `SAFETY`.
+    /// Relative error of the sum of the pressures of each pair.
     pub force: Vec<f64>,
 }
 
@@ -70,12 +73,6 @@ impl Estimate {
             Quantity::Displacements => self.displacement,
             Quantity::Forces => self.force.iter().copied().fold(0.0, f64::max),
         }
-    }
-
-    /// Return the pair with the largest error at its sharp ends, and the error.
-    pub fn largest_end(&self) -> Option<(usize, f64)> {
-        let ends = self.ends.iter().copied().enumerate();
-        ends.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Return whether the errors are a guess: of pressures at the edge of the contact, or because the energy error is as large as the solution.
@@ -107,7 +104,6 @@ pub fn estimate(
     for pair in 0..model.pairs.len() {
         local.add_pair(meshes, model, layer, &recovered, (pair, &rigid_closing(model, iterate, pair)));
     }
-    drop(recovered);
     let mut bodies: Vec<f64> = local.cells.iter().take(model.meshed()).map(|cells| cells.iter().sum()).collect();
     model.exchange.sum(&mut bodies);
     local.cells.iter_mut().zip(&local.strips).for_each(|(cells, strips)| axpy(1.0, strips, cells));
@@ -125,6 +121,8 @@ pub fn estimate(
     let whole = bodies.iter().chain(&layers).sum::<f64>().max(nodal);
     let energy = relative_norm(whole, reference, held.energy);
     let pressures = PressureErrors::new(meshes, model, layer, &closing);
+    let solution = force::Solution { iterate, layer, displacements: &displacements, recovered: &recovered };
+    let force = force::errors(meshes, model, step, &solution, &pressures.error)?;
     let mut trace = iterate.trace.clone();
     held.add_trace(model, -1.0, &mut trace);
     let both = [0, 1].into_iter().flat_map(|side| (0..model.pairs.len()).map(move |pair| (pair, side)));
@@ -137,8 +135,9 @@ pub fn estimate(
         energy,
         nodal: relative_norm(nodal, reference, held.energy),
         pressure: pressures.relative,
-        force: pressures.force,
+        force,
         ends: pressures.ends,
+        worst: pressures.worst,
         guesses: pressures.guesses,
         pressure_error: pressures.error,
         displacement: if error == 0.0 { 0.0 } else { SAFETY * f64::sqrt(error / whole) },
@@ -264,7 +263,7 @@ impl LocalErrors {
         let mut compression = vec![0.0; points.each.len()];
         for side in 0..2 {
             if let Some(recovered) = &recovered[pair.bodies[side]] {
-                let normal = recovered.normal_displacement(index, side);
+                let normal = recovered.recovered_displacement(index, side);
                 compression.iter_mut().zip(normal).for_each(|(sum, u)| *sum += u);
             }
         }

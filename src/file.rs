@@ -4,9 +4,12 @@ use crate::error::{Error, Kind, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fs::{File, FileType};
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
+
+/// What a pointer of Git LFS begins with.
+const LFS: &[u8] = b"version https://git-lfs.github.com/spec/";
 
 /// Return all bytes of a regular file.
 ///
@@ -17,18 +20,36 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
     file.read_to_end(&mut bytes).map_err(|cause| Error::file(path, "read", &cause)).map(|_| bytes)
 }
 
-/// Open a regular file. Others are refused: devices and pipes may have no end, or keep a reader waiting for ever.
+/// Open a regular file. Others are refused: devices and pipes may have no end, or keep a reader waiting for ever. So is what Git LFS leaves in
+/// the place of a large file that was not fetched.
 ///
 /// # Errors
-/// [`Kind::File`]: the path is no regular file, or cannot be read.
+/// [`Kind::File`]: the path is no regular file, or cannot be read, or is a pointer of Git LFS.
 pub fn open(path: &Path) -> Result<File> {
     let failed = |cause| Error::file(path, "read", &cause);
     let kind = std::fs::metadata(path).map_err(failed)?.file_type();
     if kind.is_file() {
-        return File::open(path).map_err(failed);
+        let (mut file, mut start) = (File::open(path).map_err(failed)?, Vec::new());
+        file.by_ref().take(LFS.len() as u64).read_to_end(&mut start).map_err(failed)?;
+        if start == LFS {
+            return Err(Error::new(
+                Kind::File,
+                format!("{} is a pointer of Git LFS, not the file itself", path.display()),
+            )
+            .help("fetch the file: git lfs pull"));
+        }
+        return file.rewind().map_err(failed).map(|()| file);
     }
     Err(Error::new(Kind::File, format!("{} is {}, not a file", path.display(), kind_of(kind)))
         .help("name a regular file; what a pipe gives can be saved as one"))
+}
+
+/// Write a file.
+///
+/// # Errors
+/// The file system refuses.
+pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|cause| Error::file(path, "write", &cause))
 }
 
 /// Return the kind of a directory entry in words.

@@ -1,12 +1,18 @@
 //! Signals that request the program to end.
 //!
 //! A signal ends the program at once where nothing would be lost, with the exit code that a shell uses for it. After [`Interrupt::hold`], the first
-//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at once. Handlers set
-//! flags and do nothing else.
+//! signal only sets a flag, and the run checks the flag where it can end properly; a second signal ends the program at
+//! once.
+//!
+//! The first thread waits for signals, and the work of the program is done in a second one. So a library in which the
+//! work goes on for ever cannot hold a signal up, and one that installs handlers of its own, as METIS does for SIGTERM,
+//! cannot take it.
 
 use crate::error::{Error, Kind, Result};
+use nix::sys::signal::{SigSet, Signal};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
-use signal_hook::flag;
+use signal_hook::{flag, low_level};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -22,28 +28,64 @@ pub struct Interrupt {
     asked: Arc<AtomicUsize>,
 }
 
+/// Bytes of the stack of the second thread, as many as Linux gives the first one.
+const STACK: usize = 8 << 20;
+
 impl Interrupt {
-    /// Install the handlers. Signals end the program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`. With a
-    /// limit on the size of files, writing fails with an error that has a message.
+    /// Do the work of the program in a second thread, and exit with the code that it returns. This thread waits for
+    /// signals. They end the program until [`hold`](Interrupt::hold) is called. SIGHUP stays ignored under `nohup`.
+    /// With a limit on the size of files, writing fails with an error that has a message.
     ///
     /// # Errors
-    /// The system refuses a handler.
-    pub fn watch() -> Result<Self> {
+    /// The system refuses a thread or a handler.
+    pub fn watch(work: impl FnOnce(&Interrupt) -> i32 + Send + 'static) -> Result<i32> {
         let interrupt = Self::default();
         interrupt.at_once.store(true, Ordering::SeqCst);
-        let installed = interrupt.install();
-        installed.map_err(|cause| Error::new(Kind::File, "signals cannot be watched").because(cause.to_string()))?;
-        Ok(interrupt)
+        let ended = interrupt.begin(work);
+        Err(Error::new(Kind::File, "signals cannot be watched").because(ended.to_string()))
     }
 
-    fn install(&self) -> std::io::Result<()> {
+    /// Begin the work, and wait for signals. Return why that is not possible.
+    fn begin(&self, work: impl FnOnce(&Interrupt) -> i32 + Send + 'static) -> std::io::Error {
+        let interrupt = self.clone();
+        // the hook for panics has printed a message
+        let work = move || std::process::exit(catch_unwind(AssertUnwindSafe(|| work(&interrupt))).unwrap_or(101));
+        let wait = || -> std::io::Result<std::convert::Infallible> {
+            let ending = self.install()?;
+            std::thread::Builder::new().name("main".to_owned()).stack_size(STACK).spawn(work)?;
+            // the system prefers the first thread for a signal, if that waits for it
+            ending.thread_block()?;
+            loop {
+                self.note(ending.wait()? as i32);
+            }
+        };
+        match wait() {
+            Err(cause) => cause,
+        }
+    }
+
+    /// Install handlers for a signal that another thread takes all the same, as it may where it starts a process. Return
+    /// the signals that end the program.
+    fn install(&self) -> std::io::Result<SigSet> {
+        let mut ending = SigSet::empty();
         for signal in ENDING.into_iter().filter(|&signal| signal != SIGHUP || !is_ignored(signal)) {
-            // handlers run in this order: the shutdown is tested before the flag is set, so that only the second signal ends the program
+            // handlers run in this order: the shutdown is tested before the flag is set, so that only the second signal
+            // ends the program
             flag::register_conditional_shutdown(signal, Kind::Stopped(signal).exit_code(), self.at_once.clone())?;
             flag::register(signal, self.at_once.clone())?;
             flag::register_usize(signal, self.asked.clone(), signal as usize)?;
+            ending.add(Signal::try_from(signal)?);
         }
-        flag::register(SIGXFSZ, Arc::default()).map(|_| ())
+        flag::register(SIGXFSZ, Arc::default())?;
+        Ok(ending)
+    }
+
+    /// Do for a signal what the handlers do.
+    fn note(&self, signal: i32) {
+        if self.at_once.swap(true, Ordering::SeqCst) {
+            low_level::exit(Kind::Stopped(signal).exit_code());
+        }
+        self.asked.store(signal as usize, Ordering::SeqCst);
     }
 
     /// From now on, let the first signal set the flag only.
@@ -77,7 +119,7 @@ pub fn ended(signal: i32) -> Error {
 
 /// Return the name of a signal that ends a run.
 pub fn name(signal: i32) -> &'static str {
-    signal_hook::low_level::signal_name(signal).unwrap_or("a signal")
+    low_level::signal_name(signal).unwrap_or("a signal")
 }
 
 /// Whether the program was started with a signal ignored, as by `nohup`.

@@ -1,4 +1,4 @@
-//! Frictionless contact of N elastic bodies through nonlinear Winkler layers, by Robin-Robin domain decomposition.
+//! Frictionless contact of elastic bodies through nonlinear Winkler layers, by Newton's method or Robin-Robin domain decomposition on PETSc.
 //!
 //! Programs use [`api`] (a scene built in Rust, solved, read as arrays) and [`petsc`] (the binding, useful alone). The errors of
 //! both are in [`error`]; [`cli`] is the command line. Other modules are private. `internals`, which rustdoc does not show, has those of their

@@ -1,9 +1,10 @@
 //! Owner ranks of bodies, and messages between ranks by the `mpi` crate.
 
 use crate::error::{Error, Result};
-use crate::exchange::{Exchange, all_gather};
+use crate::exchange::Exchange;
 use crate::petsc::Session;
 use mpi::collective::SystemOperation;
+use mpi::datatype::PartitionMut;
 use mpi::traits::{Communicator, CommunicatorCollectives, Destination, Root, Source};
 use std::cell::Cell;
 
@@ -57,6 +58,18 @@ impl Exchange for Ranks {
             return vec![mine];
         }
         self.count_message();
+        let world = self.session.world();
+        let mut lengths = vec![0_u64; self.session.size()];
+        world.all_gather_into(&(mine.len() as u64), &mut lengths[..]);
+        if lengths.iter().sum::<u64>() <= CHUNK as u64 {
+            let counts: Vec<i32> = lengths.iter().map(|&length| length as i32).collect();
+            let starts: Vec<i32> =
+                counts.iter().scan(0, |end, count| Some(std::mem::replace(end, *end + count))).collect();
+            let mut all = vec![0_u8; lengths.iter().sum::<u64>() as usize];
+            world.all_gather_varcount_into(&mine[..], &mut PartitionMut::new(&mut all[..], &counts[..], &starts[..]));
+            let of_rank = |(&start, &count): (&i32, &i32)| all[start as usize..(start + count) as usize].to_vec();
+            return starts.iter().zip(&counts).map(of_rank).collect();
+        }
         let of_rank = |rank| self.broadcast(rank, if rank == self.session.rank() { mine.clone() } else { Vec::new() });
         (0..self.session.size()).map(of_rank).collect()
     }
@@ -114,12 +127,15 @@ pub fn collectively<T>(session: &Session, result: Result<T>) -> Result<T> {
         return result;
     }
     // an error without a message comes from another rank, which has the message
-    let mine = result.as_ref().err().filter(|error| !error.is_silent()).map(|error| error.kind().exit_code());
-    let all = all_gather(&Ranks::new(session), mine).into_iter().enumerate();
-    let Some((first, code)) = all.filter_map(|(rank, code)| Some((rank, code?))).next() else { return result };
+    let told = result.as_ref().err().filter(|error| !error.is_silent());
+    // the rank in the upper half: the least number is that of the first rank with a message
+    let mine = told.map_or(u64::MAX, |error| (session.rank() as u64) << 32 | error.kind().exit_code() as u64);
+    let mut least = mine;
+    session.world().all_reduce_into(&mine, &mut least, SystemOperation::min());
     match result {
-        Err(error) if session.rank() == first => Err(error.agreed()),
-        _ => Err(Error::silent(code)),
+        _ if least == u64::MAX => result,
+        Err(error) if mine == least => Err(error.agreed()),
+        _ => Err(Error::silent(least as u32 as i32)),
     }
 }
 

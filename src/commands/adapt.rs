@@ -1,6 +1,7 @@
 //! The rounds of a run on several meshes, which are adapted to an error: solve, estimate, stop or follow the sizes of the next mesh.
 
 use super::checkpoint::{Checkpoint, CheckpointHeader};
+use super::shortfall::Shortfall;
 use super::transfer::{self, EstimatedSolution};
 use crate::ddm::{InitialGuess, Solution, Status};
 use crate::discretize::meshes::Meshes;
@@ -9,7 +10,7 @@ use crate::estimate::Estimate;
 use crate::estimate::sizes::{self, Aim, Sizes};
 use crate::interrupt::Interrupt;
 use crate::mesh;
-use crate::output::{ContactTable, RoundReport};
+use crate::output::{ContactTable, RoundReport, UnmetReport};
 use crate::parallel::collectively;
 use crate::petsc::Session;
 use crate::problem::history::History;
@@ -77,10 +78,10 @@ pub struct AdaptiveRun {
     pub scene: Rc<Scene>,
     /// Reports of the rounds so far.
     pub rounds: Vec<RoundReport>,
-    /// Why the run ends before the error is reached, as a text.
-    pub limit: Option<String>,
-    /// What the error at a sharp end of a contact would cost, as a text, if it alone is left.
-    pub costly_end: Option<String>,
+    /// Why the run ends before the error is reached.
+    pub shortfall: Option<Shortfall>,
+    /// The errors of pairs on the last mesh that are above the one asked for.
+    pub unmet: Vec<UnmetReport>,
     /// The error to which meshes are adapted; none without adaptation.
     goal: Option<AdaptSpec>,
     /// The checkpoint from which the first round goes on.
@@ -157,14 +158,15 @@ impl AdaptiveRun {
 
     /// Return the plan of a scene that has made no mesh yet, or none since the checkpoint.
     fn of(scene: Rc<Scene>, resumed: Option<Checkpoint>) -> Self {
+        let head = resumed.as_ref().map(|checkpoint| checkpoint.head.clone()).unwrap_or_default();
         Self {
             goal: scene.adapt.clone(),
             requested: scene.clone(),
             scene,
-            rounds: resumed.as_ref().map_or(Vec::new(), |checkpoint| checkpoint.head.rounds.clone()),
+            rounds: head.rounds,
             resumed,
-            limit: None,
-            costly_end: None,
+            shortfall: head.shortfall,
+            unmet: head.unmet,
             last_end: None,
             start_from: Vec::new(),
             seconds: 0.0,
@@ -179,7 +181,6 @@ impl AdaptiveRun {
     fn resume(&mut self, head: &CheckpointHeader) {
         let scene = Rc::make_mut(&mut self.scene);
         follow(scene, head.adapted.clone().map(Into::into));
-        self.limit.clone_from(&head.limit);
         if self.goal.is_none() || head.on_last_mesh {
             scene.method.steps.begun = head.steps.len();
         } else {
@@ -237,9 +238,10 @@ impl AdaptiveRun {
     /// What [`run::build`] refuses, but not the mesh of a later round.
     pub fn build(&mut self, session: &Session, interrupt: &Interrupt, clock: &mut Clock) -> Result<Built> {
         match run::build(session, self.scene.clone(), interrupt, clock) {
-            Err(error) if error.kind() == Kind::Mesh && self.last_mesh.is_some() && self.limit.is_none() => {
+            Err(error) if error.kind() == Kind::Mesh && self.last_mesh.is_some() && self.shortfall.is_none() => {
                 let round = self.rounds.len();
-                self.limit = Some(format!("no mesh comes of the sizes after mesh {round}: {}", error.message()));
+                let reason = format!("no mesh comes of the sizes after mesh {round}: {}", error.message());
+                self.shortfall = Some(Shortfall::Limit(reason));
                 follow(Rc::make_mut(&mut self.scene), self.last_mesh.take());
                 self.end_meshes();
                 run::build(session, self.scene.clone(), interrupt, clock)
@@ -262,7 +264,8 @@ impl AdaptiveRun {
             rounds: self.rounds.clone(),
             adapted: self.adapted().map(|adapted| (*adapted).clone()),
             on_last_mesh: self.is_stepping(),
-            limit: self.limit.clone(),
+            shortfall: self.shortfall.clone(),
+            unmet: self.unmet.clone(),
             ..CheckpointHeader::default()
         }
     }
@@ -287,23 +290,25 @@ impl AdaptiveRun {
         }
         let (Some(goal), Some(estimate)) = (self.goal.clone(), estimate) else { return false };
         self.record(done, estimate, clock);
-        if !done.outcome.status.is_solved() || self.limit.is_some() {
+        if !done.outcome.status.is_solved() || self.shortfall.is_some() {
             return false;
         }
         let (asked, error) = (goal.error.value, estimate.largest(goal.of));
+        self.unmet = unmet(done, estimate, &goal);
         // a second mesh checks a guess
         let is_reached = error <= asked && !(self.rounds.len() == 1 && estimate.is_guess());
-        if is_reached || self.has_costly_end(done, estimate, &goal) {
+        if is_reached || self.has_costly_ends(estimate, &goal) {
             return self.end_meshes();
         }
         if self.rounds.len() >= goal.rounds {
-            self.limit = Some(format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds));
+            let reason = format!("{} meshes were made: allow more (adapt.rounds)", goal.rounds);
+            self.shortfall = Some(Shortfall::Limit(reason));
             return self.end_meshes();
         }
         let Some(next) = self.next_sizes(done, estimate, &goal) else {
             let RoundReport { cells, .. } = self.rounds[self.rounds.len() - 1];
             let needed = format!("a mesh has {cells} cells, and the next one needs more than {}", goal.cells);
-            self.limit = Some(needed + ": allow more (adapt.cells)");
+            self.shortfall = Some(Shortfall::Limit(needed + ": allow more (adapt.cells)"));
             return self.end_meshes();
         };
         self.start_from = contact_tables(done);
@@ -330,16 +335,15 @@ impl AdaptiveRun {
         (!is_full).then_some(next)
     }
 
-    /// Return whether only a sharp end of a contact is left of an error, which meshes of a few times as many cells do not reach there.
+    /// Return whether only sharp ends of contacts are left of an error, which meshes of a few times as many cells do not reach there.
     ///
     /// Without a layer the pressure is K r^(lambda - 1) at the distance r from the end, and facets of size h miss the order h^(lambda - 1/2) of it. A
     /// punch with right angles has lambda = 0.774: a half of the error takes facets of a thirteenth.
-    fn has_costly_end(&mut self, done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> bool {
+    fn has_costly_ends(&mut self, estimate: &Estimate, goal: &AdaptSpec) -> bool {
         if !matches!(goal.of, Quantity::All | Quantity::Pressures) {
             return false;
         }
-        let Some((pair, error)) = estimate.largest_end() else { return false };
-        let asked = goal.error.value;
+        let (asked, error) = (goal.error.value, estimate.ends.iter().copied().fold(0.0, f64::max));
         let cells = self.rounds[self.rounds.len() - 1].cells as f64;
         let own = MeshError { cells, error };
         let beside = estimate.largest_beside_ends(goal.of);
@@ -348,15 +352,16 @@ impl AdaptiveRun {
         if needed <= COSTLY * cells {
             return false;
         }
-        let [a, b] = done.built.discrete.surfaces(pair);
         let meshes = match needed < 1e9 {
             true => format!("takes a mesh of about {needed:.0e} cells"),
             false => "takes more cells than a mesh can have".to_owned(),
         };
-        self.costly_end = Some(format!(
-            "the pressures between `{a}` and `{b}` have an error of {error:.1e} at a sharp end of the contact, and all others of {beside:.1e} at most: \
-             {asked:.1e} there {meshes}; a rounded edge or a softer layer bounds these pressures"
-        ));
+        let ends: Vec<String> = self.unmet.iter().map(UnmetReport::in_words).collect();
+        self.shortfall = Some(Shortfall::SharpEnds(format!(
+            "not to {asked:.1e} at sharp ends of contacts: {}; all other errors are {beside:.1e} at most, and {asked:.1e} there {meshes}; a rounded \
+             edge or a softer layer bounds these pressures",
+            ends.join(", ")
+        )));
         true
     }
 
@@ -420,6 +425,23 @@ impl AdaptiveRun {
         self.previous.iter().for_each(|previous| previous.correct(&tables, &edges, estimate));
         self.previous = Some(EstimatedSolution::new(estimate, tables));
     }
+}
+
+/// Return the errors of pairs that count for a goal and are above it.
+fn unmet(done: &Done, estimate: &Estimate, goal: &AdaptSpec) -> Vec<UnmetReport> {
+    let (of, errors) = match goal.of {
+        Quantity::All | Quantity::Pressures => ("pressure", &estimate.pressure),
+        Quantity::Forces => ("force", &estimate.force),
+        Quantity::Displacements => return Vec::new(),
+    };
+    let above = errors.iter().enumerate().filter(|(_, error)| **error > goal.error.value);
+    let report = |(pair, &error): (usize, &f64)| UnmetReport {
+        surfaces: done.built.discrete.surfaces(pair).map(str::to_owned),
+        of: of.to_owned(),
+        error,
+        place: estimate.worst[pair],
+    };
+    above.map(report).collect()
 }
 
 /// Return the solution on the contact surfaces, one table for each pair.

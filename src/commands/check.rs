@@ -19,7 +19,7 @@ pub struct CheckArgs {
     scene: SceneArgs,
 }
 
-/// Build a scene's problem, print it and return the exit code.
+/// Build a scene's problem, print it and return the exit code: that of `solve` if loads work on a motion that nothing can hold.
 ///
 /// Bodies, dofs, surfaces, gaps and the unconstrained rigid motions of each body are printed.
 ///
@@ -37,8 +37,9 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &CheckArgs) -> R
     clock.watch = None;
     clock.total();
     let shared = report::GatheredCounters::gather(&built.discrete);
+    let exit = i32::from(built.discrete.model.mechanism.is_some());
     if session.rank() != 0 {
-        return Ok(0);
+        return Ok(exit);
     }
     if request.scene.json {
         let headline = json!(report::headline(session, &built, &shared.solvers, &clock));
@@ -46,7 +47,7 @@ pub fn check(session: &Session, interrupt: &Interrupt, request: &CheckArgs) -> R
     } else {
         print(&built, &report::solvers_in_words(&shared.solvers))?;
     }
-    Ok(0)
+    Ok(exit)
 }
 
 /// Return all of `--json`: the headline of a report, with what is known before a solution.

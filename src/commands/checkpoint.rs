@@ -4,12 +4,13 @@
 //! all that. It is replaced as a whole, so that there is always a good one. The states are compressions of the layers and traces of the bodies, in the
 //! units of the scene: Newton's method starts from the former, sweeps from the latter.
 
+use super::shortfall::Shortfall;
 use crate::ddm::{InitialGuess, Solution, Status};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::{Exchange, broadcast};
 use crate::file::digest;
 use crate::model::Field;
-use crate::output::{RoundReport, StepReport, write_whole};
+use crate::output::{RoundReport, StepReport, UnmetReport, write_whole};
 use crate::problem::mesh::AdaptedMesh;
 use crate::run::stages::{Begin, Built, Done};
 use crate::scene::Scene;
@@ -47,7 +48,9 @@ pub struct CheckpointHeader {
     /// Whether the run ends with this mesh of an adaptation: it makes all load steps on it, or it is the best mesh once more.
     pub on_last_mesh: bool,
     /// Why the error was not reached on the last mesh, if it was not.
-    pub limit: Option<String>,
+    pub shortfall: Option<Shortfall>,
+    /// The errors of pairs that were not reached.
+    pub unmet: Vec<UnmetReport>,
 }
 
 /// A checkpoint that was read.

@@ -1,5 +1,6 @@
 //! `winkler mesh`: make the mesh of a scene, or find it in the cache, and print what is in it.
 
+use super::inputs;
 use crate::discretize::{Verified, find_group, verify};
 use crate::error::{Error, Kind, Result};
 use crate::exchange::Serial;
@@ -7,9 +8,10 @@ use crate::fem::Space;
 use crate::interrupt::Interrupt;
 use crate::linalg::bounds;
 use crate::mesh::{Group, Loaded, Mesh, MeshOrigin};
+use crate::output::folder::MARK_OF_MESH;
 use crate::output::report::readable;
 use crate::output::terminal::ProgressLine;
-use crate::output::{say, write_whole};
+use crate::output::{refuse_foreign, say, write_whole};
 use crate::problem::{BodySpec, MeshSource, Order};
 use crate::run::{in_parts, made_straight};
 use crate::scene::Scene;
@@ -117,6 +119,8 @@ fn facts<const D: usize>(
     interrupt: &Interrupt,
     request: &MeshArgs,
 ) -> Result<MeshFacts> {
+    let read = scene.map_or_else(|| crate::mesh::files(source), inputs);
+    request.output.as_ref().map_or(Ok(()), |path| check_output(path, &read))?;
     let orders = scene.into_iter().flat_map(|scene| &scene.bodies).map(|body| body.order);
     let order = orders.max().unwrap_or(Order::P1);
     let began = Instant::now();
@@ -206,12 +210,25 @@ fn in_lines(facts: &MeshFacts) -> String {
     lines.join("\n")
 }
 
-/// Write the mesh to another file.
-fn write(path: &Path, mesh: &Path, dimension: usize) -> Result<()> {
+/// Refuse what is no name for a mesh file, and what is read or of another origin.
+fn check_output(path: &Path, inputs: &[PathBuf]) -> Result<()> {
     if path.extension().is_none_or(|ending| ending != "msh") {
         return Err(Error::new(Kind::Usage, format!("`{}` is no name for a mesh file", path.display()))
             .help("end it with .msh; `winkler solve --vtu` writes bodies for ParaView"));
     }
+    let is_own = |own: PathBuf| inputs.iter().any(|input| input.canonicalize().is_ok_and(|input| input == own));
+    if path.canonicalize().is_ok_and(is_own) {
+        return Err(Error::new(Kind::File, format!("{} is an input of this command", path.display()))
+            .help("name another file with `-o`"));
+    }
+    refuse_foreign(path)
+}
+
+/// Write the mesh to another file.
+fn write(path: &Path, mesh: &Path, dimension: usize) -> Result<()> {
     let bytes = crate::mesh::as_msh(mesh, dimension)?;
-    write_whole(path, |out| out.write_all(&bytes))
+    write_whole(path, |out| {
+        out.write_all(&bytes)?;
+        out.write_all(MARK_OF_MESH.as_bytes())
+    })
 }

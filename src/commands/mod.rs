@@ -11,6 +11,7 @@ pub(crate) mod mesh;
 pub(crate) mod new;
 mod plots;
 mod rows;
+mod shortfall;
 pub(crate) mod solve;
 pub(crate) mod sweep;
 mod transfer;
@@ -145,6 +146,13 @@ pub fn folder_of(scene: &Scene, typed: Option<&PathBuf>) -> PathBuf {
         .cloned()
         .or_else(|| scene.output.dir.clone())
         .unwrap_or_else(|| PathBuf::from("results").join(case_of(&scene.path)))
+}
+
+/// Return the files that a scene is read from.
+pub fn inputs(scene: &Scene) -> Vec<PathBuf> {
+    let data = scene.data.values().map(|data| data.spec.file.clone());
+    let table = scene.method.steps.table.iter().map(|table| table.value.clone());
+    data.chain(table).chain([scene.path.clone()]).chain(crate::mesh::files(&scene.mesh)).collect()
 }
 
 /// Return the name of a scene's case: the folder of a file called `scene.toml`, else the file's name.

@@ -21,7 +21,10 @@ pub const REVOLUTION: Example = [include_str!("new/revolution.toml"), include_st
 /// # Errors
 /// A folder without a name or with one that is no file name, files that exist or cannot be written.
 pub fn new(folder: &Path, [scene, script]: Example) -> Result<i32> {
-    let name = folder.file_name().and_then(|name| name.to_str()).filter(|name| !name.contains(['"', '\\']));
+    let name = folder
+        .file_name()
+        .and_then(|name| name.to_str())
+        .filter(|name| !name.contains(|c: char| c.is_control() || "\"\\".contains(c)));
     let Some(name) = name else {
         let message = format!("`{}` does not end with a name for a scene", folder.display());
         return Err(Error::new(Kind::Usage, message).help("for example `winkler new blocks`"));

@@ -60,6 +60,10 @@ impl Row {
     pub fn of_report(report: &Value) -> Self {
         let number = |path: &str| report.pointer(path).and_then(Value::as_f64);
         let pairs = report["pairs"].as_array().filter(|pairs| !pairs.is_empty());
+        let own = match Self::deserialize(report) {
+            Ok(own) => own,
+            Err(cause) => return Self::unsolved("failed", &format!("its report cannot be read: {cause}")),
+        };
         Self {
             points: pairs.map(|pairs| pairs.iter().filter_map(|pair| pair["points"].as_u64()).sum::<u64>() as usize),
             peak_pressure: largest(&report["pairs"], "peak_pressure"),
@@ -77,7 +81,7 @@ impl Row {
             error_of: largest(&report["bodies"], "error_l2")
                 .map_or(String::new(), |_| "displacement, exact".to_owned()),
             runs: 1,
-            ..Self::deserialize(report).unwrap_or_default()
+            ..own
         }
     }
 

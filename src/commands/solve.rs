@@ -3,8 +3,9 @@
 use super::adapt::AdaptiveRun;
 use super::checkpoint::{self, Checkpoint};
 use super::plots::unit_words;
-use super::write::{ResultFiles, to_json, write_fields};
-use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, load};
+use super::shortfall::Shortfall;
+use super::write::{ResultFiles, planned, planned_on_mesh, to_json, write_fields};
+use super::{SceneArgs, Terminal, VerbosityArgs, clock_with_phases, flags, folder_of, inputs, load};
 use crate::ddm::{Observer, Row, Status};
 use crate::error::{Error, Result};
 use crate::estimate::Estimate;
@@ -16,7 +17,9 @@ use crate::output::{
 use crate::parallel::{Ranks, collectively};
 use crate::petsc::Session;
 use crate::run::{self, All, Clock, Done, Prepared, Recorder, report, results, verdict};
+use crate::scene::Scene;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// The command line of `winkler solve`.
 #[derive(clap::Args)]
@@ -60,7 +63,10 @@ pub fn solve(session: &Session, interrupt: &Interrupt, request: &SolveArgs) -> R
     let scene = load(session, &request.scene.scene, &request.overrides())?;
     let read = |folder: &PathBuf| Checkpoint::read(&Ranks::new(session), folder);
     let checkpoint = collectively(session, request.restart.as_ref().map(read).transpose())?;
-    let folder = collectively(session, claim(session, folder_of(&scene, request.output.as_ref())))?;
+    let folder = collectively(
+        session,
+        claim(session, folder_of(&scene, request.output.as_ref()), std::slice::from_ref(&scene), planned(&scene)),
+    )?;
     let plan = AdaptiveRun::new(session, scene, checkpoint, interrupt, &mut clock)?;
     let has_checkpoint =
         request.restart.as_ref().is_some_and(|from| from.canonicalize().ok() == folder.path().canonicalize().ok());
@@ -130,7 +136,7 @@ impl Solver<'_> {
         let typed = session.options().typed();
         let is_monitored = typed.iter().any(|(name, _)| name.contains("monitor") || name.contains("view"));
         self.terminal.decisions(session, &ready)?.iter().for_each(|line| eprintln!("{line}"));
-        self.open_tables(&ready)?;
+        collectively(session, self.open_tables(&ready))?;
         let scene = &self.plan.scene;
         let is_shown = self.terminal.is_loud() && !is_monitored;
         self.table = IterationTable::new(is_shown, &run::targets(scene), scene.method.stop.residual);
@@ -155,6 +161,7 @@ impl Solver<'_> {
             return Ok(());
         }
         if !std::mem::replace(&mut self.has_tables, true) {
+            self.folder.check(&planned_on_mesh(&ready.built), &inputs(&ready.built.scene))?;
             prepare_folder(&self.folder, self.has_checkpoint)?;
         }
         self.tables = Tables::open(&self.folder, ready)?;
@@ -200,18 +207,16 @@ impl Solver<'_> {
     /// Write all results of the last mesh, and return the exit code.
     fn finish(self, Round { done, estimate }: Round) -> Result<i32> {
         let (plan, first, path) = (&self.plan, self.terminal.is_first, self.folder.path());
+        let shortfall = plan.shortfall.as_ref().filter(|_| verdict::exit_code(&done) == 0);
         let line = self.terminal.is_loud().then(|| ProgressLine::new("stresses and files", None));
         let (report, written) = self.files(&done, estimate.as_ref(), true).write(&mut self.clock.clone(), |report| {
-            report.warnings.extend(plan.costly_end.clone());
-            if let Some(limit) = &plan.limit {
-                report.status = "mesh-limit".to_owned();
-                report.message = format!("the error asked for is not reached: {limit}");
-            }
+            report.unmet.clone_from(&plan.unmet);
+            shortfall.iter().for_each(|shortfall| shortfall.put_into(report));
         });
         drop(line);
-        let code = if plan.limit.is_some() { 1 } else { verdict::exit_code(&done) };
+        let code = shortfall.map_or(verdict::exit_code(&done), Shortfall::exit_code);
         if first {
-            if self.has_checkpoint && code == 0 {
+            if self.has_checkpoint && verdict::exit_code(&done) == 0 {
                 // nothing is left to go on with; it is no failure if the file is gone already
                 let _ = std::fs::remove_file(path.join(checkpoint::FILE));
             }
@@ -253,9 +258,14 @@ fn brief_summary(report: &Report, code: i32, results: &str) -> String {
     ended.into_iter().chain(warnings).chain([results.to_owned()]).collect::<Vec<_>>().join("\n")
 }
 
-/// Take the folder of results for this run. The first rank, which writes its tables, locks it.
-pub(super) fn claim(session: &Session, path: PathBuf) -> Result<Folder> {
-    if session.rank() == 0 { Folder::claim(path) } else { Folder::create(path) }
+/// Take the folder of results for a run of these scenes, which writes files of these names. The first rank, which writes its tables, locks it.
+pub(super) fn claim(session: &Session, path: PathBuf, scenes: &[Rc<Scene>], names: Vec<String>) -> Result<Folder> {
+    if session.rank() > 0 {
+        return Folder::create(path);
+    }
+    let folder = Folder::claim(path)?;
+    folder.check(&names, &scenes.iter().flat_map(|scene| inputs(scene)).collect::<Vec<_>>())?;
+    Ok(folder)
 }
 
 /// Remove the results of other runs from the folder.

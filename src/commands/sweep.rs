@@ -49,8 +49,12 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         let overrides: Vec<String> = request.scene.overrides().into_iter().chain(own).collect();
         crate::scene::parse(&case.scene, text.clone(), &overrides).map(Rc::new)
     };
-    let scenes = collectively(session, plan.cases.iter().map(load).collect::<Result<Vec<Rc<Scene>>>>())?;
-    let folder = collectively(session, claim(session, folder_of(&scenes[0], request.output.as_ref())))?;
+    let scenes = plan.cases.iter().map(load).collect::<Result<Vec<Rc<Scene>>>>();
+    let scenes = collectively(session, scenes.and_then(without_adaptation))?;
+    let folder = collectively(
+        session,
+        claim(session, folder_of(&scenes[0], request.output.as_ref()), &scenes, planned(&scenes[0])),
+    )?;
     let terminal = Terminal::new(session, &request.scene, &request.verbosity);
     let bar = terminal::runs(plan.cases.len(), terminal.is_loud());
     let mut sweep = Sweep {
@@ -72,9 +76,11 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         let mut clock = Clock::default();
         sweep.bar.set_message(case.label.clone());
         let ready = sweep.prepare(case, scene, before.take(), &mut clock)?;
-        let done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
+        let mut done = run::iterate(ready, interrupt, &mut requests, &mut clock)?;
+        let estimate = run::estimate(&mut done, &mut clock)?;
         clock.total();
-        let report = report::report(session, &done, &results::recover(&done), &clock);
+        let mut report = report::report(session, &done, &results::recover(&done), &clock);
+        report.discretization_error = estimate.as_ref().map(report::discretization_error);
         exit = exit.max(verdict::exit_code(&done));
         if session.rank() == 0 {
             sweep.add(case, &done, report)?;
@@ -89,6 +95,23 @@ pub fn sweep(session: &Session, interrupt: &Interrupt, request: &SweepArgs) -> R
         sweep.finish(scenes[0].output.plots)?;
     }
     Ok(exit)
+}
+
+/// Refuse scenes that are to be adapted: a sweep solves each on its own mesh, and a loose tolerance of the iteration would be all that is left.
+fn without_adaptation(scenes: Vec<Rc<Scene>>) -> Result<Vec<Rc<Scene>>> {
+    if scenes.iter().all(|scene| scene.adapt.is_none()) {
+        return Ok(scenes);
+    }
+    let error = Error::new(Kind::Usage, "`sweep` solves every value on one mesh, and adapts none");
+    Err(error.help(
+        "leave --tolerance and [adapt] away, and take --estimate for the errors; `solve` adapts the mesh of one scene",
+    ))
+}
+
+/// Return the names of the files that a sweep writes, but for plots beyond the first.
+fn planned(scene: &Scene) -> Vec<String> {
+    let plots = ["convergence.svg", "pressure.svg"].into_iter().filter(|_| scene.output.plots);
+    plots.chain(["sweep.csv"]).map(str::to_owned).collect()
 }
 
 /// Return the cases of a request.
@@ -175,8 +198,12 @@ impl Sweep<'_> {
 /// Return the fields of all pairs and reactions.
 fn result_fields(report: &Report, names: &ResultNames) -> Vec<Cell> {
     let mut fields = Vec::new();
+    let estimates = report.discretization_error.iter().flat_map(|error| error.pressure.iter().zip(&names.pairs));
+    fields.extend(estimates.map(|(error, name)| tables::number(format!("pressure_estimate {name}"), *error)));
     for (pair, name) in report.pairs.iter().zip(&names.pairs) {
-        fields.push(tables::number(format!("peak_pressure {name}"), pair.peak_pressure));
+        fields.push(tables::number(format!("normal_force {name}"), pair.normal_force));
+        fields.push(tables::number(format!("mean_pressure {name}"), pair.mean_pressure));
+        fields.extend(tables::peaks(name, pair.peak_pressure, pair.tension));
         fields.push(names.contact(name, &pair.extent));
         fields.push(tables::number(format!("layer_energy {name}"), pair.layer_energy));
         fields.extend(tables::vector("force", name, &pair.force[0], names.dimension));

@@ -1,23 +1,24 @@
 //! The files of the results of a run: tables, plots, fields, those of each load step included, the page, and the report, which lists all files.
 
 use super::adapt::AdaptiveRun;
-use super::interpolate::PointTree;
+use super::checkpoint;
 use super::plots::{self, Plots};
 use crate::contact::ContactPair;
-use crate::discretize::BodyInfo;
+use crate::discretize::{BodyInfo, corners};
 use crate::error::{Error, Kind, Result};
 use crate::estimate::Estimate;
 use crate::exchange::{all_gather, gather};
-use crate::output::folder::{REPORT, STEPS};
+use crate::output::folder::{MARK_OF_MESH, REPORT, STEPS};
 use crate::output::views::Tags;
 use crate::output::vtu::{self, CollectionEntry, write_pvd};
 use crate::output::{Folder, LISTED, PairReport, PairRow, Report, busiest, safe_name, tables};
 use crate::petsc::Session;
 use crate::report::{self as page, Page, Surface};
 use crate::run::results::{self, pair_names};
-use crate::run::{All, Clock, Done, Recovered, report};
-use crate::scene::Precision;
+use crate::run::{All, Built, Clock, Done, Recovered, report};
+use crate::scene::{Precision, Scene};
 use serde::Serialize;
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -87,7 +88,7 @@ impl ResultFiles<'_> {
         let compression = |i: usize| &layer.compression[model.range(i)];
         let row = |(i, pair): (usize, &ContactPair)| PairRow::new(&pair.area, &pair.gap, compression(i));
         let mut rows: Vec<PairRow> = model.pairs.iter().enumerate().map(row).collect();
-        let stems = stems(done);
+        let stems = stems(&done.built);
         shown.iter().for_each(|&i| rows[i].table = format!("{}.csv", stems[i]));
         plots.files().filter(|_| has_plots).for_each(|(i, file)| rows[i].plot = file);
         tables::save(folder, &report.pairs, &rows)?;
@@ -120,7 +121,7 @@ impl ResultFiles<'_> {
         let scene = &done.built.scene;
         // in the plane contact surfaces are lines, which have plots
         let in_space = shown.iter().filter(|_| scene.dimension.value == 3);
-        let names = stems(done);
+        let names = stems(&done.built);
         let mut bodies: Vec<Surface> = of_bodies.into_iter().map(Surface::join).collect();
         mark(&mut bodies, done);
         let page = Page {
@@ -142,9 +143,9 @@ impl ResultFiles<'_> {
     /// Return the names of the files of a run, those of other ranks included.
     fn names(&self) -> Vec<String> {
         let (done, steps) = (self.done, self.done.built.scene.method.steps.steps.len());
-        let mut of_ranks = field_files(done, &|name| safe_name(name));
+        let mut of_ranks = field_files(&done.built, &|name| safe_name(name));
         for step in 1..=done.steps.len() {
-            of_ranks.extend(field_files(done, &|name| stem_of(name, step, steps)));
+            of_ranks.extend(field_files(&done.built, &|name| stem_of(name, step, steps)));
         }
         of_ranks.retain(|name| self.folder.path().join(name).is_file());
         let mut names = [self.folder.files(), of_ranks, vec![REPORT.to_owned()]].concat();
@@ -157,19 +158,74 @@ impl ResultFiles<'_> {
 /// Mark supports, loads, springs and contact surfaces of the bodies.
 fn mark(bodies: &mut [Surface], done: &Done) {
     let (model, layer) = (done.model(), &done.outcome.layer);
+    // how many contact points of each facet there are, and how many of them carry pressure
+    let mut points: HashMap<[u32; 3], [usize; 2]> = HashMap::new();
+    for (i, contact) in done.built.discrete.contacts.iter().enumerate() {
+        let pressure = &layer.pressure[model.range(i)];
+        for facing in &contact.facing {
+            let closed = facing.points.iter().filter(|&&q| pressure[q] != 0.0).count();
+            for facet in facing.facets {
+                let [all, under_pressure] = points.entry(facet).or_default();
+                (*all, *under_pressure) = (*all + facing.points.len(), *under_pressure + closed);
+            }
+        }
+    }
+    let is_closed = |facet: &[u32]| {
+        points.get(&corners(facet.iter().copied())).is_some_and(|[all, closed]| *closed > 0 && 2 * closed >= *all)
+    };
     for (index, body) in bodies.iter_mut().enumerate() {
-        let own: Vec<usize> = (0..model.pairs.len()).filter(|&i| model.pairs[i].bodies.contains(&index)).collect();
-        let points: Vec<[f64; 3]> = own.iter().flat_map(|&i| &model.pairs[i].position).copied().collect();
-        let pressure: Vec<f64> = own.iter().flat_map(|&i| &layer.pressure[model.range(i)]).copied().collect();
-        let tree = PointTree::new(&points);
-        let is_closed = |x| tree.inverse_distances(&x, 1).iter().any(|&(q, _)| pressure[q] != 0.0);
         body.mark(done.built.marks.iter().filter(|mark| mark.body == index), &is_closed);
     }
 }
 
-/// Copy the mesh with which an adaptation has ended, as `adapted.msh`, which a scene can name as its mesh.
+/// Copy the mesh with which an adaptation has ended into a file that a scene can name as its mesh.
 fn copy_mesh(folder: &Folder, mesh: &Path) -> Result<()> {
-    folder.write("adapted.msh", |out| std::io::copy(&mut File::open(mesh)?, out).map(|_| ()))
+    folder.write(ADAPTED, |out| {
+        std::io::copy(&mut File::open(mesh)?, out)?;
+        out.write_all(MARK_OF_MESH.as_bytes())
+    })
+}
+
+/// The file of the last mesh of an adaptation.
+const ADAPTED: &str = "adapted.msh";
+
+/// Return the names of the files that a run may write for a scene and its bodies, whatever is on its mesh.
+pub fn planned(scene: &Scene) -> Vec<String> {
+    let (output, steps) = (&scene.output, scene.method.steps.steps.len());
+    let is_plane = scene.dimension.value == 2 && !scene.contacts.is_empty();
+    let fixed = [
+        (true, REPORT),
+        (true, "history.csv"),
+        (true, "contacts.csv"),
+        (true, checkpoint::FILE),
+        (true, checkpoint::ASIDE),
+        (steps > 0, "steps.csv"),
+        (output.plots, "convergence.svg"),
+        (output.plots && is_plane, "pressure.svg"),
+        (output.plots && steps > 1, "force-approach.svg"),
+        (output.report, page::FILE),
+        (output.vtu, COLLECTION),
+        (scene.adapt.is_some(), ADAPTED),
+    ];
+    let mut files: Vec<String> =
+        fixed.into_iter().filter(|(is_written, _)| *is_written).map(|(_, file)| file.to_owned()).collect();
+    for (_, ending) in [(output.vtu, "vtu"), (output.msh, "msh")].into_iter().filter(|(is_written, _)| *is_written) {
+        files.extend(scene.bodies.iter().map(|body| format!("{}.{ending}", safe_name(&body.name.value))));
+    }
+    files
+}
+
+/// Return the names of the files that a run may write on its mesh, those of other ranks included.
+pub fn planned_on_mesh(built: &Built) -> Vec<String> {
+    let (scene, stems) = (&built.scene, stems(built));
+    let (output, steps) = (&scene.output, scene.method.steps.steps.len());
+    let mut fields = field_files(built, &|name| safe_name(name));
+    fields.extend(stems.iter().flat_map(|stem| ["vtu", "msh"].map(|ending| format!("{stem}.{ending}"))));
+    fields.retain(|file| if file.ends_with("msh") { output.msh } else { output.vtu });
+    for step in (1..steps).filter(|_| output.vtu) {
+        fields.extend(field_files(built, &|name| stem_of(name, step, steps)));
+    }
+    [planned(scene), stems.iter().map(|stem| format!("{stem}.csv")).collect(), fields].concat()
 }
 
 /// Return a report, or several, as JSON text that ends with a newline.
@@ -200,8 +256,8 @@ fn stem_of(name: &str, step: usize, steps: usize) -> String {
 }
 
 /// Return `contact-<a>-<b>` for each pair, safe as a file name, with a number from the second pair of the same bodies on.
-pub fn stems(done: &Done) -> Vec<String> {
-    pair_names(&done.built).into_iter().map(|name| format!("contact-{}", safe_name(&name))).collect()
+pub fn stems(built: &Built) -> Vec<String> {
+    pair_names(built).into_iter().map(|name| format!("contact-{}", safe_name(&name))).collect()
 }
 
 /// Return the name of the file with a rank's part of a body.
@@ -218,9 +274,9 @@ fn ending(info: &BodyInfo) -> &'static str {
 }
 
 /// Return the names that the files of fields of all ranks have or would have. `stem` returns the name of a file without its ending.
-fn field_files(done: &Done, stem: &dyn Fn(&str) -> String) -> Vec<String> {
+fn field_files(built: &Built, stem: &dyn Fn(&str) -> String) -> Vec<String> {
     let mut files = Vec::new();
-    for info in &done.built.discrete.bodies {
+    for info in &built.discrete.bodies {
         let stem = stem(&info.name);
         for ending in ["vtu", "msh"] {
             files.extend(info.ranks.iter().map(|&rank| part(&stem, info, rank, ending)));
@@ -232,7 +288,7 @@ fn field_files(done: &Done, stem: &dyn Fn(&str) -> String) -> Vec<String> {
 /// Return the names of the bodies, then those of the contact surfaces.
 fn names(done: &Done) -> Vec<String> {
     let bodies = done.built.discrete.bodies.iter().map(|body| body.name.clone());
-    bodies.chain(stems(done)).collect()
+    bodies.chain(stems(&done.built)).collect()
 }
 
 /// Write the fields at the end of a run or, before that, of the load step that has ended. Each rank writes its parts of bodies; the first rank also
@@ -274,7 +330,7 @@ fn views(done: &Done, recovered: &All, folder: &Folder, displacement: &[Vec<[f64
             tags = Tags { entity: tags.entity + 1, points: tags.points + info.nodes, cells: tags.cells + info.cells };
         }
     }
-    for (i, name) in stems(done).into_iter().enumerate().filter(|_| rank == 0) {
+    for (i, name) in stems(&done.built).into_iter().enumerate().filter(|_| rank == 0) {
         let grid = report::contact_surface(&name, done, i, &displacement[i]);
         folder.write(&format!("{name}.msh"), |out| grid.write_msh(tags, out))?;
         let (points, cells) = (grid.points.len(), grid.connectivity.len() / grid.cell.stride());
@@ -307,7 +363,7 @@ fn fields(
             folder.write(&format!("{stem}.pvtu"), |out| vtu::join(&parts, single, out))?;
         }
     }
-    for (i, name) in stems(done).into_iter().enumerate().filter(|_| rank == 0) {
+    for (i, name) in stems(&done.built).into_iter().enumerate().filter(|_| rank == 0) {
         let file = format!("{}.vtu", stem(&name));
         let grid = report::contact_surface(&name, done, i, &displacement[i]);
         folder.write(&file, |out| grid.write(single, out))?;

@@ -84,8 +84,7 @@ fn opposite(edge: usize) -> usize {
 pub(super) enum PressureBasis {
     /// The dual basis mu = C phi of the covered part, with one function for each node and the shape functions phi.
     Dual(DMatrix<f64>),
-    /// The same on an edge of order three or more with the shape functions of the covered part. The function of a node on the axis of revolution is zero,
-    /// since int r phi is.
+    /// The same on an edge of order three or more with the shape functions of the covered part. The function of a node on the axis of revolution is zero.
     Part(DMatrix<f64>, Part),
     /// Hat functions: the barycentric coordinate mu_i = l_i at vertex i, zero at mid-edges.
     Hats,
@@ -108,11 +107,20 @@ const ROUNDING: f64 = 1e-6;
 
 impl PressureBasis {
     /// Choose the basis on facet `chunk[0].facet_a`, a simplex of `order` with `count` nodes. `chunk` holds the integration
-    /// points of the part that the facets `b` of side b cover.
+    /// points of the part that the facets `b` of side b cover, and `axis` is the local node on the axis of revolution.
+    ///
+    /// On an edge of order three or more this node carries no point. On a straight edge int r phi is zero there, and on a curved edge it has either sign: it
+    /// is distributed over the other nodes, so that their weights integrate polynomials of one degree less than the elements as before.
     ///
     /// Where these facets are apart, the distance jumps, and a dual mean would be beyond the distances on both sides of the jump: an overlap
     /// where there is none.
-    pub fn on<const D: usize>(order: Order, count: usize, chunk: &[IntegrationPoint<D>], b: &Facets<D>) -> Self {
+    pub fn on<const D: usize>(
+        order: Order,
+        count: usize,
+        chunk: &[IntegrationPoint<D>],
+        b: &Facets<D>,
+        axis: Option<usize>,
+    ) -> Self {
         if are_apart(b, chunk) {
             return Self::Hats;
         }
@@ -136,11 +144,14 @@ impl PressureBasis {
         }
         let Some(factor) = mass.cholesky() else { return Self::Hats };
         let mut dual = factor.inverse();
-        let none = |i: &usize| integral[*i].abs() <= ROUNDING * integral.iter().sum::<f64>();
-        let on_axis = (0..D).find(|i| part.is_some() && none(i));
-        for (i, mut row) in dual.row_iter_mut().enumerate() {
-            row *= if on_axis == Some(i) { 0.0 } else { integral[i] };
+        // a part that ends before the axis has all of its points
+        let on_axis = axis.filter(|&i| part.is_some_and(|part| part.ends[i] == i as f64));
+        if let Some(axis) = on_axis {
+            let (highest, on_axis) = (lagrange::of(order, D).highest(), std::mem::take(&mut integral[axis]));
+            let others = (0..count).filter(|&i| i != axis);
+            others.for_each(|i| integral[i] -= on_axis * highest[i] / highest[axis]);
         }
+        dual.row_iter_mut().zip(&integral).for_each(|(mut row, integral)| row *= *integral);
         let carriers: Vec<usize> = (0..count).filter(|i| on_axis != Some(*i)).collect();
         part.iter_mut().for_each(|part| part.without = on_axis);
         let basis = match part {

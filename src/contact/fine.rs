@@ -174,7 +174,7 @@ impl FinePoints {
         let mut each = self.each.iter_mut();
         for chunk in shared.chunk_by(|p, q| p.facet_a == q.facet_a) {
             let nodes = a.on_facet(chunk[0].facet_a);
-            let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets);
+            let basis = PressureBasis::on(self.order, nodes.len(), chunk, &b.facets, a.axis_of(chunk[0].facet_a));
             let row = |values: element::Values| {
                 let of_point = |(node, value): (&u32, f64)| point_of[*node as usize].map(|q| (q, value));
                 let entries = nodes.iter().zip(values).filter(|(_, value)| *value != 0.0).filter_map(of_point);

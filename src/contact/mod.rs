@@ -14,10 +14,10 @@ mod review;
 mod side;
 
 pub use basis::Carriers;
-pub use fine::{Fine, FinePoints};
+pub use fine::{Fine, FinePoint, FinePoints};
 pub use law::LayerLaw;
 #[cfg(test)]
 pub use law::Response;
-pub use pair::{ContactPair, Fault, LostPieces, add, assemble, moment_in_scene};
+pub use pair::{ContactPair, Coverage, Fault, LostPieces, add, assemble, moment_in_scene};
 pub use review::{Chords, ends};
 pub use side::Side;

@@ -3,7 +3,7 @@
 use super::basis::{Carriers, PressureBasis};
 use super::law::{LawMaker, LayerLaw, LinearLaw};
 use super::pieces::{Intersection, WHOLE};
-use super::side::{FaceNode, Side, along};
+use super::side::{FaceNode, ROUNDING, Side, along};
 use crate::error::{Error, Result};
 use crate::fem::element::{self, Rule};
 use crate::fem::{area_vector, cross, length, pad};
@@ -41,6 +41,9 @@ pub struct ContactPair {
     pub normal: Vec<[f64; 3]>,
     /// Length of the sum of the outer unit normals of both sides, n: zero where they are opposite.
     pub tilt: Vec<f64>,
+    /// Spread of the normals of the facets around each point, n; empty where no facet of the pair leans. The first rank alone has it.
+    #[serde(skip)]
+    pub spread: Vec<[[f64; 3]; 3]>,
     /// Initial gap d_q along the normal, n: the distance of the meshes plus the gap that the scene adds.
     pub gap: Vec<f64>,
     /// Closing of the gap (a length) that an earlier load step has found and locked.
@@ -142,7 +145,7 @@ fn integrate<const D: usize>(
     for chunk in common.points.chunk_by(|p, q| p.facet_a == q.facet_a) {
         let facet = chunk[0].facet_a;
         let nodes = a.on_facet(facet);
-        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets);
+        let basis = PressureBasis::on(a.facets.order, nodes.len(), chunk, &b.facets, a.axis_of(facet));
         carriers[facet] = Some(basis.carriers());
         for point in chunk {
             let (phi, shapes) =
@@ -198,6 +201,7 @@ pub fn assemble<const D: usize>(
         area: points.iter().zip(&nodes).map(across).collect(),
         normal: nodes.iter().map(|at| pad(at.direction)).collect(),
         tilt: nodes.iter().map(|at| at.tilt).collect(),
+        spread: spreads(&nodes),
         gap: gaps(a, &points, &position, gap)?,
         nodes: nodes.iter().map(|at| at.node).collect(),
         face: faces(a, &on_side, &points, &position),
@@ -223,6 +227,13 @@ pub fn assemble<const D: usize>(
         }
     }
     Ok(pair)
+}
+
+/// Return the spread of the normals around each contact point, nothing if none exceeds the rounding of normals.
+fn spreads<const D: usize>(nodes: &[&FaceNode<D>]) -> Vec<[[f64; 3]; 3]> {
+    let of = |at: &&FaceNode<D>| std::array::from_fn(|c| if c < D { pad(at.spread[c]) } else { [0.0; 3] });
+    let leans = |at: &&FaceNode<D>| (0..D).any(|c| at.spread[c][c] > ROUNDING * ROUNDING);
+    if nodes.iter().any(leans) { nodes.iter().map(of).collect() } else { Vec::new() }
 }
 
 /// Return the number of the face of each contact point.
@@ -394,6 +405,8 @@ pub struct Coverage {
     pub lost: usize,
     /// Which of its nodes carry points; `None` where it has no partner.
     pub carriers: Option<Carriers>,
+    /// Whether facets of side b lie before it that are too far away or inclined by too much.
+    pub is_cut_short: bool,
 }
 
 impl Coverage {
@@ -403,8 +416,14 @@ impl Coverage {
         common.points.iter().for_each(|point| covered[point.facet_a] += point.weight);
         let rule = element::rule(D, if a.facets.order == Order::P1 { 2 } else { 2 * a.facets.order.degree() + 1 });
         let of_facet = |i: usize| {
-            let found = Self { share: covered[i] / facet_measure(a, i, &rule), lost: 0, carriers: carriers[i] };
-            Self { lost: if found.is_whole() { 0 } else { common.refused[i].lost }, ..found }
+            let refused = &common.refused[i];
+            let found = Self {
+                share: covered[i] / facet_measure(a, i, &rule),
+                lost: 0,
+                carriers: carriers[i],
+                is_cut_short: refused.is_inclined || !refused.far.is_empty(),
+            };
+            Self { lost: if found.is_whole() { 0 } else { refused.lost }, ..found }
         };
         (0..covered.len()).map(of_facet).collect()
     }

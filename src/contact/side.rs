@@ -4,7 +4,7 @@ use super::law::LawMaker;
 use super::mirror::Mirrors;
 use crate::error::Result;
 use crate::fem::{Facets, Frame, Space, area_vector, element, length, minus, unit};
-use crate::linalg::{DisjointSets, bounds, dot};
+use crate::linalg::{DisjointSets, axpy, bounds, dot};
 use crate::mesh::datum;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -43,6 +43,16 @@ pub struct FaceNode<const D: usize> {
     pub tilt: f64,
     /// Curvature (1/length): the largest difference of two nodal normals over their distance, on the facets around.
     pub curvature: f64,
+    /// Mean of (n_f - n)(n_f - n)' over the unit normals n_f of the facets around, where n is `normal`; of both sides, where `direction` is.
+    pub spread: Spread<D>,
+}
+
+/// The mean of products of differences of normals: a symmetric matrix.
+pub type Spread<const D: usize> = [[f64; D]; D];
+
+/// Add `weight * v v'` to a spread.
+fn add_square<const D: usize>(spread: &mut Spread<D>, weight: f64, v: [f64; D]) {
+    (0..D).for_each(|i| (0..D).for_each(|j| spread[i][j] += weight * v[i] * v[j]));
 }
 
 impl<'a, const D: usize> Side<'a, D> {
@@ -66,13 +76,37 @@ impl<'a, const D: usize> Side<'a, D> {
                     (0..D).for_each(|c| normal[c] += area[c]);
                 }
                 let normal = unit(mirrors.mean(space, node, normal, least));
-                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0 });
+                let whole: f64 = face.iter().map(|(_, area)| length(*area)).sum();
+                let mut spread = [[0.0; D]; D];
+                for (_, area) in face {
+                    add_square(&mut spread, length(area) / whole, minus(unit(area), normal));
+                }
+                nodes.push(FaceNode { node, normal, direction: normal, tilt: 0.0, curvature: 0.0, spread });
             }
         }
         let mut side = Self { name, space, facets, prescribed, frame, mirrors, nodes, corners };
         side.flatten();
         side.bend();
+        side.spread_within();
         side
+    }
+
+    /// Give the nodes within curved facets, which have one normal, the mean spread at the vertices: the kinks there show how far normals between them err.
+    fn spread_within(&mut self) {
+        let (stride, mut facets_at) = (self.facets.stride, vec![0; self.nodes.len()]);
+        self.corners.iter().for_each(|&at| facets_at[at as usize] += 1);
+        for i in 0..self.facets.count() {
+            let on = self.corners[i * stride..(i + 1) * stride].to_vec();
+            let mut mean = [[0.0; D]; D];
+            for vertex in &on[..D] {
+                let spread = &self.nodes[*vertex as usize].spread;
+                (0..D).for_each(|c| axpy(1.0 / D as f64, &spread[c], &mut mean[c]));
+            }
+            on[D..]
+                .iter()
+                .filter(|at| facets_at[**at as usize] == 1)
+                .for_each(|at| self.nodes[*at as usize].spread = mean);
+        }
     }
 
     /// Give the nodes of each flat face one normal, where coordinates have fewer digits than doubles. A face is flat if its normals
@@ -123,6 +157,11 @@ impl<'a, const D: usize> Side<'a, D> {
     /// Return the indices in `nodes` of the nodes of facet `i`.
     pub fn on_facet(&self, i: usize) -> &[u32] {
         &self.corners[i * self.facets.stride..(i + 1) * self.facets.stride]
+    }
+
+    /// Return the vertex of facet `i` on the axis of revolution.
+    pub fn axis_of(&self, i: usize) -> Option<usize> {
+        self.facets.facet(i)[..D].iter().position(|&node| self.space.on_axis(node))
     }
 
     /// Return the nodes of facet `i`.

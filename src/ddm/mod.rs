@@ -24,10 +24,11 @@
 //! | `newton::WHOLE_STEP` | 0.2 | when a descent ends | random scenes, none lost |
 //! | `step::SHORTENED` | 2 | when laws are smoothed | counted steps of slender scenes |
 //! | `step::AHEAD` | 100 | by how much, and when the path is lost | counted steps of peeling beams |
-//! | `bound::EXACT` | 1.5e-8 | up to which imbalance a step is exact, and which falls of F1 can be seen | the root of epsilon |
+//! | `bound::EXACT` | 1.5e-8 | up to which imbalance a step is exact, and how large the squared error is near the solution | the root of epsilon |
 //! | `newton::LOOK` | 0.5 | how well the last look at the equilibrium is solved | its size alone is wanted |
 //! | `newton::UNSEEN` | 0.01 | when smoothing ends, and what lies on the laws | two digits more than were asked for |
 //! | `stop::FALLS`, `NEAR_FALLS` | 0.9, 0.5 | what is progress far from the solution, and near it | random scenes, none lost |
+//! | `stop::SEEN` | 1e-12 | which falls of F1 are no roundoff | a sum of a million terms |
 //! | `stop::PATIENCE` | 3 | how many steps without progress end a run | random scenes, none lost |
 //! | `solve::TIMES` | 10 | how many tolerances of imbalance are no solution | the two norms differ by less |
 //! | `linalg::DIGIT` | 0.1 | when roundoff leaves no result | no digit is left |

@@ -17,7 +17,7 @@ use super::forcing::{Forcing, resisting};
 use super::run::{Outcome, Row, Run};
 use super::start::SEARCH;
 use super::step::{Equilibrium, Progress, StepLength};
-use super::stop::{Stagnation, Status};
+use super::stop::{Stagnation, Status, falls};
 use crate::error::Result;
 use crate::exchange::{self, ASKS, asks};
 use crate::model::Model;
@@ -52,9 +52,10 @@ pub(super) fn iterate(
     is_near: bool,
 ) -> Result<Outcome> {
     let (progress, tolerance, foreign) = (Progress::new(run.model), run.stop.tolerance(), linear.sweeps());
-    let (stagnation, start) = (Stagnation::default(), Some(u.clone()));
+    let (stagnation, added, descents, lowest) = (Stagnation::default(), Vec::new(), 0, Position::default());
     let mut newton =
-        Newton { run, linear, progress, stagnation, tolerance, foreign, u, start, states, added: Vec::new(), is_near };
+        Newton { run, linear, progress, stagnation, tolerance, foreign, u, lowest, descents, states, added, is_near };
+    newton.lowest = newton.position();
     loop {
         let step = match newton.linear_step()? {
             Ok(step) => step,
@@ -67,7 +68,7 @@ pub(super) fn iterate(
         let iterate = newton.advance(step, part);
         let mut measured = newton.measure(&iterate)?;
         if let Some(status) = newton.check_termination(&iterate, &mut measured)? {
-            if status == Status::Stagnated && newton.begin_anew()? {
+            if status == Status::Stagnated && newton.descend()? {
                 continue;
             }
             return Ok(newton.end(status, iterate, &measured));
@@ -86,14 +87,25 @@ struct Newton<'n, 'r> {
     /// Sweeps that the solver of linear steps had made before this run began.
     foreign: usize,
     u: Field,
-    /// Displacements at the start, until F1 has fallen from there.
-    start: Option<Field>,
+    /// Where the next descent begins, unless F1 is less at the iterate: the start, then the end of the last descent.
+    lowest: Position,
+    /// Steps of all descents so far.
+    descents: usize,
     /// States of the layers from which the next linear step is taken.
     states: Layer,
     /// Springs that stood in for a contact in the last linear step, n.
     added: Vec<f64>,
     /// Whether the states are those of another solution, while the displacements are still at rest.
     is_near: bool,
+}
+
+/// An iterate that can be returned to.
+#[derive(Clone, Default)]
+struct Position {
+    u: Field,
+    /// The gaps that the rigid parts of u leave, n.
+    gap: Vec<f64>,
+    f1: f64,
 }
 
 /// The result of a step: displacements and pressures in equilibrium, and the states on the laws that belong to them.
@@ -138,6 +150,21 @@ struct Measured {
 }
 
 impl Newton<'_, '_> {
+    /// Return where the iterate is. Collective.
+    fn position(&mut self) -> Position {
+        let model = &mut *self.run.model;
+        let layer = Layer::at(model, &self.u.trace);
+        let products = self.linear.multiply(model, &self.u.displacements);
+        let (_, energy) = residual(model, products, &self.u, &layer.force);
+        let mut potential = [energy.potential];
+        model.exchange.sum(&mut potential);
+        Position { u: self.u.clone(), gap: model.gap.clone(), f1: potential[0] + layer.energy.iter().sum::<f64>() }
+    }
+
+    fn return_to(&mut self, position: Position) {
+        (self.u, self.run.model.gap) = (position.u, position.gap);
+    }
+
     /// Solve the linear step from the states.
     fn linear_step(&mut self) -> Result<LinearResult> {
         let (model, states) = (&mut *self.run.model, &self.states);
@@ -185,25 +212,38 @@ impl Newton<'_, '_> {
         taken > SEARCH * step.energy
     }
 
-    /// Let F1 fall from the iterate by Newton's method for F1 itself, until whole steps are taken: to least F1 along each step. Return whether it
-    /// fell; then the next step begins from the states at the new compressions.
+    /// Let F1 fall by Newton's method for F1 itself, to its least along each step, until whole steps are taken. Return whether it fell; then the next
+    /// step begins from the states at the new compressions.
     ///
     /// The distance from the laws falls along no step whose tangents nearly vanish, as where a law saturates or hardly anything holds a body. F1 is convex,
     /// and a step of Newton's method always descends. The least F1 may be at a tiny part of the step, which halving would not find.
+    ///
+    /// A descent begins where the last one ended, or at the iterate if F1 is less there, and takes at least as many steps as all before. So F1 falls
+    /// to its minimum if whole steps lead away from it again and again.
     fn descend(&mut self) -> Result<bool> {
-        let (start, gap) = (self.u.clone(), self.run.model.gap.clone());
-        for step in 0..self.run.stop.iterations {
-            let Some(length) = self.descent_step()?.filter(|length| step > 0 || *length > 0.0) else {
-                (self.u, self.run.model.gap) = (start, gap);
-                return Ok(false);
-            };
-            if length == 0.0 || (length - 1.0).abs() <= WHOLE_STEP || self.is_asked() {
+        let here = self.position();
+        let begin = if here.f1 <= self.lowest.f1 { here.clone() } else { self.lowest.clone() };
+        let f1 = begin.f1;
+        self.return_to(begin);
+        let least = self.descents;
+        for step in 1..=self.run.stop.iterations {
+            let length = self.descent_step()?;
+            self.descents += 1;
+            let is_whole = (length - 1.0).abs() <= WHOLE_STEP && step >= least;
+            if length == 0.0 || is_whole || self.is_asked() {
                 break;
             }
         }
-        self.states = Layer::at(self.run.model, &self.u.trace);
-        self.progress.forget_pressure();
-        Ok(true)
+        let end = self.position();
+        let falls = falls(f1, end.f1);
+        if falls {
+            (self.lowest, self.stagnation) = (end, Stagnation::default());
+            self.states = Layer::at(self.run.model, &self.u.trace);
+            self.progress.forget_pressure();
+        } else {
+            self.return_to(here);
+        }
+        Ok(falls)
     }
 
     /// Return whether something outside asks the run to end, on any rank. Collective.
@@ -213,17 +253,9 @@ impl Newton<'_, '_> {
         exchange::asked(&sums) != 0
     }
 
-    /// Go back to the start and let F1 fall from there, once. A first step over a law that saturates may lead so far that roundoff hides any distance from
-    /// the laws. Return whether the run goes on.
-    fn begin_anew(&mut self) -> Result<bool> {
-        let Some(start) = self.start.take() else { return Ok(false) };
-        (self.u, self.stagnation) = (start, Stagnation::default());
-        self.descend()
-    }
-
-    /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length; none if its linear system
+    /// Take one step of Newton's method for F1 from the states at the compressions of the iterate. Return its length; zero if its linear system
     /// is not solved, or F1 falls without end.
-    fn descent_step(&mut self) -> Result<Option<f64>> {
+    fn descent_step(&mut self) -> Result<f64> {
         let model = &mut *self.run.model;
         let layer = Layer::at(model, &self.u.trace);
         let springs = resisting(model, &layer);
@@ -238,14 +270,14 @@ impl Newton<'_, '_> {
             residual: &residual,
             enough: &mut enough,
         };
-        let Ok(step) = self.linear.solve(system)? else { return Ok(None) };
+        let Ok(step) = self.linear.solve(system)? else { return Ok(0.0) };
         let products = self.linear.multiply(model, &step.field.displacements);
         let Ok(length) = LineEnergy::new(model, &layer, &residual, &step.field, &products).minimize(SEARCH) else {
-            return Ok(None);
+            return Ok(0.0);
         };
         self.u.advance(model, length, &step.field);
         self.u.retrace(model);
-        Ok(Some(length))
+        Ok(length)
     }
 
     /// Take this part of a step, and resolve the laws at its end.

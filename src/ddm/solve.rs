@@ -9,7 +9,7 @@ use super::stop::Status;
 use super::{newton, robin};
 use crate::error::Result;
 use crate::linalg::{DIGIT, axpy};
-use crate::model::field::Field;
+use crate::model::field::{Field, residual};
 use crate::model::layer::{Layer, surface_slopes};
 use crate::model::linear::LinearStep;
 use crate::model::rigid::{self, Motions, NamedMotion};
@@ -88,7 +88,10 @@ impl Run<'_> {
         rigid: &RigidStart,
         wants_interval: bool,
     ) -> Result<Outcome> {
-        self.scale = Scale::new(self.model, &[&vec![0.0; 2 * self.model.points()], &rigid.trace]);
+        let rest = vec![0.0; 2 * self.model.points()];
+        // an overlap at rest says nothing of contacts that carry loads
+        let references = if self.is_loaded() { vec![&rigid.trace[..]] } else { vec![&rest[..], &rigid.trace] };
+        self.scale = Scale::new(self.model, &references);
         let RigidStart { layer: states, amounts, mut trace } = first_states(self.model, &start, rigid);
         let is_known = matches!(start, InitialGuess::Known(_));
         let known = match start {
@@ -120,6 +123,15 @@ impl Run<'_> {
                 robin::iterate(self, &mut **rule, coefficient, u, wants_interval)
             }
         }
+    }
+
+    /// Whether a load or a prescribed displacement acts on a body. Collective.
+    fn is_loaded(&self) -> bool {
+        let rest = Field::zero(self.model);
+        let (loads, _) = residual(self.model, rest.displacements.clone(), &rest, &vec![0.0; self.model.points()]);
+        let mut loaded = [loads.iter().flatten().filter(|load| **load != 0.0).count() as f64];
+        self.model.exchange.sum(&mut loaded);
+        loaded[0] > 0.0
     }
 
     /// Return the amounts of the free motions of each body in a start. Bodies on springs begin at rest, since springs resist some of the motions of the start.

@@ -78,12 +78,20 @@ const PATIENCE: usize = 3;
 /// None of 300 random scenes was lost by it.
 const NEAR_FALLS: f64 = 0.5;
 
+/// Share of F1 by which a fall is more than its roundoff: that of a sum of a million terms is 1e3 epsilon.
+const SEEN: f64 = 1e-12;
+
+/// Return whether F1 is less than it was `before` by more than roundoff.
+pub(super) fn falls(before: f64, now: f64) -> bool {
+    before - now > SEEN * now.abs()
+}
+
 /// A watch for stagnation of Newton's method.
 ///
 /// Each step is measured by itself, by the squared distance from the laws at its end over that at its beginning: earlier steps had other slopes. Far from
-/// the solution this distance falls while the error may rise by many orders. Where a contact peels point by point, F1 alone falls, by a share that half of
-/// its digits show ([`EXACT`]), and what reaches a new least F1 cannot repeat itself. Where the square of the error, in the energy norm, is below that
-/// share, F1 has no such fall left. The solution is near then: the error itself has to fall, and what else falls is roundoff.
+/// the solution this distance falls while the error may rise by many orders. Where a contact peels point by point, F1 alone falls ([`falls`]), and what
+/// reaches a new least F1 cannot repeat itself. Where the square of the error, in the energy norm, is below [`EXACT`], the solution is near: a distance
+/// that falls is roundoff there.
 #[derive(Debug, Clone)]
 pub(super) struct Stagnation {
     /// The error at the last progress in it.
@@ -110,9 +118,9 @@ impl Stagnation {
         if is_better {
             self.best = error;
         }
-        let is_lower = self.least - energy > EXACT * energy.abs();
+        let is_lower = falls(self.least, energy);
         self.least = self.least.min(energy);
-        let is_progress = is_better || is_smoothed || is_far && (is_lower || fall < FALLS);
+        let is_progress = is_better || is_smoothed || is_lower || is_far && fall < FALLS;
         self.since = if is_progress { 0 } else { self.since + 1 };
         self.since >= PATIENCE
     }
@@ -143,8 +151,9 @@ mod tests {
             [false; 4]
         );
         assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -(k as f64)), [false; 4]);
-        assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -1.0 - 1e-9 * k as f64), [false, false, false, true]);
-        assert_eq!(noted(&[(1e-5, 0.5, false); 4], &|k| -(k as f64)), [false, false, false, true]);
+        assert_eq!(noted(&[(1.0, 1.0, false); 4], &|k| -1.0 - 1e-13 * k as f64), [false, false, false, true]);
+        // a distance of states near the solution is roundoff
+        assert_eq!(noted(&[(1e-5, 0.5, false); 4], &same), [false, false, false, true]);
         assert_eq!(noted(&[(1.0, 1.0, true); 5], &same), [false; 5]);
         // less than a tenth of the best error, or of the distance
         assert!(noted(&[(1.0, 1.0, false), (0.95, 0.95, false), (0.91, 1.0, false), (0.9, 1.0, false)], &same)[3]);

@@ -10,6 +10,7 @@ use crate::linalg::{Csr, dot, length};
 use crate::mesh::{Group, Mesh};
 use crate::model::Segment;
 use crate::problem::SpringKind;
+use std::cell::OnceCell;
 
 /// Smallest cosine of the angle between a force or a constrained direction and the contact normal at which a place is included.
 /// It belongs to 60 degrees, up to which facets are pairs without the key `angle`.
@@ -50,6 +51,8 @@ pub fn rows<const D: usize>(
     }
     let holders = holders(body, mesh)?;
     let loads = body.spec.load.iter().map(|load| body.full_load(load, mesh)).collect::<Result<Vec<_>>>()?;
+    let whole = OnceCell::new();
+    let everywhere = || shapes(&assemble::body_force(&body.mesh.space, &|_| axis_vector(0)));
     for &Segment { pair, side } in segments {
         let Some(normal) = mean_normal(&pairs[pair]) else {
             rows.push_row([]);
@@ -59,7 +62,7 @@ pub fn rows<const D: usize>(
         let weights = mean(&holders, n, true)
             .or_else(|| working(&loads, n))
             .or_else(|| mean(&holders, n, false))
-            .unwrap_or_else(|| shapes(&assemble::body_force(&body.mesh.space, &|_| axis_vector(0))));
+            .unwrap_or_else(|| whole.get_or_init(everywhere).clone());
         let total: f64 = weights.iter().map(|entry| entry.1).sum();
         rows.push_row(weights.iter().flat_map(|&(node, weight)| {
             n.into_iter().enumerate().map(move |(c, n)| (D * node as usize + c, n * weight / total))

@@ -1,9 +1,11 @@
 //! Rigid motions of bodies, alone or together, that neither supports nor springs nor contact resist.
 //!
 //! A body may slide on a plane, halves of a ring of blocks may slide on each other, and a group of bodies without supports may move as
-//! one. These motions are the kernel of one matrix over all bodies, (B E)'(B E), where E are the motions that supports and springs leave
-//! to each body, and B are the contact rows. Motions of a whole group come first: contact within the group cannot resist them, whatever
-//! the rows of a mesh say where curved surfaces are apart.
+//! one. These motions close no point of contact ([`Squares`]), among the motions that supports and springs leave to each body. Motions of a whole group come
+//! first, so that they are found and named as such.
+//!
+//! Facets resist motions that smooth surfaces do not, such as the turn of a pin in a hub, because their normals lean (docs/theory.md, "Motions that nothing
+//! holds"). Such motions count as free.
 //!
 //! If the loads do no work on a motion, the solution is unique only up to it. One dof is then fixed, without reaction. If the loads do
 //! work on it, there is no solution, and the run reports this. Loads that balance on the true surfaces may lack balance on facets, and by
@@ -14,8 +16,8 @@ use crate::contact::ContactPair;
 use crate::error::{few, joined};
 use crate::fem::{PointExtent, RigidMotion, rigid};
 use crate::linalg::{Blocks, DisjointSets, PART, TOLERANCE, axpy, dot, fit};
-use crate::model::{Mechanism, Motions};
-use nalgebra::{DMatrix, DVector};
+use crate::model::Mechanism;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 /// Least value of [`MechanismSearch::lack`]: forces in equilibrium that people write have three digits or more.
 const LACKING: f64 = 1e-3;
@@ -25,10 +27,13 @@ pub fn fix<const D: usize>(bodies: &mut [WholeBody<D>], pairs: &[ContactPair], l
     let tilt = pairs.iter().map(|pair| pair.uncertainty).fold(0.0, f64::max);
     let mut search = MechanismSearch { bodies, pairs, tilt, lack: lack.max(LACKING), found: Vec::new() };
     for group in search.groups() {
-        search.settle(search.as_one(&group));
+        search.settle(search.as_one(&group), |_| false);
     }
     if search.found.iter().all(|mechanism| mechanism.work == 0.0) {
-        search.settle(search.kernel());
+        let squares = search.squares();
+        let least = search.tolerance();
+        let is_resisted = |motion: &DVector<f64>| squares.closing.energy(motion) > least * motion.norm_squared();
+        search.settle(search.kernel(&squares), is_resisted);
     }
     search.found
 }
@@ -121,19 +126,78 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         (0..body).map(|body| self.unconstrained(body).len()).sum()
     }
 
-    /// Return the motions that contact does not resist.
+    /// Return the motions that contact does not resist, and those that facets alone resist.
     ///
-    /// Each pair counts by the mean square of its closings. Motions are of size one. So a motion that closes less than the error of the
-    /// normals is free, and so is one that closes less than the root of [`TOLERANCE`], the error of coordinates on curves.
-    fn kernel(&self) -> Vec<DVector<f64>> {
-        let points: Vec<usize> = self.pairs.iter().map(ContactPair::len).collect();
-        let share = |pair: &ContactPair| {
-            let all: f64 = pair.area.iter().sum();
-            pair.area.iter().map(|area| area / all).collect::<Vec<_>>()
-        };
-        let shares: Vec<f64> = self.pairs.iter().flat_map(share).collect();
-        let motions = self.bodies.iter().map(|body| (&body.segments[..], &body.motions[..]));
-        Motions::new(motions, &points).springs(&shares).kernel(TOLERANCE.max(self.tilt * self.tilt))
+    /// Motions are of size one. So a motion that closes less than the error of the normals is free, and so is one that closes less than the root of
+    /// [`TOLERANCE`], the error of coordinates on curves.
+    fn kernel(&self, squares: &Squares) -> Vec<DVector<f64>> {
+        let Squares { closing, leaning, .. } = squares;
+        let mut held = closing.clone();
+        leaning.stored().for_each(|(i, j, block)| held.add(i, j, &(-DOUBT * block)));
+        let held = held.factor_unscaled(self.tolerance());
+        let leans = |motion: &DVector<f64>| leaning.energy(motion) > self.tolerance() * motion.norm_squared();
+        let (doubtful, mut free): (Vec<_>, Vec<_>) = held.kernel().into_iter().partition(leans);
+        if !doubtful.is_empty() {
+            let all = DMatrix::from_columns(&doubtful);
+            let products = |matrix: &Blocks| {
+                let columns: Vec<_> = doubtful.iter().map(|motion| matrix.multiply(motion)).collect();
+                all.tr_mul(&DMatrix::from_columns(&columns))
+            };
+            let doubt = DOUBT * products(leaning) + self.tolerance() * all.tr_mul(&all);
+            let of_all = |weights: DVector<f64>| &all * weights;
+            let found = less(&products(closing), doubt).map(|few| few.into_iter().map(of_all).collect());
+            let works = self.bodies.iter().flat_map(|body| body.motions.iter().map(|motion| motion.work));
+            let loads = DVector::from_vec(works.collect());
+            let yielding = held.solve(&loads);
+            free.extend(found.unwrap_or(doubtful).into_iter().map(|motion| {
+                let is_exact = closing.energy(&motion) <= self.tolerance() * motion.norm_squared();
+                if is_exact { motion } else { squares.plain(motion, &loads, &yielding) }
+            }));
+        }
+        free
+    }
+
+    /// Return the share of e'e up to which the mean square of the closings of a motion e is rounding.
+    fn tolerance(&self) -> f64 {
+        TOLERANCE.max(self.tilt * self.tilt)
+    }
+
+    /// Return the [`Squares`] of all pairs.
+    ///
+    /// The displacement between the two sides is that of both motions at the position of the point. So bodies that move as one close nothing, whatever
+    /// the rows of a mesh say where curved surfaces are apart.
+    fn squares(&self) -> Squares {
+        let sizes: Vec<usize> = (0..self.bodies.len()).map(|body| self.unconstrained(body).len()).collect();
+        let [mut closing, mut leaning, mut error] = [0; 3].map(|_| Blocks::new(&sizes));
+        for pair in self.pairs.iter().filter(|pair| pair.bodies[0] != pair.bodies[1]) {
+            let sides: Vec<usize> = pair.bodies.into_iter().filter(|body| *body < self.bodies.len()).collect();
+            let signed = |(&body, sign): (&usize, f64)| sign * self.at_points(body, pair);
+            let moves: Vec<DMatrix<f64>> = sides.iter().zip([1.0, -1.0]).map(signed).collect();
+            let closings: Vec<DMatrix<f64>> = moves.iter().map(|u| closings::<D>(u, &pair.normal)).collect();
+            let turned: Vec<DMatrix<f64>> = moves.iter().map(|u| turned::<D>(u, &pair.spread)).collect();
+            for (s, &i) in sides.iter().enumerate() {
+                for (t, &j) in sides.iter().enumerate().skip(s) {
+                    closing.add(i, j, &closings[s].tr_mul(&closings[t]));
+                    if !pair.spread.is_empty() {
+                        let leans = moves[s].tr_mul(&turned[t]);
+                        leaning.add(i, j, &leans);
+                        error.add(i, j, &(leans / pair.len() as f64));
+                    }
+                }
+            }
+        }
+        Squares { closing, leaning, error }
+    }
+
+    /// Return the displacements of the points of a pair by the motions of a body, one column each, times the root of the share of each point in the area.
+    fn at_points(&self, body: usize, pair: &ContactPair) -> DMatrix<f64> {
+        let (motions, datum) = (self.unconstrained(body), &self.bodies[body].part.mesh.space.datum);
+        let area: f64 = pair.area.iter().sum();
+        let roots: Vec<f64> = pair.area.iter().map(|own| (own / area).sqrt()).collect();
+        let points = || pair.position.iter().map(|x| std::array::from_fn(|c| x[c] - datum[c]));
+        let columns = motions.iter().map(|motion| motion.nodal(points()));
+        let scaled = columns.flat_map(|u| u.into_iter().enumerate().map(|(i, u)| roots[i / D] * u).collect::<Vec<_>>());
+        DMatrix::from_iterator(D * pair.len(), motions.len(), scaled)
     }
 
     /// Return the motion with these amounts.
@@ -153,7 +217,7 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
     }
 
     /// Fix motions that nothing resists if no load works on them, and record them.
-    fn settle(&mut self, all: Vec<DVector<f64>>) {
+    fn settle(&mut self, all: Vec<DVector<f64>>, is_resisted: impl Fn(&DVector<f64>) -> bool) {
         let mut sets: Vec<Vec<GroupMotion<D>>> = Vec::new();
         for moving in all.into_iter().map(|amounts| self.moving(amounts)) {
             match sets.iter_mut().find(|set| set[0].bodies == moving.bodies) {
@@ -171,8 +235,9 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         let mut pins = Vec::new();
         for (set, works) in named.into_iter().zip(works) {
             let most = works.iter().copied().fold(0.0, f64::max);
+            let by_facets = set.iter().any(|(_, moving)| is_resisted(&moving.amounts));
             let mechanism =
-                |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, ..Default::default() };
+                |motion: String| Mechanism { bodies: set[0].1.bodies.clone(), motion, by_facets, ..Default::default() };
             if worst > self.lack {
                 // The motion on which loads work most is the reason, and the others of its bodies are not of interest.
                 let reason = works.iter().position(|work| *work == worst);
@@ -300,6 +365,63 @@ impl<const D: usize> MechanismSearch<'_, '_, D> {
         Some(body)
     }
 }
+
+/// Quadratic forms of the motions of all bodies. Let u be the displacement between the two sides at a point with the normal n.
+struct Squares {
+    /// Mean squares of the closings n.u, summed over pairs.
+    closing: Blocks,
+    /// Mean squares of (n_f - n).u with the normals n_f of the facets around.
+    leaning: Blocks,
+    /// The same over the number of points of the pair: the square of the error that normals which lean at random leave in the mean closing.
+    error: Blocks,
+}
+
+impl Squares {
+    /// Return the plainest motion that differs from a motion by no more than its error: without small parts, and such that loads do no work on it.
+    /// `yielding` are the motions by which contact yields to the loads.
+    fn plain(&self, motion: DVector<f64>, loads: &DVector<f64>, yielding: &DVector<f64>) -> DVector<f64> {
+        let most = self.closing.energy(&motion) + self.error.energy(&motion);
+        let is_near = |other: &DVector<f64>| self.closing.energy(other) <= most;
+        let least = SLIGHT * motion.amax();
+        let mut found = motion;
+        let rounded = found.map(|part| if part.abs() < least { 0.0 } else { part });
+        if is_near(&rounded) {
+            found = rounded;
+        }
+        let unloaded = &found - loads.dot(&found) / loads.dot(yielding) * yielding;
+        if is_near(&unloaded) { unloaded } else { found }
+    }
+}
+
+/// Share of a motion below which a part of it may be an error of the normals of facets. On the coarsest round parts, with twelve facets around, normals of
+/// single facets lean by 0.15, and their mean over three dozen points by a sixth of that.
+const SLIGHT: f64 = 0.03;
+
+/// Return n.u at each point for the displacements u in each column.
+fn closings<const D: usize>(u: &DMatrix<f64>, normal: &[[f64; 3]]) -> DMatrix<f64> {
+    DMatrix::from_fn(normal.len(), u.ncols(), |q, k| (0..D).map(|c| normal[q][c] * u[(D * q + c, k)]).sum())
+}
+
+/// Return L u at each point for the displacements u in each column.
+fn turned<const D: usize>(u: &DMatrix<f64>, spread: &[[[f64; 3]; 3]]) -> DMatrix<f64> {
+    let of = |i: usize, k: usize| (0..D).map(|c| spread[i / D][i % D][c] * u[(i - i % D + c, k)]).sum();
+    DMatrix::from_fn(D * spread.len(), u.ncols(), of)
+}
+
+/// Return a basis of the weights x with x'Ax <= x'Bx, for a positive semidefinite A and a positive definite B; `None` if these are all, or B is not definite.
+fn less(a: &DMatrix<f64>, b: DMatrix<f64>) -> Option<Vec<DVector<f64>>> {
+    let root = b.cholesky()?.unpack();
+    let half = root.solve_lower_triangular(a)?;
+    let eigen = SymmetricEigen::new(root.solve_lower_triangular(&half.transpose())?);
+    let least: Vec<usize> = (0..a.nrows()).filter(|&i| eigen.eigenvalues[i] <= 1.0).collect();
+    let vector = |i: usize| root.tr_solve_lower_triangular(&eigen.eigenvectors.column(i));
+    (least.len() < a.nrows()).then(|| least.into_iter().filter_map(vector).collect())
+}
+
+/// Share of the mean square by which the normals of facets lean along a motion, below which the mean square of its closings may be their error: the
+/// motion then closes less than half of what single facets would. A pin in a hub has up to 0.12 of it (turns 0.05), a plug in a taper of 1:20 twice as
+/// much as all of it with 24 facets around.
+const DOUBT: f64 = 0.25;
 
 /// Share of the largest displacement from which a node can fix a motion; two of its digits are lost there.
 const NEAR: f64 = 1e-2;

@@ -24,6 +24,9 @@ pub trait Meshes {
     /// Return the magnitude of the nodal force at each entry of `load`, which holds forces at all nodes of a body.
     fn sizes(&self, body: usize, load: &[f64]) -> Vec<f64>;
 
+    /// Return the outer normal displacement at the integration points of a side of a pair, for displacements `u` of all nodes of its body.
+    fn normal_displacement(&self, pair: usize, side: usize, u: &[f64]) -> Vec<f64>;
+
     /// Return the integration points of a pair.
     fn points(&self, pair: usize) -> &FinePoints;
 
@@ -57,11 +60,14 @@ pub trait RecoveredFields {
     /// Return the errors of the body, see [`Recovery::errors`].
     fn errors(&self, work_on_missed: f64) -> Errors;
 
+    /// Return the products of the errors of this displacement and of the displacements `other` of all nodes in each cell, see [`Recovery::products`].
+    fn products(&self, other: &[f64]) -> Vec<f64>;
+
     /// Return the work `sum force_g n.b` of forces at the integration points of a side of a pair on the interpolation error b.
     fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64;
 
     /// Return the outer normal displacement at the integration points of a side of a pair, including the interpolation error.
-    fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
+    fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64>;
 
     /// Return, at each contact point of a pair, how much the compression changes if the mean around the point is replaced by the
     /// value at the point itself. The body is side b of the pair, and `rows` are the rows B_b of its nodal displacements.
@@ -106,6 +112,17 @@ impl<const D: usize> Meshes for KeptMeshes<D> {
 
     fn sizes(&self, _body: usize, load: &[f64]) -> Vec<f64> {
         load.chunks_exact(D).flat_map(|force| [dot(force, force).sqrt(); D]).collect()
+    }
+
+    fn normal_displacement(&self, pair: usize, side: usize, u: &[f64]) -> Vec<f64> {
+        let fine = &self.fine[pair];
+        let on = &fine.sides[side];
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let at_point = |((&facet, l), normal): ((&usize, &[f64; D]), &[f64; D])| {
+            let shapes = on.facets.facet(facet).iter().zip(element::values(on.facets.order, l));
+            shapes.map(|(&node, phi)| sign * phi * dot(normal, &u[D * node as usize..][..D])).sum()
+        };
+        on.facet.iter().zip(&on.at).zip(&fine.normal).map(at_point).collect()
     }
 
     fn points(&self, pair: usize) -> &FinePoints {
@@ -192,13 +209,18 @@ impl<const D: usize> RecoveredFields for OnBody<'_, D> {
         Errors { load: self.split.sums(errors.load), ..errors }
     }
 
+    fn products(&self, other: &[f64]) -> Vec<f64> {
+        let split = self.split;
+        self.recovery.products(&Recovery::new(&split.space, &self.shape.elasticity, split.values(other)))
+    }
+
     fn work_on_missed(&self, pair: usize, side: usize, force: &[f64]) -> f64 {
         let mut work = 0.0;
         self.visit(pair, side, |g, normal, at| work += force[g] * dot(&normal, &self.missed(&at)));
         work
     }
 
-    fn normal_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
+    fn recovered_displacement(&self, pair: usize, side: usize) -> Vec<f64> {
         let mut values = vec![0.0; self.kept.fine[pair].points.each.len()];
         self.visit(pair, side, |g, normal, at| values[g] = dot(&normal, &self.displacement(&at)));
         values

@@ -11,14 +11,14 @@ use crate::contact::law::{self, OwnLaws};
 use crate::contact::pieces::{Cut, Intersection, Reach};
 use crate::contact::{self, Chords, ContactPair, Fault, Fine, Side};
 use crate::error::{Error, Located, Result};
-use crate::fem::{Facets, jumping, unit};
-use crate::linalg::dot;
+use crate::fem::{Facets, jumping, minus, unit};
+use crate::linalg::{bounds, dot};
 use crate::mesh::{Group, Mesh};
 use crate::model::BodySlot;
 use crate::problem::contact::{Carrier, ContactSpec, Overlap};
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// A pair with its origin.
 pub struct Contact<const D: usize> {
@@ -26,6 +26,8 @@ pub struct Contact<const D: usize> {
     pub pair: ContactPair,
     /// Integration points, if they were requested.
     pub fine: Option<Fine<D>>,
+    /// Whether its surfaces look away from each other, as the faces under head and nut of a bolt.
+    is_through: bool,
     pub facts: ContactFacts,
 }
 
@@ -44,6 +46,47 @@ pub struct ContactFacts {
     pub swapped: bool,
     /// Mesh of side a, for output.
     pub surface: ContactSurface,
+    /// Facets of both sides that face each other.
+    pub facing: Vec<Facing>,
+}
+
+/// A facet of side a and one of side b that face each other.
+#[derive(Serialize, Deserialize)]
+pub struct Facing {
+    /// Corners of both facets ([`corners`]). Before an obstacle both are the facet itself.
+    pub facets: [[u32; 3]; 2],
+    /// Contact points on the facet of side a.
+    pub points: Vec<usize>,
+}
+
+impl Facing {
+    /// Return the facets of both sides with a common piece, sorted.
+    fn all<const D: usize>(
+        parts: &[SceneBody<D>],
+        sides: [&Side<D>; 2],
+        common: &Intersection<D>,
+        pair: &ContactPair,
+    ) -> Vec<Self> {
+        // an obstacle has the facets of the body before it
+        let on_mesh = pair.bodies.map(|body| &parts.get(body).unwrap_or(&parts[pair.bodies[0]]).mesh.points);
+        let point_of = pair.point_of(sides[0].nodes.len());
+        let met: BTreeSet<[usize; 2]> = common.points.iter().map(|point| [point.facet_a, point.facet_b]).collect();
+        let facing = |met: [usize; 2]| {
+            let facet =
+                |k: usize| corners(sides[k].facets.facet(met[k])[..D].iter().map(|&node| on_mesh[k][node as usize]));
+            let points = sides[0].on_facet(met[0]).iter().filter_map(|&at| point_of[at as usize]);
+            Self { facets: [facet(0), facet(1)], points: points.collect() }
+        };
+        met.into_iter().map(facing).collect()
+    }
+}
+
+/// Return the corners of a facet as sorted points of the mesh, which are three in space. In the plane the last one is no point.
+pub fn corners(points: impl Iterator<Item = u32>) -> [u32; 3] {
+    let mut corners = [u32::MAX; 3];
+    corners.iter_mut().zip(points).for_each(|(corner, point)| *corner = point);
+    corners.sort_unstable();
+    corners
 }
 
 impl ContactFacts {
@@ -93,10 +136,35 @@ pub fn all<const D: usize>(
     }
     let mut rigid = Vec::new();
     for (number, (contact, spec)) in contacts.iter_mut().zip(named()).enumerate() {
-        rigid.extend(rigid::part(&mut contact.pair, spec, number, parts.len() + rigid.len())?);
+        rigid.extend(rigid::part(&mut contact.pair, spec, contact.is_through, number, parts.len() + rigid.len())?);
     }
+    refuse_second_layers(scene, &contacts[..named().count()])?;
     auto::all_find_some(&rules, contacts.iter().map(|contact| contact.facts.table))?;
     Ok((contacts, rigid))
+}
+
+/// Refuse two layers between the same facets. A facet may face facets of several surfaces, each with a layer of its own.
+///
+/// # Errors
+/// Two of the contacts have a facet with the same partner.
+fn refuse_second_layers<const D: usize>(scene: &Scene, contacts: &[Contact<D>]) -> Result<()> {
+    let mut first: HashMap<[[u32; 3]; 2], usize> = HashMap::new();
+    for (number, contact) in contacts.iter().enumerate() {
+        for facing in &contact.facts.facing {
+            let mut facets = facing.facets;
+            facets.sort_unstable();
+            let before = *first.entry(facets).or_insert(number);
+            if before != number {
+                let [spec, other] = [contact, &contacts[before]].map(|contact| contact.facts.spec(&scene.contacts));
+                let [[a, b], [c, d]] = [&spec, &other].map(|spec| spec.between.each_ref().map(|name| &name.value));
+                let message = format!("`{a}` and `{b}` have facets in common with the contact of `{c}` and `{d}`");
+                return Err(Error::scene(&spec.between[0].place, message)
+                    .because("two layers would lie between the same facets")
+                    .help("remove one of the contacts, or let their groups not overlap"));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Return the pair of the two surfaces that a contact names.
@@ -150,10 +218,10 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         self
     }
 
-    /// Return what both surfaces have in common, and whether the gap of the scene alone counts.
+    /// Return what both surfaces have in common, and whether they look away from each other.
     fn common(&mut self, cut: Cut<D>) -> (Intersection<D>, bool) {
         let (spec, [a, b]) = (self.spec, &mut self.sides);
-        let mut reach = Reach::between(a, b, spec.angle, spec.distance);
+        let reach = Reach::between(a, b, spec.angle, spec.distance);
         let mut common = match spec.obstacle {
             true => Intersection::of_one(a),
             false => cut(a, b, &reach),
@@ -161,17 +229,18 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         if !spec.obstacle && a.towards(b, &common) {
             common = cut(a, b, &reach);
         }
-        // head and nut of a bolt look away from each other, and its preload draws them together
-        let is_through = spec.preload.is_some() && common.points.is_empty();
-        if is_through {
-            reach = Reach::anywhere(a, b, spec.angle);
-            common = cut(a, b, &reach);
+        let mut is_through = false;
+        if spec.preload.is_some() {
+            let anywhere = cut(a, b, &Reach::anywhere(a, b, spec.angle));
+            is_through = look_away(a, b, &anywhere);
+            if is_through {
+                common = anywhere;
+            }
         }
-        let is_touching = spec.is_touching() || is_through;
-        if is_touching {
+        if spec.is_touching() || is_through {
             common.close();
         }
-        (common, is_touching)
+        (common, is_through)
     }
 
     /// Assemble the pair, and its integration points if `fine` requests them. Return none if the surfaces of a pair that was found have no common
@@ -183,7 +252,8 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         cut: Cut<D>,
         fine: bool,
     ) -> Result<Option<Contact<D>>> {
-        let (common, is_touching) = self.common(cut);
+        let (common, is_through) = self.common(cut);
+        let is_touching = self.spec.is_touching() || is_through;
         let Self { spec, bodies, sides: [a, b], far: [far, _], swapped } = self;
         let is_found = spec.is_rule();
         let mut names = [a.name, b.name].map(str::to_owned);
@@ -225,12 +295,35 @@ impl<'a, const D: usize> SurfacePair<'a, D> {
         };
         let chords = if is_touching { None } else { Chords::of(&a, &b, &common, &pair) };
         let ends = spec.distance.map_or(Vec::new(), |_| contact::ends(&a, &common, &pair, &far));
+        let facing = Facing::all(parts, [&a, &b], &common, &pair);
         Ok(Some(Contact {
             pair,
             fine,
-            facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface },
+            is_through,
+            facts: ContactFacts { table: spec.table, names, chords, ends, swapped, surface, facing },
         }))
     }
+}
+
+/// Overlap of two faces that look away from each other, at least, relative to the size of a facet: the plate between them is thicker than a hundredth of
+/// its facets. The two faces of a cut overlap by less, since their meshes are of one curve.
+const THINNEST: f64 = 0.01;
+
+/// Return whether two surfaces look away from each other, with the material of their bodies between them, as the faces under head and nut of a bolt:
+/// each is behind the other, and body b does not lie before body a. Surfaces that overlap are behind each other, too, but their bodies
+/// lie before each other.
+fn look_away<const D: usize>(a: &Side<D>, b: &Side<D>, common: &Intersection<D>) -> bool {
+    let [behind, whole] = common
+        .points
+        .iter()
+        .fold([0.0; 2], |[behind, whole], point| [behind - point.weight * point.gap, whole + point.weight]);
+    let middle = |side: &Side<D>| {
+        let [low, high] = bounds(side.space.nodes.iter().copied());
+        std::array::from_fn(|c| 0.5 * (low[c] + high[c]) + side.space.datum[c])
+    };
+    let between: [f64; D] = minus(middle(b), middle(a));
+    let along: f64 = (0..a.facets.count()).map(|i| dot(&a.area(i), &between)).sum();
+    behind > whole * THINNEST * a.mean_measure().powf(1.0 / (D - 1) as f64) && along <= 0.0
 }
 
 /// Return the reason that names the pair in an error at an expression. The table of the expression may be for many pairs.

@@ -139,11 +139,18 @@ impl<'a> Obstacle<'a> {
     }
 }
 
-/// Return the rigid part of pair `number`, if its scene has one, as slot `index` of the model.
+/// Return the rigid part of pair `number`, if its scene has one, as slot `index` of the model. `is_through` says whether its surfaces look away from each
+/// other: then pressures draw them together, and so does the preload of a bond.
 ///
 /// # Errors
 /// See [`Obstacle`]: a surface without a mean normal, and a moment about it.
-pub fn part(pair: &mut ContactPair, spec: &ContactSpec, number: usize, index: usize) -> Result<Option<BodySlot>> {
+pub fn part(
+    pair: &mut ContactPair,
+    spec: &ContactSpec,
+    is_through: bool,
+    number: usize,
+    index: usize,
+) -> Result<Option<BodySlot>> {
     spec.check_step()?;
     if spec.obstacle {
         let obstacle = Obstacle::new(pair, spec);
@@ -156,7 +163,7 @@ pub fn part(pair: &mut ContactPair, spec: &ContactSpec, number: usize, index: us
     }
     let preload = spec.preload.map(|preload| spec.factor * preload);
     let Some(force) = spec.force().or(preload) else { return Ok(None) };
-    let pulls = spec.bond && spec.preload.is_some();
+    let pulls = spec.bond && spec.preload.is_some() && !is_through;
     let work = if pulls { -force } else { force };
     let motion = Motion { name: "offset".to_owned(), trace: vec![1.0; pair.len()], work };
     let name = format!("gap of {} - {}", spec.between[0].value, spec.between[1].value);

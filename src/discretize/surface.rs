@@ -1,6 +1,6 @@
 //! A contact surface of a pair: its mesh for output, which holds the facets of side a and the contact points from which their values come.
 
-use crate::contact::{ContactPair, Side};
+use crate::contact::{ContactPair, Coverage, Side};
 use crate::fem::{element, lagrange, space};
 use crate::output::{CellKind, FieldArray, UnstructuredGrid};
 use crate::problem::order::Order;
@@ -19,6 +19,16 @@ pub struct ContactSurface {
     sources: Vec<Vec<(usize, f64)>>,
     /// Share of each facet that is paired.
     cover: Vec<f64>,
+    /// Contact points of the same facet: in the plane one after the other along it, in space any two.
+    neighbours: Vec<Neighbours>,
+}
+
+/// Two contact points of one facet.
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub struct Neighbours {
+    pub points: [usize; 2],
+    /// Share of the facet that is paired.
+    pub share: f64,
 }
 
 impl ContactSurface {
@@ -36,6 +46,7 @@ impl ContactSurface {
             connectivity: Vec::new(),
             sources: Vec::new(),
             cover: Vec::new(),
+            neighbours: neighbours(a, pair, &point_of),
         };
         // the same points as in the fields of the body
         let points = space::at_equally_spaced(a.space, Cow::Borrowed(&a.space.nodes));
@@ -81,10 +92,17 @@ impl ContactSurface {
         &self.points
     }
 
-    /// Return the contact points on the corners of facets without a partner, each once or more.
-    pub fn beside_uncovered(&self) -> impl Iterator<Item = usize> {
-        let facets = self.connectivity.chunks_exact(self.cell.stride()).zip(&self.cover);
-        let nodes = facets.filter(|(_, cover)| **cover == 0.0).flat_map(|(facet, _)| facet);
+    /// Return contact points that are neighbours on a facet.
+    pub fn neighbours(&self) -> &[Neighbours] {
+        &self.neighbours
+    }
+
+    /// Return the contact points on the corners of facets without a partner because facets before them were refused, each once or more. `cover` is the
+    /// coverage of the facets.
+    pub fn beside_cut_short(&self, cover: &[Coverage]) -> impl Iterator<Item = usize> {
+        let facets = self.connectivity.chunks_exact(self.cell.stride()).zip(cover);
+        let cut = facets.filter(|(_, cover)| cover.carriers.is_none() && cover.is_cut_short);
+        let nodes = cut.flat_map(|(facet, _)| facet);
         nodes.flat_map(|&node| &self.sources[node as usize]).map(|(q, _)| *q)
     }
 
@@ -117,4 +135,21 @@ impl ContactSurface {
             at_cells: vec![FieldArray::new("cover", 1, self.cover.clone())],
         }
     }
+}
+
+/// Return the contact points that are neighbours on the facets of side a. `point_of` is the contact point of each node on a face.
+fn neighbours<const D: usize>(a: &Side<D>, pair: &ContactPair, point_of: &[Option<usize>]) -> Vec<Neighbours> {
+    let mut all = Vec::new();
+    for (facet, &Coverage { share, .. }) in pair.cover.iter().enumerate().filter(|(_, cover)| cover.carriers.is_some())
+    {
+        let nodes = a.on_facet(facet);
+        // the second node of an edge is its other end
+        let order: Vec<u32> = if D == 2 { [&nodes[..1], &nodes[2..], &nodes[1..2]].concat() } else { nodes.to_vec() };
+        let points: Vec<usize> = order.iter().filter_map(|&at| point_of[at as usize]).collect();
+        for (i, &q) in points.iter().enumerate() {
+            let last = if D == 2 { points.len().min(i + 2) } else { points.len() };
+            all.extend(points[i + 1..last].iter().map(|&r| Neighbours { points: [q, r], share }));
+        }
+    }
+    all
 }

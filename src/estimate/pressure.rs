@@ -47,10 +47,10 @@ pub(super) struct PressureErrors {
     pub error: Vec<f64>,
     /// Relative error of each pair, with the factor [`SAFETY`].
     pub relative: Vec<f64>,
-    /// Relative error of the sum of the pressures of each pair, with the same factor.
-    pub force: Vec<f64>,
     /// The part of it on the facets at rims.
     pub ends: Vec<f64>,
+    /// Place of the largest part of it.
+    pub worst: Vec<[f64; 3]>,
     /// Why the error of each pair is a guess, if it is one.
     pub guesses: Vec<Option<Guess>>,
 }
@@ -65,7 +65,7 @@ impl PressureErrors {
         let compression: Vec<f64> = layer.compression.iter().zip(closing).map(|(c, more)| c + more).collect();
         let resolved = Layer::resolve(model, &compression, &layer.linear(&compression), &meeting_slopes(model), &[]);
         let error = resolved.pressure.iter().zip(&layer.pressure).map(|(exact, discrete)| exact - discrete).collect();
-        let mut errors = Self { error, relative: Vec::new(), force: Vec::new(), ends: Vec::new(), guesses: Vec::new() };
+        let mut errors = Self { error, relative: Vec::new(), ends: Vec::new(), worst: Vec::new(), guesses: Vec::new() };
         for pair in 0..model.pairs.len() {
             errors.add_pair(meshes.points(pair), model, layer, pair);
         }
@@ -87,10 +87,11 @@ impl PressureErrors {
             at_rims.iter().map(|q| range.start + q).map(|q| model.area[q] * self.error[q].powi(2)).sum();
         let relative = |squared: f64| if squared == 0.0 { 0.0 } else { SAFETY * f64::sqrt(squared / whole) };
         self.relative.push(relative(squared + rim.squared));
-        let sum = |value: &dyn Fn(usize) -> f64| range.clone().map(|q| model.area[q] * value(q)).sum::<f64>();
-        let (missed, force) = (sum(&|q| self.error[q]).abs(), sum(&|q| layer.pressure[q].abs()));
-        self.force.push(if missed == 0.0 { 0.0 } else { SAFETY * missed / force });
         self.ends.push(relative(of_points + rim.squared));
+        let part = |q: usize| model.area[range.start + q] * self.error[range.start + q].powi(2);
+        let most = (0..pressure.len()).max_by(|&p, &q| part(p).total_cmp(&part(q)));
+        let at = if rim.squared > squared { Some(rim.worst) } else { most };
+        self.worst.push(at.map_or([f64::NAN; 3], |q| position[q]));
         let peak = (0..pressure.len()).max_by(|&p, &q| pressure[p].total_cmp(&pressure[q]));
         self.guesses.push(if rim.squared > squared.max(UNFINISHED.powi(2) * whole) {
             Some(Guess { cause: Cause::Rim, place: position[rim.worst] })

@@ -95,6 +95,20 @@ impl Lagrange {
         squares
     }
 
+    /// Return the values at the nodes of the part of a function in the orthogonal polynomials of the highest degree. `at` gives the value of the function
+    /// at a node.
+    pub fn highest_part(&self, at: impl Fn(usize) -> f64) -> Vec<f64> {
+        // the functions psi_nm with n + m = k are the last ones of their n
+        let highest: Vec<usize> = (0..=self.degree).map(|n| (n + 1) * (2 * self.degree + 2 - n) / 2 - 1).collect();
+        let part = |j: &usize| (0..self.nodes.len()).map(|i| at(i) * self.coefficients[(i, *j)]).sum::<f64>();
+        let parts: Vec<f64> = highest.iter().map(part).collect();
+        let value = |l: &[f64; 3]| {
+            let psi = orthogonal(self.degree, self.vertices, l);
+            highest.iter().zip(&parts).map(|(&j, part)| part * psi[j].0[0]).sum()
+        };
+        self.nodes.iter().map(value).collect()
+    }
+
     /// Return the coefficient of the highest power in each function of a line, up to a common factor.
     pub fn highest(&self) -> Vec<f64> {
         (0..self.nodes.len()).map(|i| self.coefficients[(i, self.degree)]).collect()

@@ -12,6 +12,7 @@
 //! b vanishes at all nodes and is continuous. For a displacement of one degree more than the elements, b is exact.
 
 mod patch;
+mod products;
 mod strip;
 
 use super::elasticity::Elasticity;
@@ -168,12 +169,21 @@ impl<'a, const D: usize> Recovery<'a, D> {
         Errors { cells, rates: self.rates(), strips, load }
     }
 
-    /// Return the power of its size with which the energy error of each cell falls, at most the degree k of the elements, from order three on.
+    /// Return the power of its size with which the energy error of each cell falls: at most the degree k of the elements, from order three on.
+    fn rates(&self) -> Vec<f64> {
+        let degree = self.space.order.degree() as f64;
+        match self.space.order {
+            Order::P1 | Order::P2 => vec![degree; self.space.cell_count()],
+            _ => self.powers().into_iter().map(|mu| mu.clamp(1.0, degree)).collect(),
+        }
+    }
+
+    /// Return the power mu of the displacement in each cell of order three or more, from the decay of its polynomials.
     ///
     /// A displacement r^mu around a point has an energy error of h^mu. The part A_n of its polynomials of degree n in a cell at the point, in the mean square,
     /// falls as n^-(2 mu + 2), so that the last parts tell mu. Where the displacement is smooth, parts fall geometrically, which is a large power. Two
     /// degrees are taken together, since functions may be nearly even or odd.
-    fn rates(&self) -> Vec<f64> {
+    fn powers(&self) -> Vec<f64> {
         let (order, degree) = (self.space.order, self.space.order.degree());
         let of_cell = |cell: &[u32]| {
             let mut squares = vec![0.0; degree + 1];
@@ -185,12 +195,9 @@ impl<'a, const D: usize> Recovery<'a, D> {
             let ratio = degree as f64 / (degree as f64 - 1.0);
             let power = 0.5 * (part(degree - 1) / part(degree)).ln() / ratio.ln();
             // a cell that does not move has no parts
-            if power.is_nan() { degree as f64 } else { (0.5 * power - 1.0).clamp(1.0, degree as f64) }
+            if power.is_nan() { degree as f64 } else { 0.5 * power - 1.0 }
         };
-        match order {
-            Order::P1 | Order::P2 => vec![degree as f64; self.space.cell_count()],
-            _ => self.space.cells.chunks_exact(self.space.stride).map(of_cell).collect(),
-        }
+        self.space.cells.chunks_exact(self.space.stride).map(of_cell).collect()
     }
 
     /// Return the squared energy norm of the recovered minus the discrete stress on each cell.
@@ -200,15 +207,7 @@ impl<'a, const D: usize> Recovery<'a, D> {
         if order == Order::P1 && !self.space.axisymmetric {
             return (0..self.space.cell_count()).map(|index| self.energy_error_of_linear(index, &rule)).collect();
         }
-        let of_cell = |index: usize| {
-            let of_point = |point: CellPoint<D>| {
-                let mut difference = self.recovered_slope(point.cell, point.l, &point.at);
-                difference.add(-1.0, &point.slope(&self.displacement));
-                let strain = difference.strain();
-                point.weight * dot(&self.stress(index, point.at, &strain), &strain)
-            };
-            self.space.points(index, &rule).flatten().map(of_point).sum()
-        };
+        let of_cell = |index: usize| self.product(index, &rule, |point| [self.strain_beyond(point); 2]);
         (0..self.space.cell_count()).map(of_cell).collect()
     }
 

@@ -317,9 +317,10 @@ impl Blocks {
         Factor::new(self, unit_diagonal(self), TOLERANCE)
     }
 
-    /// Return a basis of the combinations e of all unknowns with e'Ae <= `tolerance * e'e`, reduced as that of a [`Factor`].
-    pub fn kernel(&self, tolerance: f64) -> Vec<DVector<f64>> {
-        Factor::new(self, vec![1.0; self.unknowns()], tolerance).kernel()
+    /// Factor the matrix without scaling. The kernel has the combinations e of all unknowns with e'Ae <= `tolerance * e'e`. If the matrix is indefinite, they
+    /// are as many as make the matrix of the unknowns that are not left out definite.
+    pub fn factor_unscaled(&self, tolerance: f64) -> Factor {
+        Factor::new(self, vec![1.0; self.unknowns()], tolerance)
     }
 
     /// Return a basis of the combinations e of a few motions with e'Ae <= `tolerance * full * e'e`. `full` is the entry of a motion that is fully
@@ -461,6 +462,11 @@ impl Blocks {
             }
         }
         y
+    }
+
+    /// Return x'Ax.
+    pub fn energy(&self, x: &DVector<f64>) -> f64 {
+        self.multiply(x).dot(x)
     }
 }
 

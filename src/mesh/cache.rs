@@ -6,8 +6,6 @@ use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 /// Return what the name of a mesh with these inputs begins with: the name of its script, and a digest. Behind it stands the Gmsh that made the
 /// mesh. The digest includes a version, which changes with the way this program calls Gmsh.
@@ -62,38 +60,16 @@ impl Cache {
     /// # Errors
     /// Those of `make`, and folders that cannot be written.
     pub fn make<T>(&self, name: &str, make: impl FnOnce(&Path, &Path) -> Result<T>) -> Result<T> {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
-        let work = self.folder.join(format!("tmp-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
-        std::fs::create_dir_all(&work).map_err(|cause| Error::file(&work, "create", &cause).help(HELP))?;
-        let (made, to) = (work.join(name), self.file(name));
-        self.remove_left();
-        let result = make(&work, &made).and_then(|result| {
-            std::fs::rename(&made, &to).map_err(|cause| Error::file(&to, "create", &cause)).map(|()| result)
-        });
-        // a folder that cannot be removed is litter, not an error
-        let _ = std::fs::remove_dir_all(&work);
-        result
-    }
-
-    /// Remove the folders to work in that were left. A folder that cannot be removed stays.
-    fn remove_left(&self) {
-        let age = |folder: &PathBuf| folder.metadata().and_then(|data| data.modified()).ok()?.elapsed().ok();
-        for folder in self.all("tmp-").iter().filter(|folder| age(folder).is_some_and(|age| age > OLD)) {
-            let _ = std::fs::remove_dir_all(folder);
-        }
+        let failed = |cause| Error::file(&self.folder, "create a file in", &cause).help(HELP);
+        std::fs::create_dir_all(&self.folder).map_err(failed)?;
+        // a name that no other process has, on whatever host; the folder is removed when it is dropped
+        let work = tempfile::Builder::new().prefix("winkler-").tempdir_in(&self.folder).map_err(failed)?;
+        let (made, to) = (work.path().join(name), self.file(name));
+        let result = make(work.path(), &made)?;
+        std::fs::rename(&made, &to).map_err(|cause| Error::file(&to, "create", &cause))?;
+        Ok(result)
     }
 }
-
-/// Age from which a folder to work in was left by a process that has been killed.
-const OLD: Duration = Duration::from_secs(24 * 3600);
 
 /// Advice for a cache that cannot be written.
 const HELP: &str = "meshes are kept there: name a folder that can be written in $WINKLER_CACHE";
-
-/// Write a file.
-///
-/// # Errors
-/// The file system refuses.
-pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|cause| Error::file(path, "write", &cause))
-}

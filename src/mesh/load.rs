@@ -1,14 +1,14 @@
 //! The way from the scene's mesh source to a mesh: by Gmsh, from the cache, from a file, or from arrays.
 
 use super::builder::MeshProducer;
-use super::cache::{self, Cache, write};
+use super::cache::{self, Cache};
 use super::gmsh::{Gmsh, MeshingTask};
 use super::msh;
 use super::msh2::Contents;
 use super::script::{self, Script, quoted};
 use super::{Mesh, abaqus, arrays, digits, foreign};
 use crate::error::{Error, Located, Result};
-use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines};
+use crate::file::{Digested, digest, digest_of_bytes, with_unix_lines, write};
 use crate::interrupt::Interrupt;
 use crate::problem::mesh::{AdaptedMesh, is_shape};
 use crate::problem::{GmshSource, Guard, MeshSource, Order};
@@ -71,6 +71,17 @@ pub fn load<const D: usize>(source: &MeshSource, order: Order, interrupt: &Inter
     loaded.mesh.uncertainty = digits::uncertainty(&loaded.mesh.points);
     loaded.mesh.straighten();
     Ok(loaded)
+}
+
+/// Return the files that a mesh is read from or made of, as far as they are there.
+pub fn files(source: &MeshSource) -> Vec<PathBuf> {
+    match source {
+        MeshSource::Geo(GmshSource { file, .. }) => {
+            Script::read(&file.value).map_or_else(|_| vec![file.value.clone()], |script| script.paths)
+        }
+        MeshSource::Msh { file } => vec![file.value.clone()],
+        MeshSource::Arrays(_) => Vec::new(),
+    }
 }
 
 /// Number of bytes at the start of a file that show its kind.
@@ -202,6 +213,12 @@ impl Wanted<'_> {
             // Advice for scripts does not help with a file of another program.
             advice if self.order.is_none() && advice.is_none_or(|advice| advice.contains("Physical")) => {
                 error.help(format!("see what Gmsh makes of it: gmsh {}", self.path.display()))
+            }
+            Some(advice) if is_shape(self.path) && advice.contains("Physical") => {
+                let [whole, rim] = if D == 3 { ["solid", "faces"] } else { ["face", "edges"] };
+                error.help(format!(
+                    "the file has {rim} without a {whole}: export the bodies as {whole}s, or merge it in a script (.geo) that makes them"
+                ))
             }
             _ => error,
         })?;

@@ -32,7 +32,7 @@ mod vertices;
 pub use builder::MeshProducer;
 pub use check::{Asked, BodyCheck, Components, Duty};
 pub use groups::{Group, Groups, Numbering};
-pub use load::{Loaded, MeshOrigin, as_msh, load};
+pub use load::{Loaded, MeshOrigin, as_msh, files, load};
 pub use locality::bisect;
 pub use msh::parse;
 pub use script::unstructured;

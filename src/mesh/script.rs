@@ -4,9 +4,9 @@
 //! This is a search through its words, not an interpreter. A script is a program: it may read the clock, the environment, or files whose names
 //! it computes. The mesh of a script that does so, as its words tell, is made anew in each run.
 
-use super::cache::write;
 use super::foreign::is_data;
 use crate::error::{Error, Kind, Located, Result};
+use crate::file::write;
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::ops::Range;
@@ -15,7 +15,9 @@ use std::path::{Path, PathBuf};
 /// A script and all files that it reads.
 #[derive(Debug, Default)]
 pub struct Script {
-    /// Contents of the script itself and of every file that it names, in order of first appearance.
+    /// Paths of the script itself and of every file that it names, in order of first appearance.
+    pub paths: Vec<PathBuf>,
+    /// Contents of these files.
     pub files: Vec<Vec<u8>>,
     /// Whether these files alone may not determine the mesh.
     pub may_change: bool,
@@ -58,7 +60,7 @@ impl Script {
             }));
             script.files.push(bytes);
         }
-        Ok(script)
+        Ok(Script { paths: found, ..script })
     }
 
     /// Return whether the last line is ended. Otherwise Gmsh silently omits the last command, unless another script includes

@@ -285,6 +285,31 @@ fn sections_of_no_use_are_skipped() {
     assert_eq!(parse::<2>(bytes.as_bytes()).unwrap().points, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
 }
 
+/// Work of two processes with one number, as on two hosts, and folders of a user in the cache.
+#[test]
+fn the_cache_removes_only_its_own_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let old = folder.path().join("tmp-thesis");
+    std::fs::create_dir(&old).unwrap();
+    let day_before = std::time::SystemTime::now() - std::time::Duration::from_secs(3 * 86_400);
+    std::fs::File::open(&old).unwrap().set_modified(day_before).unwrap();
+    let cache = Cache::at(folder.path().to_owned());
+    let write = |text: &str, to: &Path| crate::file::write(to, text);
+    cache
+        .make("a", |own, made| {
+            cache.make("b", |other, made| {
+                assert_ne!(own, other);
+                write("b", made)
+            })?;
+            assert!(own.is_dir());
+            write("a", made)
+        })
+        .unwrap();
+    let mut names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["a", "b", "tmp-thesis"]);
+}
+
 #[test]
 fn scripts_are_meshed_once_for_each_key() {
     let folder = tempfile::tempdir().unwrap();

@@ -139,10 +139,13 @@ impl JointStep {
             axpy(1.0, &change, &mut column);
             let (closing, energy) = closing_and_energy(model, &self.rows, self.first, &column, &load);
             let error = last_error.unwrap_or(self.matrix.solver().accuracy() * energy.sqrt());
-            border.push(motion, column, &closing, error);
+            self.matrix.multiply_stiffness(&self.rows, &column, &mut product);
+            border.push(model, motion, (column, &product), &closing, error);
         }
-        (self.motions, self.border) = (motions, Some(border));
-        Ok(None)
+        self.motions = motions;
+        let is_factored = border.factor();
+        self.border = Some(border);
+        Ok((!is_factored).then(|| "nothing resists a motion of a rigid part".to_owned()))
     }
 
     /// Return the range of each body in a vector of all bodies.

@@ -23,7 +23,7 @@ pub use field::Field;
 pub use joint::JointStep;
 pub use layer::Layer;
 pub use linear::LinearStep;
-pub use rigid::{Motions, NamedMotion};
+pub use rigid::NamedMotion;
 
 use crate::contact::ContactPair;
 use crate::error::Result;
@@ -67,6 +67,8 @@ pub struct Mechanism {
     pub support: String,
     /// The work of the loads, as such a share, that was taken from them, if it is more than the digits of the mesh allow for.
     pub balanced: f64,
+    /// Whether contact resists it, by no more than facets may by mistake.
+    pub by_facets: bool,
     /// The body that was fixed at one node to remove the motion; `None` if loads do work on it, or if there is no suitable node outside the contact.
     pub fixed: Option<usize>,
 }
@@ -416,6 +418,7 @@ pub(crate) mod sample {
             on_side: vec![0, 1],
             face: vec![1; 2],
             tilt: vec![0.0; 2],
+            spread: Vec::new(),
             uncertainty: 0.0,
             position: vec![[0.0; 3]; 2],
             area: AREA[2 * i..2 * i + 2].to_vec(),

@@ -15,13 +15,13 @@ pub mod views;
 pub mod vtu;
 
 pub use fields::{BodyField, CellKind, FieldArray, LargestStress, UnstructuredGrid};
-pub use folder::{Folder, make_folder, safe_name, write_whole};
+pub use folder::{Folder, make_folder, refuse_foreign, safe_name, write_whole};
 pub use mark::{Mark, Role};
 pub use plot::{Color, Plot, PlotAxis, Series, Style};
 pub use report::{
     BalanceReport, BodyReport, EstimateReport, Extent, ForceReport, InnerTimes, IntervalReport, LISTED, ObstacleReport,
-    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, UNSETTLED, UnitWords, busiest,
-    warning_lines,
+    PairReport, ReactionReport, Report, RoundReport, StepPairReport, StepReport, TensionReport, UNSETTLED, UnitWords,
+    UnmetReport, busiest, warning_lines,
 };
 pub use tables::{ContactTable, HistoryWriter, PairRow, ResultNames, RowFile, StepTable};
 pub use terminal::IterationTable;
@@ -83,6 +83,23 @@ pub fn trimmed(text: &str) -> &str {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text }
 }
 
+/// Escape a text for HTML and XML, between tags and in the value of an attribute. A character that XML does not allow becomes U+FFFD.
+pub fn escape(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe += "&amp;",
+            '<' => safe += "&lt;",
+            '>' => safe += "&gt;",
+            '"' => safe += "&quot;",
+            '\t' | '\n' | '\r' => safe.push(c),
+            _ if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => safe.push('\u{fffd}'),
+            _ => safe.push(c),
+        }
+    }
+    safe
+}
+
 /// Format an integer in superscript digits, for powers of ten.
 pub(super) fn superscript(value: i32) -> String {
     value
@@ -121,6 +138,14 @@ mod tests {
             assert_eq!(field(value).parse::<f64>(), Ok(value));
         }
         assert_eq!(field(f64::NAN), "");
+    }
+
+    #[test]
+    fn texts_are_escaped() {
+        assert_eq!(
+            escape("a ]]> <b> & \"\u{1b}\u{ffff}\" größe"),
+            "a ]]&gt; &lt;b&gt; &amp; &quot;\u{fffd}\u{fffd}&quot; größe"
+        );
     }
 
     #[test]

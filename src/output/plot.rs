@@ -1,6 +1,8 @@
 //! Plots: curves over two axes, as SVG, with a legend beside the axes, where it hides nothing.
 
 use super::axis::Axis;
+use super::escape;
+use super::folder::MARK;
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
@@ -149,7 +151,7 @@ impl Plot {
         let [width, height] = SIZE;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
-             font-family=\"sans-serif\" font-size=\"12.5\" stroke-linejoin=\"round\">\n<rect width=\"100%\" height=\"100%\" fill=\"#FFF\"/>\n"
+             font-family=\"sans-serif\" font-size=\"12.5\" stroke-linejoin=\"round\">\n<!-- {MARK} -->\n<rect width=\"100%\" height=\"100%\" fill=\"#FFF\"/>\n"
         );
         self.draw_axes(&frame, &axes, &mut svg);
         for (series, pen) in self.series.iter().zip(&pens) {
@@ -261,8 +263,7 @@ fn draw_legend(entries: &[(String, Pen)], left: f64, svg: &mut String) {
 /// Write a text at a place.
 fn text(svg: &mut String, [x, y]: [f64; 2], attributes: &str, text: &str) {
     if !text.is_empty() {
-        let text = text.replace('&', "&amp;").replace('<', "&lt;");
-        let _ = writeln!(svg, "<text x=\"{x:.2}\" y=\"{y:.2}\" {attributes}>{text}</text>");
+        let _ = writeln!(svg, "<text x=\"{x:.2}\" y=\"{y:.2}\" {attributes}>{}</text>", escape(text));
     }
 }
 
@@ -293,6 +294,6 @@ mod tests {
         let series = vec![Series::new("", points, Style::Line)];
         let plot = Plot { title: "<a & b>".into(), x: PlotAxis::default(), y: PlotAxis::log("y"), series };
         assert_eq!(curves(&plot), [1, 2, 1]);
-        assert!(plot.svg().contains("&lt;a &amp; b>"));
+        assert!(plot.svg().contains("&lt;a &amp; b&gt;"));
     }
 }

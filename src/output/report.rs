@@ -19,7 +19,7 @@ pub struct Report {
     /// Title of the scene.
     pub title: String,
     /// Status at the end of the run: `converged`, `roundoff-limited`, `stagnated`, `iteration-limit`, `not-finite`, `out-of-range`,
-    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`.
+    /// `underconstrained`, `unbounded`, `inner-solver`, `inaccurate`, `interrupted`, `mesh-limit`, `tolerance-unmet`.
     pub status: String,
     /// The status in words, with body and iteration where they matter.
     pub message: String,
@@ -72,6 +72,8 @@ pub struct Report {
     pub unbalanced: Option<f64>,
     /// Estimated errors of the discretisation, if requested.
     pub discretization_error: Option<EstimateReport>,
+    /// Errors of pairs above the tolerance, if an adapted run has ended with any.
+    pub unmet: Vec<UnmetReport>,
     /// Adapted meshes, one after another.
     pub rounds: Vec<RoundReport>,
     /// Interval (33) of gamma, if requested.
@@ -150,6 +152,32 @@ pub struct EstimateReport {
     pub force: Vec<f64>,
     /// Fraction of the squared energy error in each body, in the order of the scene.
     pub bodies: Vec<f64>,
+}
+
+/// An estimated error above the tolerance at the end of an adapted run.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub struct UnmetReport {
+    /// Names of the surfaces of the pair, in the order of the scene.
+    pub surfaces: [String; 2],
+    /// What has the error: `pressure` or `force`.
+    pub of: String,
+    /// Relative error.
+    pub error: f64,
+    /// Place of the largest part of the error of the pressures (x, y, z).
+    pub place: [f64; 3],
+}
+
+impl UnmetReport {
+    /// Return the error in words.
+    pub fn in_words(&self) -> String {
+        let [a, b] = &self.surfaces;
+        format!(
+            "{} of the {} between `{a}` and `{b}`, most of it near {}",
+            sci(self.error, 1),
+            self.of,
+            place(self.place)
+        )
+    }
 }
 
 /// The result on one mesh of an adaptation. Errors are relative estimates.
@@ -276,16 +304,24 @@ pub struct PairReport {
     pub moment: [[f64; 3]; 2],
     /// Approach of the bodies along the mean normal; null where normals cancel.
     pub approach: Option<f64>,
-    /// Largest pressure.
+    /// Sum of the pressures times their areas. It is not the resultant of `force` where normals differ, as around a shaft.
+    pub normal_force: f64,
+    /// Mean pressure of the part in contact.
+    pub mean_pressure: f64,
+    /// Largest pressure; zero where a bond only pulls.
     pub peak_pressure: f64,
     /// Point of the largest pressure (x, y, z).
     pub peak_at: [f64; 3],
     /// Largest compression of the layer; negative where all of it is open.
     pub peak_compression: f64,
+    /// The largest tension, if the pair is bonded.
+    #[serde(flatten)]
+    pub tension: Option<TensionReport>,
     /// Size of the contact, and of the part that both surfaces cover and that is open.
     #[serde(flatten)]
     pub extent: Extent,
-    /// Plane problems: points where contact begins or ends. They are zeros of c, interpolated linearly between contact points.
+    /// Plane problems: points where contact begins or ends, from the pressure and the opening of the contact points on both sides
+    /// (docs/theory.md).
     pub contact_ends: Vec<[f64; 3]>,
     /// The obstacle before the surface, if there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -293,6 +329,17 @@ pub struct PairReport {
     /// Closing of the gap (a length) that was found for the force or preload of the pair.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offset: Option<f64>,
+}
+
+/// The tension of a bonded layer.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct TensionReport {
+    /// Largest tension; zero where the bond is only pressed.
+    pub peak_tension: f64,
+    /// Point of the largest tension (x, y, z).
+    pub peak_tension_at: [f64; 3],
+    /// Largest stretch of the layer; zero where all of it is compressed.
+    pub peak_stretch: f64,
 }
 
 /// The report of an obstacle.
@@ -341,7 +388,16 @@ pub struct StepPairReport {
     /// Size of the contact.
     #[serde(flatten)]
     pub extent: Extent,
-    /// Largest pressure.
+    /// Sum of the pressures times their areas.
+    #[serde(default)]
+    pub normal_force: f64,
+    /// Mean pressure of the part in contact.
+    #[serde(default)]
+    pub mean_pressure: f64,
+    /// The largest tension, if the pair is bonded.
+    #[serde(flatten)]
+    pub tension: Option<TensionReport>,
+    /// Largest pressure; zero where a bond only pulls.
     pub peak_pressure: f64,
     /// Largest compression of the layer; negative where all of it is open.
     pub peak_compression: f64,
@@ -372,13 +428,9 @@ impl Default for Extent {
 }
 
 impl Extent {
-    /// Sum the areas `weight` of the points by the sign of their compression. `measure` says whether these are lengths, see
+    /// Return the sizes of the parts in contact and open. `measure` says whether these are lengths, see
     /// [`measure`](crate::contact::ContactPair::measure).
-    pub fn new(measure: &str, weight: &[f64], compression: &[f64]) -> Self {
-        let sum = |counts: fn(f64) -> bool| {
-            weight.iter().zip(compression).filter(|(_, c)| counts(**c)).fold(0.0, |sum, (weight, _)| sum + weight)
-        };
-        let (contact, open) = (sum(|c| c > 0.0), sum(|c| c < 0.0));
+    pub fn new(measure: &str, contact: f64, open: f64) -> Self {
         match measure {
             "length" => Self::Length { contact_length: contact, open_length: open },
             _ => Self::Area { contact_area: contact, open_area: open },
@@ -512,7 +564,9 @@ impl Report {
 
     /// Return whether the run ended since the loads have no equilibrium.
     fn has_no_state(&self) -> bool {
-        matches!(self.status.as_str(), "underconstrained" | "unbounded")
+        // of a history the state is that of its last step
+        let status = self.steps.last().map_or(&self.status, |step| &step.status);
+        matches!(status.as_str(), "underconstrained" | "unbounded")
     }
 
     /// Return the line with the counters, errors and times.
@@ -555,12 +609,9 @@ impl Report {
             ..=LISTED => {
                 let pairs = step.pairs.iter().zip(&self.pairs).map(|(at, pair)| {
                     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
-                    let (peak, sum) = (readable(at.peak_pressure, 6), units.vector(at.force, 0.0));
+                    let (peak, sum) = (peaks(at.peak_pressure, None, at.tension, units), units.vector(at.force, 0.0));
                     let closed = if self.is_bonded(pair) { "compressed" } else { "closed" };
-                    format!(
-                        "{a} - {b}: force on `{on}` {sum}{force}, peak pressure {peak}{stress}, {} points {closed}",
-                        at.closed
-                    )
+                    format!("{a} - {b}: force on `{on}` {sum}{force}, {peak}, {} points {closed}", at.closed)
                 });
                 pairs.collect::<Vec<_>>().join("; ")
             }
@@ -618,11 +669,11 @@ fn largest(displacement: Option<f64>, von_mises: Option<f64>, place: &str, units
 /// Return the line of a pair, which its surfaces name in the order of the scene.
 fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let ([a, b], on) = (&pair.surfaces, &pair.bodies[0]);
-    // a bonded pair may pull everywhere
-    if pair.peak_pressure <= 0.0 && pair.force[0] == [0.0; 3] || pair.peak_pressure.is_nan() {
+    let is_pulled = pair.tension.is_some_and(|tension| tension.peak_tension > 0.0);
+    if pair.peak_pressure <= 0.0 && !is_pulled || pair.peak_pressure.is_nan() {
         return format!("  {a} - {b}: no contact");
     }
-    let UnitWords { extent, stress, force, length, .. } = units;
+    let UnitWords { extent, force, length, .. } = units;
     let moved = |ObstacleReport { approach, tilt, moment, .. }: &ObstacleReport| {
         let turned = || format!(", tilt {}, moment {}", vector(tilt, 0.0, 6), vector(moment, 0.0, 6));
         let turned = if *tilt == [0.0; 3] { String::new() } else { turned() };
@@ -632,15 +683,34 @@ fn pair_line(pair: &PairReport, is_bonded: bool, units: &UnitWords) -> String {
     let more = pair.obstacle.as_ref().map(moved).or(offset).unwrap_or_default();
     let what = if pair.extent.is_area() { "area" } else { "length" };
     let [closed, open] = if is_bonded { ["compressed", "pulled"] } else { ["in contact", "open"] };
-    let scale = pair.peak_pressure.abs() * (pair.extent.contact() + pair.extent.open());
+    let peak = pair.peak_pressure.max(pair.tension.map_or(0.0, |tension| tension.peak_tension));
+    let scale = peak * (pair.extent.contact() + pair.extent.open());
     format!(
-        "  {a} - {b}: force on `{on}` {}{force}{more}, peak pressure {}{stress} at {}, {what} {closed} {}{extent}, {open} {}{extent}",
+        "  {a} - {b}: force on `{on}` {}{force}, normal force {}{force}{more}, {}, {what} {closed} {}{extent}, {open} {}{extent}",
         units.vector(pair.force[0], scale),
-        readable(pair.peak_pressure, 6),
-        units.point(pair.peak_at),
+        readable(pair.normal_force, 6),
+        peaks(pair.peak_pressure, Some((pair.peak_at, pair.mean_pressure)), pair.tension, units),
         readable(pair.extent.contact(), 6),
         readable(pair.extent.open(), 6)
     )
+}
+
+/// Return the words on the largest pressure, with its place and the mean pressure where they are given, and on the largest tension of a bond. A bond that only
+/// pulls has no pressure.
+fn peaks(pressure: f64, more: Option<([f64; 3], f64)>, tension: Option<TensionReport>, units: &UnitWords) -> String {
+    let stress = &units.stress;
+    let tension = tension.filter(|tension| tension.peak_tension > 0.0);
+    let mut words = Vec::new();
+    if pressure > 0.0 || tension.is_none() {
+        let more = more.map_or(String::new(), |(at, mean)| {
+            format!(" at {}, mean pressure {}{stress}", units.point(at), readable(mean, 6))
+        });
+        words.push(format!("peak pressure {}{stress}{more}", readable(pressure, 6)));
+    }
+    words.extend(tension.map(|TensionReport { peak_tension, peak_tension_at, .. }| {
+        format!("largest tension {}{stress} at {}", readable(peak_tension, 6), units.point(peak_tension_at))
+    }));
+    words.join(", ")
 }
 
 /// Change of the stress within the cells at its largest value beyond which this value may be anything: half of it. There the next mesh of half the

@@ -3,11 +3,11 @@
 
 use super::field;
 use super::folder::{Folder, failed};
-use super::report::{Extent, PairReport, ReactionReport, StepReport};
+use super::report::{Extent, PairReport, ReactionReport, StepReport, TensionReport};
 use crate::ddm::{Observer, Row};
 use crate::error::Result;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Seek, Write};
 use std::path::PathBuf;
 
 /// A field of a table: the name of its column and its text.
@@ -55,6 +55,9 @@ impl RowFile {
     /// Write the header, which is that of this row.
     pub fn begin(&mut self, row: &[Cell]) {
         self.columns = row.iter().map(|(column, _)| column.clone()).collect();
+        // the header takes the place of the mark of a file without rows
+        let mut file = self.csv.get_ref();
+        self.written = file.set_len(0).and_then(|()| file.rewind()).map_err(csv::Error::from);
         self.record(&self.columns.clone());
     }
 
@@ -167,6 +170,16 @@ impl ResultNames {
     }
 }
 
+/// Return the fields of the largest pressure of a pair and, of a bond, the largest tension with its place.
+pub fn peaks(name: &str, pressure: f64, tension: Option<TensionReport>) -> Vec<Cell> {
+    let mut fields = vec![number(format!("peak_pressure {name}"), pressure)];
+    if let Some(TensionReport { peak_tension, peak_tension_at, .. }) = tension {
+        fields.push(number(format!("peak_tension {name}"), peak_tension));
+        fields.extend(vector("tension", name, &peak_tension_at, 3));
+    }
+    fields
+}
+
 impl StepTable {
     /// Write a step.
     pub fn row(&mut self, step: &StepReport) {
@@ -180,7 +193,9 @@ impl StepTable {
             line.extend(vector("force", name, &pair.force, dimension));
             line.push(number(format!("approach {name}"), pair.approach));
             line.push(self.names.contact(name, &pair.extent));
-            line.push(number(format!("peak_pressure {name}"), pair.peak_pressure));
+            line.push(number(format!("normal_force {name}"), pair.normal_force));
+            line.push(number(format!("mean_pressure {name}"), pair.mean_pressure));
+            line.extend(peaks(name, pair.peak_pressure, pair.tension));
             line.push(count(format!("closed {name}"), pair.closed));
             if let Some(obstacle) = &pair.obstacle {
                 // about z in the plane
@@ -244,8 +259,12 @@ fn pair_fields(pair: &PairReport, row: &PairRow) -> Vec<Cell> {
         count("closed", row.closed),
     ];
     fields.extend(three(["force_x", "force_y", "force_z"], pair.force[0]));
+    fields.extend([number("normal_force", pair.normal_force), number("mean_pressure", pair.mean_pressure)]);
     fields.push(number("peak_pressure", pair.peak_pressure));
     fields.extend(three(["peak_x", "peak_y", "peak_z"], pair.peak_at));
+    fields.push(number("peak_tension", pair.tension.map(|tension| tension.peak_tension)));
+    let pulled_at = pair.tension.map_or([f64::NAN; 3], |tension| tension.peak_tension_at);
+    fields.extend(three(["tension_x", "tension_y", "tension_z"], pulled_at));
     fields.extend([number("contact", pair.extent.contact()), number("open", pair.extent.open())]);
     fields.extend(three(["gap_least", "gap_mean", "gap_largest"], row.gap));
     fields.extend([number("opening_mean", row.opening[0]), number("opening_largest", row.opening[1])]);
@@ -348,8 +367,11 @@ mod tests {
             surfaces: ["up_bottom", "low_top"].map(str::to_owned),
             points: 2,
             force: [[1.0, 2.0, 3.0], [-1.0, -2.0, -3.0]],
+            normal_force: 3.5,
+            mean_pressure: 0.5,
             peak_pressure: 4.0,
             peak_at: [5.0, 6.0, 7.0],
+            tension: Some(TensionReport { peak_tension: 7.5, peak_tension_at: [0.0, 1.0, 2.0], peak_stretch: 0.1 }),
             extent: Extent::Area { contact_area: 8.0, open_area: 9.0 },
             layer_energy: 10.0,
             approach: Some(11.0),
@@ -365,10 +387,10 @@ mod tests {
         save(&Folder::create(base.path()).unwrap(), &[pair], &[row]).unwrap();
         let text = std::fs::read_to_string(base.path().join("contacts.csv")).unwrap();
         let (header, line) = text.trim().split_once('\n').unwrap();
-        assert_eq!(header.split(',').count(), 31);
+        assert_eq!(header.split(',').count(), 37);
         assert_eq!(
             line,
-            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,4.0,5.0,6.0,7.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,"
+            "up,low,up_bottom,low_top,2,1,1.0,2.0,3.0,3.5,0.5,4.0,5.0,6.0,7.0,7.5,0.0,1.0,2.0,8.0,9.0,-0.75,-0.5,0.25,0.5,2.0,10.0,11.0,0.1,0.2,0.3,4.0,5.0,6.0,,contact-up-low.csv,"
         );
     }
 }

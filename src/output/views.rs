@@ -1,6 +1,7 @@
 //! Views for Gmsh: `.msh` 4.1, binary.
 
 use super::fields::{CellKind, FieldArray, UnstructuredGrid};
+use super::folder::MARK_OF_MESH;
 use std::io::{self, Write};
 
 /// The entities, points and cells of earlier files. Tags go on from there, so that Gmsh can open the files of a run together.
@@ -20,7 +21,7 @@ impl UnstructuredGrid {
     pub fn write_msh(&self, tags: Tags, out: &mut dyn Write) -> io::Result<()> {
         let (dimension, _) = self.cell.gmsh();
         let tag = tags.entity as i32 + 1;
-        let name = self.title.replace('"', "'");
+        let name: String = self.title.chars().map(|c| if c == '"' || c.is_control() { '\'' } else { c }).collect();
         write!(out, "$MeshFormat\n4.1 1 8\n")?;
         write_i32(out, &[1])?;
         write!(out, "\n$EndMeshFormat\n$PhysicalNames\n1\n{dimension} {tag} \"{name}\"\n$EndPhysicalNames\n")?;
@@ -31,7 +32,7 @@ impl UnstructuredGrid {
         for array in self.at_points.iter().filter(|array| array.name != "principal") {
             write_view(&format!("{name}: {}", array.name), array, tags.points + 1, out)?;
         }
-        Ok(())
+        out.write_all(MARK_OF_MESH.as_bytes())
     }
 
     /// Write the one entity that has all cells, with its bounding box and its physical group.

@@ -1,6 +1,8 @@
 //! Files for ParaView: `.vtu` with the numbers behind the XML as raw bytes, `.pvtu`, which joins the parts of ranks, and `.pvd`, a collection over time.
 
+use super::escape;
 use super::fields::{BodyField, FieldArray, UnstructuredGrid};
+use super::folder::MARK;
 use std::io::{self, Write};
 
 /// A function that writes to a file.
@@ -121,7 +123,7 @@ pub fn write_pvd(entries: &[CollectionEntry], out: &mut dyn Write) -> io::Result
 
 fn begin(kind: &str, out: &mut dyn Write) -> io::Result<()> {
     let format = r#"version="1.0" byte_order="LittleEndian" header_type="UInt64""#;
-    writeln!(out, "<?xml version=\"1.0\"?>\n<VTKFile type=\"{kind}\" {format}>")
+    writeln!(out, "<?xml version=\"1.0\"?>\n<!-- {MARK} -->\n<VTKFile type=\"{kind}\" {format}>")
 }
 
 /// Return the attributes of an array: its name, the number of its components and their names.
@@ -134,11 +136,6 @@ fn attributes(name: &str, components: usize) -> String {
     };
     let names: String = names.iter().enumerate().map(|(i, name)| format!(" ComponentName{i}=\"{name}\"")).collect();
     format!(" Name=\"{}\" NumberOfComponents=\"{components}\"{names}", escape(name))
-}
-
-/// Escape a text for the value of an XML attribute.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -107,7 +107,7 @@ impl Ksp {
     ///
     /// [`failure`](Self::failure) reports whether the factorisation succeeded.
     pub(super) fn factored(session: &Session, scope: Scope, matrix: ffi::Mat, rows: usize) -> Result<Ksp> {
-        let mut solver = Self::of(session, scope, "")?;
+        let mut solver = Self::of(session, scope, "patch_")?;
         let new = || Vector::new(session, scope, rows, 1);
         solver.vectors = Some([new()?, new()?]);
         let pc = solver.pc()?;
@@ -143,7 +143,7 @@ impl Ksp {
     /// wrong.
     ///
     /// # Errors
-    /// When PETSc refuses an option.
+    /// When PETSc refuses an option, and for `-ksp_max_it 0`.
     pub fn set_from_options(&mut self) -> Result<()> {
         // SAFETY: the solver of this wrapper.
         unsafe { petsc!(KSPSetFromOptions(self.ksp)) }.map_err(|error| {
@@ -154,9 +154,20 @@ impl Ksp {
         })?;
         if self.applies_only() {
             // SAFETY: the solver of this wrapper.
-            unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, flag(false))) }?;
+            return unsafe { petsc!(KSPSetReusePreconditioner(self.ksp, flag(false))) };
         }
-        Ok(())
+        let (mut limit, none) = (0, null_mut());
+        // SAFETY: the solver of this wrapper; PETSc writes to no null pointer.
+        unsafe { petsc!(KSPGetTolerances(self.ksp, none, none, none, &mut limit)) }?;
+        // PETSc's conjugate gradients go through one iteration all the same, and may write where they have allocated
+        // nothing
+        if limit < 1 { Err(Self::idle(&format!("{}ksp_max_it", self.own_options()), limit)) } else { Ok(()) }
+    }
+
+    /// Return the refusal of an option that limits the number of iterations to none.
+    pub(crate) fn idle(option: &str, limit: impl fmt::Display) -> Error {
+        Error::new(Kind::Solver, format!("{option} is {limit}: the solver would do nothing"))
+            .help("give 1 or more; `-ksp_type preonly` applies the preconditioner once")
     }
 
     /// Name the solver in what `-ksp_view` prints.

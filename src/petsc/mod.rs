@@ -27,6 +27,7 @@ mod blas;
 mod call;
 mod ffi;
 mod ksp;
+mod lanczos;
 mod launch;
 mod matrix;
 mod metis;

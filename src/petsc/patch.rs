@@ -82,7 +82,12 @@ impl PatchSpace {
     fn new(matrix: &Matrix, dofs: &[usize], layers: usize) -> Result<Option<Self>> {
         let (session, scope, owned) = (matrix.session(), matrix.scope(), matrix.own());
         let header = |rows: &[usize]| Vector::new(session, scope, rows.len(), 1);
-        let dofs = of_whole_nodes(Indices::around(matrix, dofs, layers)?, matrix.block_size());
+        let mut dofs = of_whole_nodes(Indices::around(matrix, dofs, layers)?, matrix.block_size());
+        // The factor of all rows costs little more than that of most of them. With it nothing is left to the iteration,
+        // whose digits the soft motions of a small stiff rest would take.
+        if 2 * dofs.len() > matrix.total() {
+            dofs = (0..matrix.total()).collect();
+        }
         let mut touched = Indices::around(matrix, &dofs, 1)?;
         touched.retain(|i| owned.contains(i));
         let mut inside: Vec<usize> = dofs.iter().copied().filter(|i| owned.contains(i)).collect();

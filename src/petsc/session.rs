@@ -97,9 +97,9 @@ impl Session {
 
     /// Return whether `mpiexec` or `srun` started this process as one of several ranks.
     pub fn is_one_of_several() -> bool {
-        let size =
-            ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"].iter().find_map(|name| env::var(name).ok()?.parse::<usize>().ok());
-        size.map_or_else(is_launched, |size| size > 1)
+        let sizes = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"];
+        let size = sizes.iter().find_map(|name| env::var(name).ok()?.parse::<usize>().ok());
+        is_launched() && size.is_none_or(|size| size > 1)
     }
 
     /// Return the options of the user.

@@ -1,7 +1,8 @@
 //! A linear solve with a stopping test of the caller.
 
-use super::call::{flag, is_set, petsc};
+use super::call::petsc;
 use super::ksp::Solved;
+use super::lanczos::Lanczos;
 use super::subspace::ERROR;
 use super::vector::slice;
 use super::{Ksp, ffi};
@@ -18,7 +19,8 @@ pub struct KspIterate<'a> {
     pub residual: f64,
     /// The norm of the residual of the first guess, which is zero or the exact solution in a [`Subspace`](super::Subspace).
     pub first: f64,
-    /// The least eigenvalue of the preconditioned matrix that conjugate gradients have found so far.
+    /// The least eigenvalue of the preconditioned matrix that conjugate gradients in the natural norm have found so
+    /// far.
     pub least: Option<f64>,
 }
 
@@ -38,15 +40,11 @@ struct Test<'a, 'b> {
     own: Option<PetscTest>,
     /// The context of that test.
     own_context: *mut c_void,
+    /// The eigenvalues that conjugate gradients find, if their norm is the natural one.
+    lanczos: Option<Lanczos>,
 }
 
 impl Ksp {
-    /// Let conjugate gradients estimate the spectrum of the preconditioned matrix (Lanczos). To be called before the set-up.
-    pub fn estimate_spectrum(&self) -> Result<()> {
-        // SAFETY: a solver of ours and a flag.
-        unsafe { petsc!(KSPSetComputeSingularValues(self.ksp, flag(true))) }
-    }
-
     /// Solve `A x = b` from a zero guess until `enough` returns true, or the solver reaches its own tolerances.
     ///
     /// Collective: `enough` has to return the same on all processes.
@@ -85,7 +83,12 @@ impl Ksp {
         let (mut own, mut own_context, mut destroy) = (None, null_mut(), None);
         // SAFETY: the solver's own test is taken out with its context, and put back below whatever the outcome of the solve.
         unsafe { petsc!(KSPGetAndClearConvergenceTest(self.ksp, &mut own, &mut own_context, &mut destroy)) }?;
-        let mut test = Test { enough, first: f64::NAN, own, own_context };
+        let mut norm = ffi::KSPNormType_KSP_NORM_DEFAULT;
+        // SAFETY: the solver of this wrapper.
+        unsafe { petsc!(KSPGetNormType(self.ksp, &mut norm)) }?;
+        let has_spectrum = self.ksp_type() == "cg" && norm == ffi::KSPNormType_KSP_NORM_NATURAL;
+        let lanczos = has_spectrum.then(Lanczos::default);
+        let mut test = Test { enough, first: f64::NAN, own, own_context, lanczos };
         let context: *mut Test = &mut test;
         // SAFETY: the test reads this context, which lives until the test is replaced below.
         unsafe { petsc!(KSPSetConvergenceTest(self.ksp, Some(is_enough), context.cast(), None)) }?;
@@ -118,40 +121,32 @@ unsafe extern "C" fn is_enough(
     if iteration == 0 {
         test.first = norm;
     }
-    if iteration == 0 || *reason != 0 {
+    if *reason != 0 || (iteration == 0 && test.lanczos.is_none()) {
         return 0;
     }
     let (mut vector, mut array, mut rows) = (null_mut(), null(), 0);
     // SAFETY: PETSc's solver, which has an iterate during a solve; its vector is only read.
     let read = (|| unsafe {
         petsc!(KSPBuildSolution(ksp, null_mut(), &mut vector))?;
+        test.lanczos.as_mut().map_or(Ok(()), |lanczos| lanczos.follow(ksp, vector, norm * norm))?;
         petsc!(VecGetLocalSize(vector, &mut rows))?;
         petsc!(VecGetArrayRead(vector, &mut array))
     })();
     let Ok(()) = read else { return ERROR };
+    if iteration == 0 {
+        return give_back(vector, array);
+    }
     // SAFETY: PETSc's array has that many entries here, and nobody writes to it before it is given back.
     let x = unsafe { slice(array, rows as usize) };
-    let least = least_eigenvalue(ksp).filter(|least| *least > 0.0);
+    let least = test.lanczos.as_mut().and_then(Lanczos::least);
     if (test.enough)(&KspIterate { x, residual: norm, first: test.first, least }) {
         *reason = ffi::KSPConvergedReason_KSP_CONVERGED_RTOL;
     }
-    // SAFETY: gives back what was read above.
-    match unsafe { petsc!(VecRestoreArrayRead(vector, &mut array)) } {
-        Ok(()) => 0,
-        Err(_) => ERROR,
-    }
+    give_back(vector, array)
 }
 
-/// Return the least eigenvalue that conjugate gradients have found, if they estimate the spectrum.
-fn least_eigenvalue(ksp: ffi::KSP) -> Option<f64> {
-    let (mut least, mut largest, mut estimates) = (0.0, 0.0, flag(false));
-    // SAFETY: PETSc's solver during a solve, and variables for its answers.
-    unsafe {
-        petsc!(KSPGetComputeSingularValues(ksp, &mut estimates)).ok()?;
-        if !is_set(estimates) {
-            return None;
-        }
-        petsc!(KSPComputeExtremeSingularValues(ksp, &mut largest, &mut least)).ok()?;
-    }
-    Some(least)
+/// Give an array back that was read from a vector.
+fn give_back(vector: ffi::Vec, mut array: *const f64) -> ffi::PetscErrorCode {
+    // SAFETY: PETSc's own array.
+    unsafe { petsc!(VecRestoreArrayRead(vector, &mut array)) }.map_or(ERROR, |()| 0)
 }

@@ -332,7 +332,20 @@ impl ContactSpec {
                 let help = "it has a force in each load step: force = F";
                 Err(Flaw::new("preload", "a preload of an obstacle", "", help))
             }
-            Some(on) => Ok(pattern::check(on)?),
+            Some(on) => {
+                let of_meshes = [
+                    ("distance", self.distance.is_some()),
+                    ("angle", self.angle != angle()),
+                    ("touching", self.touching),
+                    ("of", self.of.is_some()),
+                ];
+                if let Some((key, _)) = of_meshes.iter().find(|(_, is_given)| *is_given) {
+                    let help =
+                        "it is for the meshes of two bodies: the `gap` alone says where an obstacle is; remove it";
+                    return Err(Flaw::new(*key, format!("`{key}` of an obstacle"), "", help));
+                }
+                Ok(pattern::check(on)?)
+            }
         }
     }
 
@@ -372,16 +385,27 @@ impl ContactSpec {
             if let Some(value) = values.iter().find(|value| !value.is_finite()) {
                 return Err(Flaw::new(*key, format!("`{key}` is {value}"), "", ""));
             }
-            if values.first().is_some_and(|value| *value < 0.0) && (*key == "preload" || *key == "force" && !self.bond)
-            {
-                let help = "a force > 0 presses; only a bonded pair can be pulled";
+            let is_pull = *key == "preload" || *key == "force" && !self.bond;
+            if let Some(value) = values.first().filter(|value| is_pull && **value < 0.0) {
+                let help = &match *key {
+                    "preload" if self.bond => {
+                        format!("a preload of a bonded pair is a tension already: write {}", -value)
+                    }
+                    "preload" => "a preload > 0 presses".to_owned(),
+                    _ => "a force > 0 presses; only a bonded pair can be pulled".to_owned(),
+                };
                 return Err(Flaw::new(*key, format!("a negative `{key}`"), "", help));
             }
         }
-        match self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
-            true => Err(Flaw::new("path", "`path` without a force or motion of this contact", "", "")),
-            false => Ok(()),
+        let is_scaled = |field: &Field| field.is_constant() && !field.is_zero();
+        if self.path.is_some() && of(&["approach", "force", "preload", "tilt", "moment"]).is_empty() {
+            return Err(Flaw::new("path", "`path` without a force or motion of this contact", "", ""));
         }
+        if self.path.is_some() && self.given().any(|field| !field.is_constant()) && !self.given().any(is_scaled) {
+            let help = "remove it: an expression has the columns of the table as variables, force = \"100*press\"";
+            return Err(Flaw::new("path", "`path` of an expression", "", help));
+        }
+        Ok(())
     }
 
     /// Check a pair of surfaces: two plain names.

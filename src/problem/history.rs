@@ -179,6 +179,9 @@ const MOST_STEPS: i64 = 1000;
 
 const TIME: &str = "time";
 
+/// Columns of `steps.csv` beside those of the factors.
+const OWN_COLUMNS: [&str; 4] = ["step", "status", "iterations", "residual"];
+
 /// The key of `steps` from a file.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -246,10 +249,14 @@ impl History {
     /// factor.
     ///
     /// # Errors
-    /// A path that is no column, and a column that no line names.
+    /// A path without a table or that is no column, and a column that no line names.
     pub fn join(&mut self, bodies: &[BodySpec], contacts: &[ContactSpec]) -> Checked<()> {
-        let Some(table) = &self.table else { return Ok(()) };
         let all = || bodies.iter().flat_map(paths).chain(contacts.iter().filter_map(|contact| contact.path.as_ref()));
+        let Some(table) = &self.table else {
+            let Some(path) = all().next() else { return Ok(()) };
+            let error = Error::scene(&path.place, "`path` without a table of load steps");
+            return Err(error.help("name the table, [method] steps = { table = \"path.csv\" }, or remove `path`"));
+        };
         let columns = || self.names.iter().map(String::as_str).filter(|name| *name != COMMON);
         for path in all() {
             if self.names.iter().all(|name| *name != path.value) {
@@ -326,6 +333,12 @@ fn check_names(names: &[String]) -> Result<(), (String, &'static str)> {
     let is_none = |name: &String| name.is_empty() || name.parse::<f64>().is_ok();
     if names.iter().all(|name| name == TIME) || names.iter().any(is_none) {
         return Err(("these are no names of factors".to_owned(), help));
+    }
+    if let Some(taken) = names.iter().find(|name| OWN_COLUMNS.contains(&name.as_str())) {
+        return Err((
+            format!("a column is called `{taken}`"),
+            "steps.csv has a column of its own with this name: take another one",
+        ));
     }
     match (1..names.len()).find(|&column| names[..column].contains(&names[column])) {
         Some(twice) => Err((format!("two columns are called `{}`", names[twice]), help)),

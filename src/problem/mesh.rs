@@ -194,7 +194,8 @@ fn check_number(name: &str, number: f64, place: &Place) -> Checked<()> {
     if !number.is_finite() {
         return Err(Error::scene(place, format!("`{name}` is not a finite number")));
     }
-    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    // a slash parts the menus of Gmsh, as in `Sizes/h`
+    let is_word = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
     match name.chars().all(is_word) && !name.starts_with(|c: char| c.is_ascii_digit()) && !name.is_empty() {
         true => Ok(()),
         false => Err(Error::scene(place, format!("`{name}` is no name of a Gmsh number"))),

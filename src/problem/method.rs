@@ -8,6 +8,7 @@ use crate::expression::Field;
 use schemars::JsonSchema;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -75,6 +76,42 @@ pub fn complete(method: &mut Spanned<DeValue<'_>>) {
     if is_robin && !method.contains_key("robin") {
         put(method, "robin", "tangent");
     }
+}
+
+/// A key of `[method]` that the method of the scene does not read.
+pub struct IdleKey {
+    /// The key.
+    pub name: &'static str,
+    /// The place of its value.
+    pub span: Range<usize>,
+    /// The method.
+    pub method: String,
+    /// The methods that read it.
+    pub readers: &'static str,
+}
+
+/// Return a key of the [`complete`] table `[method]` that its method does not read. A key of the file may stand there
+/// if an option of the command line has replaced the method. `is_option` tells whether a place is in such an option.
+pub fn idle_key(method: &Spanned<DeValue<'_>>, is_option: impl Fn(&Range<usize>) -> bool) -> Option<IdleKey> {
+    let DeValue::Table(table) = method.get_ref() else { return None };
+    let word = |key: &str| table.get(key).and_then(|value| value.get_ref().as_str());
+    let (name, linear) = (word("name").unwrap_or("auto"), word("linear"));
+    if !["auto", "newton", "newton-robin"].contains(&name) {
+        return None;
+    }
+    let is_replaced = table.get("name").is_some_and(|name| is_option(&name.span()));
+    let has_sweeps = match name {
+        "auto" => linear.is_none_or(|linear| linear == "sweeps"),
+        "newton" => linear == Some("sweeps"),
+        _ => true,
+    };
+    let robin = ("gamma", false, "`robin`");
+    let zone = ["psi", "robin"].map(|key| (key, has_sweeps, "`robin` and `newton-robin`"));
+    [robin].into_iter().chain(zone).filter(|(_, is_read, _)| !is_read).find_map(|(key, _, readers)| {
+        let span = table.get(key)?.span();
+        let is_idle = is_option(&span) || !is_replaced;
+        is_idle.then(|| IdleKey { name: key, span, method: name.to_owned(), readers })
+    })
 }
 
 impl Check for MethodSpec {

@@ -19,15 +19,23 @@ pub struct Units {
 }
 
 impl Units {
-    /// Return the units of a length and a stress.
+    /// Return the units of a length and a stress. The force is in newtons where these two make it so.
     fn new(length: &str, stress: &str) -> Self {
-        Self { length: length.to_owned(), stress: stress.to_owned(), force: format!("{stress} {length}²") }
+        let force = if is_newton(length, stress) { "N".to_owned() } else { format!("{stress} {length}²") };
+        Self { length: length.to_owned(), stress: stress.to_owned(), force }
     }
 
     /// Return the units for plane bodies, whose forces are per length of thickness.
     pub fn per_thickness(self) -> Self {
-        Self { force: format!("{} {}", self.stress, self.length), ..self }
+        let Self { length, stress, .. } = &self;
+        let force = if is_newton(length, stress) { format!("N/{length}") } else { format!("{stress} {length}") };
+        Self { force, ..self }
     }
+}
+
+/// Whether the product of this stress and the square of this length is a newton.
+fn is_newton(length: &str, stress: &str) -> bool {
+    [("mm", "MPa"), ("m", "Pa")].contains(&(length, stress))
 }
 
 impl From<Units> for String {

@@ -5,7 +5,8 @@ mod surface;
 pub use surface::Surface;
 
 use crate::output::{
-    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, trimmed,
+    BodyReport, ForceReport, Mark, ObstacleReport, PairReport, Plot, Report, Role, RoundReport, UNSETTLED, escape,
+    trimmed,
 };
 use crate::problem::{Units, label};
 use serde_json::Value;
@@ -49,11 +50,6 @@ fn table<T: AsRef<str>>(headings: &[T], rows: impl Iterator<Item = Vec<String>>)
     };
     let heads: String = headings.iter().map(head).collect();
     format!("<div class=\"wide\"><table>\n<tr>{heads}</tr>\n{}</table></div>", rows.map(line).collect::<String>())
-}
-
-/// Return a text for HTML.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 /// Format a number with five digits; one that is unknown becomes a dash.
@@ -181,8 +177,9 @@ impl Page<'_> {
                 digits(error.energy)
             );
         }
-        let units =
-            self.units.as_ref().map(|units| format!(" Units: {}, {}, {}.", units.length, units.stress, units.force));
+        let units = self.units.as_ref().map(|Units { length, stress, force }| {
+            format!(" Units: {}.", escape(&[length.as_str(), stress, force].join(", ")))
+        });
         text + &units.unwrap_or_default()
     }
 
@@ -209,13 +206,18 @@ impl Page<'_> {
             "layer".to_owned(),
             "#points".to_owned(),
             self.label("force on the first", |units| &units.force),
+            self.label("#normal force", |units| &units.force),
+            self.label("#mean pressure", |units| &units.stress),
             self.label("#peak pressure", |units| &units.stress),
             self.label("at", |units| &units.length),
             label(if is_area { "#area in contact" } else { "#length in contact" }, unit.as_deref()),
             label("#open", unit.as_deref()),
         ];
         let moves = pairs.iter().any(|pair| pair.obstacle.is_some() || pair.offset.is_some());
-        let columns: Vec<String> = columns.into_iter().chain(moves.then(|| "obstacle or offset".to_owned())).collect();
+        let pulls = pairs.iter().any(|pair| pair.tension.is_some());
+        let tension = [self.label("#largest tension", |units| &units.stress), self.label("at", |units| &units.length)];
+        let columns = columns.into_iter().chain(tension.into_iter().filter(|_| pulls));
+        let columns: Vec<String> = columns.chain(moves.then(|| "obstacle or offset".to_owned())).collect();
         let row = |pair: &PairReport| {
             let obstacle = pair.obstacle.as_ref().map(|obstacle| {
                 let ObstacleReport { approach, tilt, force, moment, .. } = obstacle;
@@ -230,12 +232,17 @@ impl Page<'_> {
                 escape(&words(&self.report.settings["contact"][pair.contact]["layer"])),
                 pair.points.to_string(),
                 vector(&pair.force[0]),
+                digits(pair.normal_force),
+                digits(pair.mean_pressure),
                 digits(pair.peak_pressure),
                 if pair.peak_pressure > 0.0 { vector(&pair.peak_at) } else { String::new() },
                 digits(pair.extent.contact()),
                 digits(pair.extent.open()),
             ];
-            cells.into_iter().chain(moved).collect()
+            let tension = pair.tension.filter(|tension| tension.peak_tension > 0.0);
+            let tension = tension.map(|tension| [digits(tension.peak_tension), vector(&tension.peak_tension_at)]);
+            let tension = tension.unwrap_or_default().into_iter().filter(|_| pulls);
+            cells.into_iter().chain(tension).chain(moved).collect()
         };
         let rest = match pairs.len() {
             ..=ROWS => String::new(),

@@ -120,8 +120,8 @@ impl Surface {
         self
     }
 
-    /// Mark the places of a body. `is_closed` returns whether the contact nearest to a place carries pressure.
-    pub fn mark<'m>(&mut self, marks: impl Iterator<Item = &'m Mark>, is_closed: &dyn Fn([f64; 3]) -> bool) {
+    /// Mark the places of a body. `is_closed` returns whether contact on a facet carries pressure, from its corners as points of the mesh.
+    pub fn mark<'m>(&mut self, marks: impl Iterator<Item = &'m Mark>, is_closed: &dyn Fn(&[u32]) -> bool) {
         let number: HashMap<u32, u32> = self.origin.iter().copied().zip(0..).collect();
         for mark in marks {
             for simplex in &mark.simplices {
@@ -130,13 +130,11 @@ impl Surface {
                 if nodes.len() < corners {
                     continue;
                 }
-                let places = nodes[..corners].iter().map(|&node| self.points[node as usize]);
-                let sum = places.fold([0.0; 3], |sum, x| std::array::from_fn(|c| sum[c] + x[c]));
                 let kind = match mark.role {
                     Role::Support => "support",
                     Role::Load => "load",
                     Role::Spring => "spring",
-                    Role::Contact if is_closed(sum.map(|x| x / corners as f64)) => "closed",
+                    Role::Contact if is_closed(&simplex[..corners]) => "closed",
                     Role::Contact => "open",
                 };
                 let [triangles, lines, points] = self.marks.entry(kind).or_default();

@@ -18,7 +18,7 @@ use crate::solver::preset::{self, Smoother};
 use crate::solver::{InterfaceDofs, Krylov, MakeSolver};
 use mpi::collective::SystemOperation;
 use mpi::traits::CommunicatorCollectives;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// A factory that makes the inner solvers of a scene's bodies by its plan.
 pub struct SolverFactory<'a> {
@@ -28,6 +28,8 @@ pub struct SolverFactory<'a> {
     typed: UserOptions,
     /// Interpolation of the displacements of all bodies from linear ones, if bodies have quadratic elements and multigrid.
     pub interpolation: Option<Prolongation>,
+    /// Rigid motions of all bodies, on the rows of this rank in the matrix of all bodies, if its multigrid is GAMG.
+    pub near_null_space: Vec<Vec<f64>>,
     /// The plan, once it is made.
     pub plan: Plan,
     /// Condensed bodies that an earlier scene has left. `local` exists on the rank that owns the body.
@@ -56,6 +58,7 @@ impl<'a> SolverFactory<'a> {
             asked,
             typed,
             interpolation: None,
+            near_null_space: Vec::new(),
             plan: Plan { linear: Linear::Sweeps, bodies: Vec::new(), seconds: None },
             kept: kept.into_iter().map(|slot| (slot.name.clone(), slot)).collect(),
         })
@@ -126,6 +129,24 @@ impl<'a> SolverFactory<'a> {
         kinds.into_iter().map(warning).collect()
     }
 
+    /// Return the warning of options that would show the solves of bodies, where sweeps apply multigrid instead.
+    pub fn idle_options(&self) -> Option<String> {
+        if self.plan.linear != Linear::Sweeps || self.asked.method == MethodName::Robin {
+            return None;
+        }
+        let solved = self.plan.bodies.iter().filter(|body| body.preset != Preset::Condensed);
+        let applied = solved.map(|body| &body.facts.options).filter(|chosen| chosen.is_applied_once());
+        let shown = |chosen: &'_ Chosen| chosen.all_looking("ksp_").collect::<Vec<String>>();
+        let options: BTreeSet<String> = applied.flat_map(shown).collect();
+        let options = options.into_iter().collect::<Vec<_>>().join(" ");
+        (!options.is_empty()).then(|| {
+            format!(
+                "nothing to show for {options}: each sweep applies multigrid once instead of solving; with \
+                 -ksp_rtol 1e-2 it solves"
+            )
+        })
+    }
+
     /// Return the names of the condensed bodies.
     pub fn condensed(&self) -> Vec<String> {
         let condensed = self.plan.bodies.iter().filter(|body| body.preset == Preset::Condensed);
@@ -148,7 +169,11 @@ impl<'a> SolverFactory<'a> {
         let is_quadratic = self.is_quadratic();
         match self.plan.linear {
             Linear::Dense => {}
-            Linear::Direct => preset::apply(&mut self.asked.whole, Preset::Mumps, None),
+            Linear::Direct => {
+                let is_iterative = |preset: &Preset| matches!(preset, Preset::Gamg | Preset::Icc);
+                let preset = self.asked.preset.filter(is_iterative).unwrap_or(Preset::Mumps);
+                preset::apply(&mut self.asked.whole, preset, None);
+            }
             Linear::Multigrid => {
                 preset::made_often(&mut self.asked.whole);
                 preset::apply(&mut self.asked.whole, Preset::Hypre, smoother(is_parallel, is_quadratic));
@@ -241,9 +266,15 @@ impl Factory for SolverFactory<'_> {
             let first = if distribution.is_some() { 0 } else { whole.rows.columns };
             whole.append(&next, first);
         }
-        let mut modes: Vec<Vec<f64>> = if is_swept { near_null_space() } else { Vec::new() };
+        let is_gamg = self.asked.whole.get("pc_type") == Some("gamg");
+        let mut modes: Vec<Vec<f64>> = if is_swept || is_gamg { near_null_space() } else { Vec::new() };
         if let Some(distribution) = &distribution {
             modes.iter_mut().for_each(|mode| *mode = distribution.of_known(mode));
+        }
+        if !is_swept {
+            // each motion moves all bodies at once: few cells do not see the difference
+            self.near_null_space.resize(modes.len(), Vec::new());
+            self.near_null_space.iter_mut().zip(modes.drain(..)).for_each(|(whole, mode)| whole.extend(mode));
         }
         let make: MakeSolver = Box::new(move |stiffness: Rows| {
             Ok(Box::new(Krylov::new(&session, chosen, dimension, stiffness, &modes, levels)?))

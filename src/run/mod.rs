@@ -3,6 +3,7 @@
 //!
 //! Errors are failures of the solver library, but for what functions say of their own.
 
+mod extent;
 pub mod inner;
 pub mod phases;
 mod plan;

@@ -143,7 +143,7 @@ where
         drop(stage);
         let mut warnings = warnings::of_problem(session, &discrete);
         warnings.extend(self.of_mesh());
-        warnings.extend(inner.applied_once());
+        warnings.extend(inner.applied_once().into_iter().chain(inner.idle_options()));
         let has_page = scene.output.report && session.rank() == 0;
         let built = Built {
             scene: self.scene.clone(),
@@ -158,6 +158,7 @@ where
             mesh_file: file.as_ref().map(|(_, path)| path.clone()),
             linear: inner.plan.linear,
             interpolation: inner.interpolation.take(),
+            near_null_space: std::mem::take(&mut inner.near_null_space),
             choice: inner.reason(),
             condensed: inner.condensed(),
             options: inner.into_options(),
@@ -338,21 +339,24 @@ fn coefficient_of(scene: &Scene) -> Coefficient {
 
 /// Return the solver of the linear steps of Newton's method.
 fn linear_step(session: &Session, built: &mut Built, start: &mut InitialGuess) -> Result<Box<dyn LinearStep>> {
-    let Built { scene, discrete, linear, options, interpolation, .. } = built;
+    let Built { scene, discrete, linear, options, interpolation, near_null_space, .. } = built;
     let (model, linear, interpolation) = (&mut discrete.model, *linear, interpolation.take());
+    let modes = std::mem::take(near_null_space);
     if linear == Linear::Sweeps {
         crate::robin::prepare(model)?;
         return Ok(Box::new(SweepCg::new(coefficient_of(scene))));
     }
-    // multigrid needs complete nodes, without unknowns for rigid motions among them, and so do distributed rows
-    let of_nodes = linear == Linear::Multigrid || model.is_distributed();
+    // a factorisation alone can do without complete nodes, with unknowns for rigid motions among them, if its rows are
+    // not distributed
     let is_dense = linear == Linear::Dense;
+    let factors = is_dense || matches!(options[0].get("pc_type"), Some("cholesky" | "lu"));
+    let of_nodes = !factors || model.is_distributed();
     let make: MakeSolver = if is_dense {
         Box::new(|stiffness| Ok(Box::new(Dense::new(stiffness))))
     } else {
         let (session, chosen) = (session.clone(), options[0].clone());
         let block = if of_nodes { scene.dimension.value } else { 1 };
-        Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &[], interpolation)?)))
+        Box::new(move |stiffness| Ok(Box::new(Krylov::new(&session, chosen, block, stiffness, &modes, interpolation)?)))
     };
     let mut step: Box<dyn LinearStep> = Box::new(JointStep::new(model, of_nodes, is_dense, make)?);
     if let Some(springs) = first_springs(model, start) {

@@ -122,6 +122,7 @@ impl SolverRequest {
             ),
             (Some(preset), _) => (preset, "the scene asks for it"),
             (None, Some(Linear::Dense)) if may_condense => (Preset::Condensed, "the scene asks for dense linear steps"),
+            (None, Some(Linear::Dense)) if self.wants_ksp(body) => (Preset::Mumps, "PETSc options were typed"),
             (None, Some(Linear::Direct)) => (Preset::Mumps, "the scene asks for direct linear steps"),
             (None, Some(Linear::Multigrid)) => (Preset::Hypre, "the scene asks for linear steps by multigrid"),
             _ => return None,

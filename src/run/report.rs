@@ -2,8 +2,7 @@
 
 use super::stages::{All, Built, Clock, Done};
 use super::verdict::{self, message, status_name};
-use super::{results, warnings};
-use crate::contact::ContactPair;
+use super::{extent, results, warnings};
 use crate::ddm::{Outcome, Row, Status};
 use crate::discretize::{BodyInfo, Discrete};
 use crate::error::Result;
@@ -13,7 +12,7 @@ use crate::exchange::{all_gather, gather};
 use crate::linalg::axpy;
 use crate::model::{Body, BodyCounts, Model};
 use crate::output::{
-    BodyReport, ContactTable, EstimateReport, Extent, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
+    BodyReport, ContactTable, EstimateReport, FieldArray, InnerTimes, IntervalReport, PairReport, Report,
     UnstructuredGrid,
 };
 use crate::petsc::Session;
@@ -26,31 +25,38 @@ pub fn report(session: &Session, done: &Done, recovered: &All, clock: &Clock) ->
     let shared = GatheredCounters::gather(discrete);
     let mut report = headline(session, &done.built, &shared.solvers, clock);
     add_outcome(&mut report, outcome, model);
+    if let Some((status, message)) = verdict::worst_step(&done.steps) {
+        (report.status, report.message) = (status, message);
+    }
     add_counters(&mut report, &shared, outcome);
     report.messages = model.exchange.messages();
     report.memory_of_ranks = all_gather(&*model.exchange, clock.memory.clone());
     report.steps = done.steps.clone();
-    report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(&done.steps)));
+    report.warnings.extend(done.warnings.iter().cloned().chain(verdict::step_warnings(done)));
     let too_large = results::fill(discrete, recovered, &mut report.bodies);
     report.warnings.extend(too_large);
     for i in 0..model.pairs.len() {
         report.warnings.extend(warnings::beyond_law(done, i).into_iter().chain(warnings::by_chords(done, i)));
         report.warnings.extend(warnings::tilted(done, i).into_iter().chain(warnings::cut_short(done, i)));
+        report.warnings.extend(warnings::steep_gap(done, i));
     }
     report.warnings.extend(warnings::nothing_touches(done));
     let approaches = results::approaches(done, recovered);
     report.pairs = approaches.into_iter().enumerate().map(|(i, approach)| pair_report(done, i, approach)).collect();
     let balances = results::balances(done, recovered);
     let digits = report.error_bound.or(report.error_estimate).unwrap_or(f64::INFINITY);
-    let fixed = discrete.mechanisms.iter().filter_map(|mechanism| mechanism.fixed);
-    let reactions = discrete.bodies.iter().zip(&balances).enumerate();
-    let reactions = reactions.filter(|(body, _)| fixed.clone().any(|of| of == *body));
-    report
-        .warnings
-        .extend(reactions.filter_map(|(_, (info, balance))| warnings::of_fixed(&info.name, balance, digits)));
+    for (body, (info, balance)) in discrete.bodies.iter().zip(&balances).enumerate() {
+        let fixed = || discrete.mechanisms.iter().filter(|mechanism| mechanism.fixed == Some(body));
+        let error = if fixed().any(|mechanism| mechanism.by_facets) { digits.max(OF_FACETS) } else { digits };
+        report.warnings.extend(fixed().next().and_then(|_| warnings::of_fixed(&info.name, balance, error)));
+    }
     report.bodies.iter_mut().zip(balances).for_each(|(body, balance)| body.balance = balance);
     report
 }
+
+/// Share of all forces on a body, fixed against a motion that facets resist, that its node may carry without a warning: the forces of facets along that motion.
+/// Loads may lack balance by as much.
+const OF_FACETS: f64 = 1e-3;
 
 /// Add the status and the results of the iteration.
 fn add_outcome(report: &mut Report, outcome: &Outcome, model: &Model) {
@@ -227,7 +233,8 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
     let (pair, range) = (&model.pairs[i], model.range(i));
     let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
     let sides = discrete.sides(i);
-    let peak = (0..pair.len()).max_by(|&q, &r| p[q].total_cmp(&p[r])).unwrap_or(0);
+    let (peak, peak_pressure) = results::largest_pressure(p);
+    let (extent, contact_ends) = extent::of(done, i);
     PairReport {
         surfaces: discrete.specs[i].between.each_ref().map(|name| name.value.clone()),
         bodies: sides.map(|side| model.bodies[pair.bodies[side]].name.clone()),
@@ -241,26 +248,17 @@ fn pair_report(done: &Done, i: usize, approach: Option<f64>) -> PairReport {
         force: sides.map(|side| results::resultant(force, &pair.resultant[side])),
         moment: sides.map(|side| results::resultant(force, &pair.moment[side])),
         approach,
-        peak_pressure: p[peak],
+        normal_force: force.iter().sum(),
+        mean_pressure: results::mean_pressure(force, &extent),
+        peak_pressure,
         peak_at: pair.position[peak],
         peak_compression: results::peak(c),
-        extent: Extent::new(pair.measure, &pair.area, c),
-        contact_ends: if pair.along_curve { ends(pair, c) } else { Vec::new() },
+        tension: results::tension(pair, c, p),
+        extent,
+        contact_ends,
         obstacle: results::obstacle(done, i),
         offset: results::offset(done, i),
     }
-}
-
-/// Return the zeros of the compression c between neighbouring points of a curve, interpolated linearly.
-fn ends(pair: &ContactPair, c: &[f64]) -> Vec<[f64; 3]> {
-    let mut ends = Vec::new();
-    for q in 1..pair.len() {
-        if c[q - 1] * c[q] < 0.0 {
-            let s = c[q - 1] / (c[q - 1] - c[q]);
-            ends.push(std::array::from_fn(|k| pair.position[q - 1][k] * (1.0 - s) + pair.position[q][k] * s));
-        }
-    }
-    ends
 }
 
 /// Return the contact table of pair `i`, with sides in the order of the scene.

@@ -1,8 +1,8 @@
 //! Results from the displacements of the bodies: largest stresses and strains with their positions, errors against a known solution, forces,
 //! approach and contact size of each pair, and reactions and balance of each body.
 
-use super::numbered;
 use super::stages::{All, Built, Done, Recovered};
+use super::{extent, numbered};
 use crate::contact::{ContactPair, moment_in_scene};
 use crate::discretize::{BodyInfo, Discrete, ForceBalance, Obstacle, mean_normal};
 use crate::error::{Result, few};
@@ -14,7 +14,7 @@ use crate::model::{Body, BodySlot, Field};
 use crate::output::report::readable;
 use crate::output::{
     BalanceReport, BodyReport, Extent, ForceReport, LargestStress, ObstacleReport, ReactionReport, ResultNames,
-    StepPairReport, StepReport, sci,
+    StepPairReport, StepReport, TensionReport, sci,
 };
 use crate::problem::history::History;
 use serde::{Deserialize, Serialize};
@@ -278,16 +278,43 @@ pub fn peak(compression: &[f64]) -> f64 {
     compression.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// Return the point of the largest pressure, and this pressure. It is zero where a bond only pulls.
+pub fn largest_pressure(pressure: &[f64]) -> (usize, f64) {
+    let peak = (0..pressure.len()).max_by(|&q, &r| pressure[q].total_cmp(&pressure[r])).unwrap_or(0);
+    (peak, if pressure[peak] < 0.0 { 0.0 } else { pressure[peak] })
+}
+
+/// Return the mean pressure of the part in contact, from the forces of the points; zero without contact.
+pub fn mean_pressure(force: &[f64], extent: &Extent) -> f64 {
+    let pressed = force.iter().fold(0.0, |sum, force| sum + force.max(0.0));
+    if extent.contact() > 0.0 { pressed / extent.contact() } else { 0.0 }
+}
+
+/// Return the largest tension of a bonded pair and the largest stretch of its layer; none without a bond.
+pub fn tension(pair: &ContactPair, compression: &[f64], pressure: &[f64]) -> Option<TensionReport> {
+    let least =
+        (0..pair.len()).min_by(|&q, &r| pressure[q].total_cmp(&pressure[r])).filter(|_| pair.law.is_bonded())?;
+    Some(TensionReport {
+        peak_tension: (0.0 - pressure[least]).max(0.0),
+        peak_tension_at: pair.position[least],
+        peak_stretch: compression.iter().fold(0.0, |most, c| most.max(-c)),
+    })
+}
+
 /// Return the report of pair `i` in a load step.
-fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
+pub fn pair(done: &Done, i: usize, approach: Option<f64>) -> StepPairReport {
     let (discrete, model, layer) = (&done.built.discrete, done.model(), &done.outcome.layer);
     let (pair, range) = (&model.pairs[i], model.range(i));
-    let (c, force) = (&layer.compression[range.clone()], &layer.force[range.clone()]);
+    let (c, p, force) = (&layer.compression[range.clone()], &layer.pressure[range.clone()], &layer.force[range]);
+    let extent = extent::of(done, i).0;
     StepPairReport {
         force: resultant(force, &pair.resultant[discrete.sides(i)[0]]),
         approach,
-        extent: Extent::new(pair.measure, &pair.area, c),
-        peak_pressure: layer.pressure[range].iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        extent,
+        normal_force: force.iter().sum(),
+        mean_pressure: mean_pressure(force, &extent),
+        tension: tension(pair, c, p),
+        peak_pressure: largest_pressure(p).1,
         peak_compression: peak(c),
         closed: c.iter().filter(|c| **c > 0.0).count(),
         obstacle: obstacle(done, i),

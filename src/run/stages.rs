@@ -34,6 +34,8 @@ pub struct Built {
     pub linear: Linear,
     /// Interpolation of all bodies from linear displacements, until multigrid takes it.
     pub interpolation: Option<Prolongation>,
+    /// Rigid motions of all bodies for GAMG of their matrix, until it takes them.
+    pub near_null_space: Vec<Vec<f64>>,
     /// Reason for the choice of the inner solver, if no PETSc option was typed.
     pub choice: String,
     /// Names of the condensed bodies, which another run can reuse.

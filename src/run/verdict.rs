@@ -3,11 +3,13 @@
 use super::in_words;
 use super::recorder;
 use super::stages::Done;
+use crate::contact::ContactPair;
 use crate::ddm::{Outcome, Status};
 use crate::error::Kind;
 use crate::model::{Mechanism, Model, NamedMotion};
 use crate::output::report::readable;
 use crate::output::{StepReport, sci};
+use crate::problem::ContactSpec;
 
 /// Return the name of a status in `report.json`.
 pub fn status_name(status: &Status) -> &'static str {
@@ -29,7 +31,7 @@ pub fn status_name(status: &Status) -> &'static str {
 /// Return the exit code of a run.
 pub fn exit_code(done: &Done) -> i32 {
     match done.outcome.status {
-        Status::Converged | Status::RoundoffLimited if step_warnings(&done.steps).is_empty() => 0,
+        Status::Converged | Status::RoundoffLimited if done.steps.iter().all(is_solved) => 0,
         Status::Interrupted { asked } => recorder::signal(asked).map_or(1, |signal| Kind::Stopped(signal).exit_code()),
         _ => 1,
     }
@@ -98,14 +100,28 @@ fn not_finite(body: &str, k: usize, other: &str) -> String {
 }
 
 /// Return the message on a motion that nothing resists, and on which loads work.
-fn unbalanced_mechanism(Mechanism { bodies, motion, work, support, .. }: &Mechanism, model: &Model) -> String {
+fn unbalanced_mechanism(found: &Mechanism, model: &Model) -> String {
+    let Mechanism { bodies, motion, work, support, by_facets, .. } = found;
     let names = in_words(bodies.iter().map(|body| &model.bodies[*body].name));
     let (who, whose) = if bodies.len() == 1 { ("body", "its") } else { ("bodies", "them together in their") };
     format!(
         "{who} {names}: neither a support nor a spring nor contact holds {whose} {motion}, and loads work on it ({} % of what \
-         forces of their sizes could do): add a support {support}, or balance the loads",
-        readable(100.0 * work, 1)
+         forces of their sizes could do): add a support {support} or a weak spring, or balance the loads{}{}",
+        readable(100.0 * work, 1),
+        without_shear(bodies, model),
+        if *by_facets { CANNOT_TELL } else { "" }
     )
+}
+
+/// The advice where facets resist a motion by no more than their errors.
+const CANNOT_TELL: &str = ". Facets of this order and size cannot tell whether contact holds this motion: if it does, as in a slender taper, \
+     take a higher order or a finer mesh";
+
+/// Return the advice on bodies that a bond could hold by shear alone; empty where no bond joins them to others.
+pub fn without_shear(bodies: &[usize], model: &Model) -> &'static str {
+    let joins = |pair: &ContactPair| bodies.contains(&pair.bodies[0]) != bodies.contains(&pair.bodies[1]);
+    let is_bonded = model.pairs.iter().any(|pair| pair.law.is_bonded() && joins(pair));
+    if is_bonded { "; a bond acts along the normal only and carries no shear" } else { "" }
 }
 
 /// Return the message on unresisted motions of bodies.
@@ -165,13 +181,45 @@ pub fn is_solved(step: &StepReport) -> bool {
     [Status::Converged, Status::RoundoffLimited].iter().any(|status| step.status == status_name(status))
 }
 
-/// Return warnings of the load steps before the last one that found no solution.
-pub fn step_warnings(steps: &[StepReport]) -> Vec<String> {
+/// Statuses of load steps without a solution, from those whose last iterate is nearest to one on; others are worse.
+const UNSOLVED: [&str; 4] = ["inaccurate", "stagnated", "iteration-limit", "interrupted"];
+
+/// Return status and message of the worst load step before the last one, if it found no solution and is worse than the last one.
+pub fn worst_step(steps: &[StepReport]) -> Option<(String, String)> {
+    let badness = |step: &StepReport| match UNSOLVED.iter().position(|status| *status == step.status) {
+        _ if is_solved(step) => 0,
+        position => position.unwrap_or(UNSOLVED.len()) + 1,
+    };
+    let (last, before) = steps.split_last()?;
+    let worst = before.iter().map(badness).max().filter(|worst| *worst > badness(last))?;
+    let number = before.iter().position(|step| badness(step) == worst)?;
+    let unsolved = steps.iter().filter(|step| !is_solved(step)).count();
+    let message = format!(
+        "{unsolved} of {} load steps found no solution; load step {}: {}",
+        steps.len(),
+        number + 1,
+        before[number].message
+    );
+    Some((before[number].status.clone(), message))
+}
+
+/// Return warnings of the load steps before the last one that found no solution, and of later ones that keep what they have found.
+pub fn step_warnings(done: &Done) -> Vec<String> {
+    let (steps, history) = (&done.steps, &done.built.scene.method.steps);
     let before = steps.iter().take(steps.len().saturating_sub(1)).enumerate();
     let unsolved = before.filter(|(_, step)| !is_solved(step));
     let warning = |(i, step): (usize, &StepReport)| {
         let factors: Vec<String> = step.factors.iter().map(|(name, factor)| format!("{name} {factor}")).collect();
-        format!("load step {} ({}): {}", i + 1, factors.join(", "), step.message)
+        // a step that keeps an offset itself has not found it
+        let found = |spec: &&ContactSpec| history.locks(i + 1, spec) && !history.locks(i, spec);
+        let kept = match done.built.discrete.specs.iter().find(found) {
+            Some(spec) => format!(
+                "; the steps after it keep the offset of `{}` and `{}` that it has found, so that their results are no solutions, either",
+                spec.between[0].value, spec.between[1].value
+            ),
+            None => String::new(),
+        };
+        format!("load step {} ({}): {}{kept}", i + 1, factors.join(", "), step.message)
     };
     unsolved.map(warning).collect()
 }

@@ -2,16 +2,17 @@
 //! estimates that are guesses.
 
 use super::in_words;
-use super::results::peak;
+use super::results;
 use super::stages::Done;
-use super::verdict::is_solved;
+use super::verdict::{is_solved, without_shear};
 use crate::contact::{Chords, ContactPair, LostPieces};
 use crate::discretize::Discrete;
 use crate::estimate::{Cause, Estimate, softness};
+use crate::fem::{length, minus};
 use crate::linalg;
 use crate::model::Mechanism;
 use crate::output::report::{DIGITS, place, readable};
-use crate::output::{BalanceReport, sci};
+use crate::output::{BalanceReport, StepPairReport, sci};
 use crate::petsc::Session;
 use crate::problem::ContactSpec;
 use std::f64::consts::PI;
@@ -32,7 +33,7 @@ pub fn of_problem(session: &Session, discrete: &Discrete) -> Vec<String> {
             session.size()
         ));
     }
-    warnings.extend(discrete.mechanisms.iter().map(|mechanism| mechanism_in_words(discrete, mechanism)));
+    warnings.extend(of_mechanisms(discrete));
     warnings.extend(discrete.bodies.iter().filter_map(|body| body.warning.clone()));
     warnings.extend(of_surfaces(&discrete.model.pairs, &discrete.specs));
     warnings
@@ -50,13 +51,30 @@ pub fn made_straight(cells: usize) -> Option<String> {
     (cells > 0).then(|| format!("{cells} curved cells {why}"))
 }
 
-/// Return the warning of motions that nothing resists.
-fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
-    let Mechanism { bodies, motion, work, balanced, fixed, .. } = mechanism;
+/// Return the warnings of motions that nothing resists: one for all bodies that have the same one, each for itself.
+fn of_mechanisms(discrete: &Discrete) -> Vec<String> {
+    let mut found: Vec<(Mechanism, Vec<usize>)> = Vec::new();
+    for mechanism in &discrete.mechanisms {
+        let mut kind = mechanism.clone();
+        let bodies = std::mem::take(&mut kind.bodies);
+        kind.fixed = kind.fixed.map(|body| if bodies.len() == 1 { 0 } else { body });
+        match found.iter_mut().find(|(other, _)| bodies.len() == 1 && kind == *other) {
+            Some((_, alike)) => alike.extend(bodies),
+            None => found.push((if bodies.len() == 1 { kind } else { mechanism.clone() }, bodies)),
+        }
+    }
+    found.iter().map(|(mechanism, bodies)| mechanism_in_words(discrete, mechanism, bodies)).collect()
+}
+
+/// Return the warning of a motion that nothing resists. It is one of these bodies together if it names them, and one that each of them has if not.
+fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism, bodies: &[usize]) -> String {
+    let Mechanism { motion, work, balanced, fixed, .. } = mechanism;
     let name = |body: usize| &discrete.bodies[body].name;
-    let (who, together) = match bodies[..] {
-        [body] => (format!("body {}", name(body)), "its"),
-        _ => (format!("bodies {}", in_words(bodies.iter().map(|&body| name(body)))), "them together in their"),
+    let names = || in_words(bodies.iter().map(|&body| name(body)));
+    let (who, whose) = match bodies {
+        [body] => (format!("body {}", name(*body)), "its"),
+        _ if mechanism.bodies.is_empty() => (format!("bodies {}", names()), "each of them in its"),
+        _ => (format!("bodies {}", names()), "them together in their"),
     };
     let loads = match *work {
         0.0 if *balanced > 0.0 => format!(
@@ -68,12 +86,13 @@ fn mechanism_in_words(discrete: &Discrete, mechanism: &Mechanism) -> String {
     };
     let end = match fixed {
         Some(_) if bodies.len() == 1 => "it is fixed at one node".to_owned(),
+        Some(_) if mechanism.bodies.is_empty() => "each is fixed at one node".to_owned(),
         Some(body) => format!("they are fixed at nodes of `{}`", name(*body)),
         None if *work == 0.0 => "displacements are free up to it".to_owned(),
-        None => "there is no solution".to_owned(),
+        None => format!("there is no solution{}", without_shear(bodies, &discrete.model)),
     };
     let then = if *balanced > 0.0 { ";" } else { ":" };
-    format!("{who}: nothing holds {together} {motion}, and {loads}{then} {end}")
+    format!("{who}: nothing holds {whose} {motion}, and {loads}{then} {end}")
 }
 
 /// Return the warning of the force that a node carries at which a body is fixed, if it is more than the relative error of the result.
@@ -138,14 +157,14 @@ fn of_surfaces(pairs: &[ContactPair], specs: &[ContactSpec]) -> Vec<String> {
     warnings
 }
 
-/// Return the warning of facets without a partner at which the contact of pair `i` ends under pressure. Where a surface turns away from the other
-/// one, or goes on beyond it, such facets are usual, and `check` counts them.
+/// Return the warning of facets that `angle` or `distance` leaves without a partner, and at which the contact of pair `i` ends under pressure. Where a
+/// surface turns away from the other one without pressure, or goes on beyond it, such facets are usual, and `check` counts them.
 pub fn cut_short(done: &Done, i: usize) -> Option<String> {
     let (pair, spec) = (&done.model().pairs[i], &done.built.discrete.specs[i]);
     let pressure = &done.outcome.layer.pressure[done.model().range(i)];
     let [a, b] = names(spec);
     let distance = spec.distance.map_or(String::new(), |distance| format!(" and `distance` = {distance}"));
-    done.built.discrete.contacts[i].surface.beside_uncovered().any(|q| pressure[q] != 0.0).then(|| {
+    done.built.discrete.contacts[i].surface.beside_cut_short(&pair.cover).any(|q| pressure[q] != 0.0).then(|| {
         format!(
             "{a} - {b}: {} of {} facets of `{}` have no partner within `angle` = {}{distance}, and there is pressure beside them",
             pair.uncovered(),
@@ -215,23 +234,29 @@ fn lost(pair: &ContactPair, spec: &ContactSpec) -> Option<String> {
     })
 }
 
-/// Return the warning for pair `i`, if its layer is compressed beyond the end of its law, at the solution or in a load step. There the
+/// Return the warnings for pair `i`, if its layer is compressed or stretched beyond the end of its law, at the solution or in a load step. There the
 /// law is extrapolated by a straight line from the end of a table, or of an expression with `up_to`, without measured data.
-pub fn beyond_law(done: &Done, i: usize) -> Option<String> {
+pub fn beyond_law(done: &Done, i: usize) -> Vec<String> {
     let pair = &done.model().pairs[i];
-    let end = (0..pair.len()).map(|q| pair.law.end(q)).fold(f64::INFINITY, f64::min);
-    let Compressed { most, pressure, step } = most_compressed(done, i)?;
-    let when = step.map_or(String::new(), |step| format!(" in load step {step}"));
+    let least = |end: &dyn Fn(usize) -> f64| (0..pair.len()).map(end).fold(f64::INFINITY, f64::min);
     let [a, b] = names(&done.built.discrete.specs[i]);
-    (most > end).then(|| {
-        format!(
-            "{a} - {b}: the layer is compressed by {}{when}, under a pressure of {}, and its law ends at a compression of {}: beyond, the last \
+    let ends = [
+        (most_compressed(done, i), least(&|q| pair.law.end(q)), ["compressed", "pressure", "compression"]),
+        (most_stretched(done, i), least(&|q| pair.law.end_in_tension(q)), ["stretched", "tension", "stretch"]),
+    ];
+    let mut warnings = Vec::new();
+    for (found, end, [moved, stress, motion]) in ends {
+        let Some(Largest { most, pressure, step }) = found.filter(|found| found.most > end) else { continue };
+        let when = step.map_or(String::new(), |step| format!(" in load step {step}"));
+        warnings.push(format!(
+            "{a} - {b}: the layer is {moved} by {}{when}, under a {stress} of {}, and its law ends at a {motion} of {}: beyond, the last \
              slope goes on; give the law further points, or lower the load",
             sci(most, 2),
             sci(pressure, 2),
             sci(end, 2)
-        )
-    })
+        ));
+    }
+    warnings
 }
 
 /// Change of the force along the normal, as a share, from which it is worth a warning that the normals of both sides differ. A normal that is
@@ -257,13 +282,36 @@ pub fn tilted(done: &Done, i: usize) -> Option<String> {
     })
 }
 
+/// Return the warning for pair `i`, if the gap of an obstacle is steep under pressure. The obstacle's true normal is inclined to that of the surface by
+/// the slope s of the gap, and its force s p along the surface is neglected. The limit is that of [`TILTED`].
+pub fn steep_gap(done: &Done, i: usize) -> Option<String> {
+    let (discrete, pair) = (&done.built.discrete, &done.model().pairs[i]);
+    let pressure = &done.outcome.layer.pressure[done.model().range(i)];
+    let pressed = discrete.contacts[i].surface.neighbours().iter().map(|beside| beside.points);
+    let pressed = pressed.filter(|points| points.iter().all(|&q| pressure[q] > 0.0));
+    let slope = |[q, r]: [usize; 2]| {
+        ((pair.gap[q] - pair.gap[r]) / length(minus(pair.position[q], pair.position[r])), pair.position[q])
+    };
+    let (slope, at) = pressed.map(slope).max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+    let is_steep = discrete.specs[i].obstacle && 0.5 * slope * slope > TILTED;
+    (is_steep && done.outcome.status.is_solved()).then(|| {
+        format!(
+            "{}: the gap to the obstacle has a slope of {:.2} under pressure at {}: the obstacle's force along the surface, that share of the pressure, \
+             is neglected; let the obstacle be a body",
+            names(&discrete.specs[i])[0],
+            slope.abs(),
+            place(at)
+        )
+    })
+}
+
 /// Return the warning that no pair carries a pressure, at the solution or in a load step. Then contact has no part in the results.
 pub fn nothing_touches(done: &Done) -> Option<String> {
     let pairs = 0..done.model().pairs.len();
     if pairs.clone().any(|i| done.model().pairs[i].law.is_bonded()) {
         return None;
     }
-    let compressed: Option<Vec<Compressed>> = pairs.map(|i| most_compressed(done, i)).collect();
+    let compressed: Option<Vec<Largest>> = pairs.map(|i| most_compressed(done, i)).collect();
     let compressed = compressed.filter(|all| all.iter().all(|found| found.pressure <= 0.0))?;
     let nearest = (0..compressed.len()).max_by(|&i, &j| compressed[i].most.total_cmp(&compressed[j].most))?;
     let ([a, b], gap) = (names(&done.built.discrete.specs[nearest]), -compressed[nearest].most);
@@ -273,8 +321,8 @@ pub fn nothing_touches(done: &Done) -> Option<String> {
     ))
 }
 
-/// The largest compression of the layer of a pair.
-struct Compressed {
+/// The largest compression of the layer of a pair, or the largest stretch, with the pressure or the tension there.
+struct Largest {
     most: f64,
     pressure: f64,
     /// Load step, counted from 1, if there are any.
@@ -282,19 +330,25 @@ struct Compressed {
 }
 
 /// Return the largest compression of a pair over all solutions of a run, none if the run has found no solution.
-fn most_compressed(done: &Done, i: usize) -> Option<Compressed> {
+fn most_compressed(done: &Done, i: usize) -> Option<Largest> {
+    largest(done, i, |pair| Some([pair.peak_compression, pair.peak_pressure]))
+}
+
+/// Return the largest stretch of a bonded pair over all solutions of a run.
+fn most_stretched(done: &Done, i: usize) -> Option<Largest> {
+    largest(done, i, |pair| pair.tension.map(|tension| [tension.peak_stretch, tension.peak_tension]))
+}
+
+/// Return the largest of what `of` takes from the reports of a pair over all solutions of a run: a compression and a pressure.
+fn largest(done: &Done, i: usize, of: fn(&StepPairReport) -> Option<[f64; 2]>) -> Option<Largest> {
+    let found = |pair: &StepPairReport, step| of(pair).map(|[most, pressure]| Largest { most, pressure, step });
     if done.steps.is_empty() {
-        let (layer, range) = (&done.outcome.layer, done.model().range(i));
-        let pressure = layer.pressure[range.clone()].iter().copied().fold(0.0, f64::max);
-        let found = Compressed { most: peak(&layer.compression[range]), pressure, step: None };
-        return done.outcome.status.is_solved().then_some(found);
+        let is_solved = done.outcome.status.is_solved();
+        return is_solved.then(|| results::pair(done, i, None)).and_then(|pair| found(&pair, None));
     }
     let solved = done.steps.iter().enumerate().filter(|(_, step)| is_solved(step));
-    let compressed = solved.map(|(number, step)| {
-        let pair = &step.pairs[i];
-        Compressed { most: pair.peak_compression, pressure: pair.peak_pressure, step: Some(number + 1) }
-    });
-    compressed.max_by(|a, b| a.most.total_cmp(&b.most))
+    let all = solved.filter_map(|(number, step)| found(&step.pairs[i], Some(number + 1)));
+    all.max_by(|a, b| a.most.total_cmp(&b.most))
 }
 
 /// Add the warnings of contacts that reach the end of a pair, which the key `distance` has cut short. A pair has one warning, that of the first load

@@ -2,27 +2,28 @@
 
 use crate::error::Error;
 
-/// Names that are gone: a key, or a word that was the value of a key.
-pub const KEYS: &[(&str, &str)] = &[
-    ("anderson", SWEEPS),
-    ("asperities", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
-    ("balanced", "runs with an adapted mesh stop at a tenth of `adapt.error`"),
-    ("barzilai-borwein", "gamma = \"aitken\" or \"line-search\""),
-    ("checkpoint", "states are saved at the end of each load step, and when a signal ends the run"),
+/// Names that are gone, a key or a word that was the value of a key: the name, what its place in the scene is called, and the advice.
+const KEYS: &[(&str, &str, &str)] = &[
+    ("anderson", "method", SWEEPS),
+    ("asperities", "layer", "scripts/library/asperities.py prints their law: layer = { table = [...] }"),
+    ("balanced", "", "runs with an adapted mesh stop at a tenth of `adapt.error`"),
+    ("barzilai-borwein", "method", "gamma = \"aitken\" or \"line-search\""),
+    ("checkpoint", "", "states are saved at the end of each load step, and when a signal ends the run"),
     (
         "compress",
+        "output",
         "VTU files are written as they are: `precision = \"single\"` halves them, `tar czf` compresses a folder",
     ),
-    ("depth", "the method `anderson`, which had it, is gone"),
-    ("fill", HEIGHTS),
-    ("memory", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
-    ("missing", HEIGHTS),
-    ("ncg", SWEEPS),
-    ("nested", "start = \"auto\" takes about as many steps"),
-    ("options", "PETSc options follow the scene on the command line, or stand in a file: -options_file FILE"),
-    ("parabola", HEIGHTS),
-    ("points", HEIGHTS),
-    ("spectral", "gamma = \"aitken\" or \"line-search\""),
+    ("depth", "method", "the method `anderson`, which had it, is gone"),
+    ("fill", "data", HEIGHTS),
+    ("memory", "mesh", "Gmsh has `timeout` alone; the shell limits memory: ulimit -v"),
+    ("missing", "data", HEIGHTS),
+    ("ncg", "method", SWEEPS),
+    ("nested", "method", "start = \"auto\" takes about as many steps"),
+    ("options", "solver", "PETSc options follow the scene on the command line, or stand in a file: -options_file FILE"),
+    ("parabola", "data", HEIGHTS),
+    ("points", "data", HEIGHTS),
+    ("spectral", "method", "gamma = \"aitken\" or \"line-search\""),
 ];
 
 /// Options with their dashes, and commands that are gone.
@@ -62,8 +63,9 @@ pub fn explain(error: Error) -> Error {
         [start, .., name, ""] if start.starts_with("unknown ") => name,
         _ => return error,
     };
-    match advice(KEYS, name) {
-        Some(advice) => error.help(advice),
+    let is_meant = |(known, place, _): &&(&str, &str, &str)| *known == name && error.message().contains(place);
+    match KEYS.iter().find(is_meant) {
+        Some((.., advice)) => error.help(*advice),
         None => error,
     }
 }

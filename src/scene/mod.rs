@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use toml::Spanned;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 /// Read and check a scene file, after applying `overrides` in their order: `KEY=VALUE` as given to `--set`, or options that are short for
 /// it. The mesh file must exist; it is not read.
@@ -49,8 +49,8 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
     options.iter().try_for_each(|option| option.apply(table.get_mut()))?;
     if let Some(method) = table.get_mut().get_mut("method") {
         method::complete(method);
+        refuse_idle(method, &sources, source.text.len())?;
     }
-    let has_stop = table.get_ref().get("method").is_some_and(|method| method.get_ref().get("stop").is_some());
     let folder = path.parent().unwrap_or(Path::new("")).to_owned();
     let reader = Reader { table, sources };
     reader.refuse_lists()?;
@@ -64,13 +64,19 @@ pub fn parse(path: &Path, text: String, overrides: &[String]) -> Result<Scene> {
         contact.table = table;
         contact.complete();
     }
-    // meshes that are adapted need no more digits than they are worth, unless the scene says how many
-    if let (Some(adapt), false) = (&scene.adapt, has_stop) {
-        scene.method.stop.residual = Some(0.1 * adapt.error.value);
-    }
     scene.method.steps.join(&scene.bodies, &scene.contacts)?;
     scene.verify()?;
     Ok(scene)
+}
+
+/// Refuse a key of `[method]` that the method does not read. `length` is that of the file, after which the options
+/// begin.
+fn refuse_idle(method: &Spanned<DeValue<'_>>, sources: &Sources, length: usize) -> Result<()> {
+    let Some(idle) = method::idle_key(method, |span| span.start > length) else { return Ok(()) };
+    let message = format!("the method `{}` does not read `{}`", idle.method, idle.name);
+    Err(Error::scene(&sources.place(idle.span), message)
+        .label("no effect")
+        .help(format!("leave it out, or choose a method that reads it: {}", idle.readers)))
 }
 
 /// What must be known before the rest of a scene is read.

@@ -93,7 +93,7 @@ impl Typed {
         let mut steps = Vec::new();
         for (depth, span) in spans.iter().enumerate() {
             let name = &text[span.clone()];
-            if name.is_empty() || !name.chars().all(|c| c.is_ascii_alphanumeric() || "_-*?[]!".contains(c)) {
+            if name.is_empty() || !name.chars().all(|c| c.is_alphanumeric() || "_-*?[]!/".contains(c)) {
                 return Err(Error::scene(&self.place(start..equals), "this is not a key of the scene")
                     .help("a key is names and numbers joined by points: body.1.young"));
             }

@@ -24,9 +24,11 @@ pub struct Krylov {
     changed: bool,
     /// Number of factorisations or preconditioner set-ups.
     set_ups: usize,
-    /// Whether the preconditioner is a multigrid, which takes about as many iterations for any size. One application then preconditions
-    /// all bodies together, and its set-up costs more than its use.
+    /// Whether the preconditioner is a multigrid, which takes about as many iterations for any size, and whose set-up
+    /// costs more than its use.
     multigrid: bool,
+    /// Whether one application of it preconditions all bodies together, unless the user wants a whole solve.
+    is_applied_once: bool,
     /// Whether the preconditioner is kept while G changes.
     keeps: bool,
     /// Whether the method may set the tolerance of solves, because the user has not.
@@ -83,11 +85,8 @@ impl Krylov {
             let Prolongation { rows: Csr { ptr, col, values, .. }, own } = interpolation;
             ksp.set_interpolation(&matrix, [&super::integers(ptr), &super::integers(col)], &values, own)?;
         }
+        chosen.refuse_idle()?;
         ksp.set_from_options()?;
-        // the spectrum turns a residual in the natural norm into an error in the energy norm
-        if ksp.ksp_type() == "cg" && chosen.get("ksp_norm_type") == Some("natural") {
-            ksp.estimate_spectrum()?;
-        }
         if ksp.pc_type() == "gamg" && !near_null_space.is_empty() {
             matrix.set_near_null_space(near_null_space)?;
         }
@@ -97,6 +96,7 @@ impl Krylov {
             "mg" => check_levels(&ksp, chosen.prefix(), levels)? == 2,
             _ => false,
         } && ksp.ksp_type() != "preonly";
+        let is_applied_once = multigrid && !chosen.steers_iteration();
         let keeps = multigrid && chosen.get("ksp_reuse_preconditioner").is_none();
         let free = ksp.ksp_type() != "preonly" && chosen.typed("ksp_rtol").is_none();
         let session = session.clone();
@@ -110,6 +110,7 @@ impl Krylov {
             changed: true,
             set_ups: 0,
             multigrid,
+            is_applied_once,
             keeps,
             stale: true,
             prepared: Vec::new(),
@@ -264,7 +265,7 @@ impl InnerSolver for Krylov {
     }
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<SolveOutcome> {
-        if !self.multigrid {
+        if !self.is_applied_once {
             return self.solve(r, z);
         }
         self.set_up()?;

@@ -133,6 +133,15 @@ impl Chosen {
         typed.map(|(name, choice)| (name.as_str(), choice.value()))
     }
 
+    /// Return the options of a family that the user wrote and that only [look](looks), as they were typed.
+    pub fn all_looking(&self, family: &str) -> impl Iterator<Item = String> {
+        let looking = self.choices.iter().filter(move |(name, _)| name.starts_with(family) && looks(name));
+        looking.map(|(name, choice)| match choice.origin {
+            OptionOrigin::Own => format!("-{}_{name}", self.prefix),
+            _ => format!("-{name}"),
+        })
+    }
+
     /// Return the controls of MUMPS that the user wrote, and mark them as read.
     pub fn controls_of_mumps(&self, session: &Session) -> Vec<(&str, &str)> {
         let controls: Vec<_> = self.all_typed().filter(|(name, _)| is_control_of_mumps(name)).collect();
@@ -155,6 +164,29 @@ impl Chosen {
     /// MUMPS and options that only [look](looks) at a solver do not count.
     pub fn asks_for_ksp(&self) -> bool {
         self.all_typed().any(|(name, _)| is_of_family(name) && !looks(name) && !is_control_of_mumps(name))
+    }
+
+    /// Return whether the user wrote an option that steers the iteration of the solver. Then a solve is one, also where
+    /// one application of the preconditioner would do.
+    pub fn steers_iteration(&self) -> bool {
+        let steers = |name: &str| name.starts_with("ksp_") && name != "ksp_reuse_preconditioner" && !looks(name);
+        self.all_typed().any(|(name, _)| steers(name))
+    }
+
+    /// Return whether a solve that only preconditions is one application of a multigrid.
+    pub fn is_applied_once(&self) -> bool {
+        matches!(self.get("pc_type"), Some("hypre" | "gamg" | "ml" | "mg")) && !self.steers_iteration()
+    }
+
+    /// Refuse limits of no iteration that the user wrote for the solver, or for the estimates of eigenvalues that
+    /// multigrid needs for its smoothers. A smoother itself may have none.
+    pub fn refuse_idle(&self) -> Result<()> {
+        let iterates = self.get("ksp_type") != Some("preonly");
+        let is_limit = |name: &str| (iterates && name == "ksp_max_it") || name.ends_with("esteig_ksp_max_it");
+        let is_idle =
+            |(name, value): &(&str, &str)| is_limit(name) && value.parse::<i64>().is_ok_and(|limit| limit < 1);
+        let idle = self.all_typed().find(is_idle);
+        idle.map_or(Ok(()), |(name, value)| Err(Ksp::idle(&format!("-{}_{name}", self.prefix), value)))
     }
 
     /// Return whether the user wrote an option for this solver alone.
@@ -243,8 +275,9 @@ impl Drop for OptionGroup {
 /// Split the arguments (without the program's name) into words of the program and words of PETSc, each in order.
 ///
 /// A PETSc option has one dash and two or more letters. It takes the next word as its value unless that looks like an
-/// option. A scene file (`*.toml`) or a command is never a value, except of `-options_file`. All words after `--` belong to the program.
-pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<String>) {
+/// option. A scene file (`*.toml`) or one of the `commands` is never a value, except of `-options_file`. All words after `--` belong to the
+/// program.
+pub fn split(words: impl IntoIterator<Item = String>, commands: &[&str]) -> (Vec<String>, Vec<String>) {
     let (mut program, mut petsc) = (Vec::new(), Vec::new());
     let mut words = words.into_iter().peekable();
     while let Some(word) = words.next() {
@@ -259,15 +292,12 @@ pub fn split(words: impl IntoIterator<Item = String>) -> (Vec<String>, Vec<Strin
         }
         let takes_file = word == "-options_file";
         petsc.push(word);
-        let is_value = |next: &String| !is_option(next) && (takes_file || !is_scene_or_command(next));
+        let is_value = |next: &String| {
+            !is_option(next) && (takes_file || !(next.ends_with(".toml") || commands.contains(&next.as_str())))
+        };
         petsc.extend(words.next_if(is_value));
     }
     (program, petsc)
-}
-
-/// Return whether a word is a scene file or a command, which is never meant as the value of an option.
-fn is_scene_or_command(word: &str) -> bool {
-    word.ends_with(".toml") || ["solve", "check", "sweep", "bench", "mesh", "new", "completions"].contains(&word)
 }
 
 /// Return whether a word is one dash and two or more characters, the first of them a letter. A whole string of options (for `bench --solver`) is
@@ -292,7 +322,7 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     let is_read = |name: &&String| {
         let mut copies = groups.iter().flat_map(|group| &group.copies);
         let is_copy_read = copies.any(|(copy, plain)| plain.eq_ignore_ascii_case(name) && options.used(copy));
-        is_copy_read || is_global(&name[1..]) || options.used(name)
+        is_copy_read || is_global(&name[1..]) || options.used(name) || is_read_by_solves(name, &groups)
     };
     let mine: Vec<String> = typed.iter().filter(is_read).cloned().collect();
     let (read, has_solvers): (Vec<_>, Vec<_>) =
@@ -303,9 +333,7 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
     let (mut warnings, mut watching) = (Vec::new(), Vec::new());
     for option in &typed {
         let bare = names::bare(option, bodies);
-        // a solve reads this one
-        let is_read =
-            read.contains(option) || (has_solvers && is_of_family(bare) && bare.ends_with("ksp_converged_reason"));
+        let is_read = read.contains(option);
         if is_read || !is_listed {
             options.has(option);
         }
@@ -329,6 +357,18 @@ pub fn unread(session: &Session, bodies: &[&str]) -> Result<Vec<String>> {
         ));
     }
     Ok(warnings)
+}
+
+/// Return whether an option is one that solvers read in each solve, and not in their set-up.
+fn is_read_by_solves(option: &str, groups: &[Rc<OptionGroup>]) -> bool {
+    let option = option[1..].to_ascii_lowercase();
+    let is_of = |group: &Rc<OptionGroup>| {
+        group.options.all_typed().any(|(name, _)| {
+            name.ends_with("ksp_converged_reason")
+                && (name == option || option.strip_suffix(name) == Some(&format!("{}_", group.options.prefix)))
+        })
+    };
+    groups.iter().any(is_of)
 }
 
 /// Print the options of a solver as `-help` does, for a run that makes no solver of PETSc.
@@ -382,7 +422,7 @@ mod tests {
     }
 
     fn check(words: &str, program: &str, petsc: &str) {
-        let (p, q) = split(words.split_whitespace().map(String::from));
+        let (p, q) = split(words.split_whitespace().map(String::from), &["solve", "bench", "schema"]);
         assert_eq!((p.join(" "), q.join(" ")), (program.to_owned(), petsc.to_owned()), "{words}");
     }
 
@@ -397,7 +437,8 @@ mod tests {
         check("-ksp_type cg -- -ksp_type x", "-- -ksp_type x", "-ksp_type cg");
         check("-ksp_monitor", "", "-ksp_monitor");
         check("-ksp_monitor bench", "bench", "-ksp_monitor");
+        check("-ksp_monitor schema", "schema", "-ksp_monitor");
         let string = ["--solver", "-ksp_type cg -pc_type icc"].map(String::from);
-        assert_eq!(split(string.clone()), (string.to_vec(), Vec::new()));
+        assert_eq!(split(string.clone(), &[]), (string.to_vec(), Vec::new()));
     }
 }

@@ -1,7 +1,7 @@
 //! Bonded layers, which pull where they are stretched.
 
 use crate::common::here::solve_here;
-use crate::common::{Scene, case, root, solve_on};
+use crate::common::{Scene, case, root, solve, solve_on};
 use std::path::PathBuf;
 
 /// Return the patch in the plane, in space, and as a body of revolution, with the key of its load and the load that pulls.
@@ -99,4 +99,42 @@ fn bonded_beams_bend_together() {
     let apart = solve_here(&scene.path, &["contact.0.bond=false"]).converged();
     let table = apart.contact();
     assert!((table["u_n_b1"][end] / -deflection(1.0) - 1.0).abs() < 2e-3, "{}", table["u_n_b1"][end]);
+}
+
+/// A pulled patch has a largest tension with its place and no pressure, in report, tables and closing lines; beyond the end of either law it warns, in a
+/// load step, too.
+#[test]
+fn the_largest_tension() {
+    let bonded = |law: &str| {
+        let sets = ["contact.0.bond=true", "body.1.load.0.pressure=-10", law];
+        sets.into_iter().flat_map(|set| ["--set", set]).map(str::to_owned).collect::<Vec<_>>()
+    };
+    for (law, warns) in [
+        ("contact.0.gap=0", false),
+        ("contact.0.tension={table=[[1e-6,1]]}", true),
+        ("contact.0.tension={table=[[1e-2,11]]}", false),
+        ("contact.0.layer={table=[[1e-6,1]]}", true),
+    ] {
+        for steps in ["method={steps=1}", "method={steps=2}"] {
+            let mut sets = bonded(law);
+            sets.extend(["--set".to_owned(), steps.to_owned()]);
+            let run = solve(case("patch"), &sets.iter().map(String::as_str).collect::<Vec<_>>()).converged();
+            let what = format!("{law} {steps}: {}", run.said());
+            assert_eq!(run.number("pairs/0/peak_pressure"), 0.0, "{what}");
+            assert!((run.number("pairs/0/peak_tension") / 10.0 - 1.0).abs() < 1e-7, "{what}");
+            assert!(run.number("pairs/0/normal_force") < 0.0 && run.number("pairs/0/mean_pressure") == 0.0, "{what}");
+            assert!(
+                run.stdout.contains("largest tension 10.000000") && !run.stdout.contains("peak pressure"),
+                "{what}"
+            );
+            assert_eq!(run.warnings().contains("the layer is stretched by"), warns, "{what}");
+            let table = std::fs::read_to_string(run.folder.join("contacts.csv")).expect("a table");
+            assert!(table.contains(",peak_tension,tension_x,"), "{table}");
+            if steps.contains('2') {
+                assert!((run.number("steps/0/pairs/0/peak_tension") / 5.0 - 1.0).abs() < 1e-7, "{what}");
+                let steps = std::fs::read_to_string(run.folder.join("steps.csv")).expect("a table");
+                assert!(steps.contains(",peak_tension lower-upper,tension_x lower-upper,"), "{steps}");
+            }
+        }
+    }
 }

@@ -373,6 +373,11 @@ fn obstacles_that_cannot_be() {
         ("preload = 1", "a preload of an obstacle"),
         ("approach = 1\nforce = 1", "both `approach` and `force`"),
         ("path = \"a\"", "`path` without a force"),
+        ("force = 1\npath = \"a\"", "`path` without a table"),
+        ("distance = 1", "`distance` of an obstacle"),
+        ("angle = 30", "`angle` of an obstacle"),
+        ("touching = true", "`touching` of an obstacle"),
+        ("of = [\"body\", \"body\"]", "`of` of an obstacle"),
         ("gap = \"sqrt(-1 - x)\"", "the gap"),
     ] {
         let error = try_here(&footing(keys).path, &[]).err().unwrap_or_else(|| panic!("{keys} is accepted"));
@@ -383,4 +388,36 @@ fn obstacles_that_cannot_be() {
     free = free.replace("{ on = \"low\", z = 0 }, ", "");
     let run = solve_here(&scene(BLOCK, &free).path, &[]);
     assert_eq!(run["status"], "underconstrained", "{}", run.said());
+}
+
+/// The force of a steep obstacle along the surface is neglected, with a warning where it acts.
+#[test]
+fn a_steep_gap_has_a_warning() {
+    for (slope, warned) in [(1.0, true), (0.2, true), (0.1, false)] {
+        let run = solve_here(&footing(&format!("gap = \"{slope}*x\"\napproach = 3")).path, &[]).converged();
+        assert_eq!(run.warnings().contains(&format!("has a slope of {slope:.2}")), warned, "{}", run.warnings());
+    }
+    // steep where nothing touches
+    let run = solve_here(&footing("gap = \"max(0, x - 1)\"\napproach = 0.01").path, &[]).converged();
+    assert!(!run.warnings().contains("slope"), "{}", run.warnings());
+}
+
+/// A ring on springs that do not pull, under an elliptic pressure: contact is four arcs of 44.975 degrees together, by finite elements of order 5 on fine meshes.
+#[test]
+fn a_ring_on_springs() {
+    const RING: &str = "SetFactory(\"OpenCASCADE\"); DefineConstant[ n = 24 ];
+        Disk(1) = {0, 0, 0, 5.2}; Disk(2) = {0, 0, 0, 4.8}; BooleanDifference(3) = { Surface{1}; Delete; }{ Surface{2}; Delete; };
+        MeshSize {:} = 2*Pi*5/n/2; c() = Abs(Boundary{ Surface{3}; });
+        Physical Surface(\"lining\") = {3}; Physical Curve(\"outer\") = {c(0)};\n";
+    let text = "dimension = 2\nmesh = \"mesh.geo\"\n[[body]]\nname = \"lining\"\nyoung = 3e4\npoisson = 0.2\norder = 2\n\
+        load = [{ on = \"outer\", traction = [\"-0.15*x/5.2\", \"-0.3*y/5.2\"] }]\n\
+        [[contact]]\non = \"outer\"\nobstacle = true\nlayer = { linear = { stiffness = 10 } }\n";
+    let scene = scene(RING, text);
+    for (order, tolerance) in [(1, 5e-2), (2, 1e-3), (3, 1e-3), (6, 1e-3)] {
+        let run = solve_here(&scene.path, &[&format!("body.0.order={order}")]).converged();
+        close(&format!("order {order}"), run.number("pairs/0/contact_length"), 4.0 * 5.2 * 0.78496, tolerance);
+        let length = run.number("pairs/0/contact_length") + run.number("pairs/0/open_length");
+        close("all around", length, run.contact()["weight"].iter().sum(), 1e-9);
+        assert_eq!(run["pairs"][0]["contact_ends"].as_array().map(Vec::len), Some(4), "{order}");
+    }
 }

@@ -1,6 +1,6 @@
 //! Pairs that are pressed by a force, and bolts that keep their preload.
 
-use crate::common::here::solve_here;
+use crate::common::here::{solve_here, try_here};
 use crate::common::{Run, Scene, case, solve_on};
 
 fn close(what: &str, ours: f64, exact: f64, tolerance: f64) {
@@ -104,6 +104,48 @@ fn a_clamp_is_one_body() {
     let offsets: Vec<f64> = methods.iter().map(offset).collect();
     assert!(offsets[0] < -10.0 / 1e4, "{offsets:?}");
     offsets.iter().for_each(|other| close("offset", *other, offsets[0], 1e-6));
+    // faces that face each other, and are farther apart than they may be, are no faces under head and nut
+    for load in ["preload", "force"] {
+        let keys = ["contact.0={between=['lower','upper'],layer={linear={stiffness=1e4}},distance=0.1", "=10}"]
+            .join(&format!(",{load}"));
+        let fix = "body.0.fix=[{on='back',x=0,y=0}]";
+        let error = try_here(&scene.path, &[&keys, fix]).err().map(|error| error.render(false)).unwrap_or_default();
+        let words = if load == "preload" { "do not face each other anywhere" } else { "belong to body" };
+        assert!(error.contains(words), "{load}: {error}");
+    }
+}
+
+/// A plate that is thinner than its faces are wide, between head and nut: the bolt and the plate share the offset, bonded or not. A negative preload has advice
+/// that fits.
+#[test]
+fn a_bolt_through_a_thin_plate() {
+    let scene = Scene::new(
+        "dimension = 2\nmesh = \"plate.geo\"\n[[body]]\nname = \"plate\"\nyoung = 1e3\npoisson = 0\nfix = [{ on = \"pin\", x = 0, y = 0 }, { on = \"other\", y = 0 }]\n\
+         [[contact]]\nbetween = [\"top\", \"bottom\"]\npreload = 10\nlayer = { linear = { stiffness = 1e3 } }\n",
+    );
+    let script = "Point(1)={0,0,0};Point(2)={2,0,0};Point(3)={2,h,0};Point(4)={0,h,0};
+        Line(1)={1,2};Line(2)={2,3};Line(3)={3,4};Line(4)={4,1};Curve Loop(1)={1,2,3,4};Plane Surface(1)={1};
+        Transfinite Curve{1,3}=5;Transfinite Curve{2,4}=3;Transfinite Surface{1};
+        Physical Surface(\"plate\")={1};Physical Curve(\"bottom\")={1};Physical Curve(\"top\")={3};Physical Point(\"pin\")={1};Physical Point(\"other\")={2};\n";
+    let file = scene.path.with_file_name("plate.geo");
+    std::fs::write(&file, format!("DefineConstant[ h = 0.5 ];\n{script}")).expect("a script");
+    for h in [0.5, 4.0] {
+        for bond in [false, true] {
+            let sets = [format!("contact.0.bond={bond}"), format!("mesh={{geo='plate.geo',set={{h={h}}}}}")];
+            let run = solve_here(&scene.path, &sets.each_ref().map(String::as_str)).converged();
+            let what = format!("{h} {bond}");
+            // the faces are drawn together by the pressure 5
+            close(&what, run.number("pairs/0/force/0/1"), -10.0, 1e-6);
+            close(&what, run.number("pairs/0/peak_pressure"), 5.0, 1e-6);
+            close(&what, run.number("pairs/0/offset"), 5.0 / 1e3 + h * 5.0 / 1e3, 1e-6);
+            assert!(!run.warnings().contains("overlap"), "{}", run.warnings());
+        }
+    }
+    for (bond, words) in [("true", "is a tension already: write 10"), ("false", "a preload > 0 presses")] {
+        let sets = ["contact.0.preload=-10", &format!("contact.0.bond={bond}")];
+        let error = try_here(&scene.path, &sets).err().map(|error| error.render(false)).unwrap_or_default();
+        assert!(error.contains("a negative `preload`") && error.contains(words), "{bond}: {error}");
+    }
 }
 
 /// A run of load steps whose last one did not end goes on with the offset that its first step has found, and with the gaps of its step, on any ranks.
@@ -127,7 +169,7 @@ fn a_preload_is_kept_over_a_restart() {
                 close(path, of(&rest), of(&whole), 1e-9);
             }
         }
-        close("peak", rest.number("pairs/0/peak_pressure"), whole.number("pairs/0/peak_pressure"), 1e-9);
+        close("peak", rest.number("pairs/0/peak_tension"), whole.number("pairs/0/peak_tension"), 1e-9);
     }
 }
 

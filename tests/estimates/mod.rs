@@ -4,6 +4,7 @@ mod bound;
 mod carrier;
 mod effectivity;
 mod estimate;
+mod forces;
 mod orders;
 mod parts;
 mod regions;

@@ -61,3 +61,33 @@ fn spheres_that_touch_are_no_fit() {
     let run = winkler(&["check", scene.path.to_str().expect("a path")]);
     assert!(run.stdout.contains("the bodies overlap by") && !run.stdout.contains("straight facets"), "{}", run.said());
 }
+
+/// A hub on a longer shaft: the resultant is zero, and the normal force is the mean pressure times the area. Where the shaft goes on beyond the hub, its facets have no
+/// partner and no warning; where `angle` takes partners away, they have one.
+#[test]
+fn the_normal_force_of_a_press_fit() {
+    const FIT: &str = "SetFactory(\"OpenCASCADE\"); Rectangle(1) = {0, 0, 0, 25, 60}; Rectangle(2) = {25, 10, 0, 25, 40}; MeshSize {:} = 4;
+        Physical Surface(\"shaft\") = {1}; Physical Surface(\"hub\") = {2};
+        Physical Curve(\"shaft_bottom\") = {1}; Physical Curve(\"shaft_surface\") = {2}; Physical Curve(\"hub_bore\") = {8};\n";
+    let scene = Scene::new(
+        "dimension = 2\nplane = \"axisymmetric\"\nmesh = \"fit.geo\"\n\
+         [[body]]\nname = \"shaft\"\nyoung = 2.1e5\npoisson = 0.3\norder = 2\nfix = [{ on = \"shaft_bottom\", y = 0 }]\n\
+         [[body]]\nname = \"hub\"\nyoung = 2.1e5\npoisson = 0.3\norder = 2\n\
+         [[contact]]\nbetween = [\"shaft_surface\", \"hub_bore\"]\ntouching = true\ngap = -0.02\nlayer = { linear = { stiffness = 1e6 } }\n",
+    );
+    std::fs::write(scene.path.with_file_name("fit.geo"), FIT).expect("a script");
+    let run = solve(&scene, &["--report"]).converged();
+    let [normal, mean] = ["normal_force", "mean_pressure"].map(|key| run.number(&format!("pairs/0/{key}")));
+    let contact = run.contact();
+    let sum: f64 = (0..contact.rows()).map(|q| contact["weight"][q] * contact["pressure"][q]).sum();
+    // 406 kN, and 64.7 MPa on the bore of radius 25 and length 40
+    let area = 2.0 * std::f64::consts::PI * 25.0 * 40.0;
+    assert!((normal / sum - 1.0).abs() < 1e-9 && (mean * area / sum - 1.0).abs() < 1e-6, "{normal} {mean} {sum}");
+    assert!((normal / 4.06e5 - 1.0).abs() < 0.01, "{normal}");
+    assert!(run.stdout.contains("force on `shaft` (0.000000, 0.000000), normal force 40"), "{}", run.said());
+    assert!(!run.warnings().contains("have no partner"), "{}", run.warnings());
+    let page = std::fs::read_to_string(run.folder.join("report.html")).expect("a page");
+    assert!(page.contains("normal force") && page.contains("mean pressure"));
+    let table = std::fs::read_to_string(run.folder.join("contacts.csv")).expect("a table");
+    assert!(table.contains(",normal_force,mean_pressure,peak_pressure,"), "{table}");
+}

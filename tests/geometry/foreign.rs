@@ -445,12 +445,84 @@ fn input_files_are_refused_with_their_line() {
     is_ten(run, &["the surface `lower` is `lower_surface` here"], "one name");
 }
 
-/// Gmsh ignores local systems of coordinates without a word.
+/// A tetrahedron as a deck of Nastran, with cards before its grid points and the fields of the first point.
+fn deck(cards: &str, first: &str) -> String {
+    let others = "GRID,2,,1.,0.,0.\nGRID,3,0,0.,1.,0.\nGRID           4              0.      0.      1.\n";
+    format!("SOL 101\nCEND\nBEGIN BULK\n{cards}{first}\n{others}PSOLID,1,1\nCTETRA,1,1,1,2,3,4\nENDDATA\n")
+}
+
+/// Gmsh ignores local systems of coordinates without a word: points in one are refused, and systems that no point names are none of their concern.
 #[test]
-fn local_coordinates_of_bulk_data_are_refused() {
-    let bulk = |card: &str| format!("SOL 101\nCEND\nBEGIN BULK\n{card}\nGRID,1,7,0.,0.,0.\nENDDATA\n");
-    for card in ["CORD2C,7,,0.,0.,0.,0.,0.,1.", "GRDSET,,7", "cord1r  7       1       2       3"] {
-        let run = solved("a.bdf", bulk(card).as_bytes(), "\"a.bdf\"", &NAMED);
-        assert!(run.code == 4 && run.stderr.contains("a.bdf:4: the deck has a local system"), "{}", run.said());
+fn local_coordinates_of_points_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("a.bdf");
+    let listed = |text: &str| {
+        fs::write(&file, text).expect("a file");
+        winkler(&["mesh", file.to_str().expect("a path")])
+    };
+    let femap =
+        "CORD2C         1       0      0.      0.      0.      0.      0.      1.+\n+             1.      0.      1.\n";
+    let large = "GRID*                  1               7              0.              0.\n*                     0.";
+    for (cards, first) in [
+        (femap, "GRID,1,,0.,0.,0.,1"),
+        (femap, "GRID           1       0      0.      0.      0.       1"),
+        ("GRDSET,,,,,,,456\n", "GRID,1,,0.,0.,0."),
+        ("GRDSET                 0                               1     456\n", &large.replace('7', " ")),
+        ("CORD2R,7,,0.,0.,0.,0.,0.,1.\n$ GRID,9,7\n", "grid,1, 0 ,0.,0.,0."),
+    ] {
+        let run = listed(&deck(cards, first));
+        // cards of other fields than those of numbers are read by Gmsh as it likes
+        assert!(run.code == 0 || !run.stderr.contains("system of coordinates"), "{first}\n{}", run.said());
+        if first.starts_with("GRID") {
+            assert!(run.stdout.contains("group volume_1: 1 tetrahedra"), "{first}\n{}", run.said());
+        }
     }
+    for (cards, first) in [
+        (femap, "GRID,1,1,0.,0.,0."),
+        ("", "GRID           1       7      0.      0.      0."),
+        ("", large),
+        ("", "GRID*,1,7,0.,0.\n*,0."),
+        ("GRDSET,,7\n", "GRID,1,0,0.,0.,0."),
+        ("GRDSET*                                7\n", "GRID,1,,0.,0.,0."),
+    ] {
+        let run = listed(&deck(cards, first));
+        assert!(run.code == 4 && run.stderr.contains("in the local system of coordinates"), "{first}\n{}", run.said());
+    }
+    // universal files: a system may be defined, and even named, if it is the global one
+    let unv = |turn: &str| {
+        let system =
+            format!("         1\npart\n         1         0         8\nCS\n{turn}         0.D+00 0. 1.\n 0. 0. 0.\n");
+        format!(
+            "    -1\n  2420\n{system}    -1\n    -1\n  2411\n         1         1         1        11\n  0.D+00 0. 0.\n         2         1         1        11\n\
+             1. 0. 0.\n         3         1         1        11\n  0. 1. 0.\n         4         1         1        11\n  0. 0. 1.\n    -1\n    -1\n  2412\n\
+             \x20        1       111         1         1         7         4\n         1         2         3         4\n    -1\n"
+        )
+    };
+    let file = folder.path().join("a.unv");
+    for (turn, is_local) in [(" 1.D+00 0. 0.\n 0. 1. 0.\n", false), (" 0. 1. 0.\n -1. 0. 0.\n", true)] {
+        fs::write(&file, unv(turn)).expect("a file");
+        let run = winkler(&["mesh", file.to_str().expect("a path")]);
+        assert_eq!(run.stderr.contains("a.unv:14: this node is in a local system"), is_local, "{}", run.said());
+        assert_eq!(run.code, if is_local { 4 } else { 0 }, "{}", run.said());
+    }
+}
+
+/// A pointer in the place of a file that was not fetched, and a shape whose faces enclose nothing.
+#[test]
+fn advice_fits_the_file() {
+    let pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
+    for name in ["a.msh", "a.inp", "a.bdf", "a.unv", "a.step"] {
+        let run = solved(name, pointer, &format!("\"{name}\""), &NAMED);
+        assert!(
+            run.code == 6 && [name, "pointer of Git LFS", "git lfs pull"].iter().all(|word| run.stderr.contains(word)),
+            "{}",
+            run.said()
+        );
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let script = folder.path().join("faces.geo");
+    fs::write(&script, "SetFactory(\"OpenCASCADE\");\nRectangle(1) = {0,0,0,1,1};\n").expect("a script");
+    let text = made(&script, &["-0", "-format", "step"], "faces.step");
+    let run = solved("faces.step", &text, "{ geo = \"faces.step\", size = 0.5 }", &NUMBERED);
+    assert!(run.code == 4 && run.stderr.contains("faces without a solid"), "{}", run.said());
 }

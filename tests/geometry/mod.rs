@@ -7,6 +7,7 @@ mod ends;
 mod fits;
 mod foreign;
 mod gmsh;
+mod leaning;
 mod meshes;
 mod normals;
 mod patterns;

@@ -219,7 +219,7 @@ fn nothing_old_stands_beside_what_is_new() {
     let users = ["contact-notes.csv", "mesh.vtu", "notes.txt", "part.geo", "steps.toml"];
     users.iter().for_each(|name| fs::write(folder.join(name), "mine").expect("a file"));
     fs::write(folder.join("steps/mine.vtu"), "mine").expect("a file");
-    fs::write(folder.join("checkpoint"), "hours of work").expect("a file");
+    fs::write(folder.join("checkpoint"), "winkler checkpoint 1\nhours of work").expect("a file");
     // one that is refused has removed nothing
     let before = names(&folder);
     let refused = winkler(&[&["solve", &scene], &small[..], &["-ksp_tpye", "cg"]].concat());
@@ -229,7 +229,10 @@ fn nothing_old_stands_beside_what_is_new() {
     expected.sort_unstable();
     assert_eq!(names(&folder), expected);
     assert_eq!(names(&folder.join("steps")), ["mine.vtu"]);
-    assert_eq!(fs::read_to_string(folder.join("checkpoint.old")).expect("a file"), "hours of work");
+    assert_eq!(
+        fs::read_to_string(folder.join("checkpoint.old")).expect("a file"),
+        "winkler checkpoint 1\nhours of work"
+    );
     assert!(users.iter().all(|name| fs::read_to_string(folder.join(name)).is_ok_and(|text| text == "mine")));
 }
 

@@ -6,6 +6,7 @@ mod library;
 mod lines;
 mod manners;
 mod options;
+mod origins;
 mod pictures;
 mod refusals;
 mod schema;

@@ -317,3 +317,72 @@ fn multigrid_of_quadratic_elements_has_two_levels() {
     // linear elements have one level
     assert!(run("--set body.0.order=1 --set body.1.order=1").solvers().iter().all(|name| *name == "cg + hypre"));
 }
+
+/// A limit of no iteration is refused for every solver, also for the estimates of eigenvalues in multigrid. Smoothers
+/// may have none, and solvers that do not iterate read no limit.
+#[test]
+fn a_solver_without_iterations_is_refused() {
+    for (options, named) in [
+        ("--method newton --set solver=hypre -ksp_max_it 0", "-newton_ksp_max_it is 0"),
+        ("--method newton -newton_pc_type hypre -newton_ksp_max_it 0", "-newton_ksp_max_it is 0"),
+        ("--method newton-robin --set solver=hypre -ksp_max_it -1", "_ksp_max_it is -1"),
+        ("--set solver=icc -ksp_max_it 0", "_ksp_max_it is 0"),
+        ("-ksp_type gmres -pc_type jacobi -ksp_max_it 0", "_ksp_max_it is 0"),
+        ("-pc_type gamg -upper_ksp_max_it 0", "-upper_ksp_max_it is 0"),
+        ("-pc_type gamg -pc_gamg_esteig_ksp_max_it 0", "_pc_gamg_esteig_ksp_max_it is 0"),
+    ] {
+        let run = groove(options);
+        assert_eq!(run.code, 5, "{options}: {}", run.said());
+        assert!(run.stderr.contains(&format!("{named}: the solver would do nothing")), "{options}: {}", run.said());
+    }
+    for options in ["-pc_type cholesky -ksp_max_it 0", "-ksp_type preonly -pc_type lu -ksp_max_it 0"] {
+        assert!(groove(options).converged().warnings().contains("-ksp_max_it was not used"), "{options}");
+    }
+    let smoother = groove("-pc_type gamg -mg_levels_ksp_max_it 0");
+    assert!([0, 1].contains(&smoother.code), "{}", smoother.said());
+}
+
+/// Conjugate gradients that stagnate, because an option changes the problem, end with their last iteration.
+#[test]
+fn a_solve_that_stagnates_ends() {
+    let run = held("--set solver=hypre -ksp_constant_null_space -ksp_max_it 1500");
+    assert!(run.code == 1 && run.text("status") != "converged", "{}", run.said());
+}
+
+/// Where a sweep applies multigrid once, an option that steers the iteration lets it solve, and one that only looks is
+/// told to show nothing.
+#[test]
+fn options_of_the_iteration_are_never_ignored() {
+    let swept = |options: &str| held(&format!("--method newton-robin --set solver=hypre {options}")).converged();
+    let once = swept("");
+    assert_eq!(once.count("inner_iterations") % once.count("sweeps"), 0);
+    let exact = swept("-ksp_rtol 1e-12 -ksp_converged_reason");
+    assert_eq!(exact.warnings(), "");
+    assert!(exact.stdout.matches("solve converged due to CONVERGED_RTOL").count() >= exact.count("sweeps"));
+    assert!(exact.count("sweeps") < once.count("sweeps"), "{} {}", exact.count("sweeps"), once.count("sweeps"));
+    assert!(exact.count("inner_iterations") > 4 * exact.count("sweeps"));
+    assert!(swept("-upper_ksp_type gmres").count("sweeps") < once.count("sweeps"));
+    let looking = swept("-ksp_monitor -upper_ksp_view");
+    assert_eq!(looking.count("sweeps"), once.count("sweeps"));
+    assert!(looking.warnings().contains("nothing to show for -ksp_monitor -upper_ksp_view"), "{}", looking.warnings());
+    // solves that nobody makes have no reason to converge
+    for options in ["--method newton -upper_ksp_converged_reason", "--method robin -newton_ksp_converged_reason"] {
+        let run = held(&format!("{options} --set solver=mumps"));
+        let option = options.split(' ').next_back().unwrap_or_default();
+        assert!(run.warnings().contains(option), "{options}: {}", run.warnings());
+    }
+    // the preset of the scene is that of the matrix of all bodies, too
+    for (solver, name) in [("icc", "cg + icc"), ("gamg", "cg + gamg")] {
+        assert_eq!(held(&format!("--method newton --set solver={solver}")).converged().solvers(), [name; 2]);
+    }
+}
+
+/// Algebraic multigrid of all bodies has the rigid motions of each, on one rank and on two. Without them it takes 115
+/// iterations on one.
+#[test]
+fn multigrid_of_all_bodies_has_their_rigid_motions() {
+    let words = ["--method", "newton", "--set", "mesh.set.n=4", "-newton_pc_type", "gamg"];
+    let runs = [1, 2].map(|ranks| solve_on(ranks, case("groove3d"), &words).converged());
+    let counts = [0, 1].map(|k| runs[k].count("inner_iterations"));
+    assert!(counts.iter().all(|count| *count < 60), "{counts:?}");
+}

@@ -1,6 +1,6 @@
 //! The page of a run.
 
-use crate::common::{case, output, solve};
+use crate::common::{Scene, case, output, solve};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
@@ -176,5 +176,39 @@ fn bodies_in_space_are_their_surfaces() {
             assert!(dom.contains("<output>× "), "the view is not drawn");
             assert!(dom.contains("<span style=\"background"), "no colours");
         }
+    }
+}
+
+/// A stud on a plate: facets of the plate beside the stud have no partner, and are open.
+#[test]
+fn facets_beside_a_contact_are_open() {
+    const PLATE: &str = "SetFactory(\"OpenCASCADE\"); Rectangle(1) = {-6, -2, 0, 12, 2}; Rectangle(2) = {-1, 0, 0, 2, 2};
+        Transfinite Curve {3} = 25; Transfinite Curve {5} = 5; MeshSize {:} = 1;
+        Physical Surface(\"plate\") = {1}; Physical Surface(\"stud\") = {2};
+        Physical Curve(\"plate_top\") = {3}; Physical Curve(\"plate_bottom\") = {1}; Physical Curve(\"stud_top\") = {7}; Physical Curve(\"stud_bottom\") = {5};\n";
+    for soft in ["plate", "stud"] {
+        let body = |name: &str, keys: &str| {
+            let young = if name == soft { 1e4 } else { 1e5 };
+            format!("[[body]]\nname = \"{name}\"\nyoung = {young}\npoisson = 0\n{keys}\n")
+        };
+        let scene = Scene::new(format!(
+            "dimension = 2\nmesh = \"plate.geo\"\n{}{}[[contact]]\nbetween = [\"plate_top\", \"stud_bottom\"]\nlayer = {{ linear = {{ stiffness = 1e4 }} }}\n",
+            body("plate", "fix = [{ on = \"plate_bottom\", x = 0, y = 0 }]"),
+            body("stud", "fix = [{ on = \"stud_top\", x = 0 }]\nload = [{ on = \"stud_top\", pressure = 1 }]"),
+        ));
+        std::fs::write(scene.path.with_file_name("plate.geo"), PLATE).expect("a script");
+        let run = solve(&scene, &["--report"]).converged();
+        let view = view(&page(&run.folder));
+        let lines = |body: usize, kind: &str| {
+            let marks = view["bodies"][body]["marks"].as_array().expect("marks");
+            let found = marks.iter().find(|mark| mark[0] == kind);
+            let text = found.map_or("", |mark| mark[1][1].as_str().expect("base64"));
+            STANDARD.decode(text).expect("base64").len() / 8
+        };
+        assert_eq!(
+            [lines(0, "closed"), lines(0, "open"), lines(1, "closed"), lines(1, "open")],
+            [4, 20, 4, 0],
+            "{soft}"
+        );
     }
 }

@@ -292,6 +292,29 @@ fn petsc_options() {
     refused(&solve(&scene, &[]), SCENE, &["options", "command line"]);
 }
 
+/// Keys that the method does not read are refused, unless an option has replaced the method that reads them.
+#[test]
+fn keys_of_other_methods() {
+    let typed = |options: &[&str], words: &[&str]| refused(&solve(case("groove"), options), SCENE, words);
+    for key in ["psi=full", "gamma=0.5", "robin=frozen"] {
+        let name = key.split('=').next().unwrap_or_default();
+        let said = format!("the method `newton` does not read `{name}`");
+        typed(&["--method", "newton", "--set", &format!("method.{key}")], &[&said, "--set method.", "`robin`"]);
+    }
+    typed(&["--set", "method={name='auto',gamma='aitken'}"], &["the method `auto` does not read `gamma`"]);
+    typed(&["--method", "newton-robin", "--set", "method.gamma=1"], &["`newton-robin` does not read `gamma`"]);
+    typed(&["--set", "method={name='auto',linear='direct',psi='full'}"], &["does not read `psi`", "`newton-robin`"]);
+    groove_refused(
+        "gamma = 0.6",
+        "gamma = 0.6\nname = \"newton\"",
+        "gamma = 0.6",
+        &["the method `newton` does not read"],
+    );
+    for options in ["method.name=newton", "method={name='newton-robin',psi='full',robin='tangent'}"] {
+        solve(case("groove"), &["--set", "mesh.set.n=4", "--set", options]).converged();
+    }
+}
+
 #[test]
 fn a_folder_that_cannot_be_made() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -469,4 +492,67 @@ fn a_reader_that_goes_away() {
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(!said.contains("panicked"), "{args:?}: {said}");
     }
+}
+
+/// Two layers between the same facets are refused by the facets, whatever the groups are called. A surface may face two others.
+#[test]
+fn two_layers_on_the_same_facets() {
+    const BLOCKS: &str = "For k In {0:1}
+        p=10*k;
+        Point(p+1)={0,k,0};Point(p+2)={2,k,0};Point(p+3)={2,k+1,0};Point(p+4)={1,k+1,0};Point(p+5)={0,k+1,0};Point(p+6)={1,k,0};
+        Line(p+1)={p+1,p+6};Line(p+2)={p+6,p+2};Line(p+3)={p+2,p+3};Line(p+4)={p+3,p+4};Line(p+5)={p+4,p+5};Line(p+6)={p+5,p+1};
+        Curve Loop(k+1)={p+1:p+6};Plane Surface(k+1)={k+1};
+        EndFor
+        Mesh.MeshSizeMax=0.5;
+        Physical Surface(\"lower\")={1};Physical Surface(\"upper\")={2};Physical Curve(\"base\")={1,2};Physical Curve(\"head\")={14,15};
+        Physical Curve(\"right\")={4};Physical Curve(\"all\")={4,5};Physical Curve(\"same\")={4,5};Physical Curve(\"left\")={5};
+        Physical Curve(\"under\")={11,12};Physical Curve(\"under_left\")={11};Physical Curve(\"under_right\")={12};\n";
+    let solved = |contacts: &[&str]| {
+        let contacts: Vec<String> = contacts
+            .iter()
+            .map(|keys| format!("[[contact]]\n{keys}\nlayer = {{ linear = {{ stiffness = 1e5 }} }}\n"))
+            .collect();
+        let scene = Scene::new(format!(
+            "dimension = 2\nmesh = \"blocks.geo\"\n[[body]]\nname = \"lower\"\nyoung = 7e3\npoisson = 0\nfix = [{{ on = \"base\", x = 0, y = 0 }}]\n\
+             [[body]]\nname = \"upper\"\nyoung = 7e3\npoisson = 0\nfix = [{{ on = \"head\", x = 0 }}]\nload = [{{ on = \"head\", pressure = 3 }}]\n{}",
+            contacts.concat()
+        ));
+        std::fs::write(scene.path.with_file_name("blocks.geo"), BLOCKS).expect("a script");
+        solve(&scene, &[])
+    };
+    let (pair, obstacle) = ("between = [\"all\", \"under\"]", "on = \"all\"\nobstacle = true\ngap = 1");
+    for (first, second, words) in [
+        (
+            pair,
+            "between = [\"same\", \"under\"]",
+            "`same` and `under` have facets in common with the contact of `all` and `under`",
+        ),
+        (pair, "between = [\"under\", \"right\"]", "`under` and `right` have facets in common"),
+        (pair, "between = [\"left\", \"under_left\"]\nbond = true", "`left` and `under_left` have facets in common"),
+        (obstacle, "on = \"right\"\nobstacle = true\ngap = 2", "`right` and `obstacle` have facets in common"),
+    ] {
+        refused(&solved(&[first, second]), SCENE, &[words, "two layers"]);
+    }
+    for contacts in [
+        &["between = [\"left\", \"under\"]", "between = [\"right\", \"under\"]"][..],
+        &["between = [\"all\", \"under_left\"]", "between = [\"same\", \"under_right\"]"],
+        &[pair, "on = \"same\"\nobstacle = true\ngap = 1"],
+    ] {
+        let run = solved(contacts).converged();
+        assert!((run.number("pairs/0/peak_pressure") / 3.0 - 1.0).abs() < 1e-6, "{}", run.said());
+    }
+}
+
+/// A sweep adapts no mesh, and does not solve loosely in its place.
+#[test]
+fn sweeps_do_not_adapt() {
+    let path = case("groove-held").display().to_string();
+    let over = ["--over", "contact.0.layer.power.a=0.5,1", "--set", "mesh.set.n=4"];
+    for words in [["--tolerance", "1e-2"], ["--set", "adapt={error=0.5}"]] {
+        let run = winkler(&[&["sweep", &path][..], &words, &over].concat());
+        assert!(run.code == 2 && run.stderr.contains("adapts none"), "{}", run.said());
+    }
+    let run = winkler(&[&["sweep", &path, "--estimate", "-o", "out"][..], &over].concat());
+    let table = std::fs::read_to_string(run.folder.join("out/sweep.csv")).expect("a table");
+    assert!(run.code == 0 && table.contains("pressure_estimate lower-upper"), "{}\n{table}", run.said());
 }

@@ -10,9 +10,10 @@ use std::path::Path;
 fn groove(steps: &str) -> Scene {
     let text = text_of("groove-held");
     let (held, _) = text.split_once("[method]").expect("a method");
+    let path = |name: &str| if steps.contains("table") { format!(", path = \"{name}\"") } else { String::new() };
     let text = held
-        .replace("pressure = 10 }", "pressure = 10, path = \"press\" }")
-        .replace("on = \"lower_face\", y = 0 }", "on = \"lower_face\", y = 1e-3, path = \"lift\" }")
+        .replace("pressure = 10 }", &format!("pressure = 10{} }}", path("press")))
+        .replace("on = \"lower_face\", y = 0 }", &format!("on = \"lower_face\", y = 1e-3{} }}", path("lift")))
         .replace("n = 32", "n = 8");
     Scene::new(format!("{text}[method]\nstop = {{ residual = 1e-10 }}\n{steps}"))
 }
@@ -294,4 +295,32 @@ fn tables_that_are_none_are_refused_with_their_line() {
     // a load that grows beyond the range of numbers is refused in its step, and the rows before are there
     let run = solve(with_table("press,lift\n1,0\n1e308,1\n"), &[]);
     assert!(run.code == 3 && steps(&run.folder).rows() == 1, "{}", run.said());
+}
+
+/// A history has the status of its worst step; what later steps keep of such a step is named.
+#[test]
+fn a_history_is_as_good_as_its_worst_step() {
+    let scene = with_table("press, lift\n1, 0\n0, 0\n");
+    let run = solve(&scene, &["--method", "newton", "--set", "method.stop.iterations=1"]);
+    let statuses = [0, 1].map(|step| run.text(&format!("steps/{step}/status")).to_owned());
+    assert_eq!(statuses, ["iteration-limit", "converged"], "{}", run.said());
+    assert_eq!((run.code, run.text("status")), (1, "iteration-limit"), "{}", run.said());
+    assert!(run.text("message").starts_with("1 of 2 load steps found no solution; load step 1: "), "{}", run.said());
+    let kept = Scene::edited("bolt", "[method]", "[method]\nstop = { iterations = 1 }");
+    fs::copy(case("bolt").with_file_name("tighten.csv"), kept.path.with_file_name("tighten.csv")).expect("a table");
+    let run = solve(&kept, &["--method", "robin", "--set", "method.gamma=0.3"]);
+    assert!(run.warnings().contains("keep the offset of `top1` and `cut`"), "{}", run.said());
+}
+
+/// Names of columns that `steps.csv` has itself, and a path of an expression, which has the columns as variables.
+#[test]
+fn columns_of_the_table_of_steps() {
+    for name in ["step", "status", "iterations", "residual"] {
+        let run = solve(with_table(&format!("{name}, press, lift\n1, 1, 0\n")), &[]);
+        assert_eq!(run.code, 3, "{}", run.said());
+        assert!(run.stderr.contains(&format!("a column is called `{name}`")), "{}", run.said());
+    }
+    let sets = ["--set", "contact.0.force=10*press", "--set", "contact.0.path=press"];
+    let run = solve(with_table(PATH), &sets);
+    assert!(run.code == 3 && run.stderr.contains("`path` of an expression"), "{}", run.said());
 }

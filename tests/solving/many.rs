@@ -81,14 +81,14 @@ fn the_busiest_pairs_have_files() {
     assert_eq!(rows.len(), pairs.len());
     let number = |row: &[&str], column: usize| row[column].parse::<f64>().expect("a number");
     let force = |row: &&Vec<&str>| number(row, 6).hypot(number(row, 7));
-    let (tabled, others): (Vec<_>, Vec<_>) = rows.iter().partition(|row| !row[29].is_empty());
+    let (tabled, others): (Vec<_>, Vec<_>) = rows.iter().partition(|row| !row[35].is_empty());
     let least = tabled.iter().map(force).fold(f64::INFINITY, f64::min);
     assert!(tabled.len() == LISTED && others.iter().map(force).all(|force| force <= least), "{text}");
     for row in tabled {
-        let table = run.table(row[29]);
-        assert_eq!((table.rows(), files(&run, row[30], "")), (row[4].parse().expect("points"), 1));
+        let table = run.table(row[35]);
+        assert_eq!((table.rows(), files(&run, row[36], "")), (row[4].parse().expect("points"), 1));
         let most = table["pressure"].iter().copied().fold(0.0, f64::max);
-        assert_eq!(most, number(row, 9));
+        assert_eq!(most, number(row, 11));
     }
     // the bed joints above the first course carry all that lies on it: 1.75 m of wall, courses of 0.125 m
     let first: Vec<String> = (1..=SIDE).map(|brick| format!("brick_odd_{brick}")).collect();

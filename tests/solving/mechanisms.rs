@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::common::{Run, Scene, distance, root, solve, solve_on, winkler};
+use crate::common::{Run, Scene, case, distance, root, solve, solve_on, winkler};
 
 const METHODS: [&str; 4] = ["auto", "newton", "newton-robin", "robin"];
 
@@ -84,7 +84,8 @@ fn pressed_together_by_opposite_loads() {
     for (text, methods, motions) in [(&stack, &FAST[..], whole), (&revolved, &FAST[..2], "translation along y")] {
         let scene = Scene::new(text.as_str());
         for method in methods {
-            let run = solve(&scene, &["--method", method, "--set", "method.robin=auto"]).converged();
+            let robin: &[&str] = if *method == "newton" { &[] } else { &["--set", "method.robin=auto"] };
+            let run = solve(&scene, &[&["--method", method], robin].concat()).converged();
             (0..2).for_each(|pair| uniform(&run, pair, 10.0));
             let named = format!(
                 "bodies `b1`, `b2` and `b3`: nothing holds them together in their {motions}, and no load works on it"
@@ -393,5 +394,21 @@ fn balanced_bolts_are_enough_on_every_mesh() {
         let run = solve(&scene, more).converged();
         assert!(run.warnings().contains("nothing holds them together"), "{}", run.warnings());
         assert!((run.forces(0)[0][2].abs() / 1e3 - 1.0).abs() < 0.05, "{}", run.said());
+    }
+}
+
+/// A patch that is bonded and loaded along the bond: `check` ends as `solve` does, and both say that bonds carry no shear.
+#[test]
+fn a_bond_carries_no_shear() {
+    let path = case("patch").display().to_string();
+    let keys = ["body.1.fix=[]", "body.1.load=[{on='upper_face',traction=[1,0]}]"];
+    for (bond, says) in [("contact.0.bond=true", true), ("contact.0.bond=false", false)] {
+        let sets: Vec<&str> = keys.iter().chain([&bond]).flat_map(|set| ["--set", *set]).collect();
+        for command in ["check", "solve"] {
+            let run = winkler(&[&[command, &path][..], &sets].concat());
+            assert_eq!(run.code, 1, "{command} {bond}: {}", run.said());
+            let words = "a bond acts along the normal only and carries no shear";
+            assert_eq!(run.stdout.contains(words), says, "{command} {bond}: {}", run.said());
+        }
     }
 }

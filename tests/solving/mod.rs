@@ -9,5 +9,6 @@ mod many;
 mod mechanisms;
 mod methods;
 mod robustness;
+mod saturating;
 mod steps;
 mod stopping;

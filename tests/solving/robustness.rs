@@ -1,7 +1,8 @@
 //! Where rounding or a bad start spoiled the answer: columns of two blocks whose pressure a line of algebra gives.
 
+use crate::common::blocks::Blocks;
 use crate::common::shapes::SHAPES;
-use crate::common::{Run, Scene, distance, solve, solve_on};
+use crate::common::{Run, Scene, case, distance, solve, solve_on};
 
 /// Two unit blocks of modulus `young` on each other, the lower one on a roller; Poisson's ratio is zero, so that each is a
 /// spring. `upper` is what holds and loads the upper one.
@@ -331,6 +332,19 @@ fn a_run_that_rounding_ends_is_soon_over() {
     assert!(run.number("residual") < 1e-12 && run.count("iterations") <= 12, "{}", run.said());
 }
 
+/// A support that draws blocks together over a far overlap, or a far gap, leaves no more digits than `rounding` says.
+#[test]
+fn far_overlaps_have_their_error() {
+    for gap in ["-1e4", "-1e8", "1e8", "-1e10", "-1e12"] {
+        let args = ["mesh.set.n=4", "method={}", &format!("contact.0.gap={gap}")];
+        let args: Vec<&str> = args.iter().flat_map(|set| ["--set", set]).collect();
+        let run = solve(case("groove-held"), &args);
+        let off = (run.number("pairs/0/peak_pressure") / 10.0 - 1.0).abs();
+        assert!(run.code != 0 || off <= run.number("rounding") + 1e-6, "{gap}: {off:e}, {}", run.said());
+        assert_eq!(run.code == 0 && run.text("status") == "converged", gap == "-1e4", "{gap}: {}", run.said());
+    }
+}
+
 /// Solvers have thresholds: MUMPS takes pivots below 1e-20 for zeros, and residuals below 1e-50 were none. Units change nothing but the last digits.
 #[test]
 fn units_are_the_users_choice() {
@@ -407,5 +421,43 @@ fn stiff_layers_have_their_error() {
             let off = run.contact()["pressure"].iter().map(|p| (p / 150.0 - 1.0).abs()).fold(0.0, f64::max);
             assert!(run.code != 0 || off < of(&run) + 1e-12, "{method}, {stiffness}: {off:e}, {}", run.said());
         }
+    }
+}
+
+/// Multigrid of two small blocks on a stiff layer, the upper one held sideways by soft springs: rows near the contact
+/// are most of all rows. It takes at most as many iterations as there are dofs, for the pressures of a factorisation.
+#[test]
+fn multigrid_of_a_small_mesh_on_a_stiff_layer() {
+    let mut mesh = Blocks::default();
+    mesh.add("lo", 3, 1, 2, |[x, y, z]| [x, y, 0.6 * z - 0.6]);
+    mesh.add("up", 3, 1, 2, |[x, y, z]| [x + 0.15, 0.9 * y, 0.59 * z + 0.01]);
+    let scene = Scene::new(
+        r#"
+dimension = 3
+mesh = "blocks.msh"
+[[body]]
+name = "lo"
+young = 7000
+poisson = 0.3
+fix = [{ on = "lo_low", x = 0, y = 0, z = 0 }]
+[[body]]
+name = "up"
+young = 17061
+poisson = 0.3
+load = [{ on = "up_high", force = [0, 0, -0.95], moment = [0.0476, 0.0286, 0], rigid = true }]
+spring = [{ on = "up_side", stiffness = [1, 1, 0] }]
+[[contact]]
+between = ["lo_high", "up_low"]
+touching = true
+layer = { linear = { stiffness = 1e7 } }
+"#,
+    );
+    std::fs::write(scene.path.with_file_name("blocks.msh"), mesh.text(1, |x| x.to_string())).expect("a mesh");
+    let run = |ranks: usize, solver: &str| solve_on(ranks, &scene, &["--set", solver]).converged();
+    let exact = run(1, "solver=mumps");
+    for ranks in [1, 2] {
+        let found = run(ranks, "solver=hypre");
+        assert!(found.count("inner_iterations") <= found.count("dofs"), "{}", found.count("inner_iterations"));
+        assert!(distance(&found.contact()["pressure"], &exact.contact()["pressure"]) < 1e-6);
     }
 }

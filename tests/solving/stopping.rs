@@ -78,13 +78,10 @@ impl Working {
 
     /// The processes that this one started, by their numbers.
     fn children(&self) -> Vec<u32> {
-        let id = self.child.0.id();
-        let path = format!("/proc/{id}/task/{id}/children");
-        fs::read_to_string(path)
-            .unwrap_or_default()
-            .split_whitespace()
-            .map(|id| id.parse().expect("a number"))
-            .collect()
+        let threads = fs::read_dir(format!("/proc/{}/task", self.child.0.id())).into_iter().flatten().flatten();
+        let children = |thread: fs::DirEntry| fs::read_to_string(thread.path().join("children")).unwrap_or_default();
+        let all: Vec<String> = threads.map(children).collect();
+        all.join(" ").split_whitespace().map(|id| id.parse().expect("a number")).collect()
     }
 
     fn signal(&self, name: &str) {
@@ -174,6 +171,24 @@ fn a_second_signal_ends_at_once() {
     let (status, scratch, said) = run.end();
     assert_eq!(status.code(), Some(143), "{said}");
     assert!(!scratch.path().join("results/report.json").exists());
+}
+
+/// METIS catches SIGTERM, and SIGABRT, which nothing else catches, while it works. SIGTERM ends the run all the same.
+#[test]
+fn a_library_takes_no_signal() {
+    let scene = case("patch-3d");
+    let mesh = ["--set", "mesh.set={nl=20,nu=19}", "--set", "solver=condensed"];
+    let mut run = Working::start(&words(&scene, &mesh), 1);
+    let status = format!("/proc/{}/status", run.child.0.id());
+    let is_caught = || {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let mask = text.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigCgt:")?.trim(), 16).ok());
+        mask.is_some_and(|mask| mask >> (6 - 1) & 1 == 1)
+    };
+    run.until("METIS", |_| is_caught());
+    run.signal("TERM");
+    let (status, _, said) = run.end();
+    assert_eq!(status.code(), Some(143), "{said}");
 }
 
 /// A run that was killed within its load steps goes on after the last one that ended.

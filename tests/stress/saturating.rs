@@ -1,5 +1,6 @@
-//! Random scenes whose layer saturates: a block on rollers under another, with a table law of two to four pieces whose last slope nearly vanishes,
-//! and a load of 0.1 to 0.95 of what the layer can bear. All are convex, and have a solution.
+//! Random scenes whose layer saturates: a block on another, with a table law of two to four pieces whose last slope nearly vanishes, and a load of 0.1 to
+//! 0.95 of what the layer can bear. Contact alone holds the upper block along the load; in every second scene it has a wavy gap, and a load that is not
+//! even, or an obstacle presses it. All are convex, and have a solution.
 
 use super::random::Random;
 use super::scenes::{Case, Expect};
@@ -8,9 +9,74 @@ use std::path::Path;
 /// Largest pressure of the layer before its last, nearly flat piece.
 const PLATEAU: f64 = 5.0;
 
-/// Return scene `index` of a series. The blocks are four wide.
+/// Return scene `index` of a series.
 pub fn scene(seed: u64, index: usize, root: &Path) -> Case {
     let mut random = Random::new(seed, index);
+    if index % 2 == 1 { pressed(index, &mut random, root) } else { groove(index, random, root) }
+}
+
+/// Return a scene with two blocks of width one and meshes that do not match, in the plane or of revolution.
+fn pressed(index: usize, random: &mut Random, root: &Path) -> Case {
+    let plane = random.pick(&["strain", "stress", "axisymmetric"]);
+    let steep = format!(
+        "[{:e}, {PLATEAU}], [10, {:e}]",
+        random.power_of_ten(-8.0, -3.0),
+        PLATEAU + random.power_of_ten(-5.0, -1.0)
+    );
+    let layer = format!("table = [{}]", if random.chance(0.5) { steep } else { table(random) });
+    let [n1, n2] = [random.pick(&[3, 6, 12]), random.pick(&[3, 6, 12])];
+    let mean = PLATEAU * random.uniform(0.1, 0.95);
+    let gap = format!("{:e}*sin({:e}*x)", random.power_of_ten(-4.5, -2.0), random.uniform(2.0, 18.0));
+    let (taper, is_round) = (random.uniform(-0.03, 0.03), plane == "axisymmetric");
+    let has_obstacle = !is_round && random.chance(0.4);
+    let mut body = |name: &str, more: &str| {
+        let (young, order) = (random.power_of_ten(2.5, 5.0), random.pick(&[1, 2]));
+        format!("[[body]]\nname = \"{name}\"\nyoung = {young:e}\npoisson = 0.3\norder = {order}\n{more}\n")
+    };
+    let lower = body("b1", "fix = [{ on = \"b1_bottom\", y = 0 }, { on = \"b1_left\", x = 0 }]");
+    let side = if is_round { "" } else { "fix = [{ on = \"b2_left\", x = 0 }]" };
+    let load = format!("load = [{{ on = \"b2_top\", pressure = \"{mean:e}*(1 + {taper:e}*x)\" }}]");
+    let upper = body("b2", &format!("{side}\n{}", if has_obstacle { "" } else { &load }));
+    let press = if has_obstacle {
+        let law = match random.pick(&[0, 1, 2]) {
+            0 => format!("exponential = {{ p0 = {PLATEAU}, c0 = {:e} }}", random.power_of_ten(-6.0, -3.0)),
+            1 => format!("linear = {{ stiffness = {:e} }}", random.power_of_ten(2.0, 7.0)),
+            _ => format!("table = [{}]", table(random)),
+        };
+        let (rise, moment) = (random.power_of_ten(-4.0, -2.0), taper * mean);
+        format!(
+            "[[contact]]\non = \"b2_top\"\nobstacle = true\ngap = \"{rise:e}*(x - 0.5)^2\"\nforce = {mean:e}\nmoment = {moment:e}\n\
+             layer = {{ {law} }}\n"
+        )
+    } else {
+        String::new()
+    };
+    let carried = match (is_round, has_obstacle) {
+        (true, _) => 2.0 * std::f64::consts::PI * mean * (0.5 + taper / 3.0),
+        (_, true) => mean,
+        _ => mean * (1.0 + 0.5 * taper),
+    };
+    let script = root.join("meshes/stack/stack.geo");
+    let text = format!(
+        "dimension = 2\nplane = \"{plane}\"\nmesh = {{ geo = \"{}\", set = {{ rows = 2, columns = 1, n1 = {n1}, n2 = {n2} }} }}\n{lower}{upper}\
+         [[contact]]\nbetween = [\"b1_top\", \"b2_bottom\"]\ngap = \"{gap}\"\nlayer = {{ {layer} }}\n{press}",
+        script.display()
+    );
+    Case {
+        index,
+        line: format!("saturating {index}: {plane} n {n1} {n2} q {mean} gap {gap} {layer} {press}").replace('\n', " "),
+        text,
+        expect: Expect::Solution,
+        hanging: true,
+        pressure: mean,
+        carried: Some(carried),
+        gamma: 0.5,
+        start: None,
+    }
+}
+
+/// Return a scene with a block on rollers under another; both are four wide.
+fn groove(index: usize, mut random: Random, root: &Path) -> Case {
     let layer = table(&mut random);
     let [mesh, pressure] = [random.pick(&[4.0, 6.0, 8.0, 12.0]), PLATEAU * random.uniform(0.1, 0.95)];
     let gap = format!("{:e}*sin({:e}*x)", random.power_of_ten(-5.0, -3.0), random.uniform(2.0, 15.0));

@@ -9,6 +9,7 @@ mod process;
 pub use plan::BenchArgs;
 
 use super::cases::Case;
+use super::inputs;
 use super::rows::{Row, aligned};
 use crate::error::Result;
 use crate::interrupt::Interrupt;
@@ -18,6 +19,9 @@ use compare::{PairPoints, difference};
 use plan::{Benchmark, COLUMNS, Measured, is_of_mesh, usage};
 use process::Runner;
 use std::collections::BTreeSet;
+
+/// The table of all runs.
+const TABLE: &str = "bench.csv";
 
 /// Run all combinations, and write `bench.csv` row by row and the plots at the end.
 ///
@@ -34,8 +38,11 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     let bench = Benchmark::new(request)?;
     let reference = bench.reference(request)?;
     let folder = Folder::claim(bench.folder(request))?;
+    let names: Vec<String> = plots::names(&bench).chain([TABLE.to_owned()]).collect();
+    folder.check(&names, &bench.scenes.iter().flat_map(inputs).collect::<Vec<_>>())?;
     let runner = Runner::new(interrupt, request.timeout, request.repeat, folder.path())?;
-    let mut file = RowFile::create(&folder, "bench.csv")?;
+    bench.plan.cases.iter().try_for_each(|case| runner.check(case, request.against.as_deref()))?;
+    let mut file = RowFile::create(&folder, TABLE)?;
     let bar = terminal::runs(bench.plan.cases.len(), !request.quiet);
     let (mut rows, mut meshed) = (Vec::new(), BTreeSet::new());
     for case in &bench.plan.cases {
@@ -58,7 +65,7 @@ pub fn bench(interrupt: &Interrupt, request: &BenchArgs) -> Result<i32> {
     bar.finish_and_clear();
     file.finish()?;
     bench.compare_with_finest(&mut rows, &runner);
-    let mut file = RowFile::create(&folder, "bench.csv")?;
+    let mut file = RowFile::create(&folder, TABLE)?;
     rows.iter()
         .for_each(|Measured { case, row }| file.push(&bench.plan.fields(case).chain(row.fields()).collect::<Vec<_>>()));
     file.finish()?;

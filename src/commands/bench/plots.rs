@@ -3,7 +3,7 @@
 use super::plan::{Benchmark, Measured, is_of_mesh};
 use crate::commands::rows::Row;
 use crate::linalg::fit;
-use crate::output::{Color, Plot, PlotAxis, Series, Style};
+use crate::output::{Color, Plot, PlotAxis, Series, Style, safe_name};
 
 /// Return all plots for which the rows have numbers, with the names of their files. With several scenes a name has the scene in it.
 pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)> {
@@ -13,17 +13,27 @@ pub(super) fn plots(rows: &[Measured], bench: &Benchmark) -> Vec<(String, Plot)>
         let rows: Vec<&Measured> = rows.iter().filter(is_shown).collect();
         let chart = Chart { rows: &rows, bench, title: &scene.title };
         let list = [
-            ("time-error", chart.time_error()),
-            ("time-dofs", chart.against_dofs(|row| chart.time(row), chart.time_label())),
-            ("memory-dofs", chart.against_dofs(|row| row.memory_mb, "peak memory, MB")),
+            chart.time_error(),
+            chart.against_dofs(|row| chart.time(row), chart.time_label()),
+            chart.against_dofs(|row| row.memory_mb, "peak memory, MB"),
         ];
-        let file = |what: &str| match bench.names.len() {
-            1 => format!("{what}.svg"),
-            _ => format!("{what}-{name}.svg"),
-        };
-        plots.extend(list.into_iter().filter_map(|(what, plot)| Some((file(what), plot?))));
+        let files = KINDS.map(|what| file(what, name, bench));
+        plots.extend(files.into_iter().zip(list).filter_map(|(file, plot)| Some((file, plot?))));
     }
     plots
+}
+
+/// What is drawn for each scene.
+const KINDS: [&str; 3] = ["time-error", "time-dofs", "memory-dofs"];
+
+/// Return the names of the files of all plots.
+pub(super) fn names(bench: &Benchmark) -> impl Iterator<Item = String> {
+    bench.names.iter().flat_map(|name| KINDS.map(|what| file(what, name, bench)))
+}
+
+/// Return the name of the file of a plot. With several scenes it has the name of the scene in it.
+fn file(what: &str, name: &str, bench: &Benchmark) -> String {
+    if bench.names.len() == 1 { format!("{what}.svg") } else { format!("{what}-{}.svg", safe_name(name)) }
 }
 
 struct Chart<'a> {

@@ -7,7 +7,8 @@ use crate::error::{Error, Kind, Result};
 use crate::file::digest;
 use crate::interrupt::{self, Interrupt};
 use crate::linalg::range;
-use crate::output::safe_name;
+use crate::output::folder::{MARK, REPORT, is_made, refuse_link};
+use crate::output::{Folder, refuse_foreign, safe_name, write_whole};
 use crate::petsc::launcher;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -30,6 +31,9 @@ pub(super) struct Runner {
     repeat: usize,
     interrupt: Interrupt,
 }
+
+/// Name of the file with the output of a run.
+const LOG: &str = "output.txt";
 
 /// Time that a process gets to end itself.
 const GRACE: Duration = Duration::from_secs(5);
@@ -64,6 +68,26 @@ impl Runner {
         }
         let start: String = name.chars().take(LONGEST_NAME / 2).collect();
         self.folder.join(format!("{start}-{:.12}", digest(&name)))
+    }
+
+    /// Check that a case can have its folder, and that results to compare `against` are not among those that it replaces.
+    ///
+    /// # Errors
+    /// A link or a log of another origin is in the way, or the results are those of the case.
+    pub fn check(&self, case: &Case, against: Option<&Path>) -> Result<()> {
+        let folder = self.folder(case);
+        [&self.folder, &folder].into_iter().try_for_each(|path| refuse_link(path))?;
+        if against
+            .and_then(|against| against.canonicalize().ok())
+            .is_some_and(|own| folder.canonicalize().ok() == Some(own))
+        {
+            return Err(usage(format!(
+                "a run would replace the results in {}, which are to compare with",
+                folder.display()
+            ))
+            .help("copy them, or name another folder with `-o`"));
+        }
+        refuse_foreign(&folder.join(LOG))
     }
 
     /// Make the mesh of a case with these overrides. A failure is not reported here, since the run itself fails in the same way.
@@ -120,10 +144,10 @@ impl Runner {
                 command.env(name, "1");
             }
         }
-        // results of an earlier run must not be taken for those of this run; there may be none
-        let _ = fs::remove_dir_all(&folder);
+        // results of an earlier run must not be taken for those of this run
+        Folder::create(&folder)?.clear()?;
         let ended = self.finish(command, &folder)?;
-        let report = fs::read(folder.join("report.json")).ok();
+        let report = fs::read(folder.join(REPORT)).ok().filter(|_| is_made(&folder.join(REPORT)));
         let report = report.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let row = match (ended.used.as_ref(), report) {
             (None, _) => Row::unsolved("failed", &ended.output),
@@ -140,14 +164,13 @@ impl Runner {
         })
     }
 
-    /// Start a process, wait for it, and end it when its time is over. Its output goes to `output.txt` in the folder.
+    /// Start a process, wait for it, and end it when its time is over. Its output goes to [`LOG`] in the folder, behind a line with its command.
     fn finish(&self, mut command: Command, folder: &Path) -> Result<Ended> {
         fs::create_dir_all(folder).map_err(|cause| Error::file(folder, "create the folder", &cause))?;
-        let path = folder.join("output.txt");
+        let path = folder.join(LOG);
         let failed = |cause: std::io::Error| Error::file(&path, "write", &cause);
-        // a file of this name is replaced: a pipe would keep its writer waiting
-        let _ = fs::remove_file(&path);
-        let file = File::create_new(&path).map_err(failed)?;
+        write_whole(&path, |out| writeln!(out, "{MARK}: {command:?}"))?;
+        let file = File::options().append(true).open(&path).map_err(failed)?;
         let both = file.try_clone().map_err(failed)?;
         command.stdin(Stdio::null()).stdout(file).stderr(both);
         let began = Instant::now();
@@ -164,7 +187,8 @@ impl Runner {
             return Err(Error::new(Kind::Stopped(signal), message));
         }
         let seconds = began.elapsed().as_secs_f64();
-        let output = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();
+        let log = String::from_utf8_lossy(&fs::read(&path).unwrap_or_default()).into_owned();
+        let output = log.split_once('\n').map_or(String::new(), |(_, output)| output.to_owned());
         Ok(Ended { used: answer.ok().and_then(|used| used.ok()), is_late, seconds, output })
     }
 

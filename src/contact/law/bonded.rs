@@ -60,6 +60,10 @@ impl LayerLaw for Bonded {
         self.compression.end(point)
     }
 
+    fn end_in_tension(&self, point: usize) -> f64 {
+        self.tension.end(point)
+    }
+
     fn robin_tangent(&self, point: usize, c: f64) -> f64 {
         self.response(point, c).tangent
     }

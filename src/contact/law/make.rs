@@ -3,7 +3,7 @@
 use super::expression::{Breach, ExpressionLaw, increases};
 use super::forms;
 use super::table::Table;
-use super::{Bonded, LayerLaw, PerPoint};
+use super::{Bonded, LayerLaw, PerPoint, Response};
 use crate::error::{Error, Kind, Result};
 use crate::linalg::diagonal;
 use crate::problem::layer::LayerSpec;
@@ -59,25 +59,61 @@ pub type LawMaker<'a> = dyn Fn(&[[f64; 3]]) -> Result<Rc<dyn LayerLaw>> + 'a;
 /// The laws of a Rust program by name. Each entry makes the law of a pair from its contact points.
 pub type OwnLaws = Own<dyn Fn(&[[f64; 3]]) -> Box<dyn LayerLaw>>;
 
-/// Return the law of this name for the contact points `position`. It is checked at the first point for compressions up to `size`, the
-/// extent of the surfaces.
+/// Return the law of this name for the contact points `position`. Its pressure, and the energy as its integral, are checked at the first point for
+/// compressions up to `size`, the extent of the surfaces.
 ///
 /// # Errors
 /// An unknown name, and a function that is not the law of a layer.
 fn own(laws: &OwnLaws, name: &str, position: &[[f64; 3]], size: f64) -> Result<Rc<dyn LayerLaw>> {
     let law = laws.get("law of a layer", name)?(position);
-    match increases(0.0, size, |c| law.pressure_and_tangent(0, c)) {
+    let refuse = |what: String| Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"));
+    let last = match increases(0.0, size, |c| law.pressure_and_tangent(0, c)) {
         // a law may end at a rigid stop, beyond which its values are not finite
-        Err(Breach { last, is_finite: false, .. }) if last > 0.0 => Ok(law.into()),
-        Err(Breach { what, .. }) => Err(Error::new(Kind::Scene, format!("`{name}` is no law of a layer: {what}"))),
-        Ok(_) => Ok(law.into()),
+        Err(Breach { last, is_finite: false, .. }) if last > 0.0 => last,
+        Err(Breach { what, .. }) => return Err(refuse(what)),
+        Ok(last) => last,
+    };
+    match wrong_energy(&*law, last) {
+        Some(c) => Err(refuse(format!("the energy is not the integral of p at c = {c:.3e}"))),
+        None => Ok(law.into()),
     }
+}
+
+/// Number of compressions in a factor of ten between which an energy is compared with pressures: neighbours differ by 2.3 %, and
+/// so the bounds of the energy differ by that times the exponent of the law.
+const FINE_STEPS: i32 = 100;
+
+/// Number of factors of ten below the largest compression in which they are compared. A formula such as p0 (c0 (exp(c/c0) - 1) - c) loses all digits
+/// at smaller ones, without harm: the energy counts relative to that of the solution.
+const ENERGY_DECADES: i32 = 4;
+
+/// Rounding of an energy that a program sums over many pieces, relative to it.
+const SUMMED: f64 = 1e-9;
+
+/// Return the first compression up to `last` at which the energy P cannot be the integral of the pressure: p increases, so that between
+/// neighbouring compressions P grows by their distance times a pressure between both of theirs.
+fn wrong_energy(law: &dyn LayerLaw, last: f64) -> Option<f64> {
+    let at = |step: i32| {
+        let c = last * 10f64.powf(f64::from(step) / f64::from(FINE_STEPS) - f64::from(ENERGY_DECADES));
+        (c, law.response(0, c))
+    };
+    let mut before = (0.0, Response::default());
+    for step in 0..=ENERGY_DECADES * FINE_STEPS {
+        let (c, now) = at(step);
+        let (grown, distance) = (now.energy - before.1.energy, c - before.0);
+        let slack = SUMMED * now.energy.abs();
+        let fits = grown >= distance * before.1.pressure - slack && grown <= distance * now.pressure + slack;
+        if !fits {
+            return Some(c);
+        }
+        before = (c, now);
+    }
+    None
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::law::Response;
 
     #[test]
     fn the_extent_is_a_diagonal() {
@@ -90,6 +126,8 @@ mod tests {
     struct Square {
         cubic: f64,
         end: f64,
+        /// Factor of the energy, which must be one.
+        energy: f64,
     }
 
     impl LayerLaw for Square {
@@ -97,20 +135,26 @@ mod tests {
             let pressure = if self.end > 0.0 && c > self.end { f64::INFINITY } else { c * c * (1.0 - self.cubic * c) };
             let (tangent, energy) =
                 (2.0 * c - 3.0 * self.cubic * c * c, c.powi(3) / 3.0 - self.cubic * c.powi(4) / 4.0);
-            Response { pressure, tangent, energy }
+            Response { pressure, tangent, energy: self.energy * energy }
         }
     }
 
     #[test]
     fn laws_of_a_program_are_checked() {
-        let made = |cubic: f64, end: f64| {
+        let made = |cubic: f64, end: f64, energy: f64| {
             let mut laws = OwnLaws::default();
-            laws.insert("film", Rc::new(move |_| Box::new(Square { cubic, end })));
+            laws.insert("film", Rc::new(move |_| Box::new(Square { cubic, end, energy })));
             own(&laws, "film", &[[0.0; 3]], 1.0)
         };
-        assert!(made(0.0, 0.0).is_ok() && made(0.0, 1e-2).is_ok());
-        for (cubic, end, words) in [(2.0, 0.0, "p does not increase at c = 3"), (0.0, 1e-20, "p is inf")] {
-            let error = made(cubic, end).expect_err(words);
+        assert!(made(0.0, 0.0, 1.0).is_ok() && made(0.0, 1e-2, 1.0).is_ok());
+        for (cubic, end, energy, words) in [
+            (2.0, 0.0, 1.0, "p does not increase at c = 3"),
+            (0.0, 1e-20, 1.0, "p is inf"),
+            (0.0, 0.0, 1.5, "the energy is not the integral"),
+            (0.0, 0.0, 0.9, "the energy is not the integral"),
+            (0.0, 0.0, -1.0, "the energy is not the integral"),
+        ] {
+            let error = made(cubic, end, energy).expect_err(words);
             assert!(error.to_string().contains(words), "{error}");
         }
         let error = own(&OwnLaws::default(), "flim", &[[0.0; 3]], 1.0).expect_err("a slip");

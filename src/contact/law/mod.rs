@@ -75,6 +75,11 @@ pub trait LayerLaw: std::fmt::Debug {
         f64::INFINITY
     }
 
+    /// Return the stretch up to which the law of a bonded layer is given, in the same way.
+    fn end_in_tension(&self, _point: usize) -> f64 {
+        f64::INFINITY
+    }
+
     /// Return g'(-c) of (38), the tangent of the paper's law g, which continues into tension as an odd function. For `c > 0` it is
     /// p'(c). The Robin terms of open points use it, the pressure never does.
     fn robin_tangent(&self, point: usize, c: f64) -> f64 {

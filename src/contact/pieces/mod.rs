@@ -108,6 +108,8 @@ pub struct Reach {
 pub struct Refused {
     /// Facets of side b whose distance is too large.
     pub far: BTreeSet<usize>,
+    /// Whether facets of side b within the limits of distance are inclined by too much.
+    pub is_inclined: bool,
     /// Number of pieces and of points of pieces that the search has lost.
     pub lost: usize,
 }
@@ -153,6 +155,7 @@ impl Refused {
         if faces && gap > reach.gap {
             self.far.insert(index);
         }
+        self.is_inclined |= !faces && reach.holds(gap);
         faces && reach.holds(gap)
     }
 }
@@ -214,6 +217,7 @@ impl<const D: usize> BoxTree<D> {
         let mut farther = Refused::default();
         let pieces = facing(&met([reach.overlap, reach.farthest]), &mut farther);
         refused.far.append(&mut farther.far);
+        refused.is_inclined |= farther.is_inclined;
         pieces
     }
 }
@@ -238,6 +242,7 @@ mod tests {
             let mut refused = Refused::default();
             assert_eq!(refused.admits(&reach, 7, gap, [up, other]), admitted, "{gap} {other:?}");
             assert_eq!(refused.far.contains(&7), is_far, "{gap} {other:?}");
+            assert_eq!(refused.is_inclined, gap == 1.0 && other == steep, "{gap} {other:?}");
         }
         assert!(!reach.faces(up, up) && !reach.faces(up, [0.9, -0.4]) && reach.faces(up, [0.8, -0.6]));
     }
